@@ -125,9 +125,11 @@ class Appliance {
   [[nodiscard]] web::CheckStatus Checks();
   /// Reloads the calibration of the room, and whether a marker has moved since.
   void RefreshRoom();
-  /// Where the gantry is on maps, as the status states it; not set if the room is not known. From
-  /// any thread.
-  [[nodiscard]] std::optional<RoomWays> RoomOnMaps() const;
+  /// Where the gantry is on the maps of a scene, as a comparison with it would find it; not set if
+  /// the room is not known. From any thread.
+  /// @param scene  Its markers: the reference marker may have lain otherwise than when the room
+  ///         was calibrated.
+  [[nodiscard]] std::optional<RoomWays> RoomIn(const MarkerMap& scene) const;
   /// From any thread.
   [[nodiscard]] web::RoomCalibrationStatus RoomCalibration();
   /// The board for the room's markers; from any thread.

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/units.hpp"
+#include "algo/comparison/room_board.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/files/marker_sheet.hpp"
 #include "daemon/loop/log.hpp"
@@ -68,10 +69,12 @@ std::optional<Pose> Appliance::RoomPose() const {
   return room_.calibration ? room_.calibration->fit.T_iec_reference : room_.configured;
 }
 
-std::optional<RoomWays> Appliance::RoomOnMaps() const {
+std::optional<RoomWays> Appliance::RoomIn(const MarkerMap& scene) const {
   const std::lock_guard lock(room_mutex_);
-  const std::optional<Pose> T_iec_reference = RoomPose();
-  return T_iec_reference ? std::optional(WaysOfRoom(*T_iec_reference)) : std::nullopt;
+  if (!room_.due.empty()) return std::nullopt;
+  const std::optional<Pose> T_iec_scene =
+      room_.calibration ? RoomOf(room_.calibration->fit.markers_iec, scene) : room_.configured;
+  return T_iec_scene ? std::optional(WaysOfRoom(*T_iec_scene)) : std::nullopt;
 }
 
 void Appliance::ReportRoom(web::Status& status) const {
@@ -85,9 +88,9 @@ void Appliance::ReportRoom(web::Status& status) const {
         "used");
   const std::optional<Pose> T_iec_reference = RoomPose();
   const Eigen::Matrix3d R_iec_reference = T_iec_reference.value_or(Pose::Identity()).linear();
-  status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
-  status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};
-  status.is_room_known = T_iec_reference.has_value();
+  status.room = {.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)},
+                 .right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)},
+                 .is_known = T_iec_reference.has_value()};
 }
 
 std::pair<std::string, web::WallClock::time_point> Appliance::RoomScansWanted() const {

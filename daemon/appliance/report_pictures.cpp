@@ -56,11 +56,15 @@ std::vector<MapMark> MarksIn(const Json& result, const SideWords& words) {
   return MapMarks(patient, room, words);
 }
 
-HeightMap HeightsOf(const fs::path& scan_folder) {
+Scene SceneWithHeights(const fs::path& scan_folder) {
   Scene scene =
       ReadScene(scan_folder / "scene", {.cloud = false, .height_map = true, .mesh = false});
   if (!scene.height_map) throw DataError("its scene has no height map");
-  return std::move(*scene.height_map);
+  return scene;
+}
+
+HeightMap HeightsOf(const fs::path& scan_folder) {
+  return std::move(*SceneWithHeights(scan_folder).height_map);
 }
 
 HeightMap MapLike(const HeightMap& heights, const fs::path& file) {
@@ -123,20 +127,27 @@ std::vector<cv::Mat> ComparisonPictures(const fs::path& scan_folder,
   });
 }
 
-std::vector<cv::Mat> ReferencePictures(const fs::path& scan_folder, const web::ReferencePlan& plan,
-                                       const std::optional<RoomWays>& room,
-                                       const PictureWords& words, const SideWords& sides) {
-  return Drawn(scan_folder, [&]() -> std::vector<cv::Mat> {
-    const HeightMap heights = HeightsOf(scan_folder);
+PlanPictures ReferencePictures(const fs::path& scan_folder, const web::ReferencePlan& plan,
+                               const RoomFinder& room_in, const PictureWords& words,
+                               const SideWords& sides) {
+  PlanPictures plans;
+  plans.pictures = Drawn(scan_folder, [&]() -> std::vector<cv::Mat> {
+    const Scene scene = SceneWithHeights(scan_folder);
+    const HeightMap& heights = *scene.height_map;
+    const std::optional<RoomWays> room = room_in ? room_in(scene.markers) : std::nullopt;
+    const std::optional<PatientPosture> posture = PostureNamed(plan.posture);
     const std::vector<std::uint8_t> region = PlannedRegion(heights.grid, plan);
     HeightImageOptions options{.region_mask = region, .words = words};
-    if (const std::optional<PatientPosture> posture = PostureNamed(plan.posture); room)
-      options.marks =
-          MapMarks(posture ? std::optional(SidesOf(*room, *posture)) : std::nullopt, room, sides);
+    std::optional<PatientAxes> patient;
+    if (room && posture) patient = SidesOf(*room, *posture);
+    options.marks = MapMarks(patient, room, sides);
     if (plan.isocentre_m)
       options.isocentre_m = Eigen::Vector2d((*plan.isocentre_m)[0], (*plan.isocentre_m)[1]);
-    return {DrawHeightImage(heights, options)};
+    std::vector<cv::Mat> pictures = {DrawHeightImage(heights, options)};
+    plans.names_sides = patient.has_value();
+    return pictures;
   });
+  return plans;
 }
 
 }  // namespace plumb

@@ -2,13 +2,16 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 #include <opencv2/core/mat.hpp>
 
+#include "algo/comparison/body_parts.hpp"
 #include "algo/render/picture_words.hpp"
+#include "algo/types/scene.hpp"
 #include "daemon/files/map_marks.hpp"
 #include "web/service/service_types.hpp"
 
@@ -25,13 +28,21 @@ namespace plumb {
                                                       double tolerance_m, const PictureWords& words,
                                                       const SideWords& sides);
 
+/// Where the room lies on the maps of a scene with these markers; nothing where it is not known.
+using RoomFinder = std::function<std::optional<RoomWays>(const MarkerMap& scene)>;
+
+struct PlanPictures {
+  std::vector<cv::Mat> pictures;
+  bool names_sides = false;  ///< Those of the planned posture: nothing has been compared.
+};
+
 /// The heights of a reference with the planned region outlined and the isocentre marked; nothing if
 /// the files are missing or damaged. In a known room the marks name the sides that the patient has
 /// in the planned posture.
-[[nodiscard]] std::vector<cv::Mat> ReferencePictures(const std::filesystem::path& scan_folder,
-                                                     const web::ReferencePlan& plan,
-                                                     const std::optional<RoomWays>& room,
-                                                     const PictureWords& words,
-                                                     const SideWords& sides);
+/// @param room_in  Empty: the room is not known.
+[[nodiscard]] PlanPictures ReferencePictures(const std::filesystem::path& scan_folder,
+                                             const web::ReferencePlan& plan,
+                                             const RoomFinder& room_in, const PictureWords& words,
+                                             const SideWords& sides);
 
 }  // namespace plumb

@@ -77,6 +77,9 @@ constexpr ReportWords kEnglish = {
     .verdict = "Verdict",
     .digits_note =
         "Each number with its uncertainty of 95 %, in the digits that it lets them have.",
+    .planned_sides =
+        "Head, feet, left and right are those of the planned posture: check that the patient lies "
+        "so.",
     .sides = {},
     .pictures = {}};
 
@@ -152,6 +155,9 @@ constexpr ReportWords kSpanish = {
     .when = "Cuándo",
     .verdict = "Veredicto",
     .digits_note = "Cada número con su incertidumbre del 95 %, con las cifras que ella permite.",
+    .planned_sides =
+        "Cabeza, pies, izquierda y derecha son los de la postura planificada: compruebe que el "
+        "paciente está así.",
     .sides = {"CABEZA", "PIES", "IZQUIERDA", "DERECHA", "GANTRY"},
     .pictures = {.notice = web::kSpanishTerms.notice,
                  .x_axis = "x (m), sistema del marcador de referencia",

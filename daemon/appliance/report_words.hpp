@@ -27,7 +27,7 @@ struct ReportWords {
       longest_lost, sensor, sensor_on, room_version, computed_with;
   std::string_view frames_lost, warming, overdue_mark, overdue_words, room_unknown, room_not_used,
       marker_ignored, weak_direction;
-  std::string_view when, verdict, digits_note;
+  std::string_view when, verdict, digits_note, planned_sides;
   SideWords sides;
   PictureWords pictures;
 };

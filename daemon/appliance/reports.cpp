@@ -318,18 +318,31 @@ std::optional<web::Reference> ReferenceFor(const ReportSources& stored, const we
   return found == references.end() ? std::nullopt : std::optional(*found);
 }
 
-std::vector<cv::Mat> PicturesOf(const ReportSources& stored, const web::Scan& scan,
-                                const std::optional<web::Reference>& reference, const Json& result,
-                                const ReportWords& words) {
+struct ReportPictures {
+  std::vector<cv::Mat> pictures;
+  std::string note;  ///< To be read below them.
+};
+
+ReportPictures PlanPicturesOf(const std::filesystem::path& scan_folder,
+                              const web::ReferencePlan& plan, const RoomFinder& room_in,
+                              const ReportWords& words) {
+  PlanPictures drawn = ReferencePictures(scan_folder, plan, room_in, words.pictures, words.sides);
+  return {.pictures = std::move(drawn.pictures),
+          .note = std::string(drawn.names_sides ? words.planned_sides : "")};
+}
+
+ReportPictures PicturesOf(const ReportSources& stored, const web::Scan& scan,
+                          const std::optional<web::Reference>& reference, const Json& result,
+                          const ReportWords& words) {
   if (!reference || scan.folder.empty()) return {};
   if (scan.purpose == web::ScanPurpose::kReference)
-    return ReferencePictures(scan.folder, reference->plan, stored.room, words.pictures,
-                             words.sides);
+    return PlanPicturesOf(scan.folder, reference->plan, stored.room_in, words);
   const std::optional<web::Scan> of_reference = stored.scans.Find(reference->scan_id);
   if (!scan.result || !of_reference || of_reference->folder.empty()) return {};
-  return ComparisonPictures(scan.folder, of_reference->folder, result,
-                            reference->plan.tolerance.shift_mm * kMillimetre, words.pictures,
-                            words.sides);
+  return {.pictures = ComparisonPictures(scan.folder, of_reference->folder, result,
+                                         reference->plan.tolerance.shift_mm * kMillimetre,
+                                         words.pictures, words.sides),
+          .note = {}};
 }
 
 }  // namespace
@@ -341,6 +354,7 @@ ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Lang
   const Json scene = JsonIn(scan.folder / "scene/scene.json");
   const Json result = JsonIn(scan.folder / "result/result.json");
   const web::Tolerance tolerance = reference ? reference->plan.tolerance : web::Tolerance{};
+  ReportPictures drawn = PicturesOf(stored, scan, reference, result, words);
   ScanReport report{.texts = TextsOf(words),
                     .title = std::string(words.scan_title),
                     .verdict = std::string(VerdictOf(scan, words)),
@@ -350,7 +364,8 @@ ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Lang
                     .cautions = CautionsIn(scan, scene, result, stored.warm_up_min, language),
                     .quality = QualityOf(scan, scene, result, words),
                     .body = {},
-                    .pictures = PicturesOf(stored, scan, reference, result, words),
+                    .pictures = std::move(drawn.pictures),
+                    .pictures_note = std::move(drawn.note),
                     .footer = Footer(words)};
   if (report.numbers.empty()) return report;
   for (const std::string& part : scan.result->body_after)
@@ -413,9 +428,10 @@ std::vector<std::string> ComparisonPngs(const ReportSources& stored, const web::
   std::vector<std::string> files;
   if (!scan.result) return files;
   try {
-    for (const cv::Mat& picture :
-         PicturesOf(stored, scan, stored.references.Find(scan.reference_id),
-                    JsonIn(scan.folder / "result/result.json"), WordsOf(language))) {
+    const ReportPictures drawn =
+        PicturesOf(stored, scan, stored.references.Find(scan.reference_id),
+                   JsonIn(scan.folder / "result/result.json"), WordsOf(language));
+    for (const cv::Mat& picture : drawn.pictures) {
       const std::vector<std::uint8_t> png = EncodePng(picture);
       files.emplace_back(png.begin(), png.end());
     }

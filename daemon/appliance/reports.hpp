@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "algo/comparison/body_parts.hpp"
+#include "daemon/appliance/report_pictures.hpp"
 #include "daemon/files/pdf_report.hpp"
 #include "daemon/records/patient_store.hpp"
 #include "daemon/records/reference_store.hpp"
@@ -19,8 +19,8 @@ struct ReportSources {
   PatientStore& patients;
   ReferenceStore& references;
   ScanStore& scans;
-  double warm_up_min;                 ///< Time that a sensor must have been on to be warm.
-  std::optional<RoomWays> room = {};  ///< As the room is known now: for pictures of plans.
+  double warm_up_min;       ///< Time that a sensor must have been on to be warm.
+  RoomFinder room_in = {};  ///< As the room is known now: for pictures of plans.
 };
 
 /// One page: identity, plan and approval, verdict, the six numbers with uncertainty and tolerance,

@@ -2,6 +2,11 @@
 
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "daemon/files/scene_folder.hpp"
+#include "daemon/loop/log.hpp"
+
 namespace plumb {
 
 std::vector<web::Reference> WebReferences::References(const std::string& patient_id) {
@@ -12,6 +17,21 @@ std::vector<web::Reference> WebReferences::References(const std::string& patient
 std::optional<web::Reference> WebReferences::FindReference(const std::string& id) {
   return store_.Read(&Store::references,
                      [&](ReferenceStore& references) { return references.Find(id); });
+}
+
+web::RoomOnMap WebReferences::RoomOfReference(const web::Reference& reference) {
+  const std::optional<web::Scan> scan = ScanOf(reference.scan_id);
+  if (!scan || scan->folder.empty()) return {};
+  try {
+    const auto ways = appliance_.RoomIn(ReadSceneMarkers(scan->folder / "scene"));
+    if (!ways) return {};
+    return {.gantry_xy = {ways->gantry.x(), ways->gantry.y()},
+            .right_xy = {ways->right.x(), ways->right.y()},
+            .is_known = true};
+  } catch (const std::exception& error) {
+    Log(LogLevel::kNotice, fmt::format("no room for reference {}: {}", reference.id, error.what()));
+    return {};
+  }
 }
 
 std::optional<web::Scan> WebReferences::ScanOf(const std::string& scan_id) {

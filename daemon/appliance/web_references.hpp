@@ -13,6 +13,7 @@ class WebReferences : public web::ReferenceService {
 
   [[nodiscard]] std::vector<web::Reference> References(const std::string& patient_id) override;
   [[nodiscard]] std::optional<web::Reference> FindReference(const std::string& id) override;
+  [[nodiscard]] web::RoomOnMap RoomOfReference(const web::Reference& reference) override;
   void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason,
                     web::Done done) override;
   void PlanReference(const web::Actor& actor, const std::string& id, int revision,

@@ -15,7 +15,7 @@ using web::ChangeResult;
 
 ReportSources WebScans::SourcesIn(Store& store) const {
   return {store.patients, store.references, store.scans, appliance_.warm_up_min(),
-          appliance_.RoomOnMaps()};
+          [this](const MarkerMap& scene) { return appliance_.RoomIn(scene); }};
 }
 
 std::vector<web::Scan> WebScans::Scans(const std::string& patient_id, int limit) {
@@ -51,12 +51,26 @@ void WebScans::RemoveScan(const web::Actor& actor, const std::string& id, const 
                 [=](StoreRemoval& removal) { removal.RemoveScan(actor, id, reason); });
 }
 
+std::string WebScans::SurfaceOf(const web::Scan& scan) {
+  // Held while packing, so that a second request for the same scan waits instead of packing too.
+  const std::lock_guard lock(packed_mutex_);
+  const auto found =
+      std::ranges::find_if(packed_, [&](const Packed& one) { return one.scan_id == scan.id; });
+  if (found != packed_.end()) return found->bytes;
+  std::string bytes = plumb::CompactMap(scan.folder, "mesh");
+  constexpr std::size_t kMaxPacked = 2;  // a scan and its reference
+  std::erase_if(packed_, [&](const Packed& one) { return !FindScan(one.scan_id); });
+  packed_.push_front({scan.id, std::move(bytes)});
+  if (packed_.size() > kMaxPacked) packed_.pop_back();
+  return packed_.front().bytes;
+}
+
 std::optional<std::string> WebScans::CompactMap(const std::string& scan_id,
                                                 const std::string& name) {
   const std::optional<web::Scan> scan = FindScan(scan_id);
   if (!scan || scan->folder.empty()) return std::nullopt;
   try {
-    return plumb::CompactMap(scan->folder, name);
+    return name == "mesh" ? SurfaceOf(*scan) : plumb::CompactMap(scan->folder, name);
   } catch (const std::exception& error) {
     plumb::Log(LogLevel::kNotice,
                fmt::format("no map {} of scan {}: {}", name, scan_id, error.what()));

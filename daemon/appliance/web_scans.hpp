@@ -43,13 +43,22 @@ class WebScans : public web::ScanService {
     web::Language language;
     std::vector<std::string> pngs;
   };
+  /// A surface as it goes to the page; the file that it was packed from never changes.
+  struct Packed {
+    std::string scan_id, bytes;
+  };
   [[nodiscard]] ReportSources SourcesIn(Store& store) const;
+  /// @throws DataError if there is none, or it cannot be read.
+  [[nodiscard]] std::string SurfaceOf(const web::Scan& scan);
 
   Appliance& appliance_;
   StoreAccess& store_;
   std::mutex drawn_mutex_;
   /// The newest ones: a page asks for both pictures at once, and the one without script every 10 s.
   std::deque<Drawn> drawn_;
+  std::mutex packed_mutex_;
+  /// The newest ones: each viewer of a result asks for its surface, and for that of the reference.
+  std::deque<Packed> packed_;
 };
 
 }  // namespace plumb

@@ -16,7 +16,7 @@ namespace plumb {
 namespace {
 
 constexpr float kSteps = 65535.0F;
-constexpr std::size_t kMostParts = std::size_t{1} << 30;  // corners are then 32-bit numbers
+constexpr std::size_t kMostParts = std::size_t{1} << 25;  // a browser reads no more
 
 void AppendNumber(std::string& bytes, std::uint32_t value, int num_bytes) {
   for (int i = 0; i < num_bytes; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xFFU);

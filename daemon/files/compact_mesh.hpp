@@ -18,8 +18,8 @@ namespace plumb {
 /// all but the last.
 ///
 /// The largest extent is 65535 steps: a body of 2 m has steps of 0.03 mm. Takes up to a second.
-/// @throws std::invalid_argument for a triangle with a missing vertex; DataError if it is too
-/// large.
+/// @throws std::invalid_argument for a triangle with a missing vertex; DataError for more than 2^25
+///         vertices or triangles, which a browser refuses.
 [[nodiscard]] std::string CompactMesh(const TriangleMesh& mesh);
 
 }  // namespace plumb

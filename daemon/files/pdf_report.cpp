@@ -238,16 +238,18 @@ void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& tex
 }
 
 /// One below the other, each as large as the space for all of them permits.
-void Pictures(Pages& pages, const std::vector<cv::Mat>& pictures) {
-  constexpr double kLeast = 60, kGap = 8;
+void Pictures(Pages& pages, const std::vector<cv::Mat>& pictures, const std::string& note) {
+  constexpr double kLeast = 60, kGap = 8, kNoteSize = 8.5;
+  const double bottom = pages.bottom() - (note.empty() ? 0.0 : 2.6 * kNoteSize);  // two lines
   auto left = static_cast<double>(pictures.size());
   for (const cv::Mat& picture : pictures) {
-    const double height = (pages.bottom() - pages.y - 6) / left - kGap;
+    const double height = (bottom - pages.y - 6) / left - kGap;
     left -= 1;
     if (height < kLeast) return;
     pages.Picture(picture, kMargin, pages.y + 6, pages.inner(), height);
     pages.y += height + kGap;
   }
+  if (!pictures.empty() && !note.empty()) pages.Paragraph(kMargin, pages.inner(), note, kNoteSize);
 }
 
 constexpr double kSmall = 6.8;
@@ -257,7 +259,7 @@ bool IsBold(std::size_t column) { return column == 2; }
 
 struct CourseTable {
   std::vector<std::array<std::string, kCourseColumns>> cells;  ///< As in the rows of the report.
-  std::array<double, kCourseColumns> left;                     ///< Of the columns, on the page.
+  std::array<double, kCourseColumns> left{};                   ///< Of the columns, on the page.
   double size = 8.0;                                           ///< Of the texts.
 };
 
@@ -331,7 +333,7 @@ std::string PdfOf(const ScanReport& report) {
     Heading(pages, report.texts.quality);
     Facts(pages, report.quality);
   }
-  Pictures(pages, report.pictures);
+  Pictures(pages, report.pictures, report.pictures_note);
   return pages.Finish();
 }
 

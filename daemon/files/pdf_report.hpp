@@ -40,9 +40,10 @@ struct ScanReport {
   std::vector<ReportNumber> numbers;
   std::vector<std::string> cautions;
   ReportFacts quality;
-  std::vector<std::string> body;  ///< Differences by part of the body.
-  std::vector<cv::Mat> pictures;  ///< CV_8UC3 RGB.
-  std::string footer;             ///< Version and time of the report.
+  std::vector<std::string> body;   ///< Differences by part of the body.
+  std::vector<cv::Mat> pictures;   ///< CV_8UC3 RGB.
+  std::string pictures_note = {};  ///< Below the pictures.
+  std::string footer;              ///< Version and time of the report.
 };
 
 /// A value and its uncertainty, in the units of its column.

@@ -24,6 +24,11 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
 constexpr std::size_t kMaxTrajectoryBytes = std::size_t{64} << 20;
 
+SceneHeader ReadHeader(const fs::path& scene_folder) {
+  const fs::path json = scene_folder / "scene.json";
+  return ParseSceneJson(ReadTextFile(json, kMaxJsonBytes), json.string());
+}
+
 std::vector<StampedPose> ReadTrajectory(const fs::path& file) {
   return ParseTrajectory(ReadTextFile(file, kMaxTrajectoryBytes), file.string());
 }
@@ -100,6 +105,8 @@ void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_toke
   output.Commit();
 }
 
+MarkerMap ReadSceneMarkers(const fs::path& folder) { return ReadHeader(folder).scene.markers; }
+
 Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
   if (!IsSceneFolder(folder)) {
     std::error_code error;
@@ -107,8 +114,7 @@ Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
                                 folder.string(),
                                 fs::exists(folder, error) ? "holds no scene.json" : "is missing"));
   }
-  const fs::path json = folder / "scene.json";
-  SceneHeader header = ParseSceneJson(ReadTextFile(json, kMaxJsonBytes), json.string());
+  SceneHeader header = ReadHeader(folder);
   Scene scene = std::move(header.scene);
   scene.keyframes = ReadTrajectory(folder / "trajectory.txt");
   if (scene.keyframes.size() != header.num_keyframes) {

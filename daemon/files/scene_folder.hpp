@@ -34,6 +34,9 @@ struct SceneParts {
 ///         or truncated files, numbers that are not finite, inconsistent sizes.
 [[nodiscard]] Scene ReadScene(const std::filesystem::path& folder, const SceneParts& parts = {});
 
+/// The markers of a scene, of which nothing else is read. @throws DataError as ReadScene(); IoError
+[[nodiscard]] MarkerMap ReadSceneMarkers(const std::filesystem::path& folder);
+
 /// True if the folder looks like a scene: it contains scene.json.
 [[nodiscard]] bool IsSceneFolder(const std::filesystem::path& folder);
 

@@ -260,7 +260,7 @@ void FakeAppliance::SignRoomCalibration(const Actor& actor, const std::string& d
   room.digest.clear();
   room.due.clear();
   room.why_not_sign = "the board has not been scanned yet";
-  status.is_room_known = true;
+  status.room.is_known = true;
   Did(actor, "room.calibrate", std::to_string(version), done, std::to_string(version));
 }
 

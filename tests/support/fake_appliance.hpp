@@ -44,7 +44,8 @@ class FakeAppliance : public web::BackgroundWork,
   web::UpdateStatus update;
   std::vector<web::Patient> patients;
   std::vector<web::Reference> references;
-  std::vector<web::Scan> scans;  ///< Oldest first.
+  std::optional<web::RoomOnMap> room_of_references;  ///< Not set: as the status states it.
+  std::vector<web::Scan> scans;                      ///< Oldest first.
   web::CheckStatus checks;
   web::SensorProfiles profiles;
   web::RoomCalibrationStatus room;
@@ -140,6 +141,7 @@ class FakeAppliance : public web::BackgroundWork,
                     web::Done done) override;
   std::vector<web::Reference> References(const std::string& patient_id) override;
   std::optional<web::Reference> FindReference(const std::string& id) override;
+  web::RoomOnMap RoomOfReference(const web::Reference& reference) override;
   void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason,
                     web::Done done) override;
   void PlanReference(const web::Actor& actor, const std::string& id, int revision,

@@ -217,6 +217,10 @@ std::optional<Reference> FakeAppliance::FindReference(const std::string& id) {
   return FindById(references, id);
 }
 
+RoomOnMap FakeAppliance::RoomOfReference(const Reference&) {
+  return room_of_references.value_or(status.room);
+}
+
 void FakeAppliance::AddReference(const Actor& actor, const std::string& scan_id,
                                  const std::string& reason, Done done) {
   const auto scan = FindScan(scan_id);

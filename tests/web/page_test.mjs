@@ -384,6 +384,10 @@ await h.step('the surface opens in 3-D', async () => {
   go();
   await anna.locator('.mesh-place').getByText('The appliance does not answer.').waitFor();
   await anna.unroute(surface);
+  await anna.route(surface, (route) => route.fulfill({ contentType: 'application/octet-stream', body: 'PLM2 and no more' }));
+  await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
+  await anna.locator('.mesh-place').getByText('The surface arrived damaged.').waitFor();
+  await anna.unroute(surface);
   await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
   await anna.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
   const mesh = anna.locator('canvas.mesh');

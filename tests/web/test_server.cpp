@@ -301,7 +301,15 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "room") {
     std::string what;
     words >> what;
-    service.status.is_room_known = what == "known";
+    service.status.room.is_known = what == "known" || what == "turned";
+    service.room_of_references.reset();
+    // As if each reference's marker had been turned by 90 degrees before the room was calibrated.
+    const auto turned = [](const std::array<double, 2>& way) {
+      return std::array<double, 2>{-way[1], way[0]};
+    };
+    if (const web::RoomOnMap& room = service.status.room; what == "turned")
+      service.room_of_references = {
+          .gantry_xy = turned(room.gantry_xy), .right_xy = turned(room.right_xy), .is_known = true};
     service.Notify(web::EventKind::kStatus);
   }
   if (name == "board") service.is_board_there = true;
@@ -420,9 +428,9 @@ int Serve(const fs::path& root, bool tls) {
       return std::nullopt;
     }
   };
-  service.status.right_xy = {kT_iec_reference(0, 0), kT_iec_reference(0, 1)};
-  service.status.gantry_xy = {kT_iec_reference(1, 0), kT_iec_reference(1, 1)};
-  service.status.is_room_known = true;
+  service.status.room.right_xy = {kT_iec_reference(0, 0), kT_iec_reference(0, 1)};
+  service.status.room.gantry_xy = {kT_iec_reference(1, 0), kT_iec_reference(1, 1)};
+  service.status.room.is_known = true;
   service.sweep = std::chrono::milliseconds(1500);
   service.profiles = KnownSensor();
   service.update.supported = true;

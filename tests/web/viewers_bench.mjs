@@ -74,7 +74,7 @@ async function viewer() {
   await events.catch(() => {});
 }
 async function download(id) {
-  while (watching) counts.downloaded += (await (await ask(`scans/${id}/files/mesh.ply`)).arrayBuffer()).byteLength;
+  while (watching) counts.downloaded += (await (await ask(`scans/${id}/maps/mesh`)).arrayBuffer()).byteLength;
 }
 
 row('load before the sweeps', load());

@@ -312,10 +312,14 @@ void AddReferenceRoutes(Table& table, ReferenceService& references) {
                 fields.Finish();
                 references.AddReference(request.actor(), scan_id, reason, Answer(respond));
               });
-  table.Read("/api/v1/references/{id}", Permission::kRoom, [&references](const Request& request) {
-    const auto reference = references.FindReference(request.arguments[0]);
-    return reference ? JsonResponse(ToJson(*reference)) : ErrorResponse(404, "no such reference");
-  });
+  table.ReadAside("/api/v1/references/{id}", Permission::kRoom,
+                  [&references](const Request& request) {
+                    const auto reference = references.FindReference(request.arguments[0]);
+                    if (!reference) return ErrorResponse(404, "no such reference");
+                    Json json = ToJson(*reference);
+                    json["room"] = ToJson(references.RoomOfReference(*reference));
+                    return JsonResponse(json);
+                  });
   table.Write("PUT", "/api/v1/references/{id}/plan", Permission::kPlan, BodyKind::kJson,
               [&references](const Request& request, const Respond& respond) {
                 const auto [plan, revision] = ParsePlan(request.body);

@@ -221,10 +221,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
           {"next_purpose", NameIn(kPurposeNames, status.next_purpose)},
           {"scans_today", status.scans_today},
           {"session", status.session ? SessionJson(*status.session) : Json(nullptr)},
-          {"room",
-           {{"gantry_xy", status.gantry_xy},
-            {"right_xy", status.right_xy},
-            {"known", status.is_room_known}}},
+          {"room", ToJson(status.room)},
           {"waiting", WaitingJson(status.waiting)},
           {"scan", status.scan ? LiveScanJson(*status.scan) : Json(nullptr)},
           {"check_overdue", status.check_overdue},
@@ -270,6 +267,10 @@ Json PlanJson(const ReferencePlan& plan) {
 }
 
 }  // namespace
+
+Json ToJson(const RoomOnMap& room) {
+  return {{"gantry_xy", room.gantry_xy}, {"right_xy", room.right_xy}, {"known", room.is_known}};
+}
 
 Json ToJson(const Reference& reference) {
   return {{"id", reference.id},

@@ -18,6 +18,7 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] Json ToJson(const Patient& patient);
 [[nodiscard]] Json ToJson(const PlanTemplate& wanted);
 [[nodiscard]] Json ToJson(const Reference& reference);
+[[nodiscard]] Json ToJson(const RoomOnMap& room);
 [[nodiscard]] Json ToJson(const CheckStatus& checks, WallClock::time_point now);
 [[nodiscard]] Json ToJson(const User& user);  ///< Without the hash.
 [[nodiscard]] Json ToJson(const AuditEntry& entry);

@@ -1,11 +1,8 @@
 // Maps of heights: reading them, colours, drawing.
 import { getBytes } from './api.js';
+import { inflated } from './inflate.js';
 
 const kNone = -32768;
-
-/// Unpacks the zlib stream that begins there.
-export const inflated = (buffer, from) => new Response(new Blob([buffer.slice(from)]).stream()
-  .pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();
 
 /// A packed map, as daemon/files/compact_map.hpp writes it: {width, height, values} on the whole
 /// grid, row 0 first, metres (for "region": 1 measured, 2 a hole), NaN where there is none.

@@ -3,6 +3,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { cellAt, errorIndex, errorTable, kOutside } from './maps.js';
 import { orientationCube } from './mesh_cube.js';
+import { correctionOf, matrixOf, shareOf } from './mesh_motion.js';
 
 function geometryOf({ positions, corners }) {
   const geometry = new THREE.BufferGeometry();
@@ -12,25 +13,8 @@ function geometryOf({ positions, corners }) {
   return geometry;
 }
 
-const matrixOf = (rows) => new THREE.Matrix4().set(...rows.flat());
 const rowsOf = ({ elements }) => [0, 1, 2, 3].map((row) =>
   [0, 1, 2, 3].map((column) => elements[4 * column + row]));
-
-/// What the correction does to the current surface, in that surface's frame: the motion of the body
-/// in the map's frame, undone.
-function correctionOf(T, motion) {
-  const toMap = T ? matrixOf(T) : new THREE.Matrix4();
-  return toMap.clone().invert().multiply(matrixOf(motion).invert()).multiply(toMap);
-}
-
-/// A share of a rigid motion: turned and shifted by it, as seen from `centre`.
-function shareOf(motion, share, centre) {
-  const turn = new THREE.Quaternion()
-    .slerp(new THREE.Quaternion().setFromRotationMatrix(motion), share);
-  const shift = centre.clone().applyMatrix4(motion).sub(centre).multiplyScalar(share);
-  const from = centre.clone().negate().applyQuaternion(turn).add(centre).add(shift);
-  return new THREE.Matrix4().compose(from, turn, new THREE.Vector3(1, 1, 1));
-}
 
 /// Colours of the vertices by the error map; T maps the mesh's frame to the map's.
 /// @param region  NaN outside the region of interest: dimmed there, as the map is.

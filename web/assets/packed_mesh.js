@@ -1,8 +1,8 @@
 // Reading a packed surface.
-import { inflated } from './maps.js';
+import { inflated } from './inflate.js';
 
 const kHead = 28;
-const kMost = 2 ** 25;
+const kMost = 2 ** 25;  // vertices or triangles, as daemon/files/compact_mesh.cpp
 
 /// A packed surface, as daemon/files/compact_mesh.hpp writes it: {positions, corners}, metres, and
 /// three corners for each triangle.

@@ -268,6 +268,13 @@ struct SensorProfiles {
   std::vector<SensorProfileVersion> versions;  ///< Newest first; the first one is in use.
 };
 
+/// Directions of the room on maps (x, y of a reference marker's frame): to the gantry, and to the
+/// right of a person facing it.
+struct RoomOnMap {
+  std::array<double, 2> gantry_xy = {0, 1}, right_xy = {1, 0};
+  bool is_known = false;  ///< False: the marker's axes are shown in place of the room's.
+};
+
 struct Status {
   ApplianceState state = ApplianceState::kNoSensor;
   std::string fault;  ///< In words, in state kFault.
@@ -279,10 +286,7 @@ struct Status {
   ScanPurpose next_purpose = ScanPurpose::kFraction;
   int scans_today = 0;                      ///< Of the open patient; counts rescans.
   std::optional<TreatmentSession> session;  ///< The open session.
-  /// Directions of the room on maps (x, y of the reference marker's frame): to the gantry, and to
-  /// the right of a person facing it.
-  std::array<double, 2> gantry_xy = {0, 1}, right_xy = {1, 0};
-  bool is_room_known = false;  ///< False: the marker's axes are shown in place of the room's.
+  RoomOnMap room;  ///< In the reference marker's frame as it lay when the room was calibrated.
   /// References that wait for a plan or an approval; at most 20.
   std::vector<WaitingReference> waiting;
   std::optional<LiveScan> scan;  ///< Set in states scanning and working.

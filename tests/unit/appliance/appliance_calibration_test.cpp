@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "algo/base/units.hpp"
 #include "daemon/appliance/unit_profile.hpp"
+#include "daemon/files/scene_folder.hpp"
 #include "daemon/records/profile_shelf.hpp"
 #include "tests/support/board_checks.hpp"
+#include "tests/support/synthetic_scene.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
 
 namespace plumb {
@@ -117,10 +120,31 @@ class ApplianceRoomTest : public ApplianceProfileTest {
     std::optional<Eigen::Vector2d> gantry;
     On([&] {
       const web::Status status = appliance_->WebStatus();
-      if (status.is_room_known) gantry = Eigen::Vector2d(status.gantry_xy.data());
+      if (status.room.is_known) gantry = Eigen::Vector2d(status.room.gantry_xy.data());
       warnings_ = fmt::format("{}", fmt::join(status.warnings, "; "));
     });
     return gantry;
+  }
+  /// A reference whose scan saw these markers.
+  web::Reference ReferenceOf(const MarkerMap& markers) {
+    std::optional<web::Reference> reference;
+    On([&] {
+      Store& store = *appliance_->store();
+      test::SyntheticOptions options;
+      options.with_cloud = false;
+      Scene scene = test::MakeSyntheticScene(options);
+      scene.markers = markers;
+      const std::string id = store.scans.Begin({.patient_id = store.patients.Add(erik_, "P-1", ""),
+                                                .reference_id = {},
+                                                .purpose = web::ScanPurpose::kReference,
+                                                .sensor_serial = "A",
+                                                .reason = {}});
+      WriteScene(scene, store.folders.Staging(id) / "scene");
+      store.scans.Finish(id,
+                         {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}});
+      reference = store.references.Find(store.references.Add(erik_, id, "", {}));
+    });
+    return reference.value();
   }
   std::string warnings_;
 };
@@ -162,10 +186,53 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
   });
 }
 
+TEST_F(ApplianceRoomTest, OnTheMapsOfAReferenceTheRoomLiesAsItsOwnMarkersSay) {
+  parts_.config.compare.T_iec_reference = Pose::Identity();
+  // The reference marker lay turned by 90 degrees when this reference was scanned.
+  const Pose turn(Eigen::AngleAxisd(90 * kDegree, Eigen::Vector3d::UnitZ()));
+  MarkerMap turned = testing::MarkersOfRoom();
+  for (auto& [id, marker] : turned) {
+    for (Eigen::Vector3d& corner : marker.corners) corner = turn * corner;
+  }
+  MarkerMap two = turned;
+  while (two.size() > 2) two.erase(two.begin());
+  Play([&] {
+    MakeReady();
+    const web::Reference reference = ReferenceOf(turned);
+    const auto shown = [&] { return services_->services().references.RoomOfReference(reference); };
+    EXPECT_TRUE(shown().is_known);
+    EXPECT_EQ(shown().gantry_xy, (std::array<double, 2>{0, 1})) << "as it is configured";
+    for (int i = 0; i < 3; ++i) ScanBoard();
+    EXPECT_EQ(Sign(), web::ChangeResult::kDone);
+    ASSERT_TRUE(Gantry());
+    const Eigen::Vector2d expected = turn.linear().topLeftCorner<2, 2>() * *Gantry();
+    ASSERT_TRUE(shown().is_known);
+    EXPECT_LT((Eigen::Vector2d(shown().gantry_xy.data()) - expected).norm(), 1e-6);
+    EXPECT_LT(
+        (Eigen::Vector2d(shown().right_xy.data()) - Eigen::Vector2d(expected.y(), -expected.x()))
+            .norm(),
+        1e-6);
+    const auto ways = appliance_->RoomIn(turned);
+    ASSERT_TRUE(ways);
+    EXPECT_LT((ways->gantry - expected).norm(), 1e-6) << "the same in the report";
+    EXPECT_FALSE(appliance_->RoomIn(two)) << "too few markers: a comparison would not know it";
+
+    MarkerMap moved = testing::MarkersOfRoom();
+    for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
+    On([&] {
+      (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
+      appliance_->RefreshRoom();
+    });
+    EXPECT_FALSE(shown().is_known) << "it has to be calibrated again";
+    EXPECT_FALSE(appliance_->RoomIn(turned));
+  });
+}
+
 TEST_F(ApplianceRoomTest, WithoutAnyNobodyKnowsTheRoom) {
   Play([&] {
     MakeReady();
     EXPECT_FALSE(Gantry());
+    EXPECT_FALSE(appliance_->RoomIn(testing::MarkersOfRoom()));
     EXPECT_EQ(warnings_, "");
     std::string why_not;
     EXPECT_EQ(services_->services().room.RoomBoardPdf(why_not).value_or("").substr(0, 5), "%PDF-")

@@ -14,6 +14,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "daemon/files/compact_mesh.hpp"
+#include "daemon/files/ply_file.hpp"
 #include "daemon/records/check_json.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
@@ -101,6 +103,50 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
       EXPECT_NE(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck);
       EXPECT_EQ(appliance_->WebStatus().patient_id, "");
     });
+  });
+}
+
+TEST_F(ApplianceTest, ASurfaceIsPackedOnceAndAFailureIsNotKept) {
+  Play([&] {
+    MakeReady();
+    const auto mesh = [&](const web::Scan& scan) { return scan.folder / "scene/mesh.ply"; };
+    const auto packed = [&](const web::Scan& scan) {
+      return services_->services().scans.CompactMap(scan.id, "mesh");
+    };
+    std::vector<web::Scan> scans;
+    On([&] {
+      Store& store = *appliance_->store();
+      const std::string patient = store.patients.Add(kTester, "P-1", "");
+      for (int i = 0; i < 3; ++i) {
+        const std::string id = store.scans.Begin({.patient_id = patient,
+                                                  .reference_id = {},
+                                                  .purpose = web::ScanPurpose::kFraction,
+                                                  .sensor_serial = "A",
+                                                  .reason = {}});
+        std::filesystem::create_directory(store.folders.Staging(id) / "scene");
+        store.scans.Finish(id,
+                           {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}});
+        scans.push_back(store.scans.Find(id).value());
+      }
+    });
+    TriangleMesh triangle;
+    triangle.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    triangle.normals.assign(3, Eigen::Vector3f::UnitZ());
+    triangle.triangles = {{0, 1, 2}};
+    EXPECT_FALSE(packed(scans[0])) << "it has none yet";
+    for (const web::Scan& scan : scans) {
+      triangle.vertices[0].z() += 0.1F;
+      WriteMeshPly(mesh(scan), triangle);
+      EXPECT_EQ(packed(scan), CompactMesh(triangle));
+      std::filesystem::remove(mesh(scan));
+    }
+    EXPECT_EQ(packed(scans[2]), CompactMesh(triangle)) << "not read again";
+    EXPECT_TRUE(packed(scans[1]));
+    EXPECT_NE(packed(scans[1]), packed(scans[2]));
+    EXPECT_FALSE(packed(scans[0])) << "only two are kept";
+    EXPECT_FALSE(services_->services().scans.CompactMap(scans[1].id, "heightmap"));
+    On([&] { appliance_->store()->removal.RemoveScan(kTester, scans[2].id, "a test"); });
+    EXPECT_FALSE(packed(scans[2])) << "gone with its scan";
   });
 }
 

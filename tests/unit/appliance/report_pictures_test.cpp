@@ -127,25 +127,45 @@ TEST_F(ReportPicturesTest, OfAReferenceShowTheRegionAndTheIsocentre) {
   const PictureWords& words = WordsOf(Language::kSpanish).pictures;
   const SideWords& sides = WordsOf(Language::kSpanish).sides;
   web::ReferencePlan plan;
-  const std::vector<cv::Mat> whole = ReferencePictures(reference_, plan, {}, words, sides);
+  const std::vector<cv::Mat> whole = ReferencePictures(reference_, plan, {}, words, sides).pictures;
   ASSERT_THAT(whole, SizeIs(1));
   plan.region_m = {{-0.2, -0.1}, {0.2, -0.1}, {0.2, 0.15}, {-0.2, 0.15}};
-  const std::vector<cv::Mat> region = ReferencePictures(reference_, plan, {}, words, sides);
+  const std::vector<cv::Mat> region =
+      ReferencePictures(reference_, plan, {}, words, sides).pictures;
   ASSERT_THAT(region, SizeIs(1));
   EXPECT_FALSE(Same(whole[0], region[0]));
   plan.isocentre_m = {{0.05, 0.02, 0.1}};
-  const std::vector<cv::Mat> isocentre = ReferencePictures(reference_, plan, {}, words, sides);
+  const std::vector<cv::Mat> isocentre =
+      ReferencePictures(reference_, plan, {}, words, sides).pictures;
   ASSERT_THAT(isocentre, SizeIs(1));
   EXPECT_FALSE(Same(region[0], isocentre[0]));
   Keep(isocentre[0], "reference_es");
-  const std::vector<cv::Mat> marked = ReferencePictures(reference_, plan, RoomWays{}, words, sides);
+  MarkerMap asked;
+  RoomWays room;
+  const RoomFinder room_in = [&](const MarkerMap& scene) {
+    asked = scene;
+    return room;
+  };
+  const PlanPictures in_room = ReferencePictures(reference_, plan, room_in, words, sides);
+  const std::vector<cv::Mat>& marked = in_room.pictures;
+  EXPECT_TRUE(in_room.names_sides);
+  EXPECT_FALSE(ReferencePictures(reference_, plan, {}, words, sides).names_sides);
+  EXPECT_THAT(asked, SizeIs(8)) << "the room is where the markers of this scene say it is";
   ASSERT_THAT(marked, SizeIs(1));
   EXPECT_FALSE(Same(isocentre[0], marked[0])) << "the gantry and the planned posture";
   Keep(marked[0], "reference_marks_es");
   plan.posture = "FFS";
-  EXPECT_FALSE(Same(ReferencePictures(reference_, plan, RoomWays{}, words, sides)[0], marked[0]))
+  EXPECT_FALSE(
+      Same(ReferencePictures(reference_, plan, room_in, words, sides).pictures[0], marked[0]))
       << "head and feet change places";
-  EXPECT_THAT(ReferencePictures(scan_, plan, {}, words, sides), SizeIs(0)) << "no scene";
+  plan.posture = "HFS";
+  room = {.gantry = Eigen::Vector2d::UnitX(), .right = -Eigen::Vector2d::UnitY()};
+  EXPECT_FALSE(
+      Same(ReferencePictures(reference_, plan, room_in, words, sides).pictures[0], marked[0]))
+      << "the marker was turned: so are the marks";
+  const PlanPictures none = ReferencePictures(scan_, plan, room_in, words, sides);
+  EXPECT_THAT(none.pictures, SizeIs(0)) << "no scene";
+  EXPECT_FALSE(none.names_sides);
 }
 
 }  // namespace

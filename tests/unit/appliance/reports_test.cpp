@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 
 #include "daemon/appliance/report_words.hpp"
+#include "daemon/files/scene_folder.hpp"
 #include "daemon/records/store.hpp"
 #include "drivers/files/file_io.hpp"
+#include "tests/support/synthetic_scene.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace plumb {
@@ -164,6 +166,23 @@ TEST_F(ReportsTest, AScanForAReferenceNamesThePlanThatWasMadeOfItAndWhoApprovedI
                     "Approved by"),
             before);
   EXPECT_TRUE(PdfOf(report).starts_with("%PDF-"));
+}
+
+TEST_F(ReportsTest, ThePictureOfAPlanThatNamesSidesAsksWhetherThePatientLiesSo) {
+  const web::Scan scan = *store_.scans.Find(store_.references.Find(Approved())->scan_id);
+  WriteScene(test::MakeSyntheticScene({}), scan.folder / "scene");
+  const ScanReport unknown = DescribeScan(sources_, scan, Language::kEnglish);
+  EXPECT_THAT(unknown.pictures, SizeIs(1));
+  EXPECT_EQ(unknown.pictures_note, "") << "no side is named";
+  sources_.room_in = [](const MarkerMap&) { return RoomWays{}; };
+  const ScanReport english = DescribeScan(sources_, scan, Language::kEnglish);
+  EXPECT_THAT(english.pictures, SizeIs(1));
+  EXPECT_THAT(english.pictures_note, HasSubstr("check that the patient lies so"));
+  EXPECT_THAT(DescribeScan(sources_, scan, Language::kSpanish).pictures_note,
+              HasSubstr("compruebe que el paciente está así"));
+  ScanReport without = english;
+  without.pictures_note.clear();
+  EXPECT_GT(PdfOf(english).size(), PdfOf(without).size()) << "it is printed";
 }
 
 TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {

@@ -156,6 +156,21 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
   EXPECT_EQ(HttpClient(port_).Get("/api/v1/checks").status, 401);
 }
 
+TEST_F(ApiTest, AReferenceStatesWhereTheRoomLiesOnItsOwnMaps) {
+  HttpClient physicist = LoggedIn("physicist");
+  web::Reference reference;
+  reference.id = "r7";
+  loop_->Do([&] {
+    service_.references.push_back(reference);
+    service_.room_of_references = web::RoomOnMap{{-1, 0}, {0, 1}, true};
+  });
+  const nlohmann::json turned = {
+      {"gantry_xy", {-1.0, 0.0}}, {"right_xy", {0.0, 1.0}}, {"known", true}};
+  EXPECT_EQ(physicist.Get("/api/v1/references/r7").json()["room"], turned);
+  EXPECT_NE(physicist.Get("/api/v1/status").json()["room"], turned);
+  EXPECT_EQ(physicist.Get("/api/v1/references/r8").status, 404);
+}
+
 TEST_F(ApiTest, PlansOutOfRangeAreRefusedWithTheField) {
   HttpClient physicist = LoggedIn("physicist");
   const auto refused = [&](const std::string& field, const nlohmann::json& value) {

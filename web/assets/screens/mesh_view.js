@@ -41,8 +41,17 @@ function cutControls(view) {
 }
 
 const kSurface_ms = 600000;  // on a slow line
-const surfaceOf = (scanId, onPart) =>
-  getBytes(`scans/${scanId}/maps/mesh`, onPart, kSurface_ms).then(readMesh);
+/// What arrived is no surface.
+class DamagedSurface extends Error {}
+
+async function surfaceOf(scanId, onPart) {
+  const bytes = await getBytes(`scans/${scanId}/maps/mesh`, onPart, kSurface_ms);
+  try {
+    return await readMesh(bytes);
+  } catch (error) {
+    throw new DamagedSurface(S.result.meshDamaged, { cause: error });
+  }
+}
 
 /// The motion of the body that the correction undoes; null where no correction is advised.
 const motionOf = (scan, details) => (isAdvice(scan) && details?.correction?.vertical_mm !== null
@@ -142,8 +151,9 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
       clear(below, marksNote(map?.compass),
         controls(view, canvas, { reference, scan, details }, map?.compass));
     } catch (error) {
-      // What did not arrive may arrive the next time; what the browser cannot show, it never can.
-      if (error instanceof ApiError) offer(error.message);
+      // What did not arrive, or not whole, may arrive the next time; what the browser cannot show,
+      // it never can.
+      if (error instanceof ApiError || error instanceof DamagedSurface) offer(error.message);
       else clear(place, h('p', { class: 'hint' }, text.meshFailed));
     }
   }, {});

@@ -167,7 +167,7 @@ async function draft(place, reference, store, reload) {
   let hadIsocentre = Boolean(model.isocentre);
   let loaded = null;
   // Nothing has been compared: whoever plans and approves sees here whether the posture is right.
-  const compassFor = (posture) => compassOfPlan(live.status?.room, posture);
+  const compassFor = (posture) => compassOfPlan(reference.room, posture);
   const isEdited = () => stored !== undefined && inputs.written() !== stored;
   const refusal = whyNotApprove(reference);
   const sign = may('approve') && !reference.approved_by && !refusal

@@ -342,6 +342,7 @@ export const en = {
     meshLabel: '3-D surface, coloured by the error. Arrow keys turn it, plus and minus zoom.',
     meshFailed: 'This browser cannot show 3-D (WebGL is missing). The pictures above show the '
       + 'same.',
+    meshDamaged: 'The surface arrived damaged. The pictures above show the same.',
     ghost: 'Show the reference', ghostLoading: 'Loading the reference…',
     correctionShare: 'Share of the correction that is shown',
     ghostShare: 'Reference to current', views3d: {

@@ -382,6 +382,7 @@ export const es = {
       + 'acercan y alejan.',
     meshFailed: 'Este navegador no puede mostrar 3-D (falta WebGL). Las imágenes de arriba '
       + 'muestran lo mismo.',
+    meshDamaged: 'La superficie llegó dañada. Las imágenes de arriba muestran lo mismo.',
     ghost: 'Mostrar la referencia', ghostLoading: 'Cargando la referencia…',
     correctionShare: 'Parte de la corrección que se muestra',
     ghostShare: 'De la referencia a la actual', views3d: {

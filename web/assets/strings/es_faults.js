@@ -319,7 +319,7 @@ export const kFaultPatterns = [
   ['^web\\.listen: (.+); the page is served at (\\S+) instead$',
     'web.listen: $1; la página se sirve en $2'],
   ['^(\\S+) is no address of this machine now: the page cannot be reached before it is '
-    + '\\(web.listen\\)$',
+    + '\\(web\\.listen\\)$',
   '$1 no es ahora una dirección de este equipo: hasta que lo sea no se llega a la página '
     + '(web.listen)'],
   // Update.
