@@ -75,6 +75,17 @@ check "a start that was handed it over says so" 'is that of the first start' "$(
 echo 22222222222222222222222222222222 >machine-id
 run
 check "and one with another ID" '^0 .*not that of the first start.* MACHINE_ID=1{32}$' "$code $(cat out) $(cat unitenv)"
+cat >bin/grub-editenv <<'SCRIPT'
+#!/bin/sh
+case "$2" in
+  list) [ -s "$1" ] && cat "$1" ;;
+  create) echo created >"$1" ;;
+  set) [ -s "$1" ] && echo "$3" >>"$1" ;;
+esac
+SCRIPT
+: >unitenv
+run
+check "a file that a power cut emptied is made anew" '^0 .*kept for the next ones created MACHINE_ID=2{32}$' "$code $(cat out unitenv | tr '\n' ' ' | xargs)"
 printf '#!/bin/sh\n[ "$2" = list ]\n' >bin/grub-editenv
 run
 check "a start goes on where it cannot be kept" '^0 .*cannot be kept' "$code $(cat out)"
@@ -121,7 +132,13 @@ printf '[recovery]\nlost_scans = 4\n' >data/provision/plumb-recovery.toml
 : >asked
 run
 check "from the data partition, before plumbd starts" '^0 4 $' "$code $(cat state/scans-are-lost) $(cat asked)"
-rm -r state/scans-are-lost data/provision
+rm state/scans-are-lost
+printf '[recovery]\nlost_scans = 5\n' >data/provision/plumb-recovery.toml
+mkdir data/unit/.recovered.new
+run
+check "nothing is carried out that could not be noted" '^0 .*nothing can be written to' "$code $(cat out)$(ls state | grep lost || true)"
+check "and no scan is confirmed" '^$' "$(ls state | grep lost || true)"
+rm -r data/unit/.recovered.new data/provision
 
 cat >bin/plumb <<'SCRIPT'
 #!/bin/sh
@@ -142,6 +159,11 @@ run stick "$work/stick"
 check "a unit without an account is stopped for it, and started again" '^stop plumbd.socket plumbd.service .*restart plumbd.service $' "$(tr '\n' ' ' <asked)"
 check "a backup that is none changes nothing" '^0 .*no-backup cannot be used.*as it was$' "$code $(tr '\n' ' ' <out | sed 's/ $//')"
 check "nothing is left of it" '^$' "$(ls -A state | grep -e recovery -e before || true)"
+printf '#!/bin/sh\ncase "$1" in --recover) kill -TERM $PPID ;; esac\nexit 1\n' >bin/plumbd-killed
+chmod +x bin/plumbd-killed
+: >asked
+PLUMB_PLUMBD=$work/bin/plumbd-killed run stick "$work/stick"
+check "nor does it stay stopped where the stick is pulled out meanwhile" '^1 stop plumbd.socket plumbd.service .*restart plumbd.service $' "$code $(tr '\n' ' ' <asked)"
 rm stick/plumb-recovery.toml
 screen=$("$source/systemd/console-screen" once)
 for line in 'Page         https://10.1.1.5:8080/' 'Page         https://\[fd00::5\]:8080/' 'Certificate  AB:CD' 'Serial       PL-7' 'Version      0.2.0' \
