@@ -123,7 +123,7 @@ void KeepSecret(const fs::path& file, const std::string& contents) {
   WriteSecret(file, contents);
   struct stat folder {};
   if (::geteuid() == 0 && (::stat(file.parent_path().c_str(), &folder) != 0 ||
-                           ::chown(file.c_str(), folder.st_uid, folder.st_gid) != 0))
+                           ::lchown(file.c_str(), folder.st_uid, folder.st_gid) != 0))
     throw IoError(DescribeWriteError(file, errno));
 }
 

@@ -224,8 +224,8 @@ void MoveIn(const fs::path& made, const fs::path& state) {
   fs::remove_all(made, ignored);
 }
 
-/// Moves everything that a restore replaces to a new folder. The database goes first: without it,
-/// and with scans, a start is safe mode.
+/// Moves everything that a restore replaces to a new folder. The database goes first: without it a
+/// start is safe mode (IsRestoreInterrupted()).
 fs::path MoveOldAside(const fs::path& state) {
   fs::path aside;
   for (int n = 1; aside.empty() || fs::exists(fs::symlink_status(aside)); ++n)
@@ -347,6 +347,11 @@ BackupReport RestoreOver(const fs::path& backup, const fs::path& state, const st
   } catch (const fs::filesystem_error& error) {
     throw IoError(DescribeWriteError(state, error.code().value()));
   }
+}
+
+bool IsRestoreInterrupted(const fs::path& state) {
+  std::error_code ignored;
+  return fs::exists(state / kRestoringOver / kDatabase, ignored);
 }
 
 void NoteRestore(const fs::path& state, Database& database) {

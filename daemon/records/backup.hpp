@@ -65,6 +65,10 @@ BackupReport RestoreBackup(const std::filesystem::path& backup, const std::files
 BackupReport RestoreOver(const std::filesystem::path& backup, const std::filesystem::path& state,
                          const std::stop_token& stop = {}, const BackupSecret* secret = nullptr);
 
+/// True after RestoreOver() was interrupted, such as by a power cut, after it had unpacked the
+/// backup and before that was in place. It can be called again.
+[[nodiscard]] bool IsRestoreInterrupted(const std::filesystem::path& state);
+
 /// Adds the entry of a restore to the audit log, at the first start after it.
 /// @throws IoError and its kinds
 void NoteRestore(const std::filesystem::path& state, Database& database);

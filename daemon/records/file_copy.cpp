@@ -108,10 +108,11 @@ FileDigest CloneOrCopy(const fs::path& from, const fs::path& to, const std::stri
 
 void PlaceFile(const fs::path& folder, const std::string& name, const std::string& text) {
   const fs::path file = folder / name, temporary = folder / ("." + name + ".new");
+  ::unlink(temporary.c_str());  // as root, a link that the folder's owner placed is not followed
   WriteWholeFile(temporary, std::string_view(text));
   struct stat owner {};
   if (::stat(folder.c_str(), &owner) != 0 ||
-      (::geteuid() == 0 && ::chown(temporary.c_str(), owner.st_uid, owner.st_gid) != 0))
+      (::geteuid() == 0 && ::lchown(temporary.c_str(), owner.st_uid, owner.st_gid) != 0))
     throw IoError(DescribeWriteError(temporary, errno));
   SyncToDisk(temporary);
   if (::rename(temporary.c_str(), file.c_str()) != 0)

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "daemon/records/audit_store.hpp"
+#include "daemon/records/backup.hpp"
 #include "daemon/records/file_copy.hpp"
 #include "daemon/records/scan_digests.hpp"
 #include "daemon/records/scan_store.hpp"
@@ -206,6 +207,11 @@ void RefuseScansOfAnother(Database& database, const ScanFolders& scans) {
     Statement version = database.Prepare("PRAGMA user_version");
     if (version.Step() && version.Integer(0) != 0) return;
   }
+  if (IsRestoreInterrupted(scans.state()))
+    throw DatabaseCorrupt(fmt::format(
+        "restoring a backup into {} was interrupted: restore it again; what was stored before is "
+        "in the newest of the folders before-restore-N in there",
+        scans.state().string()));
   std::vector<fs::path> folders = scans.All();
   std::erase_if(folders, [](const fs::path& folder) {
     return ScanFolders::IsStaging(folder);

@@ -30,7 +30,8 @@ struct RecoveryReport {
 };
 
 /// A lost database must not be replaced by a new one, to which every scan would be an orphan.
-/// @throws DatabaseCorrupt if the database is new and there are scans.
+/// @throws DatabaseCorrupt if the database is new and there are scans, or a restore was
+/// interrupted.
 void RefuseScansOfAnother(Database& database, const ScanFolders& folders);
 
 /// Confirms to the next start that this number of missing scans is lost for good. They are marked

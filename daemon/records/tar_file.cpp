@@ -108,7 +108,7 @@ void TarWriter::Sink::Take(const std::uint8_t* bytes, std::size_t count) {
 }
 
 TarWriter::TarWriter(fs::path file) : file_(std::move(file)) {
-  sink_.fd = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
+  sink_.fd = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (sink_.fd < 0) throw IoError(DescribeWriteError(file_, errno));
   archive_ = ::archive_write_new();
   const auto take = [](archive*, void* sink, const void* bytes, std::size_t count) {

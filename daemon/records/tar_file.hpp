@@ -26,7 +26,7 @@ namespace plumb {
 /// Plain path of a file in folders, without "..", ".", empty parts or control characters.
 [[nodiscard]] bool IsPlainPath(const std::string& path);
 
-/// Writes an archive. Not flushed to the disk.
+/// Writes an archive, for its owner alone. Not flushed to the disk.
 class TarWriter {
  public:
   /// @throws IoError

@@ -120,6 +120,7 @@ TEST_F(BackupArchiveTest, WhatIsRestoredIsByteIdentical) {
   EXPECT_EQ(made.files, 1U + 2 * 7 + 2);
   EXPECT_THAT(made.problems, ::testing::IsEmpty());
   EXPECT_THAT(Names(), ElementsAre("plumb.tar")) << "nothing stays beside it";
+  EXPECT_EQ(fs::status(backup()).permissions(), fs::perms(0600)) << "it has patients' data";
   const BackupReport report = RestoreBackup(backup(), restored());
   EXPECT_EQ(report.scans, 2U);
   EXPECT_EQ(report.files, made.files);

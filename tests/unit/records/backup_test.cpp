@@ -299,6 +299,19 @@ TEST_F(BackupTest, ADamagedDatabaseAndAnEmptyFolderAreRestoredOver) {
   EXPECT_EQ(Store(restored()).scans.List(patient_, 100).size(), 4U);
 }
 
+TEST_F(BackupTest, ARestoreInterruptedBetweenOldAndNewIsSafeModeUntilItIsRepeated) {
+  (void)BackUpStopped(state(), backup());
+  (void)RestoreBackup(backup(), restored() / ".recovery");  // all is unpacked, nothing in place
+  fs::create_directory(restored() / "before-restore-1");    // and the old moved aside
+  for (int start = 1; start <= 2; ++start) {
+    EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { const Store store(restored()); }),
+                HasSubstr("was interrupted: restore it again"))
+        << start;
+  }
+  EXPECT_EQ(RestoreOver(backup(), restored()).scans, 4U);
+  EXPECT_EQ(Store(restored()).scans.List(patient_, 100).size(), 4U);
+}
+
 TEST_F(BackupTest, AnInterruptedRestoreIsNoStore) {
   (void)BackUpStopped(state(), backup());
   (void)RestoreBackup(backup(), restored());

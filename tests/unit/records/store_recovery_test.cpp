@@ -277,6 +277,16 @@ TEST_F(StoreRecoveryTest, TheNumberOfLostScansIsConfirmedAndNoOther) {
   EXPECT_EQ(Open()->recovery().attached_scans, 3) << "and they may come back";
 }
 
+TEST_F(StoreRecoveryTest, AConfirmationFollowsNoLink) {
+  fs::create_directories(state());
+  WriteWholeFile(folder_ / "other", std::string_view("kept"));
+  fs::create_symlink(folder_ / "other", state() / ".scans-are-lost.new");
+  ConfirmLostScans(state(), 3);
+  EXPECT_EQ(ReadTextFile(folder_ / "other", 16), "kept");
+  EXPECT_EQ(ReadTextFile(state() / "scans-are-lost", 16), "3");
+  EXPECT_FALSE(fs::is_symlink(state() / "scans-are-lost"));
+}
+
 TEST_F(StoreRecoveryTest, AConfirmationOfNothingLostCountsForNoLaterStart) {
   {
     const auto store = Open();
