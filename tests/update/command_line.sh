@@ -33,9 +33,9 @@ commonName=supplied
 CONF
 : >short/index
 echo 01 >short/serial
-ends=$(($(date +%s) + 20))
 {
   openssl req -newkey rsa:2048 -nodes -subj "/CN=short" -keyout short/key -out short/csr
+  ends=$(($(date +%s) + 10))
   openssl ca -batch -config short/ca.conf -in short/csr -out short/pem -cert machine/pki/own-ca.pem \
     -keyfile machine/pki/own-ca.key -startdate "$(date -u -d '-1 hour' +%Y%m%d%H%M%SZ)" \
     -enddate "$(date -u -d "@$ends" +%Y%m%d%H%M%SZ)" -extfile <(
