@@ -90,6 +90,31 @@ printf '#!/bin/sh\n[ "$2" = list ]\n' >bin/grub-editenv
 run
 check "a start goes on where it cannot be kept" '^0 .*cannot be kept' "$code $(cat out)"
 
+cat >bin/grub-editenv <<'SCRIPT'
+#!/bin/sh
+file=$1 command=$2
+shift 2
+case "$command" in
+  list) [ -s "$file" ] ;;
+  create) echo created >"$file" ;;
+  set) printf '%s\n' "$@" >>"$file" ;;
+esac
+SCRIPT
+echo "root=PARTLABEL=root-b ro rauc.slot=B quiet" >cmdline
+export PLUMB_BOOT_COUNTER=$work/grubenv PLUMB_CMDLINE=$work/cmdline
+echo "A_OK=1" >grubenv
+run
+check "a boot counter that can be read stays" '^0 A_OK=1$' "$code $(cat grubenv)"
+: >grubenv
+run
+check "one that a power cut emptied is made anew for the system that runs" \
+  '^0 .*made anew: system B .* created ORDER=B A B_OK=1 B_TRY=1 A_OK=0 A_TRY=0 $' "$code $(cat out grubenv | tr '\n' ' ')"
+echo "root=/dev/sda1" >cmdline
+: >grubenv
+run
+check "but not where that is not known" '^0 .*not be made anew.*0$' "$code $(cat out) $(wc -c <grubenv)"
+unset PLUMB_BOOT_COUNTER PLUMB_CMDLINE
+
 mkdir -p data/provision
 echo 480 >data/provision/burn-in
 printf '#!/bin/sh\necho "$@"\nexit 1\n' >bin/plumb
