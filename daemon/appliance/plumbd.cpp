@@ -340,6 +340,8 @@ int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
     fmt::print("the configuration is good\n");
     return 0;
   }
+  if (options.provision && options.recover)
+    throw std::invalid_argument("--provision and --recover are two tasks: give one of them");
   if (options.provision) {
     const Config config = ReadConfiguration(options, registry);
     ApplyProvisioning(ReadProvisioning(*options.provision), options.unit, config.appliance.state);

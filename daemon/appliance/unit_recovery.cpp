@@ -1,5 +1,12 @@
 #include "daemon/appliance/unit_recovery.hpp"
 
+#include <grp.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
@@ -16,7 +23,22 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxBytes = 64 << 10;
 
+/// Root reads what a stranger's stick holds, and writes where the account of plumbd may put links,
+/// with no more rights than that account has.
+void BecomeOwnerOf(const fs::path& state) {
+  struct stat owner {};
+  if (::geteuid() != 0 || ::stat(state.c_str(), &owner) != 0 || owner.st_uid == 0) return;
+  const uid_t uid = owner.st_uid;
+  const gid_t gid = owner.st_gid;
+  if (::setgroups(0, nullptr) != 0 || ::setresgid(gid, gid, gid) != 0 ||
+      ::setresuid(uid, uid, uid) != 0 || ::setuid(0) == 0) {
+    throw IoError(fmt::format("cannot take the rights of the owner of {}: {}", state.string(),
+                              std::system_category().message(errno)));
+  }
+}
+
 std::string Confirm(int num_lost, const fs::path& state) {
+  BecomeOwnerOf(state);
   FolderLock lock;
   lock.Take(state);
   ConfirmLostScans(state, num_lost);
@@ -34,6 +56,7 @@ std::string Restore(const UnitRecovery& given, const fs::path& state,
   } else if (!given.key_file.empty()) {
     secret.emplace(given.key_file, BackupSecret::Readers::kAny);
   }
+  BecomeOwnerOf(state);
   const BackupReport report = RestoreOver(given.backup, state, {}, secret ? &*secret : nullptr);
   return fmt::format(
       "restored from {}: {} scans, {} files; what was stored before is in {}",

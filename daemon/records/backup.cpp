@@ -224,6 +224,32 @@ void MoveIn(const fs::path& made, const fs::path& state) {
   fs::remove_all(made, ignored);
 }
 
+/// What SQLite keeps beside a database. A database without them has lost its last changes.
+constexpr std::array<const char*, 3> kBesideDatabase = {"plumb.db-wal", "plumb.db-shm",
+                                                        "plumb.db-journal"};
+
+/// Moves the database. At every moment it has the files that belong to it: these are in both
+/// folders until it has moved.
+void MoveDatabase(const fs::path& from, const fs::path& to) {
+  const auto drop = [](const fs::path& folder) {
+    for (const char* name : kBesideDatabase) ::unlink((folder / name).c_str());
+  };
+  for (const char* name : kBesideDatabase) {
+    if (::link((from / name).c_str(), (to / name).c_str()) == 0 || errno == ENOENT) continue;
+    const int error = errno;
+    drop(to);
+    throw IoError(DescribeWriteError(to / name, error));
+  }
+  SyncDisk(to);
+  if (::rename((from / kDatabase).c_str(), (to / kDatabase).c_str()) != 0 && errno != ENOENT) {
+    const int error = errno;
+    drop(to);
+    throw IoError(DescribeWriteError(to / kDatabase, error));
+  }
+  SyncDisk(to);
+  drop(from);
+}
+
 /// Moves everything that a restore replaces to a new folder. The database goes first: without it a
 /// start is safe mode (IsRestoreInterrupted()).
 fs::path MoveOldAside(const fs::path& state) {
@@ -232,24 +258,33 @@ fs::path MoveOldAside(const fs::path& state) {
     aside = state / fmt::format("before-restore-{}", n);
   fs::create_directory(aside);
   GiveToOwnerOf(state, aside);
-  std::vector<std::string> names = {kDatabase,          "plumb.db-wal", "plumb.db-shm",
-                                    "plumb.db-journal", kRestored,      kScans};
+  std::vector<std::string> names = {kRestored, kScans};
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
   std::vector<std::string> moved;
+  try {
+    MoveDatabase(state, aside);
+  } catch (const IoError&) {
+    ::rmdir(aside.c_str());
+    throw;
+  }
   for (const std::string& name : names) {
     if (!fs::exists(fs::symlink_status(state / name))) continue;
     if (::rename((state / name).c_str(), (aside / name).c_str()) == 0) {
       moved.push_back(name);
       continue;
     }
-    const int error = errno;  // such as a disk that is mounted there
+    const int error = errno;
     for (const std::string& back : moved)
       (void)::rename((aside / back).c_str(), (state / back).c_str());
+    MoveDatabase(aside, state);
     ::rmdir(aside.c_str());
+    if (error == EBUSY)
+      throw IoError(fmt::format("cannot restore over {}: it is a disk of its own; unmount it first",
+                                (state / name).string()));
     throw IoError(DescribeWriteError(state / name, error));
   }
   SyncDisk(state);
-  if (!moved.empty()) return aside;
+  if (!fs::is_empty(aside)) return aside;
   fs::remove(aside);
   return {};
 }
@@ -342,7 +377,12 @@ BackupReport RestoreOver(const fs::path& backup, const fs::path& state, const st
       fs::remove_all(made, ignored);
       throw;
     }
-    MoveIn(made, state);
+    try {
+      MoveIn(made, state);
+    } catch (const IoError& error) {
+      throw IoError(fmt::format("{}. What was stored before is in {}; repeat the restore",
+                                error.what(), report.replaced.string()));
+    }
     return report;
   } catch (const fs::filesystem_error& error) {
     throw IoError(DescribeWriteError(state, error.code().value()));

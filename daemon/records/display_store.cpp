@@ -1,5 +1,7 @@
 #include "daemon/records/display_store.hpp"
 
+#include <fmt/format.h>
+
 #include "daemon/records/store_refusal.hpp"
 #include "daemon/records/stored_values.hpp"
 
@@ -59,7 +61,8 @@ bool DisplayStore::AddProvisioned(const web::Display& display) {
   {
     Statement query = change.Prepare("SELECT COUNT(*) FROM displays");
     if (query.Step() && query.Integer(0) >= static_cast<std::int64_t>(web::kMaxDisplays))
-      throw StoreRefusal(ChangeResult::kConflict, "20 screens are paired already");
+      throw StoreRefusal(ChangeResult::kConflict,
+                         fmt::format("{} screens are paired already", web::kMaxDisplays));
   }
   Insert(change, store::kSelf, display);
   change.Log(store::kSelf, "display.provision", display.name, "");

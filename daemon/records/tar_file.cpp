@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kPiece = std::size_t{256} << 10, kMaxPath = 4000;
 /// What the names of one archive may take of the memory.
-constexpr std::size_t kMaxFiles = 5'000'000, kMaxNames = std::size_t{512} << 20;
+constexpr std::size_t kMaxFiles = 500'000, kMaxNames = std::size_t{64} << 20;
 
 struct FreeReader {
   void operator()(archive* reader) const { ::archive_read_free(reader); }

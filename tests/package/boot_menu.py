@@ -45,7 +45,7 @@ def expected(whole, starts, order):
 
 
 def check_counter(text):
-    defaults, rest = text.split("load_env --file ($root)/unitenv\n")
+    defaults, rest = text.split("load_env --file ($root)/unitenv MACHINE_ID\n")
     defaults = defaults.replace("load_env --file ($root)/grubenv\n", "")
     decision = rest.split("save_env")[0]
     states = list(itertools.product((0, 1), range(4), (0, 1), range(4), ("A B", "B A")))

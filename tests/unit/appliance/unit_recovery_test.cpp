@@ -1,5 +1,10 @@
 #include "daemon/appliance/unit_recovery.hpp"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -89,6 +94,31 @@ TEST_F(UnitRecoveryTest, AUnitThatWorksIsLeftAlone) {
   }
   EXPECT_FALSE(fs::exists(state() / "before-restore-1"));
   EXPECT_FALSE(fs::exists(state() / "scans-are-lost"));
+}
+
+// Plumbd's account may have put links anywhere in its folder, and the stick is a stranger's.
+TEST_F(UnitRecoveryTest, RootTakesTheRightsOfTheFoldersOwner) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can take another account's rights";
+  constexpr uid_t kOwner = 12345;
+  (void)BackUpStopped(state(), stick() / "backup.tar");
+  const UnitRecovery given = Read("[recovery]\nrestore = \"backup.tar\"\n");
+  fs::permissions(stick() / "backup.tar", fs::perms(0644));
+  fs::permissions(folder_.path(), fs::perms(0711));
+  ASSERT_EQ(::chown(state().c_str(), kOwner, kOwner), 0);
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(state()))
+    ASSERT_EQ(::lchown(entry.path().c_str(), kOwner, kOwner), 0);
+  fs::create_directory(folder_ / "of-root");
+  const auto recover = [&] {
+    std::string done = RecoverUnit(given, state(), {});
+    const bool is_owner = ::getuid() == kOwner && ::getegid() == kOwner && ::setuid(0) != 0;
+    std::error_code error;
+    fs::create_directory(folder_ / "of-root" / "x", error);
+    std::_Exit(is_owner && error && done.find("2 scans") != std::string::npos ? 0 : 1);
+  };
+  EXPECT_EXIT(recover(), ::testing::ExitedWithCode(0), "");
+  struct stat restored {};
+  ASSERT_EQ(::stat((state() / "plumb.db").c_str(), &restored), 0);
+  EXPECT_EQ(restored.st_uid, kOwner);
 }
 
 // Whoever has the stick need not have the key.
