@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <system_error>
+#include <thread>
 
 #include <fmt/format.h>
 
@@ -27,26 +28,47 @@ constexpr std::size_t kMaxBytes = 64 << 10;
 /// with no more rights than that account has.
 void BecomeOwnerOf(const fs::path& state) {
   struct stat owner {};
-  if (::geteuid() != 0 || ::stat(state.c_str(), &owner) != 0 || owner.st_uid == 0) return;
+  if (::geteuid() != 0) return;
+  if (::stat(state.c_str(), &owner) != 0)
+    throw IoError(fmt::format("cannot recover {}: {}", state.string(),
+                              std::system_category().message(errno)));
+  if (owner.st_uid == 0) return;
   const uid_t uid = owner.st_uid;
   const gid_t gid = owner.st_gid;
   if (::setgroups(0, nullptr) != 0 || ::setresgid(gid, gid, gid) != 0 ||
-      ::setresuid(uid, uid, uid) != 0 || ::setuid(0) == 0) {
+      ::setresuid(uid, uid, uid) != 0) {
     throw IoError(fmt::format("cannot take the rights of the owner of {}: {}", state.string(),
                               std::system_category().message(errno)));
   }
+  if (::setuid(0) == 0) throw IoError("the rights of root can be taken back: nothing was changed");
 }
 
-std::string Confirm(int num_lost, const fs::path& state) {
+/// A plumbd in safe mode tries to open its store from time to time, and has the lock meanwhile.
+template <typename Action>
+auto OnceFree(std::chrono::milliseconds wait, const Action& action) {
+  const auto end = std::chrono::steady_clock::now() + wait;
+  for (;;) {
+    try {
+      return action();
+    } catch (const DatabaseBusy&) {
+      if (std::chrono::steady_clock::now() >= end) throw;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+}
+
+std::string Confirm(int num_lost, const fs::path& state, std::chrono::milliseconds wait) {
   BecomeOwnerOf(state);
-  FolderLock lock;
-  lock.Take(state);
-  ConfirmLostScans(state, num_lost);
+  OnceFree(wait, [&] {
+    FolderLock lock;
+    lock.Take(state);
+    ConfirmLostScans(state, num_lost);
+  });
   return fmt::format("{} missing scans are confirmed as lost: the next start uses that", num_lost);
 }
 
 std::string Restore(const UnitRecovery& given, const fs::path& state,
-                    const fs::path& configured_key) {
+                    const fs::path& configured_key, std::chrono::milliseconds wait) {
   std::optional<BackupSecret> secret;
   if (!configured_key.empty()) {  // a stick with a key of its own would be a way around it
     if (!given.key_file.empty())
@@ -57,7 +79,8 @@ std::string Restore(const UnitRecovery& given, const fs::path& state,
     secret.emplace(given.key_file, BackupSecret::Readers::kAny);
   }
   BecomeOwnerOf(state);
-  const BackupReport report = RestoreOver(given.backup, state, {}, secret ? &*secret : nullptr);
+  const BackupReport report = OnceFree(
+      wait, [&] { return RestoreOver(given.backup, state, {}, secret ? &*secret : nullptr); });
   return fmt::format(
       "restored from {}: {} scans, {} files; what was stored before is in {}",
       given.backup.string(), report.scans, report.files,
@@ -96,10 +119,10 @@ UnitRecovery ReadUnitRecovery(const fs::path& file) {
 }
 
 std::string RecoverUnit(const UnitRecovery& given, const fs::path& state,
-                        const fs::path& configured_key) {
+                        const fs::path& configured_key, std::chrono::milliseconds wait) {
   try {
-    return given.lost_scans ? Confirm(*given.lost_scans, state)
-                            : Restore(given, state, configured_key);
+    return given.lost_scans ? Confirm(*given.lost_scans, state, wait)
+                            : Restore(given, state, configured_key, wait);
   } catch (const DatabaseBusy&) {
     throw DataError(
         fmt::format("a plumbd works with {}: there is nothing to recover, and nothing was changed",

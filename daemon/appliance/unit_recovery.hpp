@@ -2,6 +2,7 @@
 // data partition: whoever stands at the unit has the authority.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -24,9 +25,11 @@ struct UnitRecovery {
 /// the rights of the folder's owner, for good, once the key is read.
 /// @param configured_key  Key file of the configuration; empty: none. If there is one, only backups
 ///                        that were encrypted with it are restored.
+/// @param wait  For a plumbd in safe mode that just tries to open its store.
 /// @returns what was done, as a sentence.
 /// @throws DataError if the folder is in use, or as RestoreOver(); IoError
 std::string RecoverUnit(const UnitRecovery& given, const std::filesystem::path& state,
-                        const std::filesystem::path& configured_key);
+                        const std::filesystem::path& configured_key,
+                        std::chrono::milliseconds wait = std::chrono::seconds(3));
 
 }  // namespace plumb

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <memory>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -89,11 +91,32 @@ TEST_F(UnitRecoveryTest, AUnitThatWorksIsLeftAlone) {
   (void)BackUpStopped(state(), stick() / "backup");
   const Store store(state());
   for (const char* text : {"[recovery]\nrestore = \"backup\"\n", "[recovery]\nlost_scans = 2\n"}) {
-    EXPECT_THAT(MessageOf<DataError>([&] { (void)RecoverUnit(Read(text), state(), {}); }),
+    EXPECT_THAT(MessageOf<DataError>([&] {
+                  (void)RecoverUnit(Read(text), state(), {}, std::chrono::milliseconds(0));
+                }),
                 HasSubstr("nothing was changed"));
   }
   EXPECT_FALSE(fs::exists(state() / "before-restore-1"));
   EXPECT_FALSE(fs::exists(state() / "scans-are-lost"));
+}
+
+// A plumbd in safe mode has the lock whenever it tries to open its store.
+TEST_F(UnitRecoveryTest, AFolderThatIsHeldForAMomentIsWaitedFor) {
+  (void)BackUpStopped(state(), stick() / "backup");
+  for (const char* text : {"[recovery]\nrestore = \"backup\"\n", "[recovery]\nlost_scans = 2\n"}) {
+    auto held = std::make_unique<FolderLock>();
+    held->Take(state());
+    std::thread safe_mode([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(300));
+      held.reset();
+    });
+    std::string done;
+    EXPECT_NO_THROW(done = RecoverUnit(Read(text), state(), {}, std::chrono::minutes(1)));
+    safe_mode.join();
+    EXPECT_NE(done, "");
+  }
+  EXPECT_TRUE(fs::exists(state() / "before-restore-1"));
+  EXPECT_TRUE(fs::exists(state() / "scans-are-lost"));
 }
 
 // Plumbd's account may have put links anywhere in its folder, and the stick is a stranger's.

@@ -53,6 +53,10 @@ async function surfaceOf(scanId, onPart) {
   }
 }
 
+/// A slider between words for its ends; the input itself is named for a screen reader.
+const slider = (...parts) => h('div', { class: 'slider' }, parts.map((part) =>
+  (typeof part === 'string' ? h('span', { 'aria-hidden': 'true' }, part) : part)));
+
 /// The motion of the body that the correction undoes; null where no correction is advised.
 const motionOf = (scan, details) => (isAdvice(scan) && details?.correction?.vertical_mm !== null
   ? details?.motion?.T ?? null : null);
@@ -82,8 +86,7 @@ function correctionControls(view, canvas, scan, showReference) {
     view.correct(Number(share.value), map);
     canvas.dataset.corrected = share.value;
   });
-  const end = (words) => h('span', { 'aria-hidden': 'true' }, words);
-  return [end(text.before), share, end(text.after)];
+  return slider(text.before, share, text.after);
 }
 
 function controls(view, canvas, { reference, scan, details }, compass) {
@@ -98,18 +101,19 @@ function controls(view, canvas, { reference, scan, details }, compass) {
   const ghost = checkbox(text.ghost, false, {});
   const share = h('input', {
     type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': text.ghostShare,
-    hidden: true,
   });
+  const blend = slider(text.ghostShare, share);
+  blend.hidden = true;
   const state = h('span', { class: 'hint', role: 'status' });
   ghost.box.addEventListener('change', async () => {
-    share.hidden = !ghost.box.checked;
+    blend.hidden = !ghost.box.checked;
     state.textContent = ghost.box.checked ? text.ghostLoading : '';
     try {
       await view.setGhost(ghost.box.checked ? () => surfaceOf(reference.scan_id) : null,
         Number(share.value));
     } catch (error) {
       ghost.box.checked = false;
-      share.hidden = true;
+      blend.hidden = true;
       warn(error.message);
     }
     state.textContent = '';
@@ -120,8 +124,7 @@ function controls(view, canvas, { reference, scan, details }, compass) {
     if (!ghost.box.checked) ghost.box.click();
   });
   return h('div', {}, h('div', { class: 'row' }, buttons, picture, cut),
-    h('div', { class: 'row' }, ghost.element, share, state),
-    correction && h('div', { class: 'row' }, correction));
+    h('div', { class: 'row' }, ghost.element, state), blend, correction);
 }
 
 export function meshView({ scan, reference, details }, map, tolerance_mm) {
