@@ -61,9 +61,11 @@ web::Guidance WebGuidance(SweepAdvice advice) {
     case SweepAdvice::kFarther:
       return web::Guidance::kFarther;
     case SweepAdvice::kLost:
+      return web::Guidance::kTrackingLost;
+    case SweepAdvice::kNoMarkers:
       break;
   }
-  return web::Guidance::kTrackingLost;
+  return web::Guidance::kNoMarkers;
 }
 
 constexpr double kTooManyDropped = 0.2;

@@ -33,9 +33,11 @@ const char* Name(SweepAdvice advice) {
     case SweepAdvice::kFarther:
       return "farther";
     case SweepAdvice::kLost:
+      return "tracking_lost";
+    case SweepAdvice::kNoMarkers:
       break;
   }
-  return "tracking_lost";
+  return "no_markers";
 }
 
 SweepGuide::SweepGuide(const Intrinsics& intrinsics, const GuidanceOptions& options)
@@ -52,6 +54,7 @@ const SweepGuidance& SweepGuide::Add(const Frame& frame, const TrackingReport& r
   if (report.tracked) {
     UpdateSpeed(time_s, report);
     UpdateArea(frame, report);
+    if (report.num_markers > 0) marker_s_ = time_s;
   }
   guidance_.without_new_area_s = std::max(0.0, time_s - grown_s_.value_or(*first_s_));
   guidance_.advice = Advice(time_s);
@@ -91,6 +94,8 @@ void SweepGuide::UpdateArea(const Frame& frame, const TrackingReport& report) {
 
 SweepAdvice SweepGuide::Advice(double time_s) const {
   if (time_s - tracked_s_.value_or(*first_s_) > options_.lost_after_s) return SweepAdvice::kLost;
+  if (time_s - marker_s_.value_or(*first_s_) > options_.no_markers_after_s)
+    return SweepAdvice::kNoMarkers;
   if (guidance_.valid_depth < options_.min_valid_depth) return SweepAdvice::kFarther;
   if (guidance_.median_depth_m > 0 && guidance_.median_depth_m < options_.min_distance_m)
     return SweepAdvice::kFarther;

@@ -10,8 +10,8 @@
 
 namespace plumb {
 
-enum class SweepAdvice { kNone, kSlower, kCloser, kFarther, kLost };
-/// "none", "slower", "closer", "farther", "tracking_lost"
+enum class SweepAdvice { kNone, kSlower, kCloser, kFarther, kLost, kNoMarkers };
+/// "none", "slower", "closer", "farther", "tracking_lost", "no_markers"
 [[nodiscard]] const char* Name(SweepAdvice advice);
 
 /// Starting values; distances in metres, times in seconds by the frames' stamps.
@@ -23,6 +23,9 @@ struct GuidanceOptions {
   double min_valid_depth =
       0.2;  ///< Fraction of pixels with depth; less means that the sensor is too close to measure.
   double lost_after_s = 0.3;  ///< Time without a pose.
+  /// Time without a marker. Over a body there may be none for a moment; a sweep without markers
+  /// cannot be compared.
+  double no_markers_after_s = 4.0;
   double cell_m = 0.05;       ///< Cell of the coarse grid on which seen surface is counted.
   int pixel_step = 16;        ///< Pixels between points.
   double min_growth_m2 =
@@ -63,7 +66,7 @@ class SweepGuide {
   GuidanceOptions options_;
   SweepGuidance guidance_;
   std::unordered_set<std::uint64_t> cells_;
-  std::optional<double> first_s_, tracked_s_, grown_s_;
+  std::optional<double> first_s_, tracked_s_, marker_s_, grown_s_;
   Pose T_world_camera_ = Pose::Identity();
   double grown_area_m2_ = 0.0;
 };

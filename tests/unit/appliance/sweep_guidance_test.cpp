@@ -22,6 +22,7 @@ Frame TableAt(double distance_m, double time_s) {
 TrackingReport SeenFrom(double x_m, double distance_m) {
   TrackingReport report;
   report.tracked = true;
+  report.num_markers = 2;
   report.median_depth_m = distance_m;
   report.valid_depth = 1.0;
   report.T_world_camera.translation() = Eigen::Vector3d(x_m, 0, 0);
@@ -73,6 +74,22 @@ TEST(SweepGuidanceTest, LostTrackingIsToldAfterAMomentAndEndsWithTheNextPose) {
   EXPECT_EQ(guide.Add(TableAt(0.9, 1.1), lost).advice, SweepAdvice::kNone);
   EXPECT_EQ(guide.Add(TableAt(0.9, 1.5), lost).advice, SweepAdvice::kLost);
   EXPECT_NE(guide.Add(TableAt(0.9, 1.6), SeenFrom(0.25, 0.9)).advice, SweepAdvice::kLost);
+}
+
+TEST(SweepGuidanceTest, ASweepThatSeesNoMarkersIsToldAndEndsWithTheNextMarker) {
+  SweepGuide guide(kCamera);
+  TrackingReport none = SeenFrom(0, 0.9);
+  none.num_markers = 0;
+  guide.Add(TableAt(0.9, 0.0), none);
+  EXPECT_EQ(guide.Add(TableAt(0.9, 3.9), none).advice, SweepAdvice::kNone);
+  EXPECT_EQ(guide.Add(TableAt(0.9, 4.1), none).advice, SweepAdvice::kNoMarkers)
+      << "since the beginning";
+  EXPECT_EQ(guide.Add(TableAt(0.9, 4.2), SeenFrom(0, 0.9)).advice, SweepAdvice::kNone);
+  EXPECT_EQ(guide.Add(TableAt(0.9, 8.1), none).advice, SweepAdvice::kNone);
+  EXPECT_EQ(guide.Add(TableAt(0.9, 8.3), none).advice, SweepAdvice::kNoMarkers);
+  none.tracked = false;
+  EXPECT_EQ(guide.Add(TableAt(0.9, 9.0), none).advice, SweepAdvice::kLost)
+      << "the way back comes first";
 }
 
 TEST(SweepGuidanceTest, TimeWithoutNewCoverageRunsWhileTheCameraHoldsStillAndNotWhileItMoves) {
