@@ -45,6 +45,8 @@ constexpr const char* kRestoringOver = ".recovery";
 constexpr const char* kBackingUp = ".backup";
 /// In a restored state folder, until its audit log has the entry.
 constexpr const char* kRestored = "restored.json";
+/// Moved aside with the database, which knows that its key has been used.
+constexpr const char* kProvisionedDisplay = "provisioned-display";
 
 /// True for the paths that a backup can contain: nothing outside it, nothing unknown.
 bool MayHold(const std::string& path) {
@@ -240,7 +242,12 @@ void MoveDatabase(const fs::path& from, const fs::path& to) {
     drop(to);
     throw IoError(DescribeWriteError(to / name, error));
   }
-  SyncDisk(to);
+  try {
+    SyncDisk(to);
+  } catch (const IoError&) {
+    drop(to);
+    throw;
+  }
   if (::rename((from / kDatabase).c_str(), (to / kDatabase).c_str()) != 0 && errno != ENOENT) {
     const int error = errno;
     drop(to);
@@ -258,7 +265,7 @@ fs::path MoveOldAside(const fs::path& state) {
     aside = state / fmt::format("before-restore-{}", n);
   fs::create_directory(aside);
   GiveToOwnerOf(state, aside);
-  std::vector<std::string> names = {kRestored, kScans};
+  std::vector<std::string> names = {kRestored, kProvisionedDisplay, kScans};
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
   std::vector<std::string> moved;
   try {
@@ -380,6 +387,7 @@ BackupReport RestoreOver(const fs::path& backup, const fs::path& state, const st
     try {
       MoveIn(made, state);
     } catch (const IoError& error) {
+      if (report.replaced.empty()) throw;
       throw IoError(fmt::format("{}. What was stored before is in {}; repeat the restore",
                                 error.what(), report.replaced.string()));
     }

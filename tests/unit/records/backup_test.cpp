@@ -245,6 +245,8 @@ TEST_F(BackupTest, WhatARestoreReplacesIsMovedAsideAndWhole) {
   (void)BackUpStopped(state(), backup());
   const auto saved = FilesOf(state());
   WriteWholeFile(state() / "page-key.pem", std::string_view("key"));
+  // Beside a database that does not know its key, it would pair a removed display again.
+  WriteWholeFile(state() / "provisioned-display", std::string_view("hash name"));
   {
     Store store(state());
     scan_ = StoreScan(store, patient_);
@@ -258,6 +260,7 @@ TEST_F(BackupTest, WhatARestoreReplacesIsMovedAsideAndWhole) {
   aside["page-key.pem"] = "key";
   EXPECT_EQ(aside, before) << "all but the key, which stays";
   EXPECT_TRUE(fs::exists(state() / "page-key.pem"));
+  EXPECT_FALSE(fs::exists(state() / "provisioned-display"));
   EXPECT_FALSE(fs::exists(state() / ".recovery"));
   {
     Store store(state());
