@@ -21,7 +21,7 @@ using store::kSelf;
 
 namespace {
 
-/// A display that cannot be paired keeps nobody from scanning.
+/// If the display cannot be paired, that is logged, and scanning remains possible.
 void PairProvisionedDisplay(const std::filesystem::path& state, Store& store) {
   try {
     const std::optional<web::Display> display = ProvisionedDisplay(state);

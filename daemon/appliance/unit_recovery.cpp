@@ -6,7 +6,6 @@
 
 #include <cerrno>
 #include <system_error>
-#include <thread>
 
 #include <fmt/format.h>
 
@@ -14,6 +13,7 @@
 #include "daemon/config/config_section.hpp"
 #include "daemon/records/backup.hpp"
 #include "daemon/records/file_cipher.hpp"
+#include "daemon/records/retry_while_busy.hpp"
 #include "daemon/records/store.hpp"
 #include "drivers/files/file_io.hpp"
 
@@ -43,23 +43,15 @@ void BecomeOwnerOf(const fs::path& state) {
   if (::setuid(0) == 0) throw IoError("the rights of root can be taken back: nothing was changed");
 }
 
-/// A plumbd in safe mode tries to open its store from time to time, and has the lock meanwhile.
 template <typename Action>
-auto OnceFree(std::chrono::milliseconds wait, const Action& action) {
-  const auto end = std::chrono::steady_clock::now() + wait;
-  for (;;) {
-    try {
-      return action();
-    } catch (const DatabaseBusy&) {
-      if (std::chrono::steady_clock::now() >= end) throw;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  }
+auto WhenFree(const RecoveryWait& wait, const Action& action) {
+  constexpr std::chrono::milliseconds kPause(100);
+  return RetryWhileBusy(wait.longest, kPause, wait.sleep, action);
 }
 
-std::string Confirm(int num_lost, const fs::path& state, std::chrono::milliseconds wait) {
+std::string Confirm(int num_lost, const fs::path& state, const RecoveryWait& wait) {
   BecomeOwnerOf(state);
-  OnceFree(wait, [&] {
+  WhenFree(wait, [&] {
     FolderLock lock;
     lock.Take(state);
     ConfirmLostScans(state, num_lost);
@@ -68,7 +60,7 @@ std::string Confirm(int num_lost, const fs::path& state, std::chrono::millisecon
 }
 
 std::string Restore(const UnitRecovery& given, const fs::path& state,
-                    const fs::path& configured_key, std::chrono::milliseconds wait) {
+                    const fs::path& configured_key, const RecoveryWait& wait) {
   std::optional<BackupSecret> secret;
   if (!configured_key.empty()) {  // a stick with a key of its own would be a way around it
     if (!given.key_file.empty())
@@ -79,7 +71,7 @@ std::string Restore(const UnitRecovery& given, const fs::path& state,
     secret.emplace(given.key_file, BackupSecret::Readers::kAny);
   }
   BecomeOwnerOf(state);
-  const BackupReport report = OnceFree(
+  const BackupReport report = WhenFree(
       wait, [&] { return RestoreOver(given.backup, state, {}, secret ? &*secret : nullptr); });
   return fmt::format(
       "restored from {}: {} scans, {} files; what was stored before is in {}",
@@ -119,7 +111,7 @@ UnitRecovery ReadUnitRecovery(const fs::path& file) {
 }
 
 std::string RecoverUnit(const UnitRecovery& given, const fs::path& state,
-                        const fs::path& configured_key, std::chrono::milliseconds wait) {
+                        const fs::path& configured_key, const RecoveryWait& wait) {
   try {
     return given.lost_scans ? Confirm(*given.lost_scans, state, wait)
                             : Restore(given, state, configured_key, wait);

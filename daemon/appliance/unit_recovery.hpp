@@ -1,9 +1,10 @@
-// Recovery of a unit that nobody can log in to with a shell, by one file on a USB stick or on the
-// data partition: whoever stands at the unit has the authority.
+// Recovers a unit that has no shell, as one file on a USB stick or on the data partition says.
+// Physical access to the unit is the authorisation.
 #pragma once
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -20,16 +21,20 @@ struct UnitRecovery {
 /// @throws DataError naming file, line, what was expected and found.
 [[nodiscard]] UnitRecovery ReadUnitRecovery(const std::filesystem::path& file);
 
+/// A plumbd in safe mode tries to open its store from time to time, and uses the folder meanwhile.
+struct RecoveryWait {
+  std::chrono::milliseconds longest = std::chrono::seconds(3);
+  std::function<void(std::chrono::milliseconds)> sleep = {};  ///< Empty: the thread's sleep.
+};
+
 /// Carries it out for a state folder that no plumbd works with: in safe mode, none does. Nothing
 /// that was stored is deleted or overwritten; the next start notes it in the audit log. Root takes
 /// the rights of the folder's owner, for good, once the key is read.
 /// @param configured_key  Key file of the configuration; empty: none. If there is one, only backups
 ///                        that were encrypted with it are restored.
-/// @param wait  For a plumbd in safe mode that just tries to open its store.
 /// @returns what was done, as a sentence.
 /// @throws DataError if the folder is in use, or as RestoreOver(); IoError
 std::string RecoverUnit(const UnitRecovery& given, const std::filesystem::path& state,
-                        const std::filesystem::path& configured_key,
-                        std::chrono::milliseconds wait = std::chrono::seconds(3));
+                        const std::filesystem::path& configured_key, const RecoveryWait& wait = {});
 
 }  // namespace plumb

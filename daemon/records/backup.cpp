@@ -45,7 +45,8 @@ constexpr const char* kRestoringOver = ".recovery";
 constexpr const char* kBackingUp = ".backup";
 /// In a restored state folder, until its audit log has the entry.
 constexpr const char* kRestored = "restored.json";
-/// Moved aside with the database, which knows that its key has been used.
+/// The name of a display and the hash of its key. It is moved aside together with the database,
+/// because only that database records that the key has been used.
 constexpr const char* kProvisionedDisplay = "provisioned-display";
 
 /// True for the paths that a backup can contain: nothing outside it, nothing unknown.

@@ -46,19 +46,39 @@ class Source {
   int fd_;
 };
 
+fs::path InMadeFolders(const fs::path& file) {
+  MakeFolders(file.parent_path());
+  return file;
+}
+
 }  // namespace
+
+DigestingWriter::DigestingWriter(const fs::path& folder, const std::string& path)
+    : target_(InMadeFolders(folder / path)),
+      copy_(target_),
+      digest_{.path = path, .bytes = 0, .sha256 = {}} {}
+
+void DigestingWriter::Write(std::span<const std::uint8_t> bytes) {
+  hash_.Add(bytes.data(), bytes.size());
+  copy_.Write(bytes);
+  digest_.bytes += bytes.size();
+}
+
+FileDigest DigestingWriter::Close() {
+  copy_.Close();
+  ::chmod(target_.c_str(), 0640);
+  digest_.sha256 = hash_.Hex();
+  return digest_;
+}
 
 FileDigest Copy(const fs::path& from, const fs::path& to, const std::string& path,
                 const std::stop_token& stop) {
-  const fs::path source = from / path, target = to / path;
+  const fs::path source = from / path;
   const Source file(source);
   struct stat status {};
   if (::fstat(file.get(), &status) != 0) FailToRead(source, errno);
   if (!S_ISREG(status.st_mode)) FailToRead(source, EINVAL);
-  MakeFolders(target.parent_path());
-  Sha256 hash;
-  FileDigest digest{.path = path, .bytes = 0, .sha256 = {}};
-  FileWriter copy(target);
+  DigestingWriter copy(to, path);
   std::vector<std::uint8_t> buffer(std::size_t{256} << 10);
   for (;;) {
     CheckStop(stop);
@@ -66,15 +86,9 @@ FileDigest Copy(const fs::path& from, const fs::path& to, const std::string& pat
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) FailToRead(source, errno);
     if (count == 0) break;
-    const std::span<const std::uint8_t> bytes(buffer.data(), static_cast<std::size_t>(count));
-    hash.Add(bytes.data(), bytes.size());
-    copy.Write(bytes);
-    digest.bytes += bytes.size();
+    copy.Write({buffer.data(), static_cast<std::size_t>(count)});
   }
-  copy.Close();
-  ::chmod(target.c_str(), 0640);
-  digest.sha256 = hash.Hex();
-  return digest;
+  return copy.Close();
 }
 
 namespace {

@@ -1,12 +1,15 @@
 // Copies files for backups and computes their digests.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <stop_token>
 #include <string>
 
 #include "algo/base/errors.hpp"
 #include "daemon/records/scan_files.hpp"
+#include "drivers/files/file_io.hpp"
 
 namespace plumb {
 
@@ -28,6 +31,24 @@ class SourceUnreadable : public IoError {
 [[nodiscard]] FileDigest CloneOrCopy(const std::filesystem::path& from,
                                      const std::filesystem::path& to, const std::string& path,
                                      const std::stop_token& stop);
+
+/// A file that is written piece by piece as Copy() writes its files; its digest is computed
+/// meanwhile. Destroyed without Close(), it removes the file.
+class DigestingWriter {
+ public:
+  /// Creates the necessary folders. @throws IoError
+  DigestingWriter(const std::filesystem::path& folder, const std::string& path);
+  /// @throws IoError
+  void Write(std::span<const std::uint8_t> bytes);
+  /// @throws IoError
+  [[nodiscard]] FileDigest Close();
+
+ private:
+  std::filesystem::path target_;
+  FileWriter copy_;
+  Sha256 hash_;
+  FileDigest digest_;
+};
 
 /// Writes a small file of a folder durably and in one step. It gets the folder's owner, where the
 /// process may set it.

@@ -7,12 +7,12 @@
 
 #include <cerrno>
 #include <cstring>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "daemon/records/backup.hpp"
+#include "daemon/records/retry_while_busy.hpp"
 #include "daemon/records/schema.hpp"
 #include "drivers/files/file_io.hpp"
 
@@ -55,21 +55,12 @@ void RequireWritable(const ScanFolders& folders) {
 std::unique_ptr<Database> OpenChecked(const fs::path& state, const StoreOptions& options,
                                       bool& is_checked) {
   constexpr std::chrono::milliseconds kPause(500);
-  for (std::chrono::milliseconds waited{0};; waited += kPause) {
-    try {
-      auto database = std::make_unique<Database>(state / kDatabase, Database::Access::kReadWrite,
-                                                 options.busy_wait);
-      is_checked = database->CheckIntegrity(options.check_limit);
-      return database;
-    } catch (const DatabaseBusy&) {
-      if (waited >= options.lock_wait) throw;
-    }
-    if (options.sleep) {
-      options.sleep(kPause);
-    } else {
-      std::this_thread::sleep_for(kPause);
-    }
-  }
+  return RetryWhileBusy(options.lock_wait, kPause, options.sleep, [&] {
+    auto database = std::make_unique<Database>(state / kDatabase, Database::Access::kReadWrite,
+                                               options.busy_wait);
+    is_checked = database->CheckIntegrity(options.check_limit);
+    return database;
+  });
 }
 
 /// The connection for changes, to a database of this version that belongs to this folder's scans.

@@ -268,23 +268,12 @@ FileDigest TarReader::Digest(const std::string& path, const std::stop_token& sto
 
 FileDigest TarReader::CopyTo(const fs::path& to, const std::string& path,
                              const std::stop_token& stop) const {
-  const fs::path target = to / path;
-  std::error_code error;
-  fs::create_directories(target.parent_path(), error);
-  if (error) throw IoError(DescribeWriteError(target.parent_path(), error.value()));
-  Sha256 hash;
-  FileDigest digest{.path = path, .bytes = 0, .sha256 = {}};
-  FileWriter copy(target);
+  DigestingWriter copy(to, path);
   Read(path, [&](std::span<const std::uint8_t> bytes) {
     CheckStop(stop);
-    hash.Add(bytes.data(), bytes.size());
     copy.Write(bytes);
-    digest.bytes += bytes.size();
   });
-  copy.Close();
-  ::chmod(target.c_str(), 0640);
-  digest.sha256 = hash.Hex();
-  return digest;
+  return copy.Close();
 }
 
 }  // namespace plumb

@@ -41,8 +41,8 @@ class TarWriter {
   void Close();
 
  private:
-  /// Where libarchive writes to. It is never told of an error, after which it would leak memory and
-  /// which Check() reports: the rest is dropped.
+  /// The output of libarchive, which leaks memory if it learns of a failed write. Errors are
+  /// therefore kept here, where Check() reports them, and what follows is discarded.
   struct Sink {
     int fd = -1;
     int error = 0;

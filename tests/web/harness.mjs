@@ -15,6 +15,18 @@ export const keepsPictures = process.env.PLUMB_PICTURES === '1';
 // Every size is in screens_test.mjs; painting a larger window would only take the others longer.
 const kSize = { width: 1280, height: 800 };
 
+/// In the page: the pixels of a canvas after its next frame.
+function definePixelsOf() {
+  window.pixelsOf = async (canvas) => {
+    for (let i = 0; i < 3; ++i) await new Promise((ready) => { requestAnimationFrame(ready); });
+    const copy = document.createElement('canvas');
+    [copy.width, copy.height] = [canvas.width, canvas.height];
+    const context = copy.getContext('2d');
+    context.drawImage(canvas, 0, 0);
+    return context.getImageData(0, 0, copy.width, copy.height);
+  };
+}
+
 export class Harness {
   /// @param command  Of the server, with its arguments; it names its address and the setup code on stdout or stderr. FOLDER is replaced.
   static async start({ modules, command, folder, chromium }) {
@@ -63,6 +75,7 @@ export class Harness {
   /// A browser of one's own; complaints of its console are failures.
   async person(name, viewport = kSize, options = {}) {
     const context = await this.browser.newContext({ viewport, reducedMotion: 'reduce', ignoreHTTPSErrors: this.url.startsWith('https'), ...options });
+    await context.addInitScript(definePixelsOf);
     const page = await context.newPage();
     page.setDefaultTimeout(kPatience_ms);
     page.on('pageerror', (error) => this.failures.push(`${name}: script error: ${error.message}`));

@@ -393,21 +393,16 @@ await h.step('the surface opens in 3-D', async () => {
   const mesh = anna.locator('canvas.mesh');
   // What is drawn after the next frame: its bytes, and how much of it is not the ground.
   const drawn = () => mesh.evaluate(async (canvas) => {
-    for (let i = 0; i < 3; ++i) await new Promise((ready) => { requestAnimationFrame(ready); });
-    const copy = document.createElement('canvas');
-    [copy.width, copy.height] = [canvas.width, canvas.height];
-    const context = copy.getContext('2d');
-    context.drawImage(canvas, 0, 0);
-    const { data } = context.getImageData(0, 0, copy.width, copy.height);
+    const { data, width, height } = await window.pixelsOf(canvas);
     let bright = 0;
     let corner = 0;
     for (let i = 0; i < data.length; i += 4) {
       if (data[i] + data[i + 1] + data[i + 2] < 90) continue;
       ++bright;
-      const [x, y] = [(i / 4) % copy.width, Math.floor(i / 4 / copy.width)];
-      if (x > copy.width - 0.2 * copy.height && y > 0.8 * copy.height) ++corner;
+      const [x, y] = [(i / 4) % width, Math.floor(i / 4 / width)];
+      if (x > width - 0.2 * height && y > 0.8 * height) ++corner;
     }
-    return { bytes: canvas.toDataURL('image/png'), bright, corner: corner / (0.04 * copy.height ** 2) };
+    return { bytes: canvas.toDataURL('image/png'), bright, corner: corner / (0.04 * height ** 2) };
   });
   const keep = (name, bytes) => writeFileSync(h.file(`${name}.png`), Buffer.from(bytes.split(',')[1], 'base64'));
   const seen = new Map();

@@ -245,17 +245,12 @@ await h.step('the slider of the 3-D view moves the surface as the correction wil
   // Where the region lies in the picture from the left, in pixels from the top: all around it is dimmed. Without the cube in the corner and
   // the yellow names of the sides, which stay where they are.
   const middle = () => anna.locator('canvas.mesh').evaluate(async (canvas) => {
-    for (let i = 0; i < 3; ++i) await new Promise((ready) => { requestAnimationFrame(ready); });
-    const copy = document.createElement('canvas');
-    [copy.width, copy.height] = [canvas.width, canvas.height];
-    const context = copy.getContext('2d');
-    context.drawImage(canvas, 0, 0);
-    const { data } = context.getImageData(0, 0, copy.width, copy.height);
+    const { data, width, height } = await window.pixelsOf(canvas);
     let [sum, count] = [0, 0];
     for (let i = 0; i < data.length; i += 4) {
-      const [x, y] = [(i / 4) % copy.width, Math.floor(i / 4 / copy.width)];
+      const [x, y] = [(i / 4) % width, Math.floor(i / 4 / width)];
       if (data[i] + data[i + 1] + data[i + 2] < 330 || data[i] - data[i + 2] > 20) continue;
-      if (x > 0.6 * copy.width && y > 0.6 * copy.height) continue;
+      if (x > 0.6 * width && y > 0.6 * height) continue;
       sum += y;
       ++count;
     }

@@ -379,15 +379,22 @@ std::string StoreSmallScan(Store& store, const std::string& patient) {
   return id;
 }
 
-/// As when the disk of the scans is mounted late.
-TEST_F(StorageRetryTest, AStoreThatCouldNotBeOpenedIsOpenedWhenItsScansAreThere) {
+/// Three scans of a patient, whose folder is then moved. Returns the patient.
+std::string StoreAndHideScans(const web::Actor& tester, const fs::path& state,
+                              const fs::path& away) {
   std::string patient;
   {
-    Store store(state());
-    patient = store.patients.Add(kTester, "A", "");
+    Store store(state);
+    patient = store.patients.Add(tester, "A", "");
     for (int i = 0; i < 3; ++i) (void)StoreSmallScan(store, patient);
   }
-  fs::rename(state() / "scans", folder_ / "away");
+  fs::rename(state / "scans", away);
+  return patient;
+}
+
+/// As when the disk of the scans is mounted late.
+TEST_F(StorageRetryTest, AStoreThatCouldNotBeOpenedIsOpenedWhenItsScansAreThere) {
+  const std::string patient = StoreAndHideScans(kTester, state(), folder_ / "away");
   Play([&] {
     EXPECT_THAT(Fault(), HasSubstr("cannot be seen"));
     LetItTryInVain();
@@ -409,13 +416,7 @@ TEST_F(StorageRetryTest, AStoreThatCouldNotBeOpenedIsOpenedWhenItsScansAreThere)
 
 /// As the engineer confirms it, with a file on a stick.
 TEST_F(StorageRetryTest, ScansThatAreConfirmedAsLostEndSafeModeAndAreInTheLog) {
-  std::string patient;
-  {
-    Store store(state());
-    patient = store.patients.Add(kTester, "A", "");
-    for (int i = 0; i < 3; ++i) (void)StoreSmallScan(store, patient);
-  }
-  fs::rename(state() / "scans", folder_ / "away");
+  const std::string patient = StoreAndHideScans(kTester, state(), folder_ / "away");
   Play([&] {
     EXPECT_THAT(Fault(), HasSubstr("lost_scans = 3"));
     const auto confirm = [&](int number) {

@@ -434,7 +434,7 @@ TEST_F(ApplianceTest, TheProvisionedDisplayIsPairedWhenItsStoreOpens) {
   });
 }
 
-TEST_F(ApplianceTest, AProvisionedDisplayThatCannotBeReadKeepsNobodyFromScanning) {
+TEST_F(ApplianceTest, AProvisionedDisplayThatCannotBeReadDoesNotPreventScanning) {
   std::filesystem::create_directories(folder_ / "state");
   WriteWholeFile(folder_ / "state" / "provisioned-display", std::string(63, 'a') + " Room 1\n");
   Play([&] {

@@ -5,7 +5,6 @@
 
 #include <cstdlib>
 #include <memory>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -92,7 +91,8 @@ TEST_F(UnitRecoveryTest, AUnitThatWorksIsLeftAlone) {
   const Store store(state());
   for (const char* text : {"[recovery]\nrestore = \"backup\"\n", "[recovery]\nlost_scans = 2\n"}) {
     EXPECT_THAT(MessageOf<DataError>([&] {
-                  (void)RecoverUnit(Read(text), state(), {}, std::chrono::milliseconds(0));
+                  (void)RecoverUnit(Read(text), state(), {},
+                                    {.longest = std::chrono::milliseconds(0), .sleep = {}});
                 }),
                 HasSubstr("nothing was changed"));
   }
@@ -106,14 +106,14 @@ TEST_F(UnitRecoveryTest, AFolderThatIsHeldForAMomentIsWaitedFor) {
   for (const char* text : {"[recovery]\nrestore = \"backup\"\n", "[recovery]\nlost_scans = 2\n"}) {
     auto held = std::make_unique<FolderLock>();
     held->Take(state());
-    std::thread safe_mode([&] {
-      std::this_thread::sleep_for(std::chrono::milliseconds(300));
-      held.reset();
-    });
-    std::string done;
-    EXPECT_NO_THROW(done = RecoverUnit(Read(text), state(), {}, std::chrono::minutes(1)));
-    safe_mode.join();
-    EXPECT_NE(done, "");
+    int num_pauses = 0;
+    const auto pause = [&](std::chrono::milliseconds) {
+      if (++num_pauses == 3) held.reset();
+    };
+    EXPECT_NE(
+        RecoverUnit(Read(text), state(), {}, {.longest = std::chrono::minutes(1), .sleep = pause}),
+        "");
+    EXPECT_EQ(num_pauses, 3);
   }
   EXPECT_TRUE(fs::exists(state() / "before-restore-1"));
   EXPECT_TRUE(fs::exists(state() / "scans-are-lost"));
@@ -121,7 +121,7 @@ TEST_F(UnitRecoveryTest, AFolderThatIsHeldForAMomentIsWaitedFor) {
 
 // Plumbd's account may have put links anywhere in its folder, and the stick is a stranger's.
 TEST_F(UnitRecoveryTest, RootTakesTheRightsOfTheFoldersOwner) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can take another account's rights";
+  if (::geteuid() != 0) GTEST_SKIP() << "needs root, which takes the rights of another account";
   constexpr uid_t kOwner = 12345;
   (void)BackUpStopped(state(), stick() / "backup.tar");
   const UnitRecovery given = Read("[recovery]\nrestore = \"backup.tar\"\n");
