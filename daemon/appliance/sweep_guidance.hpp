@@ -26,8 +26,8 @@ struct GuidanceOptions {
   /// Time without a marker. Over a body there may be none for a moment; a sweep without markers
   /// cannot be compared.
   double no_markers_after_s = 4.0;
-  double cell_m = 0.05;       ///< Cell of the coarse grid on which seen surface is counted.
-  int pixel_step = 16;        ///< Pixels between points.
+  double cell_m = 0.05;  ///< Cell of the coarse grid on which seen surface is counted.
+  int pixel_step = 16;   ///< Pixels between points.
   double min_growth_m2 =
       0.03;  ///< Smaller areas are noise at the edges of what was seen before, not new coverage.
   double smoothing_s = 0.25;  ///< Time constant of the speed.
