@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxWaiting = 8;
 constexpr std::chrono::minutes kWaitsFor{10};
+constexpr std::chrono::seconds kLoadsAgain{5};
 constexpr int kMaxWrongCodes = 20;
 constexpr int kCookieAge_s =
     400 * 24 * 3600;  // the longest that browsers keep a cookie; renewed at each use
@@ -50,11 +51,14 @@ void Displays::Load() {
   }
   for (const auto& [hash, session] : sessions_) session->ended = !sessions.contains(hash);
   sessions_ = std::move(sessions);
+  loaded_ = now_();
 }
 
 std::shared_ptr<Session> Displays::SessionOf(const Request& request) {
   const auto token = CookieValue(request.Header("cookie"), cookie_name());
   if (!token || token->empty() || token->size() > 64) return nullptr;
+  // In safe mode the database opens later than this begins, without a change of the displays.
+  if (sessions_.empty() && now_() - loaded_ >= kLoadsAgain) Load();
   const auto found = sessions_.find(StoredHashOf(*token));
   return found == sessions_.end() ? nullptr : found->second;
 }
