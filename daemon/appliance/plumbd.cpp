@@ -333,6 +333,22 @@ std::string ResetIfAsked(const fs::path& state) {
   return {};
 }
 
+/// A unit without a shell cannot have its configuration corrected first.
+void Recover(const fs::path& file, const Configured& configured) {
+  const ApplianceConfig& config = configured.config.appliance;
+  const UnitRecovery given = ReadUnitRecovery(file);
+  if (!configured.fault.empty()) {
+    // Without that key any backup would be taken.
+    if (!given.backup.empty() && configured.may_name_backup_key)
+      throw DataError("nothing is restored, because the key for backups is not known: " +
+                      configured.fault);
+    fmt::print("{}. What is recovered is {}\n", configured.fault, config.state.string());
+    std::fflush(stdout);
+  }
+  ::umask(::umask(0077) | 0027);
+  fmt::print("{}\n", RecoverUnit(given, config.state, config.backup_key_file));
+}
+
 int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
   if (options.show_stopped) return ShowStopped(options, registry);
   if (options.check_config) {
@@ -349,10 +365,7 @@ int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
     return 0;
   }
   if (options.recover) {
-    const ApplianceConfig config = ReadConfiguration(options, registry).appliance;
-    ::umask(::umask(0077) | 0027);
-    fmt::print("{}\n", RecoverUnit(ReadUnitRecovery(*options.recover), config.state,
-                                   config.backup_key_file));
+    Recover(*options.recover, ReadOrExplain(options, registry));
     return 0;
   }
   if (options.simulated.empty() == false && !options.state)

@@ -1,6 +1,7 @@
 #include "daemon/appliance/plumbd_options.hpp"
 
 #include <exception>
+#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -11,6 +12,7 @@
 #include "algo/base/pose.hpp"
 #include "daemon/appliance/page_identity.hpp"
 #include "daemon/config/version.hpp"
+#include "drivers/files/file_io.hpp"
 
 namespace plumb {
 namespace {
@@ -25,6 +27,29 @@ Pose SimulatedRoom() {
   Pose T_iec_reference = Pose::Identity();
   T_iec_reference.linear() << 0, 1, 0, -1, 0, 0, 0, 0, 1;
   return T_iec_reference;
+}
+
+/// The file to read; nothing: the defaults.
+std::optional<fs::path> ConfigFile(const PlumbdOptions& options) {
+  std::error_code ignored;
+  if (options.config_file) return options.config_file;
+  if (options.use_default_config && options.simulated.empty() &&
+      fs::exists(kDefaultConfig, ignored))
+    return kDefaultConfig;
+  return std::nullopt;
+}
+
+/// Read line by line, because the file may be no TOML. What cannot be read may name one.
+bool MayNameBackupKey(const fs::path& file) try {
+  constexpr std::size_t kMaxBytes = 1 << 20;
+  std::istringstream lines(ReadTextFile(file, kMaxBytes));
+  for (std::string line; std::getline(lines, line);) {
+    const bool is_comment = line.find_first_not_of(" \t") == line.find('#');
+    if (!is_comment && line.find("backup_key_file") != std::string::npos) return true;
+  }
+  return false;
+} catch (const std::exception&) {
+  return true;
 }
 
 }  // namespace
@@ -80,13 +105,8 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
 
 Config ReadConfiguration(const PlumbdOptions& options, const SensorRegistry& registry) {
   Config config;
-  std::error_code ignored;
-  if (options.config_file) {
-    config = ReadConfig(*options.config_file, ConfigUse::kAppliance);
-  } else if (options.use_default_config && options.simulated.empty() &&
-             fs::exists(kDefaultConfig, ignored)) {
-    config = ReadConfig(kDefaultConfig, ConfigUse::kAppliance);
-  }
+  if (const std::optional<fs::path> file = ConfigFile(options))
+    config = ReadConfig(*file, ConfigUse::kAppliance);
   if (options.simulated.empty())
     RefuseResearchPresets(config);
   else if (!config.compare.T_iec_reference)
@@ -112,17 +132,19 @@ Config ReadConfiguration(const PlumbdOptions& options, const SensorRegistry& reg
 
 Configured ReadOrExplain(const PlumbdOptions& options, const SensorRegistry& registry) {
   try {
-    return {.config = ReadConfiguration(options, registry), .fault = {}};
+    return {.config = ReadConfiguration(options, registry), .fault = {}, .may_name_backup_key = {}};
   } catch (const std::invalid_argument&) {
     throw;  // from the command line
   } catch (const std::exception& error) {
     PlumbdOptions without_file = options;
     without_file.config_file.reset();
     without_file.use_default_config = false;
+    const std::optional<fs::path> file = ConfigFile(options);
     return {.config = ReadConfiguration(without_file, registry),
             .fault = fmt::format("the configuration cannot be used: {}. Correct the file, then "
                                  "restart: systemctl restart plumbd",
-                                 error.what())};
+                                 error.what()),
+            .may_name_backup_key = file && MayNameBackupKey(*file)};
   }
 }
 

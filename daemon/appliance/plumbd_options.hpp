@@ -38,6 +38,8 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options);
 struct Configured {
   Config config;
   std::string fault;
+  /// The file that cannot be used names a key for backups, or may do so.
+  bool may_name_backup_key = false;
 };
 
 /// As ReadConfiguration(). If the file cannot be used, the program still starts: page, light and

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/utf8.hpp"
 #include "daemon/records/audit_subjects.hpp"
 #include "daemon/records/scan_files.hpp"
 #include "daemon/records/stored_values.hpp"
@@ -34,6 +36,9 @@ std::string ChainText(const std::string& before, std::int64_t number, std::int64
 }
 
 constexpr std::array<const char*, 5> kFields = {"user", "address", "action", "subject", "detail"};
+
+/// Key of an exported field as it is stored, where that is not UTF-8, such as a path.
+std::string BytesKey(const char* field) { return fmt::format("{}_bytes", field); }
 
 constexpr const char* kAuditRows =
     "SELECT number, time, user, address, action, subject, detail, chain FROM audit ORDER BY number";
@@ -122,8 +127,12 @@ std::string AuditStore::Export() {
   std::string lines;
   while (query.Step()) {
     nlohmann::ordered_json line = {{"number", query.Integer(0)}, {"time_us", query.Integer(1)}};
-    for (std::size_t i = 0; i < kFields.size(); ++i)
-      line[kFields[i]] = query.Text(static_cast<int>(i) + 2);
+    for (std::size_t i = 0; i < kFields.size(); ++i) {
+      const std::string stored = query.Text(static_cast<int>(i) + 2), shown = ValidUtf8(stored);
+      line[kFields[i]] = shown;
+      if (shown != stored)
+        line[BytesKey(kFields[i])] = std::vector<std::uint8_t>(stored.begin(), stored.end());
+    }
     line["chain"] = query.Text(7);
     lines += line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   }
@@ -143,8 +152,15 @@ AuditHead CheckAuditExport(std::string_view lines) {
     try {
       number = line.at("number").get<std::int64_t>();
       time_us = line.at("time_us").get<std::int64_t>();
-      for (std::size_t i = 0; i < fields.size(); ++i)
+      for (std::size_t i = 0; i < fields.size(); ++i) {
         fields[i] = line.at(kFields[i]).get<std::string>();
+        const auto bytes = line.find(BytesKey(kFields[i]));
+        if (bytes == line.end()) continue;
+        const auto raw = bytes->get<std::vector<std::uint8_t>>();
+        const std::string stored(raw.begin(), raw.end());
+        // A text that the bytes do not give is not the one that the chain covers.
+        if (ValidUtf8(stored) == fields[i]) fields[i] = stored;
+      }
       chain = line.at("chain").get<std::string>();
     } catch (const nlohmann::json::exception&) {
       throw DataError(fmt::format("what follows entry {} is not an entry of the log", head.number));

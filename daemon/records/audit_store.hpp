@@ -39,7 +39,8 @@ class AuditStore {
   /// Newest first.
   [[nodiscard]] std::vector<web::AuditEntry> Find(const web::AuditQuery& wanted);
   /// The newest kMaxExported entries, oldest first: one JSON object per line, with all fields that
-  /// the chain covers and its digests.
+  /// the chain covers and its digests. A field that is not UTF-8 is exported with U+FFFD, and its
+  /// bytes as numbers in FIELD_bytes.
   [[nodiscard]] std::string Export();
   static constexpr int kMaxExported = 200'000;
   [[nodiscard]] AuditHead Head();

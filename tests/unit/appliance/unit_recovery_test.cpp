@@ -5,11 +5,15 @@
 
 #include <cstdlib>
 #include <memory>
+#include <string>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
+#include "daemon/appliance/plumbd.hpp"
 #include "daemon/records/backup.hpp"
 #include "daemon/records/file_cipher.hpp"
 #include "tests/support/message_of.hpp"
@@ -20,6 +24,7 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::kAnna;
 using testing::MessageOf;
@@ -167,6 +172,47 @@ TEST_F(UnitRecoveryTest, WithAConfiguredKeyAForeignBackupIsRefused) {
               HasSubstr("2 scans"));
   EXPECT_THAT(RecoverUnit(Read(with_key), state(), {}), HasSubstr("before-restore-2"))
       << "a unit without its configuration takes the key from the stick";
+}
+
+TEST_F(UnitRecoveryTest, ABadConfigurationIsNoneUnlessItNamesAKeyForBackups) {
+  (void)BackUpStopped(state(), stick() / "backup");
+  (void)Read("[recovery]\nrestore = \"backup\"\n");
+  const fs::path config = folder_ / "plumb.toml";
+  const auto recover = [&](const std::string& text) {
+    WriteWholeFile(config, std::string_view(text));
+    std::vector<std::string> words = {"plumbd",
+                                      "--config",
+                                      config,
+                                      "--state",
+                                      state(),
+                                      "--recover",
+                                      stick() / "plumb-recovery.toml"};
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    ::testing::internal::CaptureStdout();
+    const int code = RunPlumbd(static_cast<int>(arguments.size()), arguments.data());
+    return std::to_string(code) + ' ' + ::testing::internal::GetCapturedStdout();
+  };
+  for (const char* text : {"[storage]\nbackup_hours = 0\nbackup_key_file = \"/etc/key\"\n",
+                           "storage = {x = \"#\", backup_key_file = \"/etc/key\"",
+                           "[storage\n"
+                           "  backup_key_file = \"/etc/key\"\n"}) {
+    EXPECT_EQ(recover(text), "3 ") << text;
+  }
+  EXPECT_FALSE(fs::exists(state() / "before-restore-1"));
+  int num_restored = 0;
+  for (const char* text : {"[storage]\nbackup_hours = 0\n", "[stor",
+                           "[storage]\n # backup_key_file = \"/etc/key\"\nx = 1\n"}) {
+    EXPECT_THAT(recover(text),
+                AllOf(HasSubstr("0 the configuration cannot be used"), HasSubstr(config.string()),
+                      HasSubstr("What is recovered is " + state().string()),
+                      HasSubstr(fmt::format("before-restore-{}", ++num_restored))))
+        << text;
+  }
+  (void)Read("[recovery]\nlost_scans = 2\n");
+  EXPECT_THAT(recover("[storage]\nx = 1\nbackup_key_file = \"/etc/key\"\n"),
+              HasSubstr("2 missing scans are confirmed"))
+      << "which needs no key";
 }
 
 }  // namespace

@@ -30,8 +30,10 @@ using testing::StoreScan;
 constexpr std::size_t kBlock = 512;
 
 /// One entry of an archive, with a header as every tar writes it.
+/// @param fields  What the header has instead, by its position.
 std::string TarEntry(const std::string& name, char type, const std::string& content = {},
-                     const std::string& link = {}) {
+                     const std::string& link = {},
+                     const std::map<std::size_t, std::string>& fields = {}) {
   std::string header(kBlock, '\0');
   const auto put = [&](std::size_t at, const std::string& text) {
     header.replace(at, text.size(), text);
@@ -48,12 +50,29 @@ std::string TarEntry(const std::string& name, char type, const std::string& cont
   put(257, std::string("ustar\0"
                        "00",
                        8));
+  for (const auto& [at, text] : fields) put(at, text);
   unsigned sum = 0;
   for (const unsigned char byte : header) sum += byte;
   put(148, fmt::format("{:06o}", sum) + std::string(1, '\0'));
   std::string padded = content;
   padded.resize((content.size() + kBlock - 1) / kBlock * kBlock, '\0');
   return header + padded;
+}
+
+/// The size of an entry as a binary number, for more than eleven octal digits can state.
+std::string BinarySize(std::uint64_t bytes) {
+  std::string field(12, '\0');
+  field[0] = '\x80';
+  for (std::size_t i = 0; i < sizeof bytes; ++i)
+    field[11 - i] = static_cast<char>(bytes >> (8 * i));
+  return field;
+}
+
+/// An empty file "scans/pax", preceded by a pax header with one record that replaces what its own
+/// header states. @param record  So short that its length has two digits, as in "path=x".
+std::string PaxEntry(const std::string& record) {
+  return TarEntry("PaxHeaders/" + record, 'x', fmt::format("{} {}\n", record.size() + 4, record)) +
+         TarEntry("scans/pax", '0');
 }
 
 class BackupArchiveTest : public ::testing::Test {
@@ -233,6 +252,11 @@ TEST_F(BackupArchiveTest, AFlippedByteOfAFileOrItsHeaderRestoresNothing) {
 TEST_F(BackupArchiveTest, WhatIsNoPlainFileOfABackupIsRefused) {
   (void)BackUpStopped(state(), backup());
   const std::string whole = Content();
+  // A GNU header with one piece of 512 bytes at the end of a file of 32 KiB.
+  const std::map<std::size_t, std::string> sparse = {{257, std::string("ustar  \0", 8)},
+                                                     {386, "00000077000"},
+                                                     {398, "00000001000"},
+                                                     {483, "00000100000"}};
   const std::map<std::string, std::string> refused = {
       {TarEntry("scans/link", '2', "", "/etc/passwd"), "not a plain file"},
       {TarEntry("scans/hard", '1', "", "plumb.db"), "not a plain file"},
@@ -249,6 +273,17 @@ TEST_F(BackupArchiveTest, WhatIsNoPlainFileOfABackupIsRefused) {
       {TarEntry("SHA256SUMS", '0', "x"), "SHA256SUMS twice"},
       {TarEntry("backup.json", '0', "x"), "backup.json twice"},
       {TarEntry("scans/000001/scene/more", '0', "x"), "files, "},
+      {TarEntry("scans/2^40", '0', "x", "", {{124, BinarySize(1ULL << 40U)}}),
+       "ends within scans/"},
+      {TarEntry("scans/2^63", '0', "x", "", {{124, BinarySize(1ULL << 63U)}}), "damaged"},
+      {TarEntry("scans/minus", '0', "x", "", {{124, std::string(12, '\xFF')}}), "damaged"},
+      {TarEntry("scans/sparse", 'S', std::string(kBlock, 'x'), "", sparse), "not a plain file"},
+      {PaxEntry("path=../evil"), "not plain"},
+      {PaxEntry("path=/etc/evil"), "not plain"},
+      {PaxEntry("path=plumb.db"), "plumb.db twice"},
+      {PaxEntry("GNU.sparse.name=../evil"), "not plain"},
+      {PaxEntry("size=1099511627776"), "ends within scans/"},
+      {PaxEntry("size=9223372036854775808"), "damaged"},
   };
   for (const auto& [entry, why] : refused) {
     Put(entry + whole);

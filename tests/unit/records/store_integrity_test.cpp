@@ -14,6 +14,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::kAnna;
 using testing::kBert;
+using ::testing::Not;
 using testing::PlanAndApprove;
 using testing::StoreScan;
 
@@ -151,6 +152,23 @@ TEST_F(StoreIntegrityTest, TheAuditLogShowsWhatWasChangedInItOrTakenFromIt) {
   EXPECT_EQ(store_.audit.FirstBroken(), number - 1);
   EXPECT_THAT(testing::MessageOf<DataError>([&] { (void)CheckAuditExport(store_.audit.Export()); }),
               HasSubstr(fmt::format("entry {} is not", number - 1)));
+}
+
+TEST_F(StoreIntegrityTest, AnEntryOfTheAuditLogThatIsNotUtf8IsExportedAsItWasWritten) {
+  store_.audit.Log(kAnna, "note", "\xC3\xA4", "/media/\xE4\xFF is full");  // a path in Latin-1
+  ASSERT_EQ(store_.audit.FirstBroken(), std::nullopt);
+  const std::string exported = store_.audit.Export();
+  EXPECT_EQ(CheckAuditExport(exported).chain, store_.audit.Head().chain);
+  EXPECT_THAT(exported, AllOf(HasSubstr("\"detail\":\"/media/\xEF\xBF\xBD\xEF\xBF\xBD is full\""),
+                              HasSubstr(",228,255,"), Not(HasSubstr("subject_bytes"))));
+  for (const auto& [from, to] :
+       {std::pair("228,255", "228,254"), std::pair("is full", "is fine")}) {
+    std::string lines = exported;
+    lines.replace(lines.find(from), 7, to);
+    EXPECT_THAT(testing::MessageOf<DataError>([&] { (void)CheckAuditExport(lines); }),
+                HasSubstr("is not as it was written"))
+        << to;
+  }
 }
 
 TEST_F(StoreIntegrityTest, UnusableFilesAreCountedUntilTheyAreBackOrTheirPatientIsArchived) {
