@@ -63,7 +63,7 @@ struct ApplianceParts {
 };
 
 /// Not thread-safe: call it on the loop's thread, except for functions marked "from any thread".
-/// They return at once. Its own threads are described in daemon/README.md.
+/// They return at once. Its threads: daemon/README.md. The loop must not run after its destruction.
 class Appliance {
  public:
   Appliance(EventLoop& loop, ApplianceParts parts);

@@ -196,7 +196,8 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
     EXPECT_EQ(WebSettings(access).GetSettings().idle_logout_min, 7);
   }
   set("{");
-  Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+  EventLoop another;
+  Appliance appliance(another, PartsOf(around.config, around.bus));
   StoreAccess access(appliance);
   EXPECT_THAT(testing::MessageOf<IoError>([&] { (void)WebSettings(access).GetSettings(); }),
               HasSubstr("what is stored cannot be read: the stored settings cannot be read: "))
@@ -208,7 +209,7 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
   WebSettings settings(access);
   settings.ChangeSettings({.user = "anna", .address = {}}, entered,
                           [&](const web::Change& change) { changed = change; });
-  EXPECT_TRUE(RunUntil(around.loop, [&] { return changed.has_value(); }));
+  EXPECT_TRUE(RunUntil(another, [&] { return changed.has_value(); }));
   EXPECT_EQ(changed->result, web::ChangeResult::kDone);
   EXPECT_EQ(settings.GetSettings().idle_logout_min, 9);
 }
