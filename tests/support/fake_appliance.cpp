@@ -332,7 +332,7 @@ void FakeAppliance::EndScan() {
   scan.finished_at = WallClock::now();
   if (!recorded.empty()) {
     const Recorded data =
-        next_recorded ? *next_recorded : recorded[std::min(num_finished_, recorded.size() - 1)];
+        next_recorded ? *next_recorded : recorded[std::min(num_finished_, recorded.size() - 1)]();
     if (!next_recorded) ++num_finished_;
     next_recorded.reset();
     scan.folder = data.folder;

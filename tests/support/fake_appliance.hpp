@@ -72,7 +72,7 @@ class FakeAppliance : public web::BackgroundWork,
     std::filesystem::path folder;
     std::optional<web::ResultSummary> result;
   };
-  std::vector<Recorded> recorded;
+  std::vector<std::function<Recorded()>> recorded;
   std::string backup_fault;               ///< Why no backup can be made; empty: one can.
   std::optional<Recorded> next_recorded;  ///< Set: what the next finished scan shows, out of turn.
   std::chrono::milliseconds sweep{3000};

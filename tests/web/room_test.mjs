@@ -138,6 +138,17 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
     }
   }
   equal(await room.locator('.number').count(), 0, 'no result during the sweep');
+  // Also beside the note of whose sides the marks are.
+  await room.locator('.room-sweep .marks-note').waitFor(kSlow);
+  for (const [width, height] of [[1280, 800], [1920, 1080]]) {
+    await room.setViewportSize({ width, height });
+    // All at once: the map is drawn again twice a second.
+    const [map, sweep, ...words] = await room.evaluate(() => ['.live-surface .map-box', '.room-sweep', '.marks-note', '.live-surface .keys']
+      .map((place) => document.querySelector(place).getBoundingClientRect().toJSON()));
+    check(map.height > 0.95 * sweep.height || map.width > 0.45 * sweep.width,
+      `the map has its space at ${width}x${height}: ${map.width} x ${map.height} of ${sweep.width} x ${sweep.height}`);
+    for (const { bottom } of words) check(bottom <= height, `note and keys in view at ${width}x${height}: down to ${bottom}`);
+  }
   h.tell('guide');
   h.tell('fast');
   await room.locator('.room-word', { hasText: 'COMPUTING' }).waitFor(kSlow);

@@ -67,18 +67,19 @@ Scene SceneOf(const SyntheticOptions& options) {
   return scene;
 }
 
+constexpr int kNumSweeps = 4;
+
 /// What the sweeps show in turn: a body, carried, lying right, with its markers covered.
-std::vector<SyntheticOptions> Sweeps() {
-  const SyntheticOptions reference = At(Pose::Identity(), 1, 0.0);
-  const SyntheticOptions moved =
-      At(BodyMotionAbout(kCentre, {0.0062, -0.0124, 0.0041}, -2.4, 0.6, -0.5), 2, 0.0008);
-  const SyntheticOptions right =
-      At(BodyMotionAbout(kCentre, {0.0006, -0.0004, 0.0003}, 0.05), 3, 0.0008);
-  SyntheticOptions covered = right;
-  for (const auto& [id, marker] : MakeSyntheticScene(reference).markers)
-    covered.hidden_markers.insert(id);
-  covered.hidden_markers.erase(covered.hidden_markers.begin());
-  return {reference, moved, right, covered};
+SyntheticOptions Sweep(int number) {
+  if (number == 0) return At(Pose::Identity(), 1, 0.0);
+  if (number == 1)
+    return At(BodyMotionAbout(kCentre, {0.0062, -0.0124, 0.0041}, -2.4, 0.6, -0.5), 2, 0.0008);
+  SyntheticOptions right = At(BodyMotionAbout(kCentre, {0.0006, -0.0004, 0.0003}, 0.05), 3, 0.0008);
+  if (number == 2) return right;
+  for (const auto& [id, marker] : MakeSyntheticScene(Sweep(0)).markers)
+    right.hidden_markers.insert(id);
+  right.hidden_markers.erase(right.hidden_markers.begin());
+  return right;
 }
 
 /// Another person in the place of the one of the reference.
@@ -126,6 +127,14 @@ class Recorder {
     return Write(folder, Compare(*reference_, scene, Options()));
   }
 
+  /// As Record(), but only the first time that something of this name is shown.
+  FakeAppliance::Recorded Once(const std::string& name,
+                               const std::function<SyntheticOptions()>& options) {
+    const auto made = made_.find(name);
+    return made != made_.end() ? made->second
+                               : made_.emplace(name, Record(options())).first->second;
+  }
+
   [[nodiscard]] const Scene& reference() const { return *reference_; }
 
   /// As Record(), of a scene that something was done to.
@@ -151,7 +160,7 @@ class Recorder {
   /// A moved body, in a room whose axes are turned by 90 degrees: the plan's posture is not its
   /// own.
   FakeAppliance::Recorded RecordAcross() {
-    Scene scene = SceneOf(Sweeps()[1]);
+    Scene scene = SceneOf(Sweep(1));
     if (scene.height_map) scene.mesh = MeshOfHeightMap(*scene.height_map, {}, {.decimation = 3});
     CompareOptions across = Options();
     across.T_iec_reference = Pose::Identity();
@@ -201,6 +210,7 @@ class Recorder {
   int num_folders_ = 0;
   std::optional<Scene> reference_;
   std::optional<Comparison> still_;
+  std::map<std::string, FakeAppliance::Recorded> made_;  ///< By the name of what they show.
 };
 
 /// What a sweep from low to high x has seen of the body after that share of it, as plumbd packs it.
@@ -296,7 +306,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     check.num_markers = 12;
     service.next_check = check;
   }
-  if (name == "stranger") service.next_recorded = recorder.Record(Stranger());
+  if (name == "stranger") service.next_recorded = recorder.Once(name, Stranger);
   if (name == "across") service.next_recorded = recorder.RecordAcross();
   if (name == "room") {
     std::string what;
@@ -418,8 +428,12 @@ web::SensorProfiles KnownSensor() {
 int Serve(const fs::path& root, bool tls) {
   FakeAppliance service;
   Recorder recorder(root);
-  for (const SyntheticOptions& options : Sweeps())
-    service.recorded.push_back(recorder.Record(options));
+  // Each takes a second to make: all but the reference only for tests that show them.
+  for (int number = 0; number < kNumSweeps; ++number)
+    service.recorded.emplace_back([&recorder, number] {
+      return recorder.Once(fmt::format("sweep {}", number), [number] { return Sweep(number); });
+    });
+  service.recorded.front()();
   service.make_map = [](const fs::path& folder,
                         const std::string& name) -> std::optional<std::string> {
     try {

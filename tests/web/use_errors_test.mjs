@@ -582,7 +582,12 @@ await h.step('scan again leads to the sweep only in the session of the same pati
 
 await h.step('two at one plan: neither saves over or approves what they have not seen', async () => {
   const shift = (page) => page.getByLabel('Shifts (mm)');
-  const save = (page) => page.getByRole('button', { name: 'Save plan' }).click();
+  /// Until the plan is drawn again: what is typed before would be lost.
+  const save = async (page) => {
+    const field = await shift(page).elementHandle();
+    await page.getByRole('button', { name: 'Save plan' }).click();
+    await page.waitForFunction((one) => !one.isConnected, field);
+  };
   await bob.goto(`${h.url}#/plan/${(await h.api(anna, 'scans?limit=1')).body.scans[0].reference_id}`);
   await shift(bob).fill('4');
   await save(bob);  // of an approved one: a new version
