@@ -77,6 +77,7 @@ class Comparer {
   Comparer(const Scene& reference, const Scene& current, const CompareOptions& options)
       : reference_(reference), current_(current), options_(options) {
     result_.preset = options.preset;
+    result_.limits = options.limits;
     result_.reference_profile = reference.sensor_profile;
     result_.current_profile = current.sensor_profile;
     evidence_.reference_lost_s = reference.longest_lost_s;

@@ -77,6 +77,7 @@ struct Comparison {
   std::optional<std::string> reference_profile, current_profile;
   Verdict verdict = Verdict::kNoAnswer;
   std::vector<std::string> reasons;  ///< Complete sentences; the first one decides.
+  AcceptanceLimits limits;           ///< By which the verdict was reached.
   std::optional<Alignment> alignment;
   std::optional<BodyMotion> motion;
   std::optional<Correction> correction;

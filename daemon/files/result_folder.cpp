@@ -94,10 +94,12 @@ Json NumbersJson(const CouchNumbers& numbers) {
           {"yaw_deg", numbers.yaw_deg}};
 }
 
-Json RegionJson(const RegionCoverage& region) {
+Json RegionJson(const RegionCoverage& region, const AcceptanceLimits& limits) {
   return {{"coverage", region.coverage},
           {"largest_hole_m", region.largest_hole_m},
-          {"hole_centre_m", VectorJson(region.hole_centre_m)}};
+          {"hole_centre_m", VectorJson(region.hole_centre_m)},
+          {"min_coverage", limits.min_coverage},
+          {"max_hole_m", limits.max_hole_m}};
 }
 
 Json BodyPartsJson(const BodyParts& body) {
@@ -191,7 +193,8 @@ std::string ResultJson(const Comparison& comparison, const std::optional<ResultR
   json["motion"] = comparison.motion ? MotionJson(*comparison.motion) : Json(nullptr);
   json["correction"] =
       comparison.correction ? CorrectionJson(*comparison.correction) : Json(nullptr);
-  json["region"] = comparison.region ? RegionJson(*comparison.region) : Json(nullptr);
+  json["region"] =
+      comparison.region ? RegionJson(*comparison.region, comparison.limits) : Json(nullptr);
   json["body"] = comparison.body_parts ? BodyPartsJson(*comparison.body_parts) : Json(nullptr);
   json["deformation"] =
       comparison.deformation ? DeformationJson(*comparison.deformation) : Json(nullptr);

@@ -106,7 +106,6 @@ function row(view, ...children) {
   return element;
 }
 
-const kHole_m = 0.05;
 const kAround = 2;  // cells to each side: what is read is the surface, not one cell's noise
 function around({ width, values }, cell) {
   const known = [];
@@ -147,8 +146,8 @@ async function loadAll(scan, reference, place) {
 
 /// The middle of the hole for which there is no answer: where to sweep again.
 function holeOf({ result, details }) {
-  const { largest_hole_m: size = 0, hole_centre_m: middle } = details?.region ?? {};
-  return result?.verdict === 'no_answer' && size > kHole_m ? middle : null;
+  const { largest_hole_m: size, max_hole_m: limit, hole_centre_m: middle } = details?.region ?? {};
+  return result?.verdict === 'no_answer' && size > limit ? middle : null;
 }
 
 /// Figure with map, reading and profile for a scan with a result; falls back to the picture.

@@ -249,7 +249,9 @@ TEST(ComparisonTest, TheMeasuredResidualMeetsItsLimit) {
   options.limits.max_residual_p95_m = 1.001 * residual_m;
   EXPECT_EQ(Compare(reference, current, options).verdict, Verdict::kInTolerance);
   options.limits.max_residual_p95_m = 0.999 * residual_m;
-  EXPECT_EQ(Compare(reference, current, options).verdict, Verdict::kNoAnswer);
+  const Comparison refused = Compare(reference, current, options);
+  EXPECT_EQ(refused.verdict, Verdict::kNoAnswer);
+  EXPECT_EQ(refused.limits.max_residual_p95_m, options.limits.max_residual_p95_m);
 }
 
 TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {

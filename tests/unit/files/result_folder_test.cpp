@@ -119,6 +119,8 @@ TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
   EXPECT_EQ(correction.at("uncertainty").at("lateral_mm"), 0.7);
   EXPECT_EQ(json.at("region").at("coverage"), 0.97);
   EXPECT_EQ(json.at("region").at("largest_hole_m"), 0.012);
+  EXPECT_EQ(json.at("region").at("min_coverage"), 0.85);
+  EXPECT_EQ(json.at("region").at("max_hole_m"), 0.04);
   EXPECT_EQ(json.at("deformation").at("samples"), 2);
   EXPECT_EQ(json.at("deformation").at("observed"), 1);
   EXPECT_NEAR(json.at("deformation").at("shift_mm").at("p95").get<double>(), 37.0, 1e-9);

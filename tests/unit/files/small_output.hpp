@@ -86,6 +86,8 @@ inline Comparison Answer() {
   correction.words[0] = "down 9.0 mm";
   comparison.correction = correction;
   comparison.region = RegionCoverage{0.97, 0.012, Eigen::Vector2d(0.4, 0.5)};
+  comparison.limits.min_coverage = 0.85;
+  comparison.limits.max_hole_m = 0.04;
   comparison.deviation = Slope(0.009);
   comparison.distance = Slope(0.008);
   comparison.current_height = Slope(0.109);

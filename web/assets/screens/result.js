@@ -51,9 +51,9 @@ function trust({ scan, details, scene }) {
   add(text.markers, alignment && `${alignment.markers_used.length}`);
   add(text.markerRms, alignment && `${mm(alignment.rms_m, 2)} mm`);
   add(text.coverage, region && `${fixed(100 * region.coverage, 1)} %`,
-    region && region.coverage < 0.9 ? 'caution' : '');
+    region && region.coverage < region.min_coverage ? 'caution' : '');
   add(text.hole, region && `${mm(region.largest_hole_m, 0)} mm`,
-    region && region.largest_hole_m > 0.05 ? 'caution' : '');
+    region && region.largest_hole_m > region.max_hole_m ? 'caution' : '');
   add(text.residual, motion
     && text.medianAnd95(mm(motion.residual_m.median), mm(motion.residual_m.p95)));
   add(text.views, scene && `${scene.keyframes}`);
