@@ -193,7 +193,8 @@ void AddComparisonTo(std::vector<std::string>& cautions, const Json& result, Lan
     cautions.push_back(
         Filled(words.room_not_used, Translated(room.value("why_not_used", ""), language)));
   if (const Json alignment = part("alignment"); alignment.is_object()) {
-    for (const auto& [id, residual_m] : alignment.value("markers_rejected", Json::object()).items())
+    const Json rejected = alignment.value("markers_rejected", Json::object());  // outlives items()
+    for (const auto& [id, residual_m] : rejected.items())
       cautions.push_back(
           Filled(words.marker_ignored, id, Said(1000 * residual_m.get<double>(), 0, words)));
   }
