@@ -25,7 +25,7 @@ const web::Actor kClara{.user = "clara", .address = {}};
 class ReportsTest : public ::testing::Test {
  protected:
   std::string Scan(const std::string& reference, const std::string& result, bool overdue = false,
-                   std::optional<double> sensor_on_s = {}) {
+                   std::optional<double> sensor_on_s = {}, const std::string& result_file = {}) {
     const std::string id = store_.scans.Begin(
         {.patient_id = patient_,
          .reference_id = reference,
@@ -37,6 +37,10 @@ class ReportsTest : public ::testing::Test {
     std::filesystem::create_directories(store_.folders.Staging(id) / "scene");
     WriteWholeFile(store_.folders.Staging(id) / "scene/scene.json",
                    R"({"frames":{"total":300,"tracked":270,"dropped":30},"keyframes":40})");
+    if (!result_file.empty()) {
+      std::filesystem::create_directories(store_.folders.Staging(id) / "result");
+      WriteWholeFile(store_.folders.Staging(id) / "result/result.json", result_file);
+    }
     store_.scans.Finish(id,
                         {.outcome = web::ScanOutcome::kDone, .failure = "", .result_json = result});
     return id;
@@ -129,6 +133,15 @@ TEST_F(ReportsTest, ASensorThatWasOnForLessThanTheConfiguredTimeIsACaution) {
   // 20 min are configured.
   EXPECT_THAT(cautions(1199), ::testing::Contains("The sensor was still warming up."));
   EXPECT_THAT(cautions(1200), Not(::testing::Contains("The sensor was still warming up.")));
+}
+
+TEST_F(ReportsTest, EachIgnoredMarkerIsACaution) {
+  const std::string id = Scan(Approved(), kMove, /*overdue=*/false, {},
+                              R"({"alignment":{"markers_rejected":{"7":0.0121,"31":0.0306}}})");
+  const web::Scan scan = *store_.scans.Find(id);
+  EXPECT_THAT(CautionsOf(sources_, scan, Language::kEnglish),
+              ::testing::IsSupersetOf({"Marker 7 was ignored: it moved 12 mm.",
+                                       "Marker 31 was ignored: it moved 31 mm."}));
 }
 
 TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {
