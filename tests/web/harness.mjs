@@ -27,6 +27,15 @@ function definePixelsOf() {
   };
 }
 
+/// In the page: no smooth edges in 3-D, which the emulated graphics card draws four times for them.
+function drawOnce() {
+  const { prototype } = HTMLCanvasElement;
+  const { getContext } = prototype;
+  prototype.getContext = function get(kind, attributes) {
+    return getContext.call(this, kind, kind.startsWith('webgl') ? { ...attributes, antialias: false } : attributes);
+  };
+}
+
 export class Harness {
   /// @param command  Of the server, with its arguments; it names its address and the setup code on stdout or stderr. FOLDER is replaced.
   static async start({ modules, command, folder, chromium }) {
@@ -76,6 +85,7 @@ export class Harness {
   async person(name, viewport = kSize, options = {}) {
     const context = await this.browser.newContext({ viewport, reducedMotion: 'reduce', ignoreHTTPSErrors: this.url.startsWith('https'), ...options });
     await context.addInitScript(definePixelsOf);
+    await context.addInitScript(drawOnce);
     const page = await context.newPage();
     page.setDefaultTimeout(kPatience_ms);
     page.on('pageerror', (error) => this.failures.push(`${name}: script error: ${error.message}`));
