@@ -27,8 +27,8 @@ function definePixelsOf() {
   };
 }
 
-/// In the page: no smooth edges in 3-D, which the emulated graphics card draws four times for them.
-function drawOnce() {
+/// In the page: 3-D without antialiasing, for which the emulated graphics card draws four samples a pixel.
+function switchOffAntialiasing() {
   const { prototype } = HTMLCanvasElement;
   const { getContext } = prototype;
   prototype.getContext = function get(kind, attributes) {
@@ -85,7 +85,7 @@ export class Harness {
   async person(name, viewport = kSize, options = {}) {
     const context = await this.browser.newContext({ viewport, reducedMotion: 'reduce', ignoreHTTPSErrors: this.url.startsWith('https'), ...options });
     await context.addInitScript(definePixelsOf);
-    await context.addInitScript(drawOnce);
+    await context.addInitScript(switchOffAntialiasing);
     const page = await context.newPage();
     page.setDefaultTimeout(kPatience_ms);
     page.on('pageerror', (error) => this.failures.push(`${name}: script error: ${error.message}`));

@@ -52,10 +52,16 @@ await h.step('three scans, their spread, and a signature with the password', asy
   await bob.keyboard.type('wrong horse battery');
   await bob.keyboard.press('Enter');
   await bob.getByRole('alert').getByText('the password is wrong').waitFor();
+  // Another page has no stream for a while, and is told of no change meanwhile.
+  const events = '**/api/v1/events';
+  await anna.route(events, (route) => route.fulfill({ status: 503 }));
+  await anna.reload();
+  await card(anna).getByText('The newest 3 scans differ').waitFor();
   await card(bob).getByLabel('Your password').focus();
   await bob.keyboard.type(h.password);
   await bob.keyboard.press('Enter');
   await card(bob).getByText(/Version 1, signed by bob, .*\b(UTC|GMT)\b.*, gives every comparison the axes of the room/).waitFor();
+  await anna.unroute(events);
   await card(anna).getByText(/signed by bob/).waitFor();
   await h.look(bob, 'room-calibration-signed');
 });

@@ -169,7 +169,7 @@ export const live = {
     this.wanted = true;
     const first = this.refreshed();
     if (!channel) {
-      this.lead();
+      this.lead(false);
       return first;
     }
     const before = now();
@@ -177,7 +177,7 @@ export const live = {
     channel.postMessage({ kind: 'hello', from: kMe });
     setTimeout(() => {
       const answered = this.pulse !== before;
-      if (this.wanted && !this.leads && !answered && !document.hidden) this.lead();
+      if (this.wanted && !this.leads && !answered && !document.hidden) this.lead(false);
     }, kHello_ms);
     return first;
   },
@@ -194,7 +194,8 @@ export const live = {
     } catch { /* the stream says that there is no connection */ }
   },
 
-  lead() {
+  /// @param missed  Messages may have come since the last stream, and are not repeated.
+  lead(missed = true) {
     this.stopLeading();
     this.leads = true;
     this.heard = now();
@@ -210,7 +211,9 @@ export const live = {
     on('logged_off', () => this.pass({ kind: 'logged_off' }));
     source.onopen = () => {
       ++this.polls;
+      const wasConnected = this.connected;
       this.connection(true);
+      if (missed && wasConnected) this.pass({ kind: 'data' });
     };
     source.onerror = () => {
       if (source.readyState !== EventSource.CLOSED) {
