@@ -333,12 +333,13 @@ std::string ResetIfAsked(const fs::path& state) {
   return {};
 }
 
-/// A unit without a shell cannot have its configuration corrected first.
+/// Works with a configuration that cannot be used, too: a unit without a shell cannot have it
+/// corrected first.
 void Recover(const fs::path& file, const Configured& configured) {
   const ApplianceConfig& config = configured.config.appliance;
   const UnitRecovery given = ReadUnitRecovery(file);
   if (!configured.fault.empty()) {
-    // Without that key any backup would be taken.
+    // Without the key any backup would be accepted.
     if (!given.backup.empty() && configured.may_name_backup_key)
       throw DataError("nothing is restored, because the key for backups is not known: " +
                       configured.fault);

@@ -39,7 +39,8 @@ std::optional<fs::path> ConfigFile(const PlumbdOptions& options) {
   return std::nullopt;
 }
 
-/// Read line by line, because the file may be no TOML. What cannot be read may name one.
+/// Looks for the key's name line by line, because the file may not be valid TOML. A file that
+/// cannot be read may contain it.
 bool MayNameBackupKey(const fs::path& file) try {
   constexpr std::size_t kMaxBytes = 1 << 20;
   std::istringstream lines(ReadTextFile(file, kMaxBytes));
@@ -132,7 +133,8 @@ Config ReadConfiguration(const PlumbdOptions& options, const SensorRegistry& reg
 
 Configured ReadOrExplain(const PlumbdOptions& options, const SensorRegistry& registry) {
   try {
-    return {.config = ReadConfiguration(options, registry), .fault = {}, .may_name_backup_key = {}};
+    return {
+        .config = ReadConfiguration(options, registry), .fault = {}, .may_name_backup_key = false};
   } catch (const std::invalid_argument&) {
     throw;  // from the command line
   } catch (const std::exception& error) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxWaiting = 8;
 constexpr std::chrono::minutes kWaitsFor{10};
-constexpr std::chrono::seconds kLoadsAgain{5};
+constexpr std::chrono::seconds kReloadInterval{5};
 constexpr int kMaxWrongCodes = 20;
 constexpr int kCookieAge_s =
     400 * 24 * 3600;  // the longest that browsers keep a cookie; renewed at each use
@@ -57,8 +57,8 @@ void Displays::Load() {
 std::shared_ptr<Session> Displays::SessionOf(const Request& request) {
   const auto token = CookieValue(request.Header("cookie"), cookie_name());
   if (!token || token->empty() || token->size() > 64) return nullptr;
-  // In safe mode the database opens later than this begins, without a change of the displays.
-  if (sessions_.empty() && now_() - loaded_ >= kLoadsAgain) Load();
+  // A database that could not be opened at the start may have been opened since.
+  if (sessions_.empty() && now_() - loaded_ >= kReloadInterval) Load();
   const auto found = sessions_.find(StoredHashOf(*token));
   return found == sessions_.end() ? nullptr : found->second;
 }

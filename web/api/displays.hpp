@@ -51,7 +51,7 @@ class Displays {
   std::function<TimePoint()> now_;
   std::vector<Pairing> pairings_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;  ///< By the hash of the token.
-  TimePoint loaded_{};
+  TimePoint loaded_{};                                        ///< When the database was last read.
   int wrong_codes_ = 0;  ///< Since the oldest pending pairing began.
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
