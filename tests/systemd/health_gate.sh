@@ -67,6 +67,11 @@ healthy; echo 'exit 1' >rauc
 run
 check "RAUC refuses" '^1 .*RAUC cannot mark' "$code $(cat log)"
 
+healthy
+echo 'echo x >>asked; [ "$(wc -l <asked)" -gt 3 ] && echo "{\"status\":\"ok\"}" || echo "{\"status\":\"failed\",\"reason\":\"storage: no\"}"' >curl
+PLUMB_GATE_WAIT=10 run
+check "a fault of the storage that passes" '^0 1$' "$code $(is_marked)"
+
 healthy; echo 'echo "{\"status\":\"failed\",\"reason\":\"sensor: unplug it\"}"' >curl
 run
 check "a fault of the sensor is not the release's" '^0 1$' "$code $(is_marked)"

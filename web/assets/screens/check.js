@@ -136,8 +136,12 @@ function earlier(checks) {
 export async function showCheck(place) {
   const text = S.check;
   const room = roomCard();
+  let asked = 0;
   const load = async () => {
+    const mine = ++asked;
     const { checks, baseline, overdue } = await get('checks', true);
+    // Answers may overtake each other: an older one does not replace a newer.
+    if (mine !== asked) return;
     const of = baseline
       ? text.baselineOf(baseline.set_by, signedTime(baseline.set_at), baseline.num_markers)
       : text.noBaseline;
