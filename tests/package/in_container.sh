@@ -38,7 +38,7 @@ check "files are as delivered" "" "$(dpkg -V plumb plumbd 2>&1 | grep -v /usr/sh
 echo '# changed by the operator' >>/etc/plumb/plumb.toml
 echo data >/var/lib/plumb/scans-of-the-operator
 before=$(systemctl show plumbd -p MainPID --value)
-check "upgrade" 0 "$(apt install /debs/new/plumbd_*.deb /debs/new/plumb_*.deb)"
+check "upgrade" 0 "$(apt -o Dpkg::Options::=--force-confold install /debs/new/plumbd_*.deb /debs/new/plumb_*.deb)"
 check "another version" "*0.2*" "$(dpkg-query -W -f '${Version}' plumbd)"
 check "the changed configuration is kept" "# changed by the operator" "$(tail -1 /etc/plumb/plumb.toml)"
 await "page after the upgrade" '*"status":"ok"*' 20 health

@@ -12,6 +12,11 @@ check() { # NAME EXPECTED-REGEX FOUND
   if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi
 }
 PLUMB_GROUP=$(id -g)
+mkdir -p bin data/journal
+printf '#!/bin/sh\necho "$*" >>%s/journalctl.calls\n' "$work" >bin/journalctl
+chmod +x bin/journalctl
+: >journalctl.calls
+export PATH=$work/bin:$PATH PLUMB_DATA=$work/data
 export PLUMB_STATE=$work/state PLUMB_ETC=$work/etc PLUMB_DELIVERED=$source/toolchain/plumb.toml PLUMB_GROUP
 start() {
   "$source/systemd/factory-reset" >reset.log 2>&1
@@ -59,6 +64,7 @@ check "the configuration is the delivered one" '^same # changed secret$' \
   "$(cmp etc/plumb.toml "$PLUMB_DELIVERED" && echo same) $(cat etc/plumb.toml.before-reset etc/backup.key | xargs -d '\n')"
 check "the accounts are gone" 'setup code: ....-....' "$(cat log)"
 check "it is logged" 'factory reset: records kept; 1 accounts' "$(cat log)"
+check "the journal is kept" '^$' "$(cat journalctl.calls)"
 check "what belongs to the sensor stays" '^data$' "$(cat state/calibration/S1.yaml)"
 check "the request is done" '^missing$' "$([ -e state/factory-reset.json ] || echo missing)"
 end
@@ -70,6 +76,7 @@ end
 "$plumb" factory-reset --wipe --yes --state state >out
 start
 check "wiped: the configuration folder" '^plumb.toml$' "$(ls -A etc)"
+check "wiped: the journal" '^-q --rotate --vacuum-time=1s$' "$(cat journalctl.calls)"
 check "wiped: the sensor's files" '^missing$' "$([ -e state/calibration/S1.yaml ] || echo missing)"
 check "wiped: it is logged" 'factory reset: everything that was stored has been removed' "$(cat log)"
 check "wiped: a new setup code is made" 'setup code: ....-....' "$(cat log)"

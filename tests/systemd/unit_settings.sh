@@ -169,7 +169,7 @@ cat >bin/plumb <<'SCRIPT'
 #!/bin/sh
 case "$3" in state) echo ready ;; page.url) echo https://0.0.0.0:8080 ;; page.certificate) echo AB:CD ;; esac
 SCRIPT
-printf '#!/bin/sh\necho "2: eth0 inet 10.1.1.5/8 scope global eth0"\necho "2: eth0 inet6 fd00::5/64 scope global"\n' >bin/ip
+printf '#!/bin/sh\necho "2: eth0 inet 10.1.1.5/8 scope global eth0"\necho "2: eth0 inet6 fd00::5/64 scope global"\necho "2: eth0 inet6 2001:db8::5/64 scope global"\n' >bin/ip
 printf '#!/bin/sh\necho "setup code: ABCD-EFGH"\n' >bin/journalctl
 printf '#!/bin/sh\ncat %q\n' "$work/session" >bin/curl
 chmod +x bin/*
@@ -195,6 +195,7 @@ for line in 'Page         https://10.1.1.5:8080/' 'Page         https://\[fd00::
   'State        ready' 'enter the setup code: ABCD-EFGH'; do
   check "the screen shows: $line" "$line" "$screen"
 done
+check "no address at which the sandbox lets nobody in" '^none$' "$(grep -q 2001: <<<"$screen" || echo none)"
 sed -i s/:8080/:9443/ bin/plumb
 check "the screen shows another port" 'https://10.1.1.5:9443/' "$("$source/systemd/console-screen" once)"
 echo '{"setup_required":false}' >session
