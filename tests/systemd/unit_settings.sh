@@ -58,6 +58,29 @@ mkdir data
 run stick "$work/stick"
 check "a stick without a file is no matter" '^0 $' "$code $(cat out)"
 
+# The stick as udev finds it: the folder stage takes the place of its file system.
+echo vfat >type
+mkdir stage
+touch stage/v2.raucb
+printf '#!/bin/sh\ncat %q\n' "$work/type" >bin/blkid
+printf '#!/bin/sh\nfor place in "$@"; do :; done\ncp %q/* "$place"\n' "$work/stage" >bin/mount
+printf '#!/bin/sh\nfor place in "$@"; do :; done\nrm -f "$place"/*\n' >bin/umount
+chmod +x bin/*
+usb_stick() { "$source/systemd/usb-stick" "$1" sdx1 >out 2>&1 && code=0 || code=$?; }
+printf '[network]\naddress = "10.1.1.5"\n' >stage/plumb-provision.toml
+usb_stick mount
+check "a stick whose settings are refused is mounted all the same" '^0 .*was not taken over.*it stays readable v2.raucb$' \
+  "$code $(tr '\n' ' ' <out)$(basename run/plumb-stick/sdx1/*.raucb)"
+usb_stick unmount
+check "and nothing is left of it once it is pulled out" '^0 $' "$code $(ls run/plumb-stick)"
+echo ntfs >type
+usb_stick mount
+check "another file system is left alone" '^1 .*left alone' "$code $(cat out)"
+usb_stick unmount
+check "and there is nothing to unmount" '^0 $' "$code $(cat out)"
+rm -r data stage bin/blkid bin/mount bin/umount
+mkdir data
+
 cat >bin/grub-editenv <<'SCRIPT'
 #!/bin/sh
 if [ "$2" = list ]; then cat "$1"; else echo "$3" >>"$1"; fi
