@@ -176,6 +176,16 @@ struct Updater::Impl {
     }
   }
 
+  void ForgetLast() {
+    last.reset();
+    try {
+      RemoveLastUpdate(options.folder);
+    } catch (const std::exception& error) {
+      Log(LogLevel::kWarning,
+          fmt::format("after a restart an earlier update may be reported: {}", error.what()));
+    }
+  }
+
   [[nodiscard]] std::string RolledBack() const {
     return last && is_there ? WhyRolledBack(*last, slot, options.boot, options.version)
                             : std::string();
@@ -343,8 +353,14 @@ struct Updater::Impl {
     Notify();
   }
 
+  /// RAUC marks the other system as bad before it writes to it, so an earlier update there starts
+  /// no more. It is forgotten before RAUC is asked: after a crash in between the page only misses
+  /// that a restart is needed, while an update remembered too long would be reported as unfit for
+  /// work. It stays forgotten if RAUC does not begin, because RAUC is then busy with the systems
+  /// for somebody else or does not answer. A roll-back that nobody has seen remains true.
   void Call() {
     is_called = true;
+    if (last && RolledBack().empty()) ForgetLast();
     const std::string path = (options.folder / bundle).string();
     const int result =
         sd_bus_call_method_async(bus.get(), nullptr, kService, kPath, kInstaller, "InstallBundle",
@@ -472,8 +488,7 @@ web::Change Updater::Remove(const std::string& name) {
 
 void Updater::ForgetRollBack() {
   if (impl_->RolledBack().empty()) return;
-  impl_->last.reset();
-  RemoveLastUpdate(impl_->options.folder);
+  impl_->ForgetLast();
   impl_->Notify();
 }
 

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/update/bundle_check.hpp"
 #include "daemon/update/updater.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -27,6 +28,11 @@ TEST(LastUpdateTest, WhatIsNotKnownIsNoRollBack) {
   }
   WriteLastUpdate(folder.path(), update);
   EXPECT_EQ(ReadLastUpdate(folder.path()), update);
+  RemoveLastUpdate(folder.path());
+  EXPECT_FALSE(ReadLastUpdate(folder.path()));
+  EXPECT_NO_THROW(RemoveLastUpdate(folder.path())) << "there is none any more";
+  std::filesystem::create_directories(folder / "last-update.json" / "not-empty");
+  EXPECT_THROW(RemoveLastUpdate(folder.path()), IoError);
 }
 
 TEST(VersionTest, AreComparedNumberByNumber) {
