@@ -86,6 +86,7 @@ struct Updater::Impl {
   bool has_begun = false;  ///< It has then reported less than 100 %.
   double fraction = 0.0;
   std::string bundle;
+  std::string copy;  ///< Bundle that is removed when its installation ends.
   web::Done done;
 
   void Disconnect() {
@@ -94,8 +95,13 @@ struct Updater::Impl {
   }
 
   void OnBroken() {
-    if (is_installing)
-      End("the connection to the installer broke: look at its log, then try again");
+    constexpr const char* kWhy =
+        "the connection to the installer broke: look at its log, then try again";
+    if (is_installing && done) {
+      Refuse(ChangeResult::kFailed, kWhy);
+    } else if (is_installing) {
+      End(kWhy);
+    }
     is_there = false;
     Notify();
   }
@@ -159,8 +165,17 @@ struct Updater::Impl {
                   ? fmt::format("{} is installed: restart the appliance to use it", bundle)
                   : fmt::format("{} was not installed: {}", bundle, failure);
     Log(failure.empty() ? LogLevel::kNotice : LogLevel::kError, outcome);
+    if (!copy.empty()) RemoveCopy(std::exchange(copy, {}));
     if (options.ended) options.ended(bundle, failure);
     Notify();
+  }
+
+  /// RAUC may still read the file if it was given up on; it has it open, and an open file outlives
+  /// its name.
+  void RemoveCopy(const std::string& name) {
+    const web::Change removed = folder.Remove(name);
+    if (removed.result == ChangeResult::kFailed) Log(LogLevel::kWarning, removed.message);
+    states.erase(name);
   }
 
   /// The next start must know what was installed, and from which system.
@@ -413,6 +428,18 @@ struct Updater::Impl {
     if (!options.run_in_background || !options.run_in_background(look)) look();
   }
 
+  void InstallCopy(const std::string& name, web::Done asked) {
+    if (is_installing) return Install(name, std::move(asked));  // refuses; the file may be in use
+    Install(name, [this, name, asked = std::move(asked)](const web::Change& change) {
+      if (change.result == ChangeResult::kDone) {
+        copy = name;
+      } else {
+        RemoveCopy(name);
+      }
+      asked(change);
+    });
+  }
+
   /// A file that RAUC took ownership of in an earlier attempt cannot be read again, but it cannot
   /// have changed since.
   void Ask(const std::filesystem::path& file, BundleState found) {
@@ -494,6 +521,10 @@ void Updater::ForgetRollBack() {
 
 void Updater::Install(const std::string& name, web::Done done) {
   impl_->Install(name, std::move(done));
+}
+
+void Updater::InstallCopy(const std::string& name, web::Done done) {
+  impl_->InstallCopy(name, std::move(done));
 }
 
 }  // namespace plumb
