@@ -344,6 +344,10 @@ struct Updater::Impl {
       return 0;
     }
     impl->version = Shown(held);
+    if (const std::string why = WhyNoVersion(impl->version); !why.empty()) {
+      impl->Refuse(ChangeResult::kInvalid, why);
+      return 0;
+    }
     if (IsOlder(impl->version, impl->options.version)) {
       impl->Refuse(ChangeResult::kConflict,
                    fmt::format("this bundle holds version {}, older than {} which runs",

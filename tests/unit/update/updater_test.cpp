@@ -86,6 +86,19 @@ TEST_F(UpdaterTest, AnOlderVersionIsRefused) {
   });
 }
 
+TEST_F(UpdaterTest, AVersionThatCannotBeComparedIsRefused) {
+  RunBesideLoop([&] {
+    FakeRauc rauc(bus_.address());
+    rauc.version = "9.0-rc1";
+    Start();
+    WaitForRauc();
+    const web::Change answer = Install("plumb-9.0.raucb");
+    EXPECT_EQ(answer.result, ChangeResult::kInvalid);
+    EXPECT_THAT(answer.message, HasSubstr("holds version '9.0-rc1': expected numbers"));
+    EXPECT_EQ(rauc.installed(), "");
+  });
+}
+
 TEST_F(UpdaterTest, AScanThatBeganWhileTheBundleWasLookedAtGoesFirst) {
   blocking_reason_ = "a scan is running";
   PlayWithRauc([&](FakeRauc& rauc) {
