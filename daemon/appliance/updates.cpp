@@ -91,12 +91,15 @@ void Updates::RemoveBundle(const web::Actor& actor, const std::string& name, web
 
 void Updates::InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) {
   if (const std::string why = WhyNotInstall(); !why.empty()) return done(Conflict(why));
-  updater_.Install(bundle, [this, actor, bundle,
-                            done = std::move(done)](const web::Change& change) {
+  updater_.Install(bundle, LogInstall(actor, bundle, std::move(done)));
+}
+
+web::Done Updates::LogInstall(const web::Actor& actor, const std::string& bundle, web::Done done) {
+  return [this, actor, bundle, done = std::move(done)](const web::Change& change) {
     options_.log(actor, change.result == ChangeResult::kDone ? "update.install" : "update.refuse",
                  bundle, change.message);
     done(change);
-  });
+  };
 }
 
 void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
@@ -114,11 +117,16 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
       options_.log(actor, "update.refuse", name, failure.message);
       return done(failure);
     }
-    AddBundle(actor, copy, name, [this, actor, name, copy, done](const web::Change& added) {
-      if (added.result == ChangeResult::kDone) return InstallUpdate(actor, name, done);
+    const auto drop = [copy, done](const web::Change& why) {
       std::error_code ignored;
       std::filesystem::remove(copy, ignored);
-      done(added);
+      done(why);
+    };
+    // A scan may have begun while it was copied.
+    if (const std::string why = WhyNotInstall(); !why.empty()) return drop(Conflict(why));
+    AddBundle(actor, copy, name, [this, actor, name, drop, done](const web::Change& added) {
+      if (added.result != ChangeResult::kDone) return drop(added);
+      updater_.InstallCopy(name, LogInstall(actor, name, done));
     });
   };
   const auto work = [file = std::move(file), folder = options_.config.folder,

@@ -44,7 +44,8 @@ class Updates : public web::UpdateService {
                  const std::string& name, web::Done done) override;
   void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
   void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
-  /// Copies the open file to the bundles, off the loop, then installs it.
+  /// Copies the open file to the bundles, off the loop, then installs it. The copy is removed at
+  /// the end.
   void InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
                    const std::string& name, web::Done done);
   [[nodiscard]] std::vector<std::string> StickBundles() override { return sticks_.Bundles(); }
@@ -55,6 +56,9 @@ class Updates : public web::UpdateService {
   void ForgetRollBack(const web::Actor& actor, web::Done done) override;
 
  private:
+  /// Also writes to the audit log what came of the request to install.
+  [[nodiscard]] web::Done LogInstall(const web::Actor& actor, const std::string& bundle,
+                                     web::Done done);
   /// Why no update may begin now; empty if it may.
   [[nodiscard]] std::string WhyNotInstall() const;
   [[nodiscard]] std::string WhyNotRestart() const;

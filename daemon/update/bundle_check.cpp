@@ -4,9 +4,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <iomanip>
@@ -23,6 +23,8 @@ constexpr std::string_view kSquashfs = "hsqs";
 constexpr std::uint64_t kMaxSignature = 64 << 10;
 constexpr std::uint64_t kLeastBundle = 4096;
 constexpr int kMaxVersion = 64;
+
+bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
 }  // namespace
 
@@ -67,18 +69,37 @@ std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_byt
   return why;
 }
 
+std::string WhyNoVersion(const std::string& version) {
+  bool is_number = false;
+  for (const char c : version) {
+    if (!IsDigit(c) && (c != '.' || !is_number)) {
+      is_number = false;
+      break;
+    }
+    is_number = IsDigit(c);
+  }
+  if (is_number) return {};
+  return fmt::format(
+      "this bundle holds version '{}': expected numbers with dots between them, such as 0.2.1; ask "
+      "who made it",
+      version);
+}
+
 bool IsOlder(const std::string& a, const std::string& b) {
+  // The digits of a number without leading zeros, so that no number is too large to be compared.
   const auto next = [](std::string_view& rest) {
     const auto dot = rest.find('.');
     const std::string_view part = rest.substr(0, dot);
     rest = dot == std::string_view::npos ? std::string_view() : rest.substr(dot + 1);
-    long number = 0;
-    std::from_chars(part.data(), part.data() + part.size(), number);
-    return number;
+    return part.substr(std::min(part.find_first_not_of('0'), part.size()));
   };
-  std::string_view left = a, right = b;
+  const auto numbers = [](std::string_view version) {
+    return version.substr(0, version.find_first_not_of("0123456789."));
+  };
+  std::string_view left = numbers(a), right = numbers(b);
   while (!left.empty() || !right.empty()) {
-    const long x = next(left), y = next(right);
+    const std::string_view x = next(left), y = next(right);
+    if (x.size() != y.size()) return x.size() < y.size();
     if (x != y) return x < y;
   }
   return false;
@@ -88,7 +109,7 @@ std::string VersionOfSystem(const std::filesystem::path& release, const std::str
   std::ifstream file(release);
   std::string version;
   file >> std::setw(kMaxVersion) >> version;
-  return version.empty() || version.front() < '0' || version.front() > '9' ? program : version;
+  return version.empty() || !IsDigit(version.front()) ? program : version;
 }
 
 }  // namespace plumb

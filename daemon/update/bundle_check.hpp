@@ -19,8 +19,14 @@ enum class BundleState { kUnknown, kWhole, kDamaged };
 /// Verity bundles carry their manifest in the signature, and only the manifest is checked.
 [[nodiscard]] BundleState LookForDamage(const std::filesystem::path& file);
 
-/// True if `a` is an older version than `b`: numbers between dots, compared one by one; parts that
-/// are not numbers count as 0.
+/// Empty, or a sentence: the version of a bundle is not of the form that toolchain/image and
+/// toolchain/bundle demand, numbers with dots between them, and cannot be compared. A release
+/// candidate, say, would pass as the release.
+[[nodiscard]] std::string WhyNoVersion(const std::string& version);
+
+/// True if `a` is an older version than `b`: numbers between dots, compared one by one, up to the
+/// first other character. A system that runs may have a version of another form and must remain one
+/// that can be updated.
 [[nodiscard]] bool IsOlder(const std::string& a, const std::string& b);
 
 /// Version of the system that runs: the first word of its release file, as toolchain/image writes

@@ -45,8 +45,10 @@ void WriteLastUpdate(const std::filesystem::path& folder, const LastUpdate& upda
 }
 
 void RemoveLastUpdate(const std::filesystem::path& folder) {
-  std::error_code ignored;
-  std::filesystem::remove(folder / kFile, ignored);
+  std::error_code error;
+  const bool is_removed = std::filesystem::remove(folder / kFile, error);
+  if (error) throw IoError(fmt::format("{} cannot be removed: {}", kFile, error.message()));
+  if (is_removed) SyncToDisk(folder);
 }
 
 std::string WhyRolledBack(const LastUpdate& update, const std::string& slot,

@@ -86,6 +86,7 @@ struct Updater::Impl {
   bool has_begun = false;  ///< It has then reported less than 100 %.
   double fraction = 0.0;
   std::string bundle;
+  std::string copy;  ///< Bundle that is removed when its installation ends.
   web::Done done;
 
   void Disconnect() {
@@ -94,8 +95,13 @@ struct Updater::Impl {
   }
 
   void OnBroken() {
-    if (is_installing)
-      End("the connection to the installer broke: look at its log, then try again");
+    constexpr const char* kWhy =
+        "the connection to the installer broke: look at its log, then try again";
+    if (is_installing && done) {
+      Refuse(ChangeResult::kFailed, kWhy);
+    } else if (is_installing) {
+      End(kWhy);
+    }
     is_there = false;
     Notify();
   }
@@ -159,8 +165,17 @@ struct Updater::Impl {
                   ? fmt::format("{} is installed: restart the appliance to use it", bundle)
                   : fmt::format("{} was not installed: {}", bundle, failure);
     Log(failure.empty() ? LogLevel::kNotice : LogLevel::kError, outcome);
+    if (!copy.empty()) RemoveCopy(std::exchange(copy, {}));
     if (options.ended) options.ended(bundle, failure);
     Notify();
+  }
+
+  /// RAUC may still read the file if it was given up on; it has it open, and an open file outlives
+  /// its name.
+  void RemoveCopy(const std::string& name) {
+    const web::Change removed = folder.Remove(name);
+    if (removed.result == ChangeResult::kFailed) Log(LogLevel::kWarning, removed.message);
+    states.erase(name);
   }
 
   /// The next start must know what was installed, and from which system.
@@ -173,6 +188,16 @@ struct Updater::Impl {
       Log(LogLevel::kWarning,
           fmt::format("after a restart nothing will say whether {} was kept: {}", version,
                       error.what()));
+    }
+  }
+
+  void ForgetLast() {
+    last.reset();
+    try {
+      RemoveLastUpdate(options.folder);
+    } catch (const std::exception& error) {
+      Log(LogLevel::kWarning,
+          fmt::format("after a restart an earlier update may be reported: {}", error.what()));
     }
   }
 
@@ -319,6 +344,10 @@ struct Updater::Impl {
       return 0;
     }
     impl->version = Shown(held);
+    if (const std::string why = WhyNoVersion(impl->version); !why.empty()) {
+      impl->Refuse(ChangeResult::kInvalid, why);
+      return 0;
+    }
     if (IsOlder(impl->version, impl->options.version)) {
       impl->Refuse(ChangeResult::kConflict,
                    fmt::format("this bundle holds version {}, older than {} which runs",
@@ -343,8 +372,14 @@ struct Updater::Impl {
     Notify();
   }
 
+  /// RAUC marks the other system as bad before it writes to it, so an earlier update there starts
+  /// no more. It is forgotten before RAUC is asked: after a crash in between the page only misses
+  /// that a restart is needed, while an update remembered too long would be reported as unfit for
+  /// work. It stays forgotten if RAUC does not begin, because RAUC is then busy with the systems
+  /// for somebody else or does not answer. A roll-back that nobody has seen remains true.
   void Call() {
     is_called = true;
+    if (last && RolledBack().empty()) ForgetLast();
     const std::string path = (options.folder / bundle).string();
     const int result =
         sd_bus_call_method_async(bus.get(), nullptr, kService, kPath, kInstaller, "InstallBundle",
@@ -395,6 +430,18 @@ struct Updater::Impl {
       });
     };
     if (!options.run_in_background || !options.run_in_background(look)) look();
+  }
+
+  void InstallCopy(const std::string& name, web::Done asked) {
+    if (is_installing) return Install(name, std::move(asked));  // refuses; the file may be in use
+    Install(name, [this, name, asked = std::move(asked)](const web::Change& change) {
+      if (change.result == ChangeResult::kDone) {
+        copy = name;
+      } else {
+        RemoveCopy(name);
+      }
+      asked(change);
+    });
   }
 
   /// A file that RAUC took ownership of in an earlier attempt cannot be read again, but it cannot
@@ -472,13 +519,16 @@ web::Change Updater::Remove(const std::string& name) {
 
 void Updater::ForgetRollBack() {
   if (impl_->RolledBack().empty()) return;
-  impl_->last.reset();
-  RemoveLastUpdate(impl_->options.folder);
+  impl_->ForgetLast();
   impl_->Notify();
 }
 
 void Updater::Install(const std::string& name, web::Done done) {
   impl_->Install(name, std::move(done));
+}
+
+void Updater::InstallCopy(const std::string& name, web::Done done) {
+  impl_->InstallCopy(name, std::move(done));
 }
 
 }  // namespace plumb

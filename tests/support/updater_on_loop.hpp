@@ -55,10 +55,15 @@ class UpdaterOnLoop : public ::testing::Test {
   }
 
   /// @param file  Name of a bundle in the updater's folder.
-  web::Change Install(const std::string& file) {
+  web::Change Install(const std::string& file) { return Ask(&Updater::Install, file); }
+  web::Change InstallCopy(const std::string& file) { return Ask(&Updater::InstallCopy, file); }
+
+  web::Change Ask(void (Updater::*install)(const std::string&, web::Done),
+                  const std::string& file) {
     auto answer = std::make_shared<std::promise<web::Change>>();
     On([&] {
-      updater_->Install(file, [answer](const web::Change& change) { answer->set_value(change); });
+      (updater_.get()->*install)(
+          file, [answer](const web::Change& change) { answer->set_value(change); });
     });
     auto future = answer->get_future();
     if (future.wait_for(kPatience) != std::future_status::ready) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/update/bundle_check.hpp"
 #include "daemon/update/updater.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -27,6 +28,11 @@ TEST(LastUpdateTest, WhatIsNotKnownIsNoRollBack) {
   }
   WriteLastUpdate(folder.path(), update);
   EXPECT_EQ(ReadLastUpdate(folder.path()), update);
+  RemoveLastUpdate(folder.path());
+  EXPECT_FALSE(ReadLastUpdate(folder.path()));
+  EXPECT_NO_THROW(RemoveLastUpdate(folder.path())) << "there is none any more";
+  std::filesystem::create_directories(folder / "last-update.json" / "not-empty");
+  EXPECT_THROW(RemoveLastUpdate(folder.path()), IoError);
 }
 
 TEST(VersionTest, AreComparedNumberByNumber) {
@@ -35,6 +41,27 @@ TEST(VersionTest, AreComparedNumberByNumber) {
   EXPECT_TRUE(IsOlder("", "0.1"));
   EXPECT_FALSE(IsOlder("0.1", "0.1.0"));
   EXPECT_FALSE(IsOlder("1.0", "0.99.99"));
+  EXPECT_FALSE(IsOlder("0.01", "0.1")) << "leading zeros";
+  EXPECT_FALSE(IsOlder("0.1", "0.01"));
+  EXPECT_TRUE(IsOlder("1", "99999999999999999999"));
+  EXPECT_FALSE(IsOlder("99999999999999999999", "1"));
+}
+
+TEST(VersionTest, ASystemOfAnotherFormCanBeUpdated) {
+  EXPECT_TRUE(IsOlder("0.2.0", "0.2.1-rc1"));
+  EXPECT_FALSE(IsOlder("0.2.1", "0.2.1-rc1"));
+  EXPECT_FALSE(IsOlder("0.2.1", "0.2.1-rc1.7"));
+}
+
+TEST(VersionTest, OnlyNumbersWithDotsBetweenThemAreAVersion) {
+  for (const char* good : {"0", "7", "0.2", "0.2.1", "10.20.30.40", "99999999999999999999"})
+    EXPECT_EQ(WhyNoVersion(good), "") << good;
+  for (const char* bad : {"", ".", "1.", ".1", "1..2", "v1.0.0", "0.2.1-rc1", "0.2.1~git1", "1.0a",
+                          "0.2+b", " 1", "1 ", "-1", "\xd9\xa1"})
+    EXPECT_NE(WhyNoVersion(bad), "") << bad;
+  EXPECT_EQ(WhyNoVersion("0.2.1-rc1"),
+            "this bundle holds version '0.2.1-rc1': expected numbers with dots between them, such "
+            "as 0.2.1; ask who made it");
 }
 
 TEST(VersionTest, AnImagesReleaseFileNamesTheSystem) {

@@ -28,6 +28,15 @@ class RollBackTest : public UpdaterTest {
     EXPECT_EQ(StatusNow().failure, "");
     On([&] { updater_.reset(); });
   }
+  /// After InstallAndEnd(): another attempt in the same start, which RAUC takes up and cannot
+  /// finish.
+  void FailToInstallAgain() {
+    rauc_->fails = true;
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
+    rauc_->Release();
+    EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
+    EXPECT_THAT(StatusNow().failure, HasSubstr("Failed writing to the slot"));
+  }
   void StartAs(const std::string& boot) {
     boot_ = boot;
     Start();
@@ -80,6 +89,55 @@ TEST_F(RollBackTest, AMachineThatStartsTheNewSystemHasNothingToSay) {
     rauc_->slot = "A";  // the boot counter gave up on it later
     StartAs("third");
     EXPECT_NE(StatusNow().rolled_back, "");
+  });
+}
+
+TEST_F(RollBackTest, AnUpdateThatAnotherOneBeganToOverwriteIsForgotten) {
+  RunBesideLoop([&] {
+    InstallAndEnd();
+    StartAs("first");
+    EXPECT_TRUE(StatusNow().restart_needed);
+    FailToInstallAgain();
+    EXPECT_FALSE(StatusNow().restart_needed);
+    On([&] { updater_.reset(); });
+    StartAs("second");
+    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(roll_backs_, "");
+  });
+}
+
+TEST_F(RollBackTest, ItIsForgottenBeforeTheInstallationEnds) {
+  RunBesideLoop([&] {
+    InstallAndEnd();
+    StartAs("first");
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "updates" / "last-update.json"));
+    On([&] { updater_.reset(); });  // as a power cut would
+    StartAs("second");
+    EXPECT_EQ(StatusNow().rolled_back, "");
+  });
+}
+
+TEST_F(RollBackTest, ABundleThatIsRefusedLeavesTheUpdateBeforeItInPlace) {
+  RunBesideLoop([&] {
+    InstallAndEnd();
+    StartAs("first");
+    rauc_->refuses_signature = true;
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kInvalid);
+    EXPECT_TRUE(StatusNow().restart_needed);
+    On([&] { updater_.reset(); });
+    StartAs("second");
+    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("version 9.0 was installed, but"));
+  });
+}
+
+TEST_F(RollBackTest, ARollBackThatNobodyHasSeenOutlivesAnotherAttempt) {
+  RunBesideLoop([&] {
+    InstallAndEnd();
+    StartAs("second");
+    FailToInstallAgain();
+    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("version 9.0 was installed, but"));
+    EXPECT_FALSE(StatusNow().restart_needed);
   });
 }
 

@@ -86,6 +86,19 @@ TEST_F(UpdaterTest, AnOlderVersionIsRefused) {
   });
 }
 
+TEST_F(UpdaterTest, AVersionThatCannotBeComparedIsRefused) {
+  RunBesideLoop([&] {
+    FakeRauc rauc(bus_.address());
+    rauc.version = "9.0-rc1";
+    Start();
+    WaitForRauc();
+    const web::Change answer = Install("plumb-9.0.raucb");
+    EXPECT_EQ(answer.result, ChangeResult::kInvalid);
+    EXPECT_THAT(answer.message, HasSubstr("holds version '9.0-rc1': expected numbers"));
+    EXPECT_EQ(rauc.installed(), "");
+  });
+}
+
 TEST_F(UpdaterTest, AScanThatBeganWhileTheBundleWasLookedAtGoesFirst) {
   blocking_reason_ = "a scan is running";
   PlayWithRauc([&](FakeRauc& rauc) {
@@ -178,6 +191,57 @@ TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
       EXPECT_EQ(updater_->Remove("c.raucb").result, ChangeResult::kNotFound);
     });
     EXPECT_EQ(StatusNow().bundles.size(), 3U);
+  });
+}
+
+TEST_F(UpdaterTest, ACopyIsRemovedAtTheEndHoweverItEndsAndAnUploadIsKept) {
+  PlayWithRauc([&](FakeRauc& rauc) {
+    const auto listed = [&] { return StatusNow().bundles; };
+    for (const bool fails : {false, true}) {
+      rauc.fails = fails;
+      WriteBundle("copy.raucb");
+      EXPECT_EQ(InstallCopy("copy.raucb").result, ChangeResult::kDone);
+      EXPECT_THAT(listed(), ::testing::Contains("copy.raucb")) << "RAUC reads it";
+      EXPECT_EQ(InstallCopy("copy.raucb").result, ChangeResult::kConflict);
+      EXPECT_THAT(listed(), ::testing::Contains("copy.raucb")) << "the refusal is another's";
+      rauc.Release();
+      EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
+      EXPECT_EQ(StatusNow().failure.empty(), !fails);
+      EXPECT_THAT(listed(), ::testing::ElementsAre("plumb-9.0.raucb"));
+      EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
+      rauc.Release();
+      EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
+      EXPECT_THAT(listed(), ::testing::ElementsAre("plumb-9.0.raucb"));
+    }
+  });
+}
+
+TEST_F(UpdaterTest, ACopyThatIsRefusedIsRemovedAndAnUploadIsKept) {
+  PlayWithRauc([&](FakeRauc& rauc) {
+    const auto expect_refusal = [&](const char* which) {
+      WriteBundle("copy.raucb");
+      EXPECT_NE(InstallCopy("copy.raucb").result, ChangeResult::kDone) << which;
+      EXPECT_NE(Install("plumb-9.0.raucb").result, ChangeResult::kDone) << which;
+      EXPECT_THAT(StatusNow().bundles, ::testing::ElementsAre("plumb-9.0.raucb")) << which;
+    };
+    rauc.refuses_signature = true;
+    expect_refusal("by the installer");
+    rauc.refuses_signature = false;
+    On([&] { blocking_reason_ = "a scan is running"; });
+    expect_refusal("because of a scan");
+  });
+}
+
+TEST_F(UpdaterTest, ACopyIsRemovedWhenTheBusGoesAway) {
+  PlayWithRauc([&](FakeRauc&) {
+    WriteBundle("copy.raucb");
+    EXPECT_EQ(InstallCopy("copy.raucb").result, ChangeResult::kDone);
+    bus_.Stop();
+    EXPECT_TRUE(Becomes([&] { return !Ended().empty(); }));
+    EXPECT_FALSE(fs::exists(folder_ / "updates" / "copy.raucb"));
+    WriteBundle("copy.raucb");
+    EXPECT_EQ(InstallCopy("copy.raucb").result, ChangeResult::kConflict) << "no installer";
+    EXPECT_FALSE(fs::exists(folder_ / "updates" / "copy.raucb"));
   });
 }
 
