@@ -19,10 +19,11 @@ package() { printf 'Package: %s\nStatus: install ok installed\nArchitecture: amd
   package plumb 0.2.0-1 | sed 's/^Maintainer/Static-Built-Using: cli11 (= 2.1.2+ds-1), eigen3 (= 3.4.0-4)\n&/'
   package plumbd 0.2.0-1 plumb | sed 's/^Maintainer/Static-Built-Using: eigen3 (= 3.4.0-4)\n&/'
 } >root/var/lib/dpkg/status
-SOURCE_DATE_EPOCH=1700000000 "$source/toolchain/sbom" root 0.2.0 >sbom.spdx
+SOURCE_DATE_EPOCH=1700000000 "$source/toolchain/sbom" root 0.2.0 "grub-efi-amd64-bin 2.06-13+deb12u1 amd64 grub2 2.06-13+deb12u1" >sbom.spdx
 check "a package names its source" 'PackageName: libssl3' "$(grep -B5 'built package from: openssl 3.0.15-1~deb12u1' sbom.spdx | tr '\n' ' ')"
 check "a rebuilt package has its source's version" 'glibc 2.36-9$' "$(grep 'from: glibc' sbom.spdx)"
 check "a library that is headers only is listed once" '^1 cli11 2.1.2.ds-1$' "$(grep -c 'from: eigen3 3.4.0-4' sbom.spdx) $(sed -n 's/.*from: \(cli11 .*\)/\1/p' sbom.spdx)"
+check "so is the boot loader, which is not in the root" '^1$' "$(grep -c 'built package from: grub2 2.06-13+deb12u1$' sbom.spdx)"
 check "so is what the page is made with" 'pkg:npm/three@[0-9.]+$' "$(grep -o 'pkg:npm/three.*' sbom.spdx)"
 check "a purl has no plain plus" '^0 1$' "$(grep -c 'purl .*+' sbom.spdx || true) $(grep -c 'cli11@2.1.2%2Bds-1' sbom.spdx)"
 check "each package is one that the document describes" '^same$' \
@@ -40,9 +41,9 @@ run() { "$source/toolchain/cves" "$@" >out 2>&1 && code=0 || code=$?; }
 run --sbom sbom.spdx --tracker tracker.json
 check "a fixed version that waits is an exit code" '^1$' "$code"
 check "those and no others, in order of what can be done" \
-  '^CVE-1-FIXED-LATER CVE-2-UNSURE CVE-2-OPEN 6 $' "$(cut -d' ' -f1 out | tr '\n' ' ')"
+  '^CVE-1-FIXED-LATER CVE-2-UNSURE CVE-2-OPEN 7 $' "$(cut -d' ' -f1 out | tr '\n' ' ')"
 check "its line says version, remedy and packages" 'medium +openssl 3.0.15-1~deb12u1 -> 3.0.15-1~deb12u2  \(libssl3, openssl\)' "$(head -1 out)"
-check "its end counts" '^6 source packages, 3 known vulnerabilities in bookworm, 1 of them' "$(tail -1 out)"
+check "its end counts" '^7 source packages, 3 known vulnerabilities in bookworm, 1 of them' "$(tail -1 out)"
 sed 's/~deb12u2/~deb12u1/' tracker.json >mended.json
 run --sbom sbom.spdx --tracker mended.json
 check "nothing waits" '^0 2 source' "$code $(grep -c '^CVE' out) $(grep -o source out | head -1)"
