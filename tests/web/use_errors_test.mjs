@@ -146,11 +146,13 @@ await h.step('where the room was never said: the words are the patient’s, no a
   h.tell('moved y -8 HFS bare');  // to the feet: along the marker's x axis, where the head lies
   await scan();
   const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
-  await card('Lateral').waitFor();
-  equal(await card('Lateral').locator('.value').innerText(), '+8.0 mm', 'along the marker’s axis');
-  equal(await card('Lateral').locator('.word').innerText(), 'toward the head', 'the words');
-  equal(await card('Lateral').locator('.arrow').count(), 0, 'no arrow of the couch');
-  await anna.getByText('The room has not been calibrated').waitFor();
+  // The head lies along the marker's x axis: its card is named by what lies there, as its direction is, and none by the couch's axes.
+  await card('Patient head/feet').waitFor();
+  equal(await card('Patient head/feet').locator('.value').innerText(), '+8.0 mm', 'along the marker’s axis');
+  equal(await card('Patient head/feet').locator('.word').innerText(), 'toward the head', 'the words');
+  equal(await card('Patient head/feet').locator('.arrow').count(), 0, 'no arrow of the couch');
+  equal((await anna.locator('.number h3').allInnerTexts()).join(), 'Vertical,Patient left/right,Patient head/feet,Tilt left/right,Tilt head/feet,Yaw', 'the cards');
+  await anna.getByText('The room has not been calibrated: directions are those of the patient or of the reference marker, never of the couch.').waitFor();
   equal(await anna.locator('.couch').count(), 0, 'no couch readings');
   await anna.locator('.map-row .map-box .ways').waitFor();
   equal((await marksIn(anna, '.map-row .map-box .ways')).join(), 'feet,head,left,right', 'the map');

@@ -87,15 +87,32 @@ function bar(value, u95, tolerance) {
 
 const kWords = { in: 'within', unsure: 'unsure', out: 'outside' };
 
+const kNear = Math.sin(Math.PI / 8);  // as the comparison chooses one of eight directions
+
+/// Name of an axis. Where the room was not known the numbers run along the axes of the reference
+/// marker: then it is the patient's line that lies along them, as in the words of the direction, or
+/// the marker's own axis; never one of the couch.
+/// @param body  Of the result: whether the room was known, and the patient's sides if they were.
+export function axisTitle({ name }, body) {
+  const text = S.result;
+  if (body?.room_known !== false || name === 'vertical' || name === 'yaw') return text.axes[name];
+  const along = name === 'longitudinal' || name === 'pitch' ? 1 : 0;
+  const words = name === 'pitch' || name === 'roll' ? text.tilts : text.lines;
+  const near = (way) => Boolean(way) && Math.abs(way[along]) > kNear;
+  const [head, left] = [near(body.head_xy), near(body.left_xy)];
+  if (head === left) return words.marker(along ? 'Y' : 'X');
+  return head ? words.head : words.left;
+}
+
 /// @param commands  Whether this is a correction to apply, or was one; else a difference that is
 /// only reported.
 /// @param pictured  Whether an arrow shows the way: only for what is to be applied, and, but for up
 /// and down, only in a room whose axes are known.
-function card(axis, { correction, u95, words }, tolerance, { weak, commands, pictured }) {
+function card(axis, { correction, u95, words }, tolerance,
+  { name, weak, commands, pictured }) {
   const text = S.result;
   const value = correction[axis.key];
   const limit = axis.shift ? tolerance.shift_mm : tolerance.rotation_deg;
-  const name = text.axes[axis.name];
   if (value === null || value === undefined) {
     return h('li', { class: 'number refused' }, h('h3', {}, name),
       h('p', { class: 'value' }, S.none), h('p', { class: 'word' }, text.refused));
@@ -150,7 +167,7 @@ export function sixNumbers(result, reference, details, valid = true) {
   const commands = result.verdict === 'move';
   return h('ol', { class: 'numbers' }, kAxes.map((axis) =>
     card(axis, result, toleranceOf(reference), {
-      weak: weak.has(axis.name), commands,
+      name: axisTitle(axis, details?.body), weak: weak.has(axis.name), commands,
       pictured: valid && (roomKnown || axis.name === 'vertical'),
     })));
 }

@@ -4,7 +4,7 @@ import { clear, fixed, h, keepFocus, warn } from '../dom.js';
 import { errorMap } from '../error_map.js';
 import { compassOf, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { loadMap, paintHeights } from '../maps.js';
-import { sixNumbers, toleranceOf } from '../numbers.js';
+import { axisTitle, sixNumbers, toleranceOf } from '../numbers.js';
 import { S, translated } from '../strings.js';
 import { trend } from '../trend.js';
 import { actions } from './accept.js';
@@ -74,7 +74,8 @@ function trust({ scan, details, scene }) {
   const rejected = Object.entries(alignment?.markers_rejected ?? {})
     .map(([id, residual]) => text.rejectedItem(id, mm(residual, 0)));
   add(text.rejected, rejected.length ? rejected.join(', ') : null, 'caution');
-  const weak = (motion?.weak_directions ?? []).map(({ name }) => text.axes[name] ?? name);
+  const weak = (motion?.weak_directions ?? [])
+    .map(({ name }) => axisTitle({ name }, details.body) ?? name);
   add(text.weak, weak.length ? weak.join(', ') : null, 'caution');
   const warnings = [...(details?.warnings ?? []), ...(scene?.warnings ?? [])].map(sentence);
   add(text.warnings, warnings.length ? warnings.join(' ') : null, 'caution whole-row');

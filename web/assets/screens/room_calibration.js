@@ -26,7 +26,8 @@ function state({ versions: [newest], due, configured }) {
     return h('p', { class: 'judged-in' }, `✓ ${text.holds(newest.version, newest.signed_by,
       signedTime(newest.signed_at))}`, configured && ` ${text.notTheConfigurations}`);
   }
-  return h('p', {}, configured ? text.configured : text.none);
+  return h('p', {}, configured ? text.configured
+    : `${S.result.roomUnknown} ${text.none}`);
 }
 
 function steps() {

@@ -286,6 +286,15 @@ export const en = {
       vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Pitch',
       roll: 'Roll', yaw: 'Yaw',
     },
+    // The same where the room was not known: along the patient, or along the reference marker.
+    lines: {
+      head: 'Patient head/feet', left: 'Patient left/right',
+      marker: (axis) => `Along marker ${axis}`,
+    },
+    tilts: {
+      head: 'Tilt head/feet', left: 'Tilt left/right',
+      marker: (axis) => `Tilt along marker ${axis}`,
+    },
     trust: 'Scan quality', markers: 'Markers matched', markerRms: 'Marker misfit (RMS)',
     coverage: 'Region covered', hole: 'Largest hole', residual: 'Surface fit',
     views: 'Keyframes', frames: 'Frames tracked', framesLost: 'Frames lost',
@@ -313,8 +322,8 @@ export const en = {
       + 'not been calibrated, and the surface does not show where the head lies.',
     roomCalibration: 'Room calibration', roomVersion: (version) => `version ${version}`,
     roomNotUsed: 'not used, see the warnings',
-    roomUnknown: 'The room has not been calibrated (T_iec_reference): the numbers run along and '
-      + 'about the axes of the reference marker, not of the couch.',
+    roomUnknown: 'The room has not been calibrated: directions are those of the patient or of the '
+      + 'reference marker, never of the couch.',
     higher: 'Patient is higher than reference', lower: 'Patient is lower than reference',
     unknown: 'not measured', hole_: 'hole in the region', regionOutline: 'region',
     reads: (value) => `${value} mm`,
@@ -411,8 +420,7 @@ export const en = {
   },
   room_calibration: {
     title: 'Room calibration',
-    none: 'The room has not been calibrated yet: directions are the patient’s, never the '
-      + 'couch’s. Calibrate the room with a printed board at the lasers.',
+    none: 'Calibrate the room with a printed board at the lasers.',
     configured: 'The axes of the room come from the configuration (T_iec_reference). A signed '
       + 'calibration replaces them.',
     holds: (version, who, when) => `Version ${version}, signed by ${who}, ${when}, gives every `

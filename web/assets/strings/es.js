@@ -319,6 +319,14 @@ export const es = {
       vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Cabeceo',
       roll: 'Balanceo', yaw: 'Guiñada',
     },
+    lines: {
+      head: 'Paciente: cabeza/pies', left: 'Paciente: izq./der.',
+      marker: (axis) => `Según ${axis} del marcador`,
+    },
+    tilts: {
+      head: 'Inclinación cabeza/pies', left: 'Inclinación izq./der.',
+      marker: (axis) => `Inclinación según ${axis} del marcador`,
+    },
     trust: 'Calidad del escaneo', markers: 'Marcadores emparejados',
     markerRms: 'Desajuste de marcadores (RMS)', coverage: 'Región cubierta',
     hole: 'Hueco mayor', residual: 'Ajuste de la superficie', views: 'Imágenes clave',
@@ -350,8 +358,8 @@ export const es = {
       + 'sala no está calibrada y la superficie no muestra dónde está la cabeza.',
     roomCalibration: 'Calibración de la sala', roomVersion: (version) => `versión ${version}`,
     roomNotUsed: 'no se usa, vea las advertencias',
-    roomUnknown: 'La sala no está calibrada (T_iec_reference): los números siguen los ejes del '
-      + 'marcador de referencia, no los de la camilla.',
+    roomUnknown: 'La sala no está calibrada: las direcciones son las del paciente o las del '
+      + 'marcador de referencia, nunca las de la camilla.',
     higher: 'El paciente está más alto que la referencia',
     lower: 'El paciente está más bajo que la referencia',
     unknown: 'no medido', hole_: 'hueco en la región', regionOutline: 'región',
@@ -455,8 +463,7 @@ export const es = {
   },
   room_calibration: {
     title: 'Calibración de la sala',
-    none: 'La sala aún no se ha calibrado: las direcciones son las del '
-      + 'paciente, nunca las de la camilla. Calibre la sala con una lámina impresa en los láseres.',
+    none: 'Calibre la sala con una lámina impresa en los láseres.',
     configured: 'Los ejes de la sala proceden de la configuración (T_iec_reference). Una '
       + 'calibración firmada los sustituye.',
     holds: (version, who, when) => `La versión ${version}, firmada por ${who}, ${when}, da a cada `
