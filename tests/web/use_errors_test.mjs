@@ -174,6 +174,8 @@ await h.step('a result that can no longer be acted on says what was found, and c
   h.tell('moved y -8 HFS');
   const shown = await scan();
   await anna.getByRole('heading', { name: /^Correction to apply/ }).waitFor();
+  await anna.getByText('every part as in the reference').first().waitFor();
+  equal(await anna.getByText('Correct the posture first').count(), 0, 'nothing to correct');
   equal(await anna.locator('.number .arrow').count(), 1, 'while it is valid it commands');
   h.tell('old');
   await anna.getByRole('heading', { name: /^Correction found then/ }).waitFor();
@@ -185,6 +187,8 @@ await h.step('a result that can no longer be acted on says what was found, and c
     equal(await anna.locator('.couch').count(), 0, 'nothing to set');
     equal(await anna.locator('.verdict .word').innerText(), '↔WAS OUTSIDE TOLERANCE', 'the verdict');
     check(!/Correction to apply|Apply the correction/.test(await anna.locator('main').innerText()), 'nothing to apply');
+    await anna.getByRole('heading', { name: 'Posture difference at this scan', exact: true }).waitFor();
+    equal(await anna.getByText('Correct the posture first').count(), 0, 'no order');
   }
   await h.look(anna, 'result-review', { axe: false });
   await anna.goto(`${h.url}result?scan=${shown.id}`);
@@ -201,6 +205,8 @@ await h.step('a lifted shoulder is said in words, on the page and in print', asy
   const said = await posture.locator('li').allInnerTexts();
   check(said.some((words) => /^left side at the head end \d+ mm high$/.test(words)), `the left shoulder: ${said.join('; ')}`);
   check(!said.some((words) => /^right side at the head end \d+ mm high$/.test(words)), `not the right one: ${said.join('; ')}`);
+  equal(await anna.locator('.verdict .flags li').first().innerText(), `Posture differs: ${said[0]}.`, 'beside the verdict');
+  await anna.getByText('Correct the posture first').waitFor();
   const { body } = await h.api(anna, `results/${shown.id}`);
   equal(body.body.named_by, 'posture', 'what names the parts');
   await anna.goto(`${h.url}result?scan=${shown.id}`);

@@ -106,10 +106,11 @@ export function axisTitle({ name }, body) {
 
 /// @param commands  Whether this is a correction to apply, or was one; else a difference that is
 /// only reported.
+/// @param valid  Whether the result can be acted on; else the card asks for nothing.
 /// @param pictured  Whether an arrow shows the way: only for what is to be applied, and, but for up
 /// and down, only in a room whose axes are known.
 function card(axis, { correction, u95, words }, tolerance,
-  { name, weak, commands, pictured }) {
+  { name, weak, commands, pictured, valid }) {
   const text = S.result;
   const value = correction[axis.key];
   const limit = axis.shift ? tolerance.shift_mm : tolerance.rotation_deg;
@@ -124,7 +125,7 @@ function card(axis, { correction, u95, words }, tolerance,
   const zero = printsAsZero(value, digits);
   const still = isStill(value, half, mostDigits(axis));
   const directed = commands && !still;
-  const told = judged === 'unsure' ? text.scanAgain : text.noMove;
+  const told = !valid ? text.atThisScan : judged === 'unsure' ? text.scanAgain : text.noMove;
   const word = !commands ? told : zero ? text.still : still ? text.insignificant
     : translated(words?.[axis.name]) ?? S.none;
   return h('li', { class: `number ${kWords[judged]}${commands ? '' : ' told'}` },
@@ -167,7 +168,7 @@ export function sixNumbers(result, reference, details, valid = true) {
   const commands = result.verdict === 'move';
   return h('ol', { class: 'numbers' }, kAxes.map((axis) =>
     card(axis, result, toleranceOf(reference), {
-      name: axisTitle(axis, details?.body), weak: weak.has(axis.name), commands,
+      name: axisTitle(axis, details?.body), weak: weak.has(axis.name), commands, valid,
       pictured: valid && (roomKnown || axis.name === 'vertical'),
     })));
 }

@@ -39,6 +39,10 @@ export const outcomeBadge = (scan) => (scan.result ? verdictBadge(scan.result.ve
 export const isAdvice = (scan) =>
   Boolean(scan.result?.correction) && scan.result.verdict !== 'no_answer';
 
+/// Shows in `place` what asks for something only while the result can be acted on.
+export const showOrders = (place, valid) => place.querySelectorAll('.order')
+  .forEach((element) => { element.hidden = !valid; });
+
 /// Where the comparison found the patient's sides and the room's, for the marks on pictures: no
 /// answer, no side of the patient.
 export function sidesOf(scan, details) {
@@ -101,10 +105,13 @@ export function ageText(seconds) {
   return text.days(Math.floor(seconds / 86400));
 }
 
-/// What lessens the trust in a result, beside its verdict.
-export function qualityFlags(scan, scene) {
+/// What lessens the trust in a result, beside its verdict; first what no verdict about the six
+/// numbers says: that the posture differs.
+export function qualityFlags(scan, scene, valid = true) {
   const text = S.result.flags;
   const flags = [];
+  const [part] = isAdvice(scan) ? scan.result.body?.after ?? [] : [];
+  if (part) flags.push((valid ? text.posture : text.postureThen)(translated(part)));
   const { total = 0, dropped = 0 } = scene?.frames ?? {};
   const lost = total > 0 ? Math.round(100 * dropped / total) : 0;
   if (lost >= 5) flags.push(text.framesLost(lost));
@@ -115,7 +122,7 @@ export function qualityFlags(scan, scene) {
   return flags;
 }
 
-export const flagList = (scan, scene) => {
-  const flags = qualityFlags(scan, scene);
+export const flagList = (scan, scene, valid = true) => {
+  const flags = qualityFlags(scan, scene, valid);
   return flags.length > 0 && h('ul', { class: 'flags' }, flags.map((flag) => h('li', {}, flag)));
 };

@@ -308,12 +308,15 @@ export const en = {
       warming: (minutes) => `The sensor had been on for ${minutes < 1 ? 'less than 1'
         : `only ${minutes}`} min and was still warming up.`,
       overdue: 'The daily check was overdue at this scan.',
+      posture: (part) => `Posture differs: ${part}.`,
+      postureThen: (part) => `Posture differed: ${part}.`,
     },
     where: 'Where on the body', before: 'Before', after: 'After the correction',
     mapLabel: 'Map of height errors, current minus reference. Use the arrow keys to read values.',
     mapPicture: 'Error map',
     bodyAfter: 'Posture difference that remains after the shift',
     bodyAfterHint: 'Correct the posture first; moving the couch cannot.',
+    bodyAfterThen: 'Posture difference at this scan', atThisScan: 'At this scan',
     bodyNow: 'Now', bodyNowHint: 'Compared with the reference, before the correction.',
     asReference: 'every part as in the reference, within 3 mm',
     bodyByRoom: 'Parts are named by the axes of the room (IEC 61217): patient orientation unknown '

@@ -343,6 +343,8 @@ export const es = {
       warming: (minutes) => `El sensor llevaba ${minutes < 1
         ? 'menos de 1' : `solo ${minutes}`} min encendido y aún se calentaba.`,
       overdue: 'El control diario estaba pendiente en este escaneo.',
+      posture: (part) => `La postura difiere: ${part}.`,
+      postureThen: (part) => `La postura difería: ${part}.`,
     },
     where: 'Dónde en el cuerpo', before: 'Antes', after: 'Después de la corrección',
     mapLabel: 'Mapa de errores de altura, actual menos referencia. Use las flechas para leer '
@@ -350,6 +352,7 @@ export const es = {
     mapPicture: 'Mapa de errores',
     bodyAfter: 'Diferencia de postura que queda tras el desplazamiento',
     bodyAfterHint: 'Corrija primero la postura; mover la camilla no puede hacerlo.',
+    bodyAfterThen: 'Diferencia de postura en este escaneo', atThisScan: 'En este escaneo',
     bodyNow: 'Ahora', bodyNowHint: 'Comparado con la referencia, antes de la corrección.',
     asReference: 'todas las partes como en la referencia, dentro de 3 mm',
     bodyByRoom: 'Las partes se nombran por los ejes de la sala (IEC 61217): la orientación del '
