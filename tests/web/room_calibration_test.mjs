@@ -21,6 +21,7 @@ await h.step('an engineer, a technician and a physicist log in', async () => {
 async function scanBoard() {
   await bob.goto(`${h.url}#/check`);
   await card(bob).getByRole('button', { name: 'Start a scan of the board' }).click();
+  await bob.locator('.who-line', { hasText: 'sweep over the board and all markers' }).waitFor();
   await bob.getByRole('button', { name: /Start sweep|Scan again/ }).click();
   await bob.waitForURL(/#\/check/, { timeout: 60000 });
 }

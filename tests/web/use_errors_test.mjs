@@ -296,8 +296,10 @@ await h.step('not as planned: no picture names a side of the patient, in a known
   const { id } = await scan();
   equal((await h.api(anna, `results/${id}`)).body.body.named_by, 'room', 'the words are the room’s');
   const { found, views } = await marksOfResult('marks-room');
-  equal(found[kPictures[0]].join(), 'gantry,minusX,plusX', 'the map');
-  equal(found[kPictures[2]].join(), 'gantry,minusX,plusX', 'the overlay');
+  equal(found[kPictures[0]].join(), 'gantry,roomMinusX,roomPlusX', 'the map');
+  equal(found[kPictures[2]].join(), 'gantry,roomMinusX,roomPlusX', 'the overlay');
+  // The numbers at its edges are the marker's x and y: no mark could be taken for one of them.
+  equal(await anna.locator('.map-row .way[data-mark=roomPlusX]').textContent(), 'ROOM +X', 'whose axis');
   for (const where of kPictures) equal(sides(found[where]).join(), '', where);
   equal(sides(views).join(), '', '3-D views');
   await anna.getByText('axes of the room (IEC 61217), not the patient’s sides').first().waitFor();
@@ -318,7 +320,8 @@ await h.step('unknown, without an answer: no picture of the result names a side 
   h.tell('stranger');
   await scan();
   const { found, views } = await marksOfResult('marks-no-answer');
-  equal(found[kPictures[0]].join(), 'gantry,minusX,plusX', 'the map');
+  equal(found[kPictures[0]].join(), 'gantry,roomMinusX,roomPlusX', 'the map');
+  equal(await anna.getByLabel('After the correction').count(), 0, 'no map of a correction either');
   check(!views.some((name) => kPatients.includes(name.toLowerCase())), `3-D views: ${views}`);
   equal(await anna.getByLabel('Share of the correction that is shown').count(), 0, 'no answer, no correction to show');
 });

@@ -22,6 +22,9 @@ export function digitsOf(u95, most) {
   if (!(u95 > 0)) return most;
   return Math.max(0, Math.min(most, -Math.floor(Math.log10(u95) + 1e-9)));
 }
+/// An uncertainty with the digits of its value. It is not said smaller than it is, but for the
+/// twentieth of a digit that nobody reads.
+export const roundedUp = (u95, digits) => Math.ceil(u95 * 10 ** digits - 0.05) / 10 ** digits;
 export const mostDigits = (axis) => (axis.shift ? 1 : 2);
 
 /// Whether a value is not known to differ from nothing: it has no direction and commands nothing.
@@ -121,7 +124,6 @@ function card(axis, { correction, u95, words }, tolerance,
   const half = u95?.[axis.key] ?? 0;
   const judged = judge(value, half, limit);
   const digits = digitsOf(half, mostDigits(axis));
-  const halfDigits = Math.min(2, digits + (/^[0.]*1/.test(half.toFixed(3)) ? 1 : 0));
   const zero = printsAsZero(value, digits);
   const still = isStill(value, half, mostDigits(axis));
   const directed = commands && !still;
@@ -137,7 +139,7 @@ function card(axis, { correction, u95, words }, tolerance,
     h('p', { class: 'fine' },
       h('span', { class: 'half' },
         h('span', { class: 'visually-hidden' }, `${text.uncertaintyLong} `),
-        text.uncertainty(number(half, halfDigits), axis.unit)),
+        text.uncertainty(number(roundedUp(half, digits), digits), axis.unit)),
       h('span', { class: 'judged' }, `${kJudgements[judged]} ${text[kWords[judged]]}`),
       h('span', { class: 'limit' }, text.tolerance(number(limit, Number.isInteger(limit) ? 0 : 1),
         axis.unit))),

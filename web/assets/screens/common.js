@@ -1,6 +1,7 @@
 // What several screens show.
 import { get, live, since_s } from '../api.js';
 import { clear, h } from '../dom.js';
+import { kJudgements } from '../numbers.js';
 import { S, translated } from '../strings.js';
 
 /// Of a time that the sensor has been on; how long it must be on is a setting of the appliance.
@@ -24,6 +25,10 @@ export function faultWords({ fault, fault_kind: kind }) {
 
 export const verdictIcon = (verdict) =>
   ({ in_tolerance: '✓', unsure: '≈', move: '↔', no_answer: '?' })[verdict] ?? '–';
+
+/// Of a result that was accepted: with a reason it was not in tolerance, or not surely.
+export const acceptanceMark = (scan) => (!scan.accepted_reason ? kJudgements.in
+  : scan.result?.verdict === 'unsure' ? kJudgements.unsure : kJudgements.out);
 
 export const verdictBadge = (verdict) => h('span', { class: `badge ${verdict}` },
   `${verdictIcon(verdict)} ${S.result.verdicts[verdict] ?? verdict}`);

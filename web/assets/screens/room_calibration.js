@@ -85,8 +85,9 @@ export function roomCard() {
       steps(),
       action(text.start, async () => {
         await post('checks/open');
-        location.hash = '#/scan';
+        location.hash = '#/scan/board';
       }, {}),
+      h('p', { class: 'hint' }, text.isCheck),
     ], scans.length > 0 && table([text.when, text.markers, text.misfit, text.size,
       text.uncertainty], scans.map(scanRow), text.scans),
     spread(room),

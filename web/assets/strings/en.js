@@ -156,6 +156,7 @@ export const en = {
     wipe: 'Delete patient data',
     wipeText: 'This permanently deletes the patient with all scans, references and files. '
       + 'Type the code to confirm.',
+    wipeDiffers: 'The code does not match.',
     wipeSubmit: 'Delete permanently', history: 'Scans', when: 'When', purpose: 'Purpose',
     outcome: 'Outcome', accepted: 'Accepted', fraction: 'Fraction',
     numbers: 'Vert., long., lat. (mm) · pitch, roll, yaw (°)',
@@ -342,7 +343,7 @@ export const en = {
     sliceAlong: ['Along x', 'Along y'], sliceHeight: 'height (cm)', sliceWay: 'position (cm)',
     marks: {
       head: 'HEAD', feet: 'FEET', left: 'LEFT', right: 'RIGHT', gantry: 'GANTRY', plusX: '+X',
-      minusX: '−X', plusY: '+Y', minusY: '−Y',
+      minusX: '−X', plusY: '+Y', minusY: '−Y', roomPlusX: 'ROOM +X', roomMinusX: 'ROOM −X',
     },
     marksOfPlan: 'Head, feet, left and right are those of the planned posture: check that the '
       + 'patient lies so.',
@@ -374,7 +375,8 @@ export const en = {
     trendEmpty: 'The trend begins with the second scan.',
     rescan: 'Scan again', accept: 'Accept', acceptedBy: (who) => `Accepted by ${who}`,
     acceptedOutside: (who, reason) => `Accepted outside tolerance by ${who}: ${reason}`,
-    acceptOutside: 'Accept outside tolerance',
+    acceptedUnsure: (who, reason) => `Accepted although not surely within by ${who}: ${reason}`,
+    acceptOutside: 'Accept outside tolerance', acceptUnsure: 'Accept although not surely within',
     acceptOutsideHint: 'Your reason, the verdict and the numbers are stored in the log.',
     acceptReason: 'Reason', acceptPassword: 'Your password',
     cannotAccept: 'Only the newest result of the open session can be accepted, for 2 minutes.',
@@ -435,6 +437,9 @@ export const en = {
     place: 'Lay it flat on a rigid plate on the couch, face up, with the cross exactly at the '
       + 'lasers, the arrow to the gantry, and its lines along the lasers.',
     scan: 'Sweep three times over the board and the markers of the room, without touching either.',
+    sweep: 'sweep over the board and all markers of the room, without a patient',
+    isCheck: 'Each of them is a daily check as well, and the room display calls it so: the board '
+      + 'must be in the sweep.',
     start: 'Start a scan of the board', scans: 'Scans of the board', when: 'When',
     markers: 'Markers', misfit: 'Misfit (RMS)', size: 'Size of the sheet',
     uncertainty: 'Uncertainty (95 %)',

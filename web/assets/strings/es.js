@@ -183,6 +183,7 @@ export const es = {
     wipe: 'Borrar los datos del paciente',
     wipeText: 'Esto borra el paciente con todos sus escaneos, referencias y archivos de forma '
       + 'permanente. Escriba el código para confirmarlo.',
+    wipeDiffers: 'El código no coincide.',
     wipeSubmit: 'Borrar permanentemente', history: 'Escaneos', when: 'Cuándo',
     purpose: 'Finalidad', outcome: 'Resultado', accepted: 'Aceptado', fraction: 'Fracción',
     numbers: 'Vert., long., lat. (mm) · cabeceo, balanceo, guiñada (°)',
@@ -380,7 +381,7 @@ export const es = {
     sliceWay: 'posición (cm)',
     marks: {
       head: 'CABEZA', feet: 'PIES', left: 'IZQ.', right: 'DER.', gantry: 'GANTRY', plusX: '+X',
-      minusX: '−X', plusY: '+Y', minusY: '−Y',
+      minusX: '−X', plusY: '+Y', minusY: '−Y', roomPlusX: '+X SALA', roomMinusX: '−X SALA',
     },
     marksOfPlan: 'Cabeza, pies, izquierda y derecha son los de la postura planificada: compruebe '
       + 'que el paciente está así.',
@@ -415,7 +416,8 @@ export const es = {
     trendEmpty: 'La evolución empieza con el segundo escaneo.',
     rescan: 'Escanear de nuevo', accept: 'Aceptar', acceptedBy: (who) => `Aceptado por ${who}`,
     acceptedOutside: (who, reason) => `Aceptado fuera de tolerancia por ${who}: ${reason}`,
-    acceptOutside: 'Aceptar fuera de tolerancia',
+    acceptedUnsure: (who, reason) => `Aceptado, aunque no es concluyente, por ${who}: ${reason}`,
+    acceptOutside: 'Aceptar fuera de tolerancia', acceptUnsure: 'Aceptar aunque no es concluyente',
     acceptOutsideHint: 'Su motivo, el veredicto y los valores se guardan en el registro.',
     acceptReason: 'Motivo', acceptPassword: 'Su contraseña',
     cannotAccept: 'Solo se puede aceptar el último resultado de la sesión abierta, durante 2 '
@@ -479,6 +481,9 @@ export const es = {
       + 'exactamente en los láseres, la flecha hacia el gantry y sus líneas a lo largo de los '
       + 'láseres.',
     scan: 'Barra tres veces la lámina y los marcadores de la sala, sin tocarlos.',
+    sweep: 'barrido sobre la lámina y todos los marcadores de la sala, sin paciente',
+    isCheck: 'Cada uno es también un control diario, y así lo llama la pantalla de la sala: la '
+      + 'lámina debe estar en el barrido.',
     start: 'Empezar un escaneo de la lámina', scans: 'Escaneos de la lámina', when: 'Cuándo',
     markers: 'Marcadores', misfit: 'Desajuste (RMS)', size: 'Tamaño de la lámina',
     uncertainty: 'Incertidumbre (95 %)',
@@ -680,7 +685,7 @@ export const es = {
     scan_limit_s: 'Barrido más largo (s)',
     keep_recordings: 'Conservar las grabaciones originales (con color)',
     retention_days: 'Borrar los escaneos tras … días (0: nunca)',
-    idle_logout_min: 'Cerrar la sesión tras … min sin uso',
+    idle_logout_min: 'Salir de la cuenta tras … min sin uso',
     readOnly: 'Solo un ingeniero puede cambiar los ajustes.',
     enterAll: 'No se puede escanear hasta que un ingeniero introduzca aquí todos los valores y los '
       + 'guarde.',
