@@ -775,13 +775,13 @@ await h.step('a patient is deleted with the code and the password', async () => 
     await bob.getByRole('button', { name: 'Delete permanently' }).click();
   };
   await submit('PX-0001', h.password);
-  await bob.getByRole('alert').getByText('Type the code to confirm').waitFor();
+  await bob.getByRole('alert').getByText('The code does not match.').waitFor();
   await submit('PX-GONE', 'not this one');
   await bob.getByRole('alert').getByText('password is wrong').waitFor();
   equal((await h.api(bob, `patients/${id}`)).status, 200, 'still there');
   await bob.getByLabel('Your password').scrollIntoViewIfNeeded();
   await h.look(bob, 'patient-delete', { axe: false });
-  await submit('PX-GONE', h.password);
+  await submit('px-gone', h.password);
   await bob.waitForURL(/#\/patients$/);
   equal((await h.api(bob, `patients/${id}`)).status, 404, 'gone');
 });

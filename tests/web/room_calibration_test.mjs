@@ -21,13 +21,14 @@ await h.step('an engineer, a technician and a physicist log in', async () => {
 async function scanBoard() {
   await bob.goto(`${h.url}#/check`);
   await card(bob).getByRole('button', { name: 'Start a scan of the board' }).click();
+  await bob.locator('.who-line', { hasText: 'sweep over the board and all markers' }).waitFor();
   await bob.getByRole('button', { name: /Start sweep|Scan again/ }).click();
   await bob.waitForURL(/#\/check/, { timeout: 60000 });
 }
 
 await h.step('without a calibration directions are the patient’s, and a technician only reads', async () => {
   await anna.goto(`${h.url}#/check`);
-  await card(anna).getByText('The room has not been calibrated yet').waitFor();
+  await card(anna).getByText('The room has not been calibrated: directions are those of the patient or of the reference marker, never of the couch. Calibrate the room').waitFor();
   equal(await card(anna).getByRole('button').count(), 0, 'nothing to start or to sign');
   await bob.goto(`${h.url}#/check`);
   const [board] = await Promise.all([bob.waitForEvent('download'),

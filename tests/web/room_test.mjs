@@ -227,7 +227,7 @@ await h.step('accepting outside tolerance takes a reason and the password', asyn
   await anna.getByLabel('Your password').fill(h.password);
   await h.look(anna, 'accept-outside', { axe: false });
   await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
-  await anna.getByText(/Accepted outside tolerance by anna, .*20.*: swelling/).waitFor();
+  await anna.getByText(/^▲ Accepted outside tolerance by anna, .*20.*: swelling/).waitFor();
   const { entries } = await ok(bob, 'audit?limit=20', 'GET');
   check(entries.some(({ action }) => action === 'scan.accept_outside'), 'it is in the log');
 });
@@ -254,11 +254,19 @@ await h.step('three words: within, not surely within, outside; no digits below t
   const card = anna.locator('.number', { hasText: 'Vertical' });
   equal(await card.locator('.judged').innerText(), '≈ not surely within', 'the word');
   equal((await card.locator('.value').innerText()).replace(/\s/g, ''), '−3mm', '−2.8 ±1.2');
+  check(/±2 mm$/.test(await card.locator('.half').innerText()), 'with the digits of its value, rounded up');
   await card.getByText('tolerance ±3 mm').waitFor();
   const pitch = anna.locator('.number', { hasText: 'Pitch' });
   equal(await pitch.locator('.value').innerText(), '0.0°', '0.01 ±0.14');
+  check(/±0\.2°$/.test(await pitch.locator('.half').innerText()), 'as many digits');
   await h.look(anna, 'result-unsure', { axe: false });
   equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'not in one tap');
+  equal(await anna.getByText('Accept outside tolerance').count(), 0, 'no value is outside');
+  await anna.getByText('Accept although not surely within…').click();
+  await anna.getByLabel('Reason', { exact: true }).fill('breathing');
+  await anna.getByLabel('Your password').fill(h.password);
+  await anna.getByRole('button', { name: 'Accept although not surely within' }).click();
+  await anna.getByText(/^≈ Accepted although not surely within by anna, .*: breathing$/).waitFor();
 });
 
 await h.step('fraction numbers count sessions, not scans', async () => {
@@ -274,7 +282,9 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   // The next thing to press is the scan, not another session.
   await anna.goto(`${h.url}#/patient/${patient}`);
   await anna.locator('a.primary', { hasText: 'Go to scan' }).waitFor();
-  equal(await anna.locator('.primary.start-session').count(), 0, 'no second session comes first');
+  equal(await anna.getByRole('button', { name: 'Start treatment session' }).count(), 0, 'what is open is not offered again');
+  equal(await anna.getByText('Confirm: P-0042 is on the couch').isVisible(), false, 'nor asked');
+  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).count(), 1, 'another purpose is');
   await anna.goto(`${h.url}#/scan`);
 });
 

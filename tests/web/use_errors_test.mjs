@@ -146,11 +146,13 @@ await h.step('where the room was never said: the words are the patient’s, no a
   h.tell('moved y -8 HFS bare');  // to the feet: along the marker's x axis, where the head lies
   await scan();
   const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
-  await card('Lateral').waitFor();
-  equal(await card('Lateral').locator('.value').innerText(), '+8.0 mm', 'along the marker’s axis');
-  equal(await card('Lateral').locator('.word').innerText(), 'toward the head', 'the words');
-  equal(await card('Lateral').locator('.arrow').count(), 0, 'no arrow of the couch');
-  await anna.getByText('The room has not been calibrated').waitFor();
+  // The head lies along the marker's x axis: its card is named by what lies there, as its direction is, and none by the couch's axes.
+  await card('Patient head/feet').waitFor();
+  equal(await card('Patient head/feet').locator('.value').innerText(), '+8.0 mm', 'along the marker’s axis');
+  equal(await card('Patient head/feet').locator('.word').innerText(), 'toward the head', 'the words');
+  equal(await card('Patient head/feet').locator('.arrow').count(), 0, 'no arrow of the couch');
+  equal((await anna.locator('.number h3').allInnerTexts()).join(), 'Vertical,Patient left/right,Patient head/feet,Tilt left/right,Tilt head/feet,Yaw', 'the cards');
+  await anna.getByText('The room has not been calibrated: directions are those of the patient or of the reference marker, never of the couch.').waitFor();
   equal(await anna.locator('.couch').count(), 0, 'no couch readings');
   await anna.locator('.map-row .map-box .ways').waitFor();
   equal((await marksIn(anna, '.map-row .map-box .ways')).join(), 'feet,head,left,right', 'the map');
@@ -172,6 +174,8 @@ await h.step('a result that can no longer be acted on says what was found, and c
   h.tell('moved y -8 HFS');
   const shown = await scan();
   await anna.getByRole('heading', { name: /^Correction to apply/ }).waitFor();
+  await anna.getByText('every part as in the reference').first().waitFor();
+  equal(await anna.getByText('Correct the posture first').count(), 0, 'nothing to correct');
   equal(await anna.locator('.number .arrow').count(), 1, 'while it is valid it commands');
   h.tell('old');
   await anna.getByRole('heading', { name: /^Correction found then/ }).waitFor();
@@ -183,6 +187,8 @@ await h.step('a result that can no longer be acted on says what was found, and c
     equal(await anna.locator('.couch').count(), 0, 'nothing to set');
     equal(await anna.locator('.verdict .word').innerText(), '↔WAS OUTSIDE TOLERANCE', 'the verdict');
     check(!/Correction to apply|Apply the correction/.test(await anna.locator('main').innerText()), 'nothing to apply');
+    await anna.getByRole('heading', { name: 'Posture difference at this scan', exact: true }).waitFor();
+    equal(await anna.getByText('Correct the posture first').count(), 0, 'no order');
   }
   await h.look(anna, 'result-review', { axe: false });
   await anna.goto(`${h.url}result?scan=${shown.id}`);
@@ -199,6 +205,8 @@ await h.step('a lifted shoulder is said in words, on the page and in print', asy
   const said = await posture.locator('li').allInnerTexts();
   check(said.some((words) => /^left side at the head end \d+ mm high$/.test(words)), `the left shoulder: ${said.join('; ')}`);
   check(!said.some((words) => /^right side at the head end \d+ mm high$/.test(words)), `not the right one: ${said.join('; ')}`);
+  equal(await anna.locator('.verdict .flags li').first().innerText(), `Posture differs: ${said[0]}.`, 'beside the verdict');
+  await anna.getByText('Correct the posture first').waitFor();
   const { body } = await h.api(anna, `results/${shown.id}`);
   equal(body.body.named_by, 'posture', 'what names the parts');
   await anna.goto(`${h.url}result?scan=${shown.id}`);
@@ -288,8 +296,10 @@ await h.step('not as planned: no picture names a side of the patient, in a known
   const { id } = await scan();
   equal((await h.api(anna, `results/${id}`)).body.body.named_by, 'room', 'the words are the room’s');
   const { found, views } = await marksOfResult('marks-room');
-  equal(found[kPictures[0]].join(), 'gantry,minusX,plusX', 'the map');
-  equal(found[kPictures[2]].join(), 'gantry,minusX,plusX', 'the overlay');
+  equal(found[kPictures[0]].join(), 'gantry,roomMinusX,roomPlusX', 'the map');
+  equal(found[kPictures[2]].join(), 'gantry,roomMinusX,roomPlusX', 'the overlay');
+  // The numbers at its edges are the marker's x and y: no mark could be taken for one of them.
+  equal(await anna.locator('.map-row .way[data-mark=roomPlusX]').textContent(), 'ROOM +X', 'whose axis');
   for (const where of kPictures) equal(sides(found[where]).join(), '', where);
   equal(sides(views).join(), '', '3-D views');
   await anna.getByText('axes of the room (IEC 61217), not the patient’s sides').first().waitFor();
@@ -310,7 +320,8 @@ await h.step('unknown, without an answer: no picture of the result names a side 
   h.tell('stranger');
   await scan();
   const { found, views } = await marksOfResult('marks-no-answer');
-  equal(found[kPictures[0]].join(), 'gantry,minusX,plusX', 'the map');
+  equal(found[kPictures[0]].join(), 'gantry,roomMinusX,roomPlusX', 'the map');
+  equal(await anna.getByLabel('After the correction').count(), 0, 'no map of a correction either');
   check(!views.some((name) => kPatients.includes(name.toLowerCase())), `3-D views: ${views}`);
   equal(await anna.getByLabel('Share of the correction that is shown').count(), 0, 'no answer, no correction to show');
 });

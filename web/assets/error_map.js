@@ -6,7 +6,7 @@ import {
 } from './map_frame.js';
 import { cellAt, errorColour, loadMap, paintErrors, paintOverlay } from './maps.js';
 import { signed } from './numbers.js';
-import { sidesOf } from './screens/common.js';
+import { isAdvice, sidesOf } from './screens/common.js';
 import { S } from './strings.js';
 
 const kTicks = [-20, -10, -5, -2, -1, 1, 2, 5, 10, 20];  // tolerances
@@ -246,7 +246,8 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
       h('span', { class: 'key current' }, text.current_)));
   const element = h('div', {},
     h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.where),
-      choose('map', 'before', text.before, both), choose('map', 'after', text.after, both)),
+      choose('map', 'before', text.before, both),
+      isAdvice(scan) && choose('map', 'after', text.after, both)),
     row(view, h('div', {}, box, marksNote(compass)),
       h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
   const overlay = () => {

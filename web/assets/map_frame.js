@@ -32,7 +32,8 @@ export function compassOf(room, body, posture) {
     return { by: 'posture', ways: known ? { ...ways, gantry } : ways };
   }
   if (known && body?.named_by !== 'axes') {
-    return { by: 'room', ways: { gantry, plusX: right, minusX: times(right, -1) } };
+    // The numbers at the edges of a map are the marker's x and y, which may lie otherwise.
+    return { by: 'room', ways: { gantry, roomPlusX: right, roomMinusX: times(right, -1) } };
   }
   return {
     by: 'axes', ways: { plusX: [1, 0], minusX: [-1, 0], plusY: [0, 1], minusY: [0, -1] },

@@ -22,6 +22,9 @@ export function digitsOf(u95, most) {
   if (!(u95 > 0)) return most;
   return Math.max(0, Math.min(most, -Math.floor(Math.log10(u95) + 1e-9)));
 }
+/// An uncertainty with the digits of its value. It is not said smaller than it is, but for the
+/// twentieth of a digit that nobody reads.
+export const roundedUp = (u95, digits) => Math.ceil(u95 * 10 ** digits - 0.05) / 10 ** digits;
 export const mostDigits = (axis) => (axis.shift ? 1 : 2);
 
 /// Whether a value is not known to differ from nothing: it has no direction and commands nothing.
@@ -87,15 +90,33 @@ function bar(value, u95, tolerance) {
 
 const kWords = { in: 'within', unsure: 'unsure', out: 'outside' };
 
+const kNear = Math.sin(Math.PI / 8);  // as the comparison chooses one of eight directions
+
+/// Name of an axis. Where the room was not known the numbers run along the axes of the reference
+/// marker: then it is the patient's line that lies along them, as in the words of the direction, or
+/// the marker's own axis; never one of the couch.
+/// @param body  Of the result: whether the room was known, and the patient's sides if they were.
+export function axisTitle({ name }, body) {
+  const text = S.result;
+  if (body?.room_known !== false || name === 'vertical' || name === 'yaw') return text.axes[name];
+  const along = name === 'longitudinal' || name === 'pitch' ? 1 : 0;
+  const words = name === 'pitch' || name === 'roll' ? text.tilts : text.lines;
+  const near = (way) => Boolean(way) && Math.abs(way[along]) > kNear;
+  const [head, left] = [near(body.head_xy), near(body.left_xy)];
+  if (head === left) return words.marker(along ? 'Y' : 'X');
+  return head ? words.head : words.left;
+}
+
 /// @param commands  Whether this is a correction to apply, or was one; else a difference that is
 /// only reported.
+/// @param valid  Whether the result can be acted on; else the card asks for nothing.
 /// @param pictured  Whether an arrow shows the way: only for what is to be applied, and, but for up
 /// and down, only in a room whose axes are known.
-function card(axis, { correction, u95, words }, tolerance, { weak, commands, pictured }) {
+function card(axis, { correction, u95, words }, tolerance,
+  { name, weak, commands, pictured, valid }) {
   const text = S.result;
   const value = correction[axis.key];
   const limit = axis.shift ? tolerance.shift_mm : tolerance.rotation_deg;
-  const name = text.axes[axis.name];
   if (value === null || value === undefined) {
     return h('li', { class: 'number refused' }, h('h3', {}, name),
       h('p', { class: 'value' }, S.none), h('p', { class: 'word' }, text.refused));
@@ -103,11 +124,10 @@ function card(axis, { correction, u95, words }, tolerance, { weak, commands, pic
   const half = u95?.[axis.key] ?? 0;
   const judged = judge(value, half, limit);
   const digits = digitsOf(half, mostDigits(axis));
-  const halfDigits = Math.min(2, digits + (/^[0.]*1/.test(half.toFixed(3)) ? 1 : 0));
   const zero = printsAsZero(value, digits);
   const still = isStill(value, half, mostDigits(axis));
   const directed = commands && !still;
-  const told = judged === 'unsure' ? text.scanAgain : text.noMove;
+  const told = !valid ? text.atThisScan : judged === 'unsure' ? text.scanAgain : text.noMove;
   const word = !commands ? told : zero ? text.still : still ? text.insignificant
     : translated(words?.[axis.name]) ?? S.none;
   return h('li', { class: `number ${kWords[judged]}${commands ? '' : ' told'}` },
@@ -119,7 +139,7 @@ function card(axis, { correction, u95, words }, tolerance, { weak, commands, pic
     h('p', { class: 'fine' },
       h('span', { class: 'half' },
         h('span', { class: 'visually-hidden' }, `${text.uncertaintyLong} `),
-        text.uncertainty(number(half, halfDigits), axis.unit)),
+        text.uncertainty(number(roundedUp(half, digits), digits), axis.unit)),
       h('span', { class: 'judged' }, `${kJudgements[judged]} ${text[kWords[judged]]}`),
       h('span', { class: 'limit' }, text.tolerance(number(limit, Number.isInteger(limit) ? 0 : 1),
         axis.unit))),
@@ -150,7 +170,7 @@ export function sixNumbers(result, reference, details, valid = true) {
   const commands = result.verdict === 'move';
   return h('ol', { class: 'numbers' }, kAxes.map((axis) =>
     card(axis, result, toleranceOf(reference), {
-      weak: weak.has(axis.name), commands,
+      name: axisTitle(axis, details?.body), weak: weak.has(axis.name), commands, valid,
       pictured: valid && (roomKnown || axis.name === 'vertical'),
     })));
 }

@@ -3,6 +3,7 @@ import { fileUrl, live, may, post } from '../api.js';
 import { action, clear, done, field, form, h, signedTime, signingPassword } from '../dom.js';
 import { S } from '../strings.js';
 import { closeSession } from '../treatment.js';
+import { acceptanceMark } from './common.js';
 import { removeScan } from './remove_scan.js';
 import { whyNotValid } from './verdict.js';
 
@@ -19,9 +20,11 @@ function rescanButton({ scan, patient }) {
 
 function outsideForm(scan, reload) {
   const text = S.result;
+  const isUnsure = scan.result.verdict === 'unsure';
+  const label = isUnsure ? text.acceptUnsure : text.acceptOutside;
   const reason = h('input', { required: true, minlength: 3, maxlength: 200, autocomplete: 'off' });
   const password = signingPassword();
-  return h('details', { class: 'accept-outside' }, h('summary', {}, `${text.acceptOutside}…`),
+  return h('details', { class: 'accept-outside' }, h('summary', {}, `${label}…`),
     h('p', { class: 'hint' }, text.acceptOutsideHint),
     form({ class: 'form inline' }, async () => {
       const body = { reason: reason.value.trim(), password: password.value };
@@ -30,7 +33,7 @@ function outsideForm(scan, reload) {
       done(S.saved);
       await reload();
     }, field(text.acceptReason, reason), field(text.acceptPassword, password),
-    h('button', { class: 'danger' }, text.acceptOutside)));
+    h('button', { class: 'danger' }, label)));
 }
 
 /// Only a valid result can be accepted: one tap in tolerance, else a reason and the password.
@@ -66,7 +69,9 @@ function accepted(scan) {
   const text = S.result;
   const { accepted_by: who, accepted_reason: why } = scan;
   const signed = scan.accepted_at ? `${who}, ${signedTime(scan.accepted_at)}` : who;
-  const words = why ? text.acceptedOutside(signed, why) : text.acceptedBy(signed);
+  const isUnsure = scan.result?.verdict === 'unsure';
+  const words = !why ? text.acceptedBy(signed)
+    : (isUnsure ? text.acceptedUnsure : text.acceptedOutside)(signed, why);
   const close = h('div', { class: 'acceptance' });
   let shown;
   const tick = () => {
@@ -80,7 +85,8 @@ function accepted(scan) {
   };
   return {
     element: h('div', { class: 'acceptance' },
-      h('p', { class: `badge wide ${why ? 'move' : 'in_tolerance'}` }, `✓ ${words}`), close),
+      h('p', { class: `badge wide ${why ? 'move' : 'in_tolerance'}` },
+        `${acceptanceMark(scan)} ${words}`), close),
     tick,
   };
 }

@@ -1,6 +1,7 @@
 // What several screens show.
 import { get, live, since_s } from '../api.js';
 import { clear, h } from '../dom.js';
+import { kJudgements } from '../numbers.js';
 import { S, translated } from '../strings.js';
 
 /// Of a time that the sensor has been on; how long it must be on is a setting of the appliance.
@@ -25,6 +26,10 @@ export function faultWords({ fault, fault_kind: kind }) {
 export const verdictIcon = (verdict) =>
   ({ in_tolerance: '✓', unsure: '≈', move: '↔', no_answer: '?' })[verdict] ?? '–';
 
+/// Of a result that was accepted: with a reason it was not in tolerance, or not surely.
+export const acceptanceMark = (scan) => (!scan.accepted_reason ? kJudgements.in
+  : scan.result?.verdict === 'unsure' ? kJudgements.unsure : kJudgements.out);
+
 export const verdictBadge = (verdict) => h('span', { class: `badge ${verdict}` },
   `${verdictIcon(verdict)} ${S.result.verdicts[verdict] ?? verdict}`);
 
@@ -38,6 +43,10 @@ export const outcomeBadge = (scan) => (scan.result ? verdictBadge(scan.result.ve
 /// could apply.
 export const isAdvice = (scan) =>
   Boolean(scan.result?.correction) && scan.result.verdict !== 'no_answer';
+
+/// Shows in `place` what asks for something only while the result can be acted on.
+export const showOrders = (place, valid) => place.querySelectorAll('.order')
+  .forEach((element) => { element.hidden = !valid; });
 
 /// Where the comparison found the patient's sides and the room's, for the marks on pictures: no
 /// answer, no side of the patient.
@@ -101,10 +110,13 @@ export function ageText(seconds) {
   return text.days(Math.floor(seconds / 86400));
 }
 
-/// What lessens the trust in a result, beside its verdict.
-export function qualityFlags(scan, scene) {
+/// What lessens the trust in a result, beside its verdict; first what no verdict about the six
+/// numbers says: that the posture differs.
+export function qualityFlags(scan, scene, valid = true) {
   const text = S.result.flags;
   const flags = [];
+  const [part] = isAdvice(scan) ? scan.result.body?.after ?? [] : [];
+  if (part) flags.push((valid ? text.posture : text.postureThen)(translated(part)));
   const { total = 0, dropped = 0 } = scene?.frames ?? {};
   const lost = total > 0 ? Math.round(100 * dropped / total) : 0;
   if (lost >= 5) flags.push(text.framesLost(lost));
@@ -115,7 +127,7 @@ export function qualityFlags(scan, scene) {
   return flags;
 }
 
-export const flagList = (scan, scene) => {
-  const flags = qualityFlags(scan, scene);
+export const flagList = (scan, scene, valid = true) => {
+  const flags = qualityFlags(scan, scene, valid);
   return flags.length > 0 && h('ul', { class: 'flags' }, flags.map((flag) => h('li', {}, flag)));
 };

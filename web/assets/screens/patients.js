@@ -7,7 +7,7 @@ import {
 import { numbersLine } from '../numbers.js';
 import { S } from '../strings.js';
 import { closeSession, openPatient } from '../treatment.js';
-import { blockNote, isAdvice, outcomeBadge } from './common.js';
+import { acceptanceMark, blockNote, isAdvice, outcomeBadge } from './common.js';
 
 const waitsFor = ({ planned_by: planner }) =>
   (planner ? S.patients.waits : S.patients.waitsForPlan);
@@ -92,8 +92,9 @@ export async function showPatients(place) {
   return live.listen((kind) => { if (kind === 'data') load().catch(() => {}); });
 }
 
-/// Where another patient's session is open, it is named and closed by the same tap.
-/// @return {element, draw}  draw() when the connection is lost or back.
+/// Where another patient's session is open, it is named and closed by the same tap. What is open
+/// already, and scanned next, is not offered again.
+/// @return {element, draw}  draw() when the connection is lost or back, or the session another.
 function openButtons(patient) {
   const text = S.patients;
   const reason = h('input', { maxlength: 200, autocomplete: 'off' });
@@ -122,6 +123,8 @@ function openButtons(patient) {
         () => begin(session.id), { class: 'danger' }),
       action(S.cancel, async () => clear(question), {})));
   };
+  const confirm = h('p', { class: 'lead' }, text.confirmWho(patient.code));
+  const why = field(text.reason, reason);
   const fraction = action(text.openFraction, open('fraction'), { class: 'start-session' });
   const reference = action(text.openReference, open('reference'), {});
   let blocked = null;
@@ -129,16 +132,23 @@ function openButtons(patient) {
   const draw = () => {
     enable(fraction, live.connected && Boolean(patient.approved_reference_id));
     enable(reference, live.connected && !blocked);
+    const { session, next_purpose: next } = live.status ?? {};
+    const isOpen = (purpose) => session?.patient_id === patient.id && session.purpose === purpose
+      && next === purpose;
+    fraction.hidden = isOpen('fraction');
+    reference.hidden = isOpen('reference');
+    confirm.hidden = fraction.hidden;  // who is open stands above
+    why.hidden = reference.hidden;
   };
-  const block = blockNote((why) => {
-    blocked = why;
+  const block = blockNote((now) => {
+    blocked = now;
     draw();
   });
   const element = h('div', { class: 'form' },
-    h('p', { class: 'lead' }, text.confirmWho(patient.code)),
+    confirm,
     h('div', { class: 'row' }, fraction, reference), block, question,
     !patient.approved_reference_id && h('p', { class: 'hint' }, text.needsReference),
-    field(text.reason, reason));
+    why);
   return { element, draw };
 }
 
@@ -190,8 +200,8 @@ function scanTable(scans) {
   if (!scans.length) return h('p', { class: 'hint' }, S.status.noScans);
   const signed = (scan) => (scan.accepted_at
     ? `${scan.accepted_by}, ${signedTime(scan.accepted_at)}` : scan.accepted_by);
-  const accepted = (scan) => (!scan.accepted_by ? S.none : scan.accepted_reason
-    ? `▲ ${signed(scan)}: ${scan.accepted_reason}` : `✓ ${signed(scan)}`);
+  const accepted = (scan) => (!scan.accepted_by ? S.none : `${acceptanceMark(scan)} ${signed(scan)}`
+    + `${scan.accepted_reason ? `: ${scan.accepted_reason}` : ''}`);
   const rows = scans.map((scan) => h('tr', {},
     h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))),
     h('td', {}, scan.fraction ?? S.none),
@@ -211,7 +221,8 @@ function wipe(patient) {
   const password = signingPassword();
   return h('details', { class: 'card' }, h('summary', {}, text.wipe), h('p', {}, text.wipeText),
     form({ class: 'form inline' }, async () => {
-      if (code.value !== patient.code) throw new Error(text.wipeText);
+      const isSame = code.value.trim().toLowerCase() === patient.code.toLowerCase();
+      if (!isSame) throw new Error(text.wipeDiffers);
       const body = { password: password.value };
       password.value = '';
       await removeFor(`patients/${patient.id}`, body);
@@ -289,7 +300,7 @@ export async function showPatient(place, id) {
   await load();
   return live.listen((kind) => {
     if (kind === 'status') drawSession();
-    if (kind === 'connection') buttons?.draw();
+    if (kind === 'status' || kind === 'connection') buttons?.draw();
     if (kind === 'data' || kind === 'result') load().catch((error) => warn(error.message));
   });
 }

@@ -4,7 +4,7 @@ import { clear, fixed, h, keepFocus, warn } from '../dom.js';
 import { errorMap } from '../error_map.js';
 import { compassOf, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { loadMap, paintHeights } from '../maps.js';
-import { sixNumbers, toleranceOf } from '../numbers.js';
+import { axisTitle, sixNumbers, toleranceOf } from '../numbers.js';
 import { S, translated } from '../strings.js';
 import { trend } from '../trend.js';
 import { actions } from './accept.js';
@@ -74,7 +74,8 @@ function trust({ scan, details, scene }) {
   const rejected = Object.entries(alignment?.markers_rejected ?? {})
     .map(([id, residual]) => text.rejectedItem(id, mm(residual, 0)));
   add(text.rejected, rejected.length ? rejected.join(', ') : null, 'caution');
-  const weak = (motion?.weak_directions ?? []).map(({ name }) => text.axes[name] ?? name);
+  const weak = (motion?.weak_directions ?? [])
+    .map(({ name }) => axisTitle({ name }, details.body) ?? name);
   add(text.weak, weak.length ? weak.join(', ') : null, 'caution');
   const warnings = [...(details?.warnings ?? []), ...(scene?.warnings ?? [])].map(sentence);
   add(text.warnings, warnings.length ? warnings.join(' ') : null, 'caution whole-row');
@@ -98,19 +99,22 @@ function overlay(map, scan) {
 }
 
 /// Where on the body, in words: what lies high or low now, and what the correction will leave.
-function bodyWords({ scan, details }) {
+/// @param valid  Whether it can be acted on; else it says what was found, and asks for nothing.
+function bodyWords({ scan, details }, valid) {
   const text = S.result;
   if (!scan.result?.body || !details?.body || !isAdvice(scan)) return null;
+  const { after, now: before } = scan.result.body;
   const list = (title, hint, words) => h('div', {}, h('h3', {}, title),
-    h('p', { class: 'hint' }, hint),
+    hint && h('p', { class: 'hint' }, hint),
     h('ul', { class: 'findings' }, words.length
       ? words.map((word) => h('li', {}, translated(word)))
       : h('li', { class: 'fine-part' }, `✓ ${text.asReference}`)));
   return h('div', { class: 'body-part-words' },
     h('div', { class: 'body-words' },
-      list(text.bodyAfter, text.bodyAfterHint, scan.result.body.after),
+      list(valid ? text.bodyAfter : text.bodyAfterThen,
+        valid && after.length > 0 && text.bodyAfterHint, after),
       details.correction?.vertical_mm !== null
-        && list(text.bodyNow, text.bodyNowHint, scan.result.body.now)),
+        && list(valid ? text.bodyNow : text.atThisScan, text.bodyNowHint, before)),
     details.body.named_by === 'room' && h('p', { class: 'caution' }, text.bodyByRoom),
     details.body.named_by === 'axes' && h('p', { class: 'caution' }, text.bodyByAxes));
 }
@@ -158,6 +162,7 @@ function build(data, reload, id) {
     who: identity(data),
     note: validityNote(scan, data.received, Boolean(id)),
     other: h('p', { class: 'caution' }),
+    words: h('div', {}),
     map: h('div', {}, h('p', { class: 'hint' }, S.loading)),
     mesh: h('div', {}),
     overlay: h('div', {}, h('p', { class: 'hint' }, S.loading)),
@@ -170,6 +175,7 @@ function build(data, reload, id) {
     if (parts.isValid === !why) return;
     parts.isValid = !why;
     clear(parts.fresh, answer(data, !why));
+    clear(parts.words, bodyWords(data, !why));
   };
   const pictures = h('div', { class: mapped || data.scene?.heightmap ? 'halves' : '' },
     mapped && card(text.overlay, parts.overlay),
@@ -180,7 +186,7 @@ function build(data, reload, id) {
     parts.fresh,
     h('section', { class: 'card actions' }, parts.actions.element),
     data.details && card(text.trust, trust(data)),
-    mapped && card(text.where, bodyWords(data), parts.map),
+    mapped && card(text.where, parts.words, parts.map),
     pictures,
     scan.result && card(text.trend,
       !isAdvice(scan) && h('p', { class: 'caution' }, text.trendWithout),

@@ -10,7 +10,8 @@ import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseTheme } from '../preferences.js';
 import { chooseLanguage, kLanguages, languageOf, S, translated } from '../strings.js';
 import {
-  ageText, faultWords, flagList, isAdvice, isCold, lastKnownNote, minutesOf, sidesOf, sentence,
+  ageText, faultWords, flagList, isAdvice, isCold, lastKnownNote, minutesOf, sentence, showOrders,
+  sidesOf,
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { preview, surfaceIn } from './scan.js';
@@ -152,7 +153,7 @@ function posture(scan) {
   const parts = isAdvice(scan) ? scan.result.body?.after : null;
   if (!parts) return null;
   return h('section', { class: 'room-posture' }, h('h2', {}, S.result.bodyAfter),
-    parts.length > 0 && h('p', {}, S.result.bodyAfterHint),
+    parts.length > 0 && h('p', { class: 'order', hidden: true }, S.result.bodyAfterHint),
     h('ul', { class: 'findings' }, parts.length
       ? parts.slice(0, kPartsShown).map((part) => h('li', {}, translated(part)))
       : h('li', { class: 'fine-part' }, `✓ ${S.result.asReference}`)));
@@ -238,6 +239,7 @@ function result() {
       if (note) judge(why);
       age();
       place.classList.toggle('is-old', Boolean(why));
+      showOrders(place, !why);
     },
   };
 }

@@ -26,7 +26,8 @@ function state({ versions: [newest], due, configured }) {
     return h('p', { class: 'judged-in' }, `✓ ${text.holds(newest.version, newest.signed_by,
       signedTime(newest.signed_at))}`, configured && ` ${text.notTheConfigurations}`);
   }
-  return h('p', {}, configured ? text.configured : text.none);
+  return h('p', {}, configured ? text.configured
+    : `${S.result.roomUnknown} ${text.none}`);
 }
 
 function steps() {
@@ -84,8 +85,9 @@ export function roomCard() {
       steps(),
       action(text.start, async () => {
         await post('checks/open');
-        location.hash = '#/scan';
+        location.hash = '#/scan/board';
       }, {}),
+      h('p', { class: 'hint' }, text.isCheck),
     ], scans.length > 0 && table([text.when, text.markers, text.misfit, text.size,
       text.uncertainty], scans.map(scanRow), text.scans),
     spread(room),

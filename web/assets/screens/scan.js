@@ -103,7 +103,8 @@ export function adviceOf(status) {
   return { hint, words: S.scan.guidance[hint], tone: hint === 'none' ? 'good' : 'bad' };
 }
 
-export async function showScan(place) {
+/// @param what  "board": a check that was opened for the calibration of the room.
+export async function showScan(place, what) {
   const text = S.scan;
   const camera = preview();
   const who = h('p', { class: 'lead who-line' });
@@ -133,7 +134,9 @@ export async function showScan(place) {
     if (shown.who === key) return;
     shown.who = key;
     if (isCheck) {
-      redraw(who, h('strong', { class: 'code-big' }, S.purposes.daily_check), ` ${S.check.sweep}`);
+      const [name, sweep] = what === 'board' ? [S.room_calibration.title, S.room_calibration.sweep]
+        : [S.purposes.daily_check, S.check.sweep];
+      redraw(who, h('strong', { class: 'code-big' }, name), ` ${sweep}`);
     } else drawSession();
   };
   const drawProgress = (status) => {

@@ -101,7 +101,7 @@ export function verdictStrip({ scan, scene, patient }, valid = true) {
       h('span', { class: 'icon', 'aria-hidden': 'true' }, verdictIcon(result.verdict)),
       (valid ? text.verdicts : text.verdictsThen)[result.verdict] ?? result.verdict),
     h('p', { class: 'why' }, sentence(first)),
-    flagList(scan, scene),
+    flagList(scan, scene, valid),
     others.length > 0 && h('details', { class: 'other-reasons' },
       h('summary', {}, text.otherReasons(others.length)),
       h('ul', {}, others.map((reason) => h('li', {}, sentence(reason))))));

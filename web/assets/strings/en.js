@@ -156,6 +156,7 @@ export const en = {
     wipe: 'Delete patient data',
     wipeText: 'This permanently deletes the patient with all scans, references and files. '
       + 'Type the code to confirm.',
+    wipeDiffers: 'The code does not match.',
     wipeSubmit: 'Delete permanently', history: 'Scans', when: 'When', purpose: 'Purpose',
     outcome: 'Outcome', accepted: 'Accepted', fraction: 'Fraction',
     numbers: 'Vert., long., lat. (mm) · pitch, roll, yaw (°)',
@@ -286,6 +287,15 @@ export const en = {
       vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Pitch',
       roll: 'Roll', yaw: 'Yaw',
     },
+    // The same where the room was not known: along the patient, or along the reference marker.
+    lines: {
+      head: 'Patient head/feet', left: 'Patient left/right',
+      marker: (axis) => `Along marker ${axis}`,
+    },
+    tilts: {
+      head: 'Tilt head/feet', left: 'Tilt left/right',
+      marker: (axis) => `Tilt along marker ${axis}`,
+    },
     trust: 'Scan quality', markers: 'Markers matched', markerRms: 'Marker misfit (RMS)',
     coverage: 'Region covered', hole: 'Largest hole', residual: 'Surface fit',
     views: 'Keyframes', frames: 'Frames tracked', framesLost: 'Frames lost',
@@ -299,12 +309,15 @@ export const en = {
       warming: (minutes) => `The sensor had been on for ${minutes < 1 ? 'less than 1'
         : `only ${minutes}`} min and was still warming up.`,
       overdue: 'The daily check was overdue at this scan.',
+      posture: (part) => `Posture differs: ${part}.`,
+      postureThen: (part) => `Posture differed: ${part}.`,
     },
     where: 'Where on the body', before: 'Before', after: 'After the correction',
     mapLabel: 'Map of height errors, current minus reference. Use the arrow keys to read values.',
     mapPicture: 'Error map',
     bodyAfter: 'Posture difference that remains after the shift',
     bodyAfterHint: 'Correct the posture first; moving the couch cannot.',
+    bodyAfterThen: 'Posture difference at this scan', atThisScan: 'At this scan',
     bodyNow: 'Now', bodyNowHint: 'Compared with the reference, before the correction.',
     asReference: 'every part as in the reference, within 3 mm',
     bodyByRoom: 'Parts are named by the axes of the room (IEC 61217): patient orientation unknown '
@@ -313,8 +326,8 @@ export const en = {
       + 'not been calibrated, and the surface does not show where the head lies.',
     roomCalibration: 'Room calibration', roomVersion: (version) => `version ${version}`,
     roomNotUsed: 'not used, see the warnings',
-    roomUnknown: 'The room has not been calibrated (T_iec_reference): the numbers run along and '
-      + 'about the axes of the reference marker, not of the couch.',
+    roomUnknown: 'The room has not been calibrated: directions are those of the patient or of the '
+      + 'reference marker, never of the couch.',
     higher: 'Patient is higher than reference', lower: 'Patient is lower than reference',
     unknown: 'not measured', hole_: 'hole in the region', regionOutline: 'region',
     reads: (value) => `${value} mm`,
@@ -330,7 +343,7 @@ export const en = {
     sliceAlong: ['Along x', 'Along y'], sliceHeight: 'height (cm)', sliceWay: 'position (cm)',
     marks: {
       head: 'HEAD', feet: 'FEET', left: 'LEFT', right: 'RIGHT', gantry: 'GANTRY', plusX: '+X',
-      minusX: '−X', plusY: '+Y', minusY: '−Y',
+      minusX: '−X', plusY: '+Y', minusY: '−Y', roomPlusX: 'ROOM +X', roomMinusX: 'ROOM −X',
     },
     marksOfPlan: 'Head, feet, left and right are those of the planned posture: check that the '
       + 'patient lies so.',
@@ -362,7 +375,8 @@ export const en = {
     trendEmpty: 'The trend begins with the second scan.',
     rescan: 'Scan again', accept: 'Accept', acceptedBy: (who) => `Accepted by ${who}`,
     acceptedOutside: (who, reason) => `Accepted outside tolerance by ${who}: ${reason}`,
-    acceptOutside: 'Accept outside tolerance',
+    acceptedUnsure: (who, reason) => `Accepted although not surely within by ${who}: ${reason}`,
+    acceptOutside: 'Accept outside tolerance', acceptUnsure: 'Accept although not surely within',
     acceptOutsideHint: 'Your reason, the verdict and the numbers are stored in the log.',
     acceptReason: 'Reason', acceptPassword: 'Your password',
     cannotAccept: 'Only the newest result of the open session can be accepted, for 2 minutes.',
@@ -411,8 +425,7 @@ export const en = {
   },
   room_calibration: {
     title: 'Room calibration',
-    none: 'The room has not been calibrated yet: directions are the patient’s, never the '
-      + 'couch’s. Calibrate the room with a printed board at the lasers.',
+    none: 'Calibrate the room with a printed board at the lasers.',
     configured: 'The axes of the room come from the configuration (T_iec_reference). A signed '
       + 'calibration replaces them.',
     holds: (version, who, when) => `Version ${version}, signed by ${who}, ${when}, gives every `
@@ -424,6 +437,9 @@ export const en = {
     place: 'Lay it flat on a rigid plate on the couch, face up, with the cross exactly at the '
       + 'lasers, the arrow to the gantry, and its lines along the lasers.',
     scan: 'Sweep three times over the board and the markers of the room, without touching either.',
+    sweep: 'sweep over the board and all markers of the room, without a patient',
+    isCheck: 'Each of them is a daily check as well, and the room display calls it so: the board '
+      + 'must be in the sweep.',
     start: 'Start a scan of the board', scans: 'Scans of the board', when: 'When',
     markers: 'Markers', misfit: 'Misfit (RMS)', size: 'Size of the sheet',
     uncertainty: 'Uncertainty (95 %)',

@@ -183,6 +183,7 @@ export const es = {
     wipe: 'Borrar los datos del paciente',
     wipeText: 'Esto borra el paciente con todos sus escaneos, referencias y archivos de forma '
       + 'permanente. Escriba el código para confirmarlo.',
+    wipeDiffers: 'El código no coincide.',
     wipeSubmit: 'Borrar permanentemente', history: 'Escaneos', when: 'Cuándo',
     purpose: 'Finalidad', outcome: 'Resultado', accepted: 'Aceptado', fraction: 'Fracción',
     numbers: 'Vert., long., lat. (mm) · cabeceo, balanceo, guiñada (°)',
@@ -319,6 +320,14 @@ export const es = {
       vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Cabeceo',
       roll: 'Balanceo', yaw: 'Guiñada',
     },
+    lines: {
+      head: 'Paciente: cabeza/pies', left: 'Paciente: izq./der.',
+      marker: (axis) => `Según ${axis} del marcador`,
+    },
+    tilts: {
+      head: 'Inclinación cabeza/pies', left: 'Inclinación izq./der.',
+      marker: (axis) => `Inclinación según ${axis} del marcador`,
+    },
     trust: 'Calidad del escaneo', markers: 'Marcadores emparejados',
     markerRms: 'Desajuste de marcadores (RMS)', coverage: 'Región cubierta',
     hole: 'Hueco mayor', residual: 'Ajuste de la superficie', views: 'Imágenes clave',
@@ -335,6 +344,8 @@ export const es = {
       warming: (minutes) => `El sensor llevaba ${minutes < 1
         ? 'menos de 1' : `solo ${minutes}`} min encendido y aún se calentaba.`,
       overdue: 'El control diario estaba pendiente en este escaneo.',
+      posture: (part) => `La postura difiere: ${part}.`,
+      postureThen: (part) => `La postura difería: ${part}.`,
     },
     where: 'Dónde en el cuerpo', before: 'Antes', after: 'Después de la corrección',
     mapLabel: 'Mapa de errores de altura, actual menos referencia. Use las flechas para leer '
@@ -342,6 +353,7 @@ export const es = {
     mapPicture: 'Mapa de errores',
     bodyAfter: 'Diferencia de postura que queda tras el desplazamiento',
     bodyAfterHint: 'Corrija primero la postura; mover la camilla no puede hacerlo.',
+    bodyAfterThen: 'Diferencia de postura en este escaneo', atThisScan: 'En este escaneo',
     bodyNow: 'Ahora', bodyNowHint: 'Comparado con la referencia, antes de la corrección.',
     asReference: 'todas las partes como en la referencia, dentro de 3 mm',
     bodyByRoom: 'Las partes se nombran por los ejes de la sala (IEC 61217): la orientación del '
@@ -350,8 +362,8 @@ export const es = {
       + 'sala no está calibrada y la superficie no muestra dónde está la cabeza.',
     roomCalibration: 'Calibración de la sala', roomVersion: (version) => `versión ${version}`,
     roomNotUsed: 'no se usa, vea las advertencias',
-    roomUnknown: 'La sala no está calibrada (T_iec_reference): los números siguen los ejes del '
-      + 'marcador de referencia, no los de la camilla.',
+    roomUnknown: 'La sala no está calibrada: las direcciones son las del paciente o las del '
+      + 'marcador de referencia, nunca las de la camilla.',
     higher: 'El paciente está más alto que la referencia',
     lower: 'El paciente está más bajo que la referencia',
     unknown: 'no medido', hole_: 'hueco en la región', regionOutline: 'región',
@@ -369,7 +381,7 @@ export const es = {
     sliceWay: 'posición (cm)',
     marks: {
       head: 'CABEZA', feet: 'PIES', left: 'IZQ.', right: 'DER.', gantry: 'GANTRY', plusX: '+X',
-      minusX: '−X', plusY: '+Y', minusY: '−Y',
+      minusX: '−X', plusY: '+Y', minusY: '−Y', roomPlusX: '+X SALA', roomMinusX: '−X SALA',
     },
     marksOfPlan: 'Cabeza, pies, izquierda y derecha son los de la postura planificada: compruebe '
       + 'que el paciente está así.',
@@ -404,7 +416,8 @@ export const es = {
     trendEmpty: 'La evolución empieza con el segundo escaneo.',
     rescan: 'Escanear de nuevo', accept: 'Aceptar', acceptedBy: (who) => `Aceptado por ${who}`,
     acceptedOutside: (who, reason) => `Aceptado fuera de tolerancia por ${who}: ${reason}`,
-    acceptOutside: 'Aceptar fuera de tolerancia',
+    acceptedUnsure: (who, reason) => `Aceptado, aunque no es concluyente, por ${who}: ${reason}`,
+    acceptOutside: 'Aceptar fuera de tolerancia', acceptUnsure: 'Aceptar aunque no es concluyente',
     acceptOutsideHint: 'Su motivo, el veredicto y los valores se guardan en el registro.',
     acceptReason: 'Motivo', acceptPassword: 'Su contraseña',
     cannotAccept: 'Solo se puede aceptar el último resultado de la sesión abierta, durante 2 '
@@ -455,8 +468,7 @@ export const es = {
   },
   room_calibration: {
     title: 'Calibración de la sala',
-    none: 'La sala aún no se ha calibrado: las direcciones son las del '
-      + 'paciente, nunca las de la camilla. Calibre la sala con una lámina impresa en los láseres.',
+    none: 'Calibre la sala con una lámina impresa en los láseres.',
     configured: 'Los ejes de la sala proceden de la configuración (T_iec_reference). Una '
       + 'calibración firmada los sustituye.',
     holds: (version, who, when) => `La versión ${version}, firmada por ${who}, ${when}, da a cada `
@@ -469,6 +481,9 @@ export const es = {
       + 'exactamente en los láseres, la flecha hacia el gantry y sus líneas a lo largo de los '
       + 'láseres.',
     scan: 'Barra tres veces la lámina y los marcadores de la sala, sin tocarlos.',
+    sweep: 'barrido sobre la lámina y todos los marcadores de la sala, sin paciente',
+    isCheck: 'Cada uno es también un control diario, y así lo llama la pantalla de la sala: la '
+      + 'lámina debe estar en el barrido.',
     start: 'Empezar un escaneo de la lámina', scans: 'Escaneos de la lámina', when: 'Cuándo',
     markers: 'Marcadores', misfit: 'Desajuste (RMS)', size: 'Tamaño de la lámina',
     uncertainty: 'Incertidumbre (95 %)',
@@ -670,7 +685,7 @@ export const es = {
     scan_limit_s: 'Barrido más largo (s)',
     keep_recordings: 'Conservar las grabaciones originales (con color)',
     retention_days: 'Borrar los escaneos tras … días (0: nunca)',
-    idle_logout_min: 'Cerrar la sesión tras … min sin uso',
+    idle_logout_min: 'Salir de la cuenta tras … min sin uso',
     readOnly: 'Solo un ingeniero puede cambiar los ajustes.',
     enterAll: 'No se puede escanear hasta que un ingeniero introduzca aquí todos los valores y los '
       + 'guarde.',
