@@ -254,11 +254,11 @@ await h.step('three words: within, not surely within, outside; no digits below t
   const card = anna.locator('.number', { hasText: 'Vertical' });
   equal(await card.locator('.judged').innerText(), '≈ not surely within', 'the word');
   equal((await card.locator('.value').innerText()).replace(/\s/g, ''), '−3mm', '−2.8 ±1.2');
-  check(/±2 mm$/.test(await card.locator('.half').innerText()), 'with the digits of its value, rounded up');
+  check(/±1\.2 mm$/.test(await card.locator('.half').innerText()), 'a second digit after a 1');
   await card.getByText('tolerance ±3 mm').waitFor();
   const pitch = anna.locator('.number', { hasText: 'Pitch' });
   equal(await pitch.locator('.value').innerText(), '0.0°', '0.01 ±0.14');
-  check(/±0\.2°$/.test(await pitch.locator('.half').innerText()), 'as many digits');
+  check(/±0\.14°$/.test(await pitch.locator('.half').innerText()), 'a second digit after a 1');
   await h.look(anna, 'result-unsure', { axe: false });
   equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'not in one tap');
   equal(await anna.getByText('Accept outside tolerance').count(), 0, 'no value is outside');

@@ -22,9 +22,12 @@ export function digitsOf(u95, most) {
   if (!(u95 > 0)) return most;
   return Math.max(0, Math.min(most, -Math.floor(Math.log10(u95) + 1e-9)));
 }
-/// An uncertainty with the digits of its value. It is not said smaller than it is, but for the
-/// twentieth of a digit that nobody reads.
-export const roundedUp = (u95, digits) => Math.ceil(u95 * 10 ** digits - 0.05) / 10 ** digits;
+/// An uncertainty has one digit more than its value if its first digit is 1 (JCGM 100, 7.2.6), but
+/// never more than values of its kind. A small one is not said to be nothing.
+function shownUncertainty(u95, digits, most) {
+  const shown = Math.min(most, digits + (/^[0.]*1/.test(u95.toFixed(3)) ? 1 : 0));
+  return number(Math.max(u95, 10 ** -shown), shown);
+}
 export const mostDigits = (axis) => (axis.shift ? 1 : 2);
 
 /// Whether a value is not known to differ from nothing: it has no direction and commands nothing.
@@ -123,9 +126,10 @@ function card(axis, { correction, u95, words }, tolerance,
   }
   const half = u95?.[axis.key] ?? 0;
   const judged = judge(value, half, limit);
-  const digits = digitsOf(half, mostDigits(axis));
+  const most = mostDigits(axis);
+  const digits = digitsOf(half, most);
   const zero = printsAsZero(value, digits);
-  const still = isStill(value, half, mostDigits(axis));
+  const still = isStill(value, half, most);
   const directed = commands && !still;
   const told = !valid ? text.atThisScan : judged === 'unsure' ? text.scanAgain : text.noMove;
   const word = !commands ? told : zero ? text.still : still ? text.insignificant
@@ -139,7 +143,7 @@ function card(axis, { correction, u95, words }, tolerance,
     h('p', { class: 'fine' },
       h('span', { class: 'half' },
         h('span', { class: 'visually-hidden' }, `${text.uncertaintyLong} `),
-        text.uncertainty(number(roundedUp(half, digits), digits), axis.unit)),
+        text.uncertainty(shownUncertainty(half, digits, most), axis.unit)),
       h('span', { class: 'judged' }, `${kJudgements[judged]} ${text[kWords[judged]]}`),
       h('span', { class: 'limit' }, text.tolerance(number(limit, Number.isInteger(limit) ? 0 : 1),
         axis.unit))),
