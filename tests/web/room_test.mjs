@@ -41,6 +41,15 @@ async function approvedPatient(code) {
   await press();
   const { draft_reference_id: draft } = await ok(anna, `patients/${id}`, 'GET');
   const { plan, ...read } = await ok(bob, `references/${draft}`, 'GET');
+  // Where its line has space for half of it, the code of a draft goes to the next one as a whole.
+  const link = bob.locator('.tile .whole', { hasText: code });
+  equal(await link.evaluate((element) => {
+    const before = document.createRange();
+    before.setStart(element.parentElement, 0);
+    before.setEndBefore(element);
+    element.parentElement.style.width = `${before.getBoundingClientRect().width + 0.6 * element.offsetWidth}px`;
+    return element.getClientRects().length;
+  }), 1, 'a code is not broken at its hyphen');
   await ok(bob, `references/${draft}/plan`, 'PUT', { region_m: plan.region_m, isocentre_m: plan.isocentre_m, posture: plan.posture,
     couch_markers: plan.couch_markers, shift_tolerance_mm: plan.tolerance.shift_mm, rotation_tolerance_deg: plan.tolerance.rotation_deg,
     revision: read.revision });
@@ -203,6 +212,16 @@ await h.step('while a sweep runs or is computed no older result looks valid', as
   equal(await anna.getByRole('button', { name: /^Accept/ }).count(), 0, 'nothing to accept');
   await h.look(anna, 'result-while-scanning', { axe: false });
   const old = await state();
+  // The bar is seen in the colours of a system with high contrast, too.
+  await clara.emulateMedia({ forcedColors: 'active' });
+  await clara.goto(`${h.url}#/scan`);
+  await clara.locator('.bar-text', { hasText: /[1-9]\d* %/ }).waitFor();
+  const bar = await clara.locator('.bar progress').boundingBox();
+  const [full, empty] = await Promise.all([4, bar.width - 8].map((x) =>
+    clara.screenshot({ clip: { x: bar.x + x, y: bar.y + bar.height / 2, width: 2, height: 2 } })));
+  check(!full.equals(empty), 'what is covered has a colour of its own');
+  await clara.emulateMedia({ forcedColors: 'none' });
+  await clara.goto(h.url);
   equal((await h.api(anna, `scans/${old.last_result.id}/accept-outside`, 'POST',
     { reason: 'because', password: h.password })).status, 409, 'nor through the interface');
   await bob.goto(`${h.url}result?scan=${old.last_result.id}`);
