@@ -109,7 +109,7 @@ export function faultsOfLayout({ touched, wall, english }) {
   const value = document.querySelector('.result .number .value');
   const end = value?.getBoundingClientRect().bottom ?? 0;
   if (touched && end > 0.65 * clientHeight) add('far down', value, `: it ends at ${px(end)} of ${clientHeight}`);
-  const last = wall && [...document.querySelectorAll('.screen:not(.is-old):has(.verdict.move) .number')].at(-1);
+  const last = wall && [...document.querySelectorAll('.screen:not(.is-old):has(.verdict:is(.move, .unsure)) .number')].at(-1);
   const below = last ? last.getBoundingClientRect().bottom : 0;
   if (below > clientHeight) add('far down', last, `: it ends at ${px(below)} of ${clientHeight}`);
 

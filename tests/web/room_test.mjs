@@ -25,6 +25,8 @@ const until = async (what, holds) => {
   }
 };
 const inState = (name) => until(`state ${name}`, (status) => status.state === name);
+const styleOf = (page, part, name) => page.locator(part).first().evaluate((element, what) => getComputedStyle(element)[what], name);
+const sizeOf = async (page, part) => parseFloat(await styleOf(page, part, 'fontSize'));
 /// A sweep with the button, to its result.
 async function press() {
   const before = (await state()).last_result?.id;
@@ -39,6 +41,15 @@ async function approvedPatient(code) {
   const open = (await state()).session?.id ?? '';
   await ok(anna, `patients/${id}/open`, 'POST', { purpose: 'reference', reason: '', replaces: open });
   await press();
+  // Where its line has space for half of it, the code of a draft goes to the next one as a whole.
+  const link = bob.locator('.tile .whole', { hasText: code });
+  equal(await link.evaluate((element) => {
+    const before = document.createRange();
+    before.setStart(element.parentElement, 0);
+    before.setEndBefore(element);
+    element.parentElement.style.width = `${before.getBoundingClientRect().width + 0.6 * element.offsetWidth}px`;
+    return element.getClientRects().length;
+  }), 1, 'a code is not broken at its hyphen');
   const { draft_reference_id: draft } = await ok(anna, `patients/${id}`, 'GET');
   const { plan, ...read } = await ok(bob, `references/${draft}`, 'GET');
   await ok(bob, `references/${draft}/plan`, 'PUT', { region_m: plan.region_m, isocentre_m: plan.isocentre_m, posture: plan.posture,
@@ -201,6 +212,16 @@ await h.step('while a sweep runs or is computed no older result looks valid', as
   await anna.getByText('A NEW SCAN IS RUNNING').waitFor();
   equal(await anna.locator('.is-old').count(), 1, 'no longer valid');
   equal(await anna.getByRole('button', { name: /^Accept/ }).count(), 0, 'nothing to accept');
+  // The bar is seen in the colours of a system with high contrast, too.
+  await clara.emulateMedia({ forcedColors: 'active' });
+  await clara.goto(`${h.url}#/scan`);
+  await clara.locator('.bar-text', { hasText: /[1-9]\d* %/ }).waitFor();
+  const bar = await clara.locator('.bar progress').boundingBox();
+  const [full, empty] = await Promise.all([4, bar.width - 8].map((x) =>
+    clara.screenshot({ clip: { x: bar.x + x, y: bar.y + bar.height / 2, width: 2, height: 2 } })));
+  check(!full.equals(empty), 'what is covered has a colour of its own');
+  await clara.emulateMedia({ forcedColors: 'none' });
+  await clara.goto(h.url);
   await h.look(anna, 'result-while-scanning', { axe: false });
   const old = await state();
   equal((await h.api(anna, `scans/${old.last_result.id}/accept-outside`, 'POST',
@@ -244,6 +265,30 @@ await h.step('in tolerance: one tap accepts, and nothing commands a move', async
   }
   await anna.getByRole('button', { name: 'Accept', exact: true }).click();
   await anna.getByText('Accepted by anna').waitFor();
+  // Old: from 3 m it is the note that is read, and nothing is green, ticked or told to do.
+  await room.locator('.room-result:not(.is-old) .verdict.in_tolerance').waitFor();
+  h.tell('old');
+  await room.locator('.room-result.is-old .verdict', { hasText: 'WAS IN TOLERANCE' }).waitFor();
+  for (const [part, name, expected] of [['.verdict', 'filter', 'grayscale(1)'], ['.room-answer', 'filter', 'grayscale(1)'],
+    ['.verdict .word', 'color', 'rgb(167, 182, 194)'], ['.verdict', 'borderTopStyle', 'dashed'], ['.verdict .icon', 'display', 'none'],
+    ['.number .word', 'display', 'none'], ['.number .judged', 'display', 'none'], ['.room-posture', 'display', 'none']]) {
+    equal(await styleOf(room, part, name), expected, `${name} of ${part}`);
+  }
+  check(await sizeOf(room, '.old-note') > 45, 'the note is large');
+  check(await sizeOf(room, '.old-note') < await sizeOf(room, '.verdict .word') * 1.5, 'and the verdict is not much larger');
+  await h.look(room, 'room-old', { axe: false, fullPage: false });
+});
+
+await h.step('no answer: the room gives three reasons in words, and nothing to unfold', async () => {
+  h.tell('stranger');
+  await press();
+  await room.locator('.verdict.no_answer').waitFor();
+  equal(await room.locator('.room-reasons li').count(), 2, 'below the first');
+  equal(await room.locator('details').count(), 0, 'nobody can open them there');
+  for (const part of ['.room-reasons li', '.verdict .why']) check(await sizeOf(room, part) > 40, `${part} is read from 3 m`);
+  const age = await room.locator('.room-age').boundingBox();
+  check(age.y + age.height <= 1080, 'all in view');
+  await h.look(room, 'room-no-answer', { axe: false, fullPage: false });
 });
 
 await h.step('three words: within, not surely within, outside; no digits below the uncertainty', async () => {
@@ -259,6 +304,16 @@ await h.step('three words: within, not surely within, outside; no digits below t
   const pitch = anna.locator('.number', { hasText: 'Pitch' });
   equal(await pitch.locator('.value').innerText(), '0.0°', '0.01 ±0.14');
   check(/±0\.14°$/.test(await pitch.locator('.half').innerText()), 'a second digit after a 1');
+  for (const page of [anna, room]) {
+    equal(await sizeOf(page, '.number:last-child .unit'), await sizeOf(page, '.number:last-child .value'), 'no small ° at the foot');
+    check(await sizeOf(page, '.number .unit') < 0.6 * await sizeOf(page, '.number .value'), 'mm is small');
+  }
+  const lowest = await anna.locator('.number').last().evaluate((element) => {
+    window.scrollTo(0, 0);
+    document.querySelector('.flags').hidden = true;
+    return element.getBoundingClientRect().bottom;
+  });
+  check(lowest <= 800, `six numbers in view, down to ${lowest}`);
   await h.look(anna, 'result-unsure', { axe: false });
   equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'not in one tap');
   equal(await anna.getByText('Accept outside tolerance').count(), 0, 'no value is outside');
@@ -269,6 +324,15 @@ await h.step('three words: within, not surely within, outside; no digits below t
   await anna.getByText(/^≈ Accepted although not surely within by anna, .*: breathing$/).waitFor();
 });
 
+await h.step('where the room is not calibrated, its screen says so as large as a direction', async () => {
+  h.tell('moved z 8 HFS bare');
+  await press();
+  await room.locator('.room-answer section > .caution').waitFor();
+  check(await sizeOf(room, '.room-answer section > .caution') > 36, 'read from 3 m');
+  const lowest = await room.locator('.number').last().evaluate((element) => element.getBoundingClientRect().bottom);
+  check(lowest <= 1080, `six numbers in view, down to ${lowest}`);
+});
+
 await h.step('fraction numbers count sessions, not scans', async () => {
   const { scans } = await ok(anna, `patients/${patient}/scans`, 'GET');
   const fractions = scans.filter(({ purpose }) => purpose === 'fraction');
@@ -277,8 +341,16 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await anna.goto(`${h.url}#/scan`);
   await anna.getByRole('button', { name: 'Close session' }).click();
   await anna.getByText('No session open').first().waitFor();
+  // A daily check that has failed meanwhile stays in the corner; the display is ready for the next session.
+  await ok(anna, 'checks/open', 'POST');
+  h.tell('markermoved');
+  h.tell('press');
+  await room.locator('.verdict.move', { hasText: 'DAILY CHECK: FAILED' }).waitFor(kSlow);
   await openOnPage(anna, 'P-0042');
   await anna.locator('.who-line', { hasText: 'Fraction 2' }).waitFor();
+  await room.locator('.room-word', { hasText: 'READY' }).waitFor();
+  await room.locator('.room-marks .bad', { hasText: 'Daily check failed' }).waitFor();
+  equal(await room.getByText('Daily check passed').count(), 0, 'not passed');
   // The next thing to press is the scan, not another session.
   await anna.goto(`${h.url}#/patient/${patient}`);
   await anna.locator('a.primary', { hasText: 'Go to scan' }).waitFor();

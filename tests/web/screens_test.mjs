@@ -480,6 +480,8 @@ await h.step('each check finds what it is for', async () => {
   await settle(page);
   const faults = () => page.evaluate(faultsOfLayout, { touched: true, english });
   equal((await faults()).join('; '), '', 'nothing at first');
+  const [padding, notice] = await page.evaluate(() => [parseFloat(getComputedStyle(document.documentElement).scrollPaddingTop), document.querySelector('.notice').offsetHeight]);
+  check(padding > notice, `what has the focus is scrolled to below the notice: ${padding} of ${notice} px`);
   for (const [kind, tag, style, text] of [
     ['sideways', 'p', 'width: 400px', 'ancho'], ['out of view', 'p', 'position: fixed; left: 350px; white-space: nowrap', 'fuera de la ventana'],
     ['cut off', 'p', 'width: 60px; overflow: hidden; white-space: nowrap', 'demasiado largo para esto'],

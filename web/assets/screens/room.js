@@ -20,6 +20,7 @@ import { ageOf, validityNote, verdictStrip } from './verdict.js';
 const kAsk_ms = 2000;
 const kWho = 'room';
 const kPartsShown = 3;
+const kReasonsBelow = 2;  // below the first, which stands in the verdict
 const kSwap_s = 8;
 const optional = (path) => get(path, true).catch(() => null);
 const wait = (ms) => new Promise((ready) => { setTimeout(ready, ms); });
@@ -82,6 +83,7 @@ function top(status, said, isSwapped) {
   const { session, sensor } = status;
   const warm = !isCold(sensor.powered_s);
   const mark = (good, words) => h('li', { class: good ? 'good' : 'bad' }, words);
+  const failed = status.last_check?.status === 'failed';
   const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
   return h('header', { class: 'room-top' },
     !said && (isSwapped && !isCheck
@@ -93,7 +95,8 @@ function top(status, said, isSwapped) {
       ? S.purposes.reference : S.session.fraction(session.fraction),
     h('span', {}, ` · ${S.session.scans(session.num_scans)}`)),
     h('ul', { class: 'room-marks' },
-      mark(!status.check_overdue, status.check_overdue ? text.checkOverdue : text.checkDone),
+      mark(!failed && !status.check_overdue, failed ? text.checkFailed
+        : status.check_overdue ? text.checkOverdue : text.checkDone),
       sensor.present && mark(warm, warm ? text.warm
         : text.warming(Math.floor(sensor.powered_s / 60), minutesOf(sensor.warm_up_s)))));
 }
@@ -202,6 +205,7 @@ function result() {
       if (isValid === !why) return;
       isValid = !why;
       clear(strip, scan.result ? verdictStrip(data, isValid) : withoutResult(scan));
+      strip.querySelector('details')?.remove();  // nobody can open it here
       if (six) {
         clear(six, h('h2', { class: 'visually-hidden' }, S.result.atIsocentre),
           details?.body?.room_known === false && h('p', { class: 'caution' }, S.result.roomUnknown),
@@ -216,7 +220,9 @@ function result() {
     };
     age();
     clear(place, note.element, strip, !scan.result && flagList(scan, scene),
-      reasons.length > 1 && h('p', {}, reasons[1]), h('div', { class: 'room-answer' }, six,
+      reasons.length > 1 && h('ul', { class: 'room-reasons' },
+        reasons.slice(1, 1 + kReasonsBelow).map((reason) => h('li', {}, reason))),
+      h('div', { class: 'room-answer' }, six,
       h('div', { class: 'room-side' }, box, posture(scan), ago)));
     await map(data, box).catch(() => {});
     if (scan.result) say(S.result.verdicts[scan.result.verdict] ?? '');
@@ -269,7 +275,8 @@ function display(main) {
   const seen = h('div', { class: 'seen-so-far' });
   const showSurface = surfaceIn(seen);
   let camera = null;
-  let lastPurpose = null;
+  let lastPurpose = null;  // of the scan that was seen last, in the session that is open
+  let lastSession;
   let drawn = '';
   let shownMarks = '';
   let patient = null;  // whose session was open last
@@ -286,6 +293,9 @@ function display(main) {
   const draw = () => {
     const { status } = live;
     if (!status) return;
+    const { session } = status;
+    if ((session?.id ?? null) !== lastSession) lastPurpose = null;
+    lastSession = session?.id ?? null;
     lastPurpose = status.scan?.purpose ?? lastPurpose;
     main.classList.toggle('off', !live.connected);
     offline.draw();
@@ -294,18 +304,18 @@ function display(main) {
     showSurface(status.state === 'scanning');
     const last = status.last_result;
     const isCheck = status.state === 'result' && lastPurpose === 'daily_check';
-    // An answer is shown only in its own state: never during a sweep, nor for another patient.
-    const mine = last && (last.patient_id ?? null) === (status.session?.patient_id ?? null);
+    // An answer is shown only in its own state: never during a sweep, nor in another session.
+    const mine = last && (last.session_id ?? null) === lastSession;
     const visible = status.state === 'result' && !isCheck && mine ? last : null;
     const said = !visible && !isCheck && saysNoSession(status);
-    const { session } = status;
     if (session && session.patient_id !== patient) {
       if (patient) swapped = now();
       patient = session.patient_id;
     }
     const isSwapped = Boolean(session && swapped && since_s(swapped) < kSwap_s);
-    const marks = JSON.stringify([S.languageName, session, isSwapped, status.check_overdue, said,
-      status.next_purpose, status.sensor.present, Math.floor(status.sensor.powered_s / 60)]);
+    const marks = JSON.stringify([S.languageName, session, isSwapped, said, status.check_overdue,
+      status.last_check?.status, status.next_purpose, status.sensor.present,
+      Math.floor(status.sensor.powered_s / 60)]);
     if (marks !== shownMarks) {
       shownMarks = marks;
       clear(head, top(status, said, isSwapped));

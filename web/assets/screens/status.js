@@ -27,7 +27,7 @@ function waitingTile({ waiting = [] }, tile) {
   const text = S.status;
   const rows = waiting.map((one) => h('li', {},
     one.planned_by ? text.waitingApproval : text.waitingPlan, ' ',
-    h('a', { href: `#/plan/${one.reference_id}` }, one.patient_code), ' ',
+    h('a', { class: 'whole', href: `#/plan/${one.reference_id}` }, one.patient_code), ' ',
     text.waitingVersion(one.version)));
   return tile(text.waiting, waiting.length ? `${waiting.length}` : text.nothingWaits,
     waiting.length ? 'waits' : '',

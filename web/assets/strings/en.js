@@ -207,6 +207,7 @@ export const en = {
     computing: 'COMPUTING', press: 'Press the button to start.',
     openOne: 'Open a patient on the page. A scan now would be unassigned.',
     checkDone: 'Daily check passed', checkOverdue: 'Daily check overdue',
+    checkFailed: 'Daily check failed',
     warm: 'Sensor warm', warming: (on, needed) => `Sensor warming up: ${on} of ${needed} min`,
     covered: (percent) => `${percent} % covered`,
     offline: 'NO CONNECTION', pairTitle: 'Pair this screen',

@@ -234,6 +234,7 @@ export const es = {
     computing: 'CALCULANDO', press: 'Pulse el botón para empezar.',
     openOne: 'Abra un paciente en la página. Un escaneo ahora quedaría sin asignar.',
     checkDone: 'Control diario superado', checkOverdue: 'Control diario pendiente',
+    checkFailed: 'Control diario no superado',
     warm: 'Sensor a temperatura',
     warming: (on, needed) => `Sensor calentando: ${on} de ${needed} min`,
     covered: (percent) => `${percent} % cubierto`,
