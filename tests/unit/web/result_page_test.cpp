@@ -50,8 +50,11 @@ TEST_F(ResultPageTest, AFreshResultIsNotOld) {
 TEST_F(ResultPageTest, WhatIsToBeKnownStandsBesideTheVerdict) {
   Add("s1", seconds(10));
   EXPECT_THAT(Page(), Not(HasSubstr("overdue")));
-  loop_->Do([&] { service_.scans.back().check_overdue = true; });
+  loop_->Do([&] { service_.scans.back().daily_check = web::DailyCheck::kOverdue; });
   EXPECT_THAT(Page(), HasSubstr("<p class=\"caution\">The daily check was overdue at this scan."));
+  loop_->Do([&] { service_.scans.back().daily_check = web::DailyCheck::kFailed; });
+  EXPECT_THAT(Page(), AllOf(HasSubstr("<p class=\"caution\">The daily check had failed before"),
+                            Not(HasSubstr("overdue"))));
 }
 
 TEST_F(ResultPageTest, AfterTwoMinutesItIsOld) {
