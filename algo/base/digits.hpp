@@ -1,8 +1,9 @@
-// How precisely a number is shown.
+// How precisely a number is shown, and how: the same on paper and on the page without script.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 namespace plumb {
 
@@ -12,5 +13,23 @@ namespace plumb {
   if (!(u95 > 0)) return most;
   return std::clamp(static_cast<int>(-std::floor(std::log10(u95) + 1e-9)), 0, most);
 }
+
+/// A value and its uncertainty as shown: "\u22123" and "1.1".
+struct ShownNumber {
+  std::string value, u95;
+  bool is_zero = false;  ///< As shown: it has neither sign nor direction.
+};
+
+/// The value has the decimals that its uncertainty justifies, a proper minus sign, and no sign if
+/// it is zero; the uncertainty has one decimal more if it begins with 1, and none if it is unknown.
+/// @param most     Largest number of decimals of the value.
+/// @param decimal  Decimal sign of the language.
+[[nodiscard]] ShownNumber Shown(double value, double u95, int most, char decimal);
+
+/// Both in one: "\u22123 \u00b11.1".
+[[nodiscard]] std::string ValueWithUncertainty(double value, double u95, int most, char decimal);
+
+/// As short as it was typed: "2.5", "3".
+[[nodiscard]] std::string PlainNumber(double value, char decimal);
 
 }  // namespace plumb

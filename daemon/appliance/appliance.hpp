@@ -93,9 +93,10 @@ class Appliance {
   void SetBlockingReason(std::function<std::string()> blocking_reason) {
     blocking_reason_ = std::move(blocking_reason);
   }
-  /// Why no reference may be scanned or approved now, with the next step: no daily check has passed
-  /// today, or the sensor is still warming up. Empty if it may, as always in the demo.
-  /// @param scan  The scan that is to be the reference. One taken while the check was overdue is
+  /// Why no reference may be scanned or approved now, with the next step: the daily check is
+  /// overdue or has failed, or the sensor is still warming up. Empty if it may, as always in the
+  /// demo.
+  /// @param scan  The scan that is to be the reference. One taken without a check that passed is
   ///         confirmed by a check of the same day (CheckStore::ConfirmsScan), or has to be
   ///         repeated.
   [[nodiscard]] std::string WhyNoReference(const std::optional<web::Scan>& scan = {});
@@ -251,7 +252,7 @@ class Appliance {
   [[nodiscard]] bool IsOwnSession() const;
   [[nodiscard]] std::optional<double> SecondsSinceSensor() const;
   [[nodiscard]] std::string WhySensorIsCold(const std::optional<web::Scan>& scan) const;
-  [[nodiscard]] bool IsCheckOverdue();
+  [[nodiscard]] web::DailyCheck DailyCheckToday();
   void NoteDropped(const ScanUpdate& update);
   void Act(ScanAction action);
   Answer WhyNotScan() const;

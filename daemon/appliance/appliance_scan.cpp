@@ -56,7 +56,7 @@ void Appliance::BeginSession() {
                        .reason = reference_reason_,
                        .session_id = scan_.session_id,
                        .sensor_on_s = SecondsSinceSensor(),
-                       .check_overdue = IsCheckOverdue()};
+                       .daily_check = DailyCheckToday()};
   scan_.sensor_before = sensors_->snapshot().statistics;
   ArmSessionTimer();
   session_ = std::make_unique<ScanSession>(

@@ -347,20 +347,30 @@ std::optional<double> Appliance::SecondsSinceSensor() const {
   return sensors_->snapshot().present ? std::optional(SecondsSince(sensor_since_)) : std::nullopt;
 }
 
-bool Appliance::IsCheckOverdue() {
-  return !store_->checks.HasPassedSince(StartOfDay(), sensors_->snapshot().sensor.serial);
+web::DailyCheck Appliance::DailyCheckToday() {
+  return store_->checks.StateSince(StartOfDay(), sensors_->snapshot().sensor.serial);
 }
 
 std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
   if (!parts_.demo_patient.empty() || store_ == nullptr) return {};
-  if (IsCheckOverdue()) {
+  const web::DailyCheck today = DailyCheckToday();
+  if (today == web::DailyCheck::kFailed) {
+    return "the daily check has failed, and references need one that has passed since: open Daily "
+           "check, clear up why it failed, sweep over all markers of the room, then go on here";
+  }
+  if (today == web::DailyCheck::kOverdue) {
     return "the daily check is overdue, and references need one that has passed today: open Daily "
            "check, sweep over all markers of the room, then go on here";
   }
-  if (scan && scan->check_overdue && !store_->checks.ConfirmsScan(scan->id)) {
+  const bool is_unconfirmed = scan && scan->daily_check != web::DailyCheck::kPassed &&
+                              !store_->checks.ConfirmsScan(scan->id);
+  if (is_unconfirmed && scan->daily_check == web::DailyCheck::kFailed) {
+    return "this scan was taken after a daily check that had failed, and no check of the same day "
+           "and sensor has confirmed it: scan the reference again";
+  }
+  if (is_unconfirmed) {
     return "this scan was taken while the daily check was overdue, and no check of the same day "
-           "and "
-           "sensor has confirmed it: scan the reference again";
+           "and sensor has confirmed it: scan the reference again";
   }
   return WhySensorIsCold(scan);
 }
@@ -383,7 +393,7 @@ std::string Appliance::WhySensorIsCold(const std::optional<web::Scan>& scan) con
 }
 
 void Appliance::ReadStored(web::Status& status) {
-  status.check_overdue = IsCheckOverdue();
+  status.daily_check = DailyCheckToday();
   status.reference_block = WhyNoReference();
   status.session = store_->treatments.Opened();
   if (status.session && status.session->id != session_id_) status.session.reset();
@@ -416,7 +426,7 @@ web::CheckStatus Appliance::Checks() {
   constexpr int kShown = 60;
   return {.checks = store_->checks.List(kShown),
           .baseline = store_->checks.Baseline(),
-          .overdue = IsCheckOverdue()};
+          .today = DailyCheckToday()};
 }
 
 web::Health Appliance::Health() {

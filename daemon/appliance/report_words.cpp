@@ -67,6 +67,8 @@ constexpr ReportWords kEnglish = {
     .warming = "The sensor was still warming up.",
     .overdue_mark = "* Daily check",
     .overdue_words = "overdue at this scan",
+    .failed_mark = "** Daily check",
+    .failed_words = "had failed before this scan",
     .room_unknown =
         "The room has not been calibrated: the numbers run along and about the axes of the "
         "reference marker, not of the couch.",
@@ -146,6 +148,8 @@ constexpr ReportWords kSpanish = {
     .warming = "El sensor aún se calentaba.",
     .overdue_mark = "* Control diario",
     .overdue_words = "pendiente en este escaneo",
+    .failed_mark = "** Control diario",
+    .failed_words = "no superado antes de este escaneo",
     .room_unknown =
         "La sala no está calibrada: los números siguen los ejes del marcador de referencia, no los "
         "de la camilla.",

@@ -25,8 +25,8 @@ struct ReportWords {
   std::string_view why_in, why_unsure, why_move;
   std::string_view quality, markers, misfit, covered, hole, tracked, tracked_of, lost, keyframes,
       longest_lost, sensor, sensor_on, room_version, computed_with;
-  std::string_view frames_lost, warming, overdue_mark, overdue_words, room_unknown, room_not_used,
-      marker_ignored, weak_direction;
+  std::string_view frames_lost, warming, overdue_mark, overdue_words, failed_mark, failed_words,
+      room_unknown, room_not_used, marker_ignored, weak_direction;
   std::string_view when, verdict, digits_note, planned_sides;
   SideWords sides;
   PictureWords pictures;

@@ -227,7 +227,8 @@ std::vector<std::string> CautionsIn(const web::Scan& scan, const Json& scene, co
   }
   if (scan.sensor_on_s && *scan.sensor_on_s < 60 * warm_up_min)
     cautions.emplace_back(words.warming);
-  if (scan.check_overdue) cautions.emplace_back(words.terms.overdue);
+  if (const std::string_view said = web::SaidOf(scan.daily_check, words.terms); !said.empty())
+    cautions.emplace_back(said);
   AddComparisonTo(cautions, result, language);
   AddWarningsTo(cautions, result, language);
   AddWarningsTo(cautions, scene, language);
@@ -389,7 +390,7 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
   if (const auto reference = stored.references.Find(patient.approved_reference_id))
     AddReferenceTo(report.identity, *reference, words);
   std::vector<web::Scan> scans = stored.scans.List(patient.id, kMaxScans);
-  bool is_any_overdue = false;
+  bool is_any_overdue = false, is_any_failed = false;
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != web::ScanOutcome::kDone) continue;
     CourseRow row{.fraction = scan->fraction > 0 ? std::to_string(scan->fraction) : "-",
@@ -397,9 +398,12 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
                   .verdict = std::string(VerdictOf(*scan, words)),
                   .accepted = AcceptedText(*scan, words),
                   .values = {}};
-    if (scan->check_overdue) {
+    if (scan->daily_check == web::DailyCheck::kOverdue) {
       row.verdict += " *";
       is_any_overdue = true;
+    } else if (scan->daily_check == web::DailyCheck::kFailed) {
+      row.verdict += " **";
+      is_any_failed = true;
     }
     if (IsAdvice(*scan)) {
       const auto values = ValuesOf(scan->result->correction), u95 = ValuesOf(scan->result->u95);
@@ -411,6 +415,8 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
   }
   if (is_any_overdue)
     report.identity.emplace_back(words.overdue_mark, std::string(words.overdue_words));
+  if (is_any_failed)
+    report.identity.emplace_back(words.failed_mark, std::string(words.failed_words));
   return report;
 }
 

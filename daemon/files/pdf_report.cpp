@@ -192,21 +192,6 @@ void Heading(Pages& pages, const std::string& text) {
   pages.Paragraph(kMargin, pages.inner(), text, 11, kBlack, true);
 }
 
-/// With a proper minus sign, no sign for zero, and the decimal sign of the language.
-std::string Number(double value, int digits, bool is_signed, char decimal) {
-  std::string text = fmt::format("{:.{}f}", std::abs(value), digits);
-  const bool is_zero = text.find_first_not_of("0.") == std::string::npos;
-  std::replace(text.begin(), text.end(), '.', decimal);
-  if (!is_signed || is_zero) return text;
-  return (value < 0 ? "\u2212" : "+") + text;
-}
-
-std::string Plain(double value, char decimal) {
-  std::string text = fmt::format("{:g}", value);
-  std::replace(text.begin(), text.end(), '.', decimal);
-  return text;
-}
-
 void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& texts) {
   const double line = pages.y += 15;
   pages.Text(kMargin, line, number.name, 9.5, kBlack, true);
@@ -222,10 +207,10 @@ void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& tex
       ValueWithUncertainty(*number.value, number.u95, number.unit == "mm" ? 1 : 2, texts.decimal) +
           unit,
       9.5, kBlack, true);
-  pages.Text(
-      kMargin + 180, line,
-      fmt::format(fmt::runtime(texts.tolerance), Plain(number.tolerance, texts.decimal), unit), 8.5,
-      kGrey);
+  pages.Text(kMargin + 180, line,
+             fmt::format(fmt::runtime(texts.tolerance),
+                         PlainNumber(number.tolerance, texts.decimal), unit),
+             8.5, kGrey);
   pages.Text(kMargin + 265, line,
              in       ? texts.within
              : unsure ? texts.unsure
@@ -298,18 +283,6 @@ CourseTable TableOf(Pages& pages, const CourseReport& report) {
 }
 
 }  // namespace
-
-std::string ValueWithUncertainty(double value, double u95, int most, char decimal) {
-  const int digits = DecimalsFor(u95, most);
-  const std::string said = Number(value, digits, /*is_signed=*/true, decimal);
-  if (!(u95 > 0)) return said;
-  // One more decimal for an uncertainty that begins with 1, as on the page.
-  const std::string half = fmt::format("{:.3f}", u95);
-  const std::size_t first = half.find_first_not_of("0.");
-  const bool begins_with_1 = first != std::string::npos && half[first] == '1';
-  return said + " \u00b1" +
-         Number(u95, std::min(2, digits + (begins_with_1 ? 1 : 0)), /*is_signed=*/false, decimal);
-}
 
 std::string PdfOf(const ScanReport& report) {
   Pages pages(report.texts, report.footer, kUpright);

@@ -66,10 +66,6 @@ struct CourseReport {
   std::string footer;
 };
 
-/// A value with the decimals that its uncertainty justifies, as on the page: "\u22123 \u00b11.1".
-/// @param most  Largest number of decimals.
-[[nodiscard]] std::string ValueWithUncertainty(double value, double u95, int most, char decimal);
-
 /// A4, as the bytes of a PDF file; every page has the notice and its number.
 /// @throws IoError if the drawing library fails.
 [[nodiscard]] std::string PdfOf(const ScanReport& report);

@@ -62,13 +62,17 @@ std::optional<web::CheckRecord> CheckStore::Last() {
   return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadCheck(query)) : std::nullopt;
 }
 
-bool CheckStore::HasPassedSince(web::WallClock::time_point since,
-                                const std::string& sensor_serial) {
+web::DailyCheck CheckStore::StateSince(web::WallClock::time_point since,
+                                       const std::string& sensor_serial) {
   const StoreDatabase::Held rows = database_.ForRows();
+  // By number, not by time: the clock may have been set back between a pass and a failure.
   Statement query = rows->Prepare(
-      "SELECT 1 FROM checks WHERE status = 'passed' AND time >= ? AND time <= ? AND (? = '' OR "
-      "sensor_serial = ?) LIMIT 1");
-  return query.Bind(ToStored(since)).Bind(Now()).Bind(sensor_serial).Bind(sensor_serial).Step();
+      "SELECT status = 'failed', time FROM checks WHERE (status = 'failed' AND (?1 = '' OR "
+      "sensor_serial IN (?1, ''))) OR (status = 'passed' AND time <= ?2 AND (?1 = '' OR "
+      "sensor_serial = ?1)) ORDER BY id DESC LIMIT 1");
+  if (!query.Bind(sensor_serial).Bind(Now()).Step() || query.Integer(1) < ToStored(since))
+    return web::DailyCheck::kOverdue;
+  return query.Integer(0) != 0 ? web::DailyCheck::kFailed : web::DailyCheck::kPassed;
 }
 
 bool CheckStore::ConfirmsScan(const std::string& scan_id) {
@@ -82,7 +86,7 @@ bool CheckStore::ConfirmsScan(const std::string& scan_id) {
       "date(scans.started_at / 1000000, 'unixepoch', 'localtime') "
       "WHERE scans.id = ?1 AND scans.sensor_serial <> '' "
       "AND NOT EXISTS (SELECT 1 FROM checks AS other WHERE other.status = 'failed' AND "
-      "other.sensor_serial = scans.sensor_serial AND other.time >= scans.started_at AND "
+      "other.sensor_serial IN (scans.sensor_serial, '') AND other.time >= scans.started_at AND "
       "other.time <= checks.time) "
       "AND EXISTS (SELECT 1 FROM check_baselines WHERE set_at <= scans.started_at) "
       "AND NOT EXISTS (SELECT 1 FROM check_baselines WHERE set_at > scans.started_at AND "

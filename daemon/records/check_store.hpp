@@ -21,9 +21,11 @@ class CheckStore {
                   const TakenCheck& taken);
   [[nodiscard]] std::vector<web::CheckRecord> List(int limit);  ///< Newest first.
   [[nodiscard]] std::optional<web::CheckRecord> Last();
-  /// Not in the future. @param sensor_serial  Unit that was to be checked; empty: any.
-  [[nodiscard]] bool HasPassedSince(web::WallClock::time_point since,
-                                    const std::string& sensor_serial = {});
+  /// By the newest check since then that passed or failed. Checks of other units do not count, but
+  /// a failed one of an unnamed unit does. A check that passed in the future counts for nothing.
+  /// @param sensor_serial  Unit that was to be checked; empty: any.
+  [[nodiscard]] web::DailyCheck StateSince(web::WallClock::time_point since,
+                                           const std::string& sensor_serial = {});
   /// Whether a later check confirms that sensor and markers were correct at this scan: of the same
   /// unit, passed on the day of the scan and after it, with no failed check in between and against
   /// a baseline from before the scan.

@@ -34,6 +34,17 @@ constexpr const char* kScanColumns =
     "unavailable, accepted_at, sensor_serial, (SELECT opened_by FROM sessions WHERE sessions.id = "
     "session_id) FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
 
+/// The column check_overdue holds its number: older versions, which know only "overdue", read every
+/// one but 0 as that.
+web::DailyCheck DailyCheckOf(std::int64_t stored) {
+  static_assert(static_cast<int>(web::DailyCheck::kPassed) == 0 &&
+                static_cast<int>(web::DailyCheck::kOverdue) == 1 &&
+                static_cast<int>(web::DailyCheck::kFailed) == 2);
+  return stored == 0   ? web::DailyCheck::kPassed
+         : stored == 2 ? web::DailyCheck::kFailed
+                       : web::DailyCheck::kOverdue;
+}
+
 /// Flushes a folder, or with ::syncfs everything on its disk.
 void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -80,7 +91,7 @@ web::Scan ScanStore::ReadScan(const Statement& row) const {
                  .session_id = row.Text(12),
                  .fraction = static_cast<int>(row.Integer(13)),
                  .sensor_on_s = {},
-                 .check_overdue = row.Integer(15) != 0,
+                 .daily_check = DailyCheckOf(row.Integer(15)),
                  .sensor_serial = row.Text(18),
                  .session_by = row.Text(19),
                  .folder = {}};
@@ -185,7 +196,7 @@ std::string ScanStore::Begin(const NewScan& scan) {
       .Bind(scan.reason)
       .Bind(ParseId(scan.session_id))
       .Bind(scan.sensor_on_s)
-      .Bind(std::int64_t{scan.check_overdue})
+      .Bind(static_cast<std::int64_t>(scan.daily_check))
       .Run();
   const std::int64_t number = change.last_id();
   const std::string id = ScanId(number);

@@ -22,7 +22,7 @@ struct NewScan {
   std::string reason;           ///< Reason for a new reference.
   std::string session_id = {};  ///< Empty without an open session.
   std::optional<double> sensor_on_s = {};
-  bool check_overdue = false;
+  web::DailyCheck daily_check = web::DailyCheck::kPassed;
 };
 
 /// Outcome of a scan.

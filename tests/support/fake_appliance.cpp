@@ -103,7 +103,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
     scan.fraction = status.session->fraction;
   }
   scan.sensor_on_s = status.sensor.powered_s;
-  scan.check_overdue = status.check_overdue;
+  scan.daily_check = status.daily_check;
   if (!is_check_) scans.push_back(scan);
   status.scan = LiveScan{
       .id = scan.id,
@@ -199,11 +199,16 @@ void FakeAppliance::EndCheck() {
   check.sensor_serial = status.sensor.serial;
   checks.checks.insert(checks.checks.begin(), check);
   if (check.status == "passed") {
-    checks.overdue = false;
+    checks.today = web::DailyCheck::kPassed;
     status.reference_block.clear();
+  } else if (check.status == "failed") {
+    checks.today = web::DailyCheck::kFailed;
+    status.reference_block =
+        "the daily check has failed, and references need one that has passed since: open Daily "
+        "check, clear up why it failed, sweep over all markers of the room, then go on here";
   }
   status.last_check = check;
-  status.check_overdue = checks.overdue;
+  status.daily_check = checks.today;
   status.scan.reset();
   status.state = ApplianceState::kResult;
   status.light = check.status == "passed" ? "result_in_tolerance" : "no_answer";

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "web/service/result_terms.hpp"
 #include "web/service/services.hpp"
 
 namespace plumb::test {
@@ -121,7 +122,8 @@ class FakeAppliance : public web::BackgroundWork,
                   web::Done done) override;
   /// No check has passed today; `block` as in Status::reference_block. Empty: one has.
   void SetOverdue(const std::string& block) {
-    checks.overdue = status.check_overdue = !block.empty();
+    checks.today = status.daily_check =
+        block.empty() ? web::DailyCheck::kPassed : web::DailyCheck::kOverdue;
     status.reference_block = block;
     Notify(web::EventKind::kStatus);
   }
@@ -162,9 +164,9 @@ class FakeAppliance : public web::BackgroundWork,
   }
   std::vector<std::string> Cautions(const std::string& scan_id, web::Language) override {
     const auto scan = FindScan(scan_id);
-    return scan && scan->check_overdue
-               ? std::vector<std::string>{"The daily check was overdue at this scan."}
-               : std::vector<std::string>();
+    const std::string said(
+        web::SaidOf(scan ? scan->daily_check : web::DailyCheck::kPassed, web::kEnglishTerms));
+    return said.empty() ? std::vector<std::string>() : std::vector{said};
   }
   std::optional<std::string> PictureOf(const std::string&, web::ComparisonPicture picture,
                                        web::Language language) override {

@@ -150,10 +150,10 @@ await h.step('a physicist plans, a second one approves', async () => {
   equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0, 'not by who planned it');
   await anna.locator('.tile li', { hasText: 'Waiting for approval: PX-0417 version 1' }).waitFor();
   await h.logIn(clara, 'clara');
-  // Its check was overdue when it was scanned: the summary says so, as a result would.
+  // The check had failed before it was scanned: the summary says so, as a result would.
   await clara.route(/\/api\/v1\/scans\/[^/]+$/, async (route) => {
     const response = await route.fetch();
-    await route.fulfill({ response, json: { ...await response.json(), check_overdue: true } });
+    await route.fulfill({ response, json: { ...await response.json(), check_overdue: true, check_failed: true } });
   });
   await clara.goto(`${h.url}${new URL(bob.url()).hash}`);
   await clara.getByText('4 corners').waitFor();
@@ -180,7 +180,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   for (const axis of ['vertical', 'longitudinal', 'lateral', 'pitch', 'roll', 'yaw']) {
     check(new RegExp(`Tolerance: ${axis}\\s+±${['pitch', 'roll', 'yaw'].includes(axis) ? '1°' : '3 mm'}`).test(facts), `the tolerance of ${axis}: ${facts}`);
   }
-  await signed.getByText('The daily check was overdue at this scan.').waitFor();
+  await signed.getByText('The daily check had failed before this scan.').waitFor();
   await h.look(clara, 'plan-summary', { axe: false });
   await clara.getByLabel('Shifts (mm)').fill('5');
   await signed.waitFor({ state: 'detached' });
@@ -599,7 +599,10 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   check(await anna.locator('.trend path.mark.outside').count() > 0, 'one that failed has another shape');
   await h.look(anna, 'check-failed', { axe: false });
   await anna.goto(`${h.url}#/status`);
-  await anna.locator('.tile', { hasText: 'Daily check' }).getByText('failed').waitFor();
+  await anna.locator('.tile', { hasText: 'Daily check' }).getByText('failed', { exact: true }).waitFor();
+  await anna.getByText('Clear up why the check failed').waitFor();
+  const { check_failed: failed, reference_block: block } = (await h.api(anna, 'status')).body;
+  check(failed && /daily check has failed/.test(block), 'after a pass of the same day it counts, too');
   await h.look(anna, 'status-check-failed', { axe: false });
 });
 

@@ -82,6 +82,12 @@ std::string_view Name(ScanPurpose purpose) { return NameIn(kPurposeNames, purpos
 
 namespace {
 
+/// A check that failed is overdue, too: for programs that know only that.
+void AddDailyCheck(Json& json, DailyCheck check, const char* overdue, const char* failed) {
+  json[overdue] = check != DailyCheck::kPassed;
+  json[failed] = check == DailyCheck::kFailed;
+}
+
 Json WordsJson(const std::array<std::string, 6>& words) {
   static constexpr std::array<const char*, 6> kNames = {"vertical", "longitudinal", "lateral",
                                                         "pitch",    "roll",         "yaw"};
@@ -108,8 +114,8 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
                {"session_id", TextOrNull(scan.session_id)},
                {"fraction", scan.fraction > 0 ? Json(scan.fraction) : Json(nullptr)},
                {"sensor_on_s", OrNull(scan.sensor_on_s)},
-               {"check_overdue", scan.check_overdue},
                {"result", nullptr}};
+  AddDailyCheck(json, scan.daily_check, "check_overdue", "check_failed");
   if (scan.accepted_at) json["accepted_at"] = TimeText(*scan.accepted_at);
   if (scan.finished_at) {
     json["finished_at"] = TimeText(*scan.finished_at);
@@ -162,7 +168,8 @@ Json CheckJson(const CheckRecord& check, WallClock::time_point now) {
 }  // namespace
 
 Json ToJson(const CheckStatus& checks, WallClock::time_point now) {
-  Json json = {{"checks", Json::array()}, {"baseline", nullptr}, {"overdue", checks.overdue}};
+  Json json = {{"checks", Json::array()}, {"baseline", nullptr}};
+  AddDailyCheck(json, checks.today, "overdue", "failed");
   for (const CheckRecord& check : checks.checks) json["checks"].push_back(CheckJson(check, now));
   if (checks.baseline) {
     json["baseline"] = {{"check_id", checks.baseline->check_id},
@@ -201,37 +208,39 @@ Json WaitingJson(const std::vector<WaitingReference>& waiting) {
 }  // namespace
 
 Json ToJson(const Status& status, WallClock::time_point now) {
-  return {{"state", NameIn(kStates, status.state)},
-          {"fault", TextOrNull(status.fault)},
-          {"fault_kind", NameIn(kFaultKinds, status.fault_kind)},
-          {"sensor",
-           {{"present", status.sensor.present},
-            {"serial", status.sensor.serial},
-            {"name", status.sensor.name},
-            {"fps", status.sensor.frames_per_second},
-            {"powered_s", status.sensor.powered_s},
-            {"warm_up_s", status.sensor.warm_up_s}}},
-          {"storage",
-           {{"free_bytes", status.storage.free_bytes},
-            {"total_bytes", status.storage.total_bytes},
-            {"writable", status.storage.writable},
-            {"warnings", status.storage.warnings}}},
-          {"light", status.light},
-          {"patient_id", TextOrNull(status.patient_id)},
-          {"next_purpose", NameIn(kPurposeNames, status.next_purpose)},
-          {"scans_today", status.scans_today},
-          {"session", status.session ? SessionJson(*status.session) : Json(nullptr)},
-          {"room", ToJson(status.room)},
-          {"waiting", WaitingJson(status.waiting)},
-          {"scan", status.scan ? LiveScanJson(*status.scan) : Json(nullptr)},
-          {"check_overdue", status.check_overdue},
-          {"reference_block", TextOrNull(status.reference_block)},
-          {"last_check", status.last_check ? CheckJson(*status.last_check, now) : Json(nullptr)},
-          {"last_result", status.last_result ? ToJson(*status.last_result, now) : Json(nullptr)},
-          {"time", TimeText(now)},
-          {"version", status.version},
-          {"warnings", status.warnings},
-          {"rolled_back", TextOrNull(status.rolled_back)}};
+  Json json = {
+      {"state", NameIn(kStates, status.state)},
+      {"fault", TextOrNull(status.fault)},
+      {"fault_kind", NameIn(kFaultKinds, status.fault_kind)},
+      {"sensor",
+       {{"present", status.sensor.present},
+        {"serial", status.sensor.serial},
+        {"name", status.sensor.name},
+        {"fps", status.sensor.frames_per_second},
+        {"powered_s", status.sensor.powered_s},
+        {"warm_up_s", status.sensor.warm_up_s}}},
+      {"storage",
+       {{"free_bytes", status.storage.free_bytes},
+        {"total_bytes", status.storage.total_bytes},
+        {"writable", status.storage.writable},
+        {"warnings", status.storage.warnings}}},
+      {"light", status.light},
+      {"patient_id", TextOrNull(status.patient_id)},
+      {"next_purpose", NameIn(kPurposeNames, status.next_purpose)},
+      {"scans_today", status.scans_today},
+      {"session", status.session ? SessionJson(*status.session) : Json(nullptr)},
+      {"room", ToJson(status.room)},
+      {"waiting", WaitingJson(status.waiting)},
+      {"scan", status.scan ? LiveScanJson(*status.scan) : Json(nullptr)},
+      {"reference_block", TextOrNull(status.reference_block)},
+      {"last_check", status.last_check ? CheckJson(*status.last_check, now) : Json(nullptr)},
+      {"last_result", status.last_result ? ToJson(*status.last_result, now) : Json(nullptr)},
+      {"time", TimeText(now)},
+      {"version", status.version},
+      {"warnings", status.warnings},
+      {"rolled_back", TextOrNull(status.rolled_back)}};
+  AddDailyCheck(json, status.daily_check, "check_overdue", "check_failed");
+  return json;
 }
 
 Json ToJson(const PlanTemplate& wanted) {

@@ -44,7 +44,8 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
   std::string text =
       "patient,scan,fraction,purpose,started_at,verdict,vertical_mm,longitudinal_mm,lateral_mm,"
       "pitch_deg,roll_deg,yaw_deg,u95_vertical_mm,u95_longitudinal_mm,u95_lateral_mm,u95_pitch_deg,"
-      "u95_roll_deg,u95_yaw_deg,accepted_by,accepted_at,accepted_reason,check_overdue\r\n";
+      "u95_roll_deg,u95_yaw_deg,accepted_by,accepted_at,accepted_reason,check_overdue,"
+      "check_failed\r\n";
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != ScanOutcome::kDone) continue;
     const bool is_advice = scan->result && scan->result->verdict != "no_answer";
@@ -59,9 +60,11 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
     } else {
       text.append(12, ',');
     }
-    text += fmt::format(",{},{},{},{}\r\n", Cell(scan->accepted_by),
+    text += fmt::format(",{},{},{},{},{}\r\n", Cell(scan->accepted_by),
                         scan->accepted_at ? TimeText(*scan->accepted_at) : "",
-                        Cell(scan->accepted_reason), scan->check_overdue ? "yes" : "no");
+                        Cell(scan->accepted_reason),
+                        scan->daily_check != DailyCheck::kPassed ? "yes" : "no",
+                        scan->daily_check == DailyCheck::kFailed ? "yes" : "no");
   }
   return text;
 }

@@ -27,10 +27,28 @@ std::string Filled(std::string_view pattern, const Values&... values) {
   return fmt::format(fmt::runtime(pattern), values...);
 }
 
+/// The appliance's "-8.0 mm" and "1 deg" as the table has them: "\u22128.0 mm", "1\u00b0".
+std::string Typeset(std::string text) {
+  const auto digit = [&](std::size_t at) {
+    return at < text.size() && text[at] >= '0' && text[at] <= '9';
+  };
+  constexpr std::string_view kDegrees = " deg";
+  for (std::size_t at = text.find(kDegrees); at != std::string::npos;
+       at = text.find(kDegrees, at + 1)) {
+    const std::size_t end = at + kDegrees.size();
+    const bool is_word =
+        end == text.size() || std::string_view(" ,;:.)").find(text[end]) != std::string_view::npos;
+    if (at > 0 && digit(at - 1) && is_word) text.replace(at, kDegrees.size(), "\u00b0");
+  }
+  for (std::size_t at = text.find(" -"); at != std::string::npos; at = text.find(" -", at + 1))
+    if (digit(at + 2)) text.replace(at, 2, " \u2212");
+  return text;
+}
+
 /// Words of the appliance, in the page's language, for HTML.
 std::string Said(const std::string& text, const ResultWords& words) {
   const bool is_spanish = &words == &ResultWordsOf(Language::kSpanish);
-  return EscapeHtml(is_spanish ? InSpanish(text).value_or(text) : text);
+  return EscapeHtml(Typeset(is_spanish ? InSpanish(text).value_or(text) : text));
 }
 
 struct NumberRow {
@@ -84,12 +102,6 @@ std::string LoginForm(const ResultWords& words, std::string_view trouble) {
       words.name, words.password, words.log_in);
 }
 
-/// With the decimal sign of the language.
-std::string Localized(std::string number, const ResultWords& words) {
-  std::replace(number.begin(), number.end(), '.', words.terms.decimal);
-  return number;
-}
-
 /// A row of the table. Only the verdict MOVE asks for moves.
 std::string NumberCells(const NumberRow& row, std::string_view name, const std::string& direction,
                         double tolerance, bool moves, const ResultWords& words) {
@@ -97,25 +109,24 @@ std::string NumberCells(const NumberRow& row, std::string_view name, const std::
     return fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td></td><td></td><td></td><td></td></tr>", name,
         words.terms.not_known);
-  const double value = *row.value, u95 = row.u95.value_or(0.0), size = std::abs(value);
-  const int most = std::string_view(row.unit) == "mm" ? 1 : 2;
-  const int digits = DecimalsFor(u95, most);
-  const bool is_zero = size < 0.5 * std::pow(10.0, -digits);  // no sign, no direction
+  const double u95 = row.u95.value_or(0.0), size = std::abs(*row.value);
+  const bool is_shift = std::string_view(row.unit) == "mm";
+  const char decimal = words.terms.decimal;
+  const ShownNumber shown = Shown(*row.value, u95, is_shift ? 1 : 2, decimal);
+  const std::string unit = is_shift ? " mm" : row.unit;
   const bool in = size + u95 <= tolerance, unsure = !in && size <= tolerance;
   const std::string way = !moves
                               ? std::string(unsure ? words.terms.scan_again : words.terms.no_move)
-                          : is_zero     ? std::string(words.no_change)
-                          : size <= u95 ? std::string(words.terms.insignificant)
-                                        : Said(direction, words);
-  const std::string shown =
-      is_zero ? fmt::format("{:.{}f}", 0.0, digits) : fmt::format("{:+.{}f}", value, digits);
+                          : shown.is_zero ? std::string(words.no_change)
+                          : size <= u95   ? std::string(words.terms.insignificant)
+                                          : Said(direction, words);
   // A narrow window has no heads above the numbers: what a bare "±" means stands beside it.
   return fmt::format(
-      "<tr><th scope=\"row\">{}</th><td>{} {}</td><td data-label=\"{}\">\xC2\xB1 {}</td>"
-      "<td data-label=\"{}\">\xC2\xB1 {}</td><td>{}</td><td>{}</td></tr>",
-      name, Localized(shown, words), row.unit, words.heads[2],
-      Localized(fmt::format("{:.{}f}", u95, most), words), words.heads[3],
-      Localized(fmt::format("{:g}", tolerance), words),
+      "<tr><th scope=\"row\">{}</th><td>{}{}</td><td data-label=\"{}\">{}</td>"
+      "<td data-label=\"{}\">\u00b1{}{}</td><td>{}</td><td>{}</td></tr>",
+      name, shown.value, unit, words.heads[2],
+      shown.u95.empty() ? std::string(words.terms.not_known) : "\u00b1" + shown.u95 + unit,
+      words.heads[3], PlainNumber(tolerance, decimal), unit,
       in       ? words.terms.within
       : unsure ? words.terms.not_surely
                : words.terms.outside,

@@ -16,7 +16,7 @@ struct ResultTerms {
   std::string_view no_answer;                    ///< As a verdict.
   std::string_view not_known, no_move, scan_again, insignificant;  ///< In place of a direction.
   std::string_view posture, as_reference;
-  std::string_view overdue;
+  std::string_view overdue, check_failed;
   char decimal = '.';
 };
 
@@ -34,6 +34,7 @@ inline constexpr ResultTerms kEnglishTerms = {
     .posture = "Posture difference that remains after the shift",
     .as_reference = "every part as in the reference, within 3 mm",
     .overdue = "The daily check was overdue at this scan.",
+    .check_failed = "The daily check had failed before this scan.",
     .decimal = '.'};
 
 inline constexpr ResultTerms kSpanishTerms = {
@@ -52,6 +53,14 @@ inline constexpr ResultTerms kSpanishTerms = {
     .posture = "Diferencia de postura que queda tras el desplazamiento",
     .as_reference = "todas las partes como en la referencia, dentro de 3 mm",
     .overdue = "El control diario estaba pendiente en este escaneo.",
+    .check_failed = "El control diario anterior a este escaneo no se superó.",
     .decimal = ','};
+
+/// What is to be read beside a result; empty if that check had passed.
+constexpr std::string_view SaidOf(DailyCheck check, const ResultTerms& terms) {
+  return check == DailyCheck::kFailed    ? terms.check_failed
+         : check == DailyCheck::kOverdue ? terms.overdue
+                                         : std::string_view();
+}
 
 }  // namespace plumb::web

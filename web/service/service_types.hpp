@@ -103,6 +103,9 @@ struct ResultSummary {
   std::vector<std::string> body_after;  ///< The same after the correction: the posture.
 };
 
+/// Of one day and sensor: the newest check that passed or failed decides.
+enum class DailyCheck : std::uint8_t { kPassed, kOverdue, kFailed };
+
 struct Scan {
   std::string id;
   std::string patient_id;
@@ -120,9 +123,9 @@ struct Scan {
   int fraction = 0;        ///< Fraction number of that session; 0 if there is none.
   /// Time that the sensor was on when the scan began, for warm-up.
   std::optional<double> sensor_on_s;
-  bool check_overdue = false;      ///< No daily check had passed when the scan began.
-  std::string sensor_serial = {};  ///< Of the unit that was swept.
-  std::string session_by = {};     ///< Who opened its session; empty if there is none.
+  DailyCheck daily_check = DailyCheck::kPassed;  ///< When the scan began.
+  std::string sensor_serial = {};                ///< Of the unit that was swept.
+  std::string session_by = {};  ///< Who opened its session; empty if there is none.
   /// Time since its end by a monotonic clock; not set if only the wall clock is available.
   std::optional<double> age_s = {};
   std::filesystem::path
@@ -248,7 +251,7 @@ struct CheckBaseline {
 struct CheckStatus {
   std::vector<CheckRecord> checks;  ///< Newest first.
   std::optional<CheckBaseline> baseline;
-  bool overdue = true;  ///< No check has passed today.
+  DailyCheck today = DailyCheck::kOverdue;
 };
 
 /// The profile of a sensor unit from then on.
@@ -291,7 +294,7 @@ struct Status {
   std::vector<WaitingReference> waiting;
   std::optional<LiveScan> scan;  ///< Set in states scanning and working.
   std::optional<CheckRecord> last_check;
-  bool check_overdue = true;  ///< No daily check has passed today.
+  DailyCheck daily_check = DailyCheck::kOverdue;  ///< Of today.
   /// Why no reference may be scanned or approved now, with the next step; empty if it may.
   std::string reference_block = {};
   std::optional<Scan> last_result;  ///< The newest finished scan since the start.

@@ -25,11 +25,12 @@ namespace plumb {
 namespace {
 
 using testing::ApplianceTest;
+using web::DailyCheck;
 
-web::Scan ScanOf(bool check_overdue) {
+web::Scan ScanOf(web::DailyCheck check) {
   web::Scan scan;
   scan.id = "1";
-  scan.check_overdue = check_overdue;
+  scan.daily_check = check;
   return scan;
 }
 
@@ -183,10 +184,27 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
           tess, appliance_->WebStatus().sensor.serial,
           TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(false)), "");
-      EXPECT_THAT(appliance_->WhyNoReference(ScanOf(true)),
+      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(DailyCheck::kPassed)), "");
+      EXPECT_THAT(appliance_->WhyNoReference(ScanOf(DailyCheck::kOverdue)),
                   ::testing::HasSubstr("scan the reference again"))
           << "of a scan from before the check";
+      const auto check = [&](MarkerCheckStatus status) {
+        (void)appliance_->store()->checks.Add(
+            tess, appliance_->WebStatus().sensor.serial,
+            TakenCheck{{.status = status, .items = {}, .reasons = {}}});
+      };
+      check(MarkerCheckStatus::kFailed);
+      const web::Json status = web::ToJson(appliance_->WebStatus(), web::WallClock::now());
+      EXPECT_TRUE(status["check_overdue"]);
+      EXPECT_TRUE(status["check_failed"]);
+      EXPECT_EQ(appliance_->Checks().today, DailyCheck::kFailed);
+      EXPECT_THAT(appliance_->WhyNoReference(ScanOf(DailyCheck::kPassed)),
+                  ::testing::HasSubstr("the daily check has failed"))
+          << "after one that had passed";
+      check(MarkerCheckStatus::kPassed);
+      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(DailyCheck::kPassed)), "");
+      EXPECT_THAT(appliance_->WhyNoReference(ScanOf(DailyCheck::kFailed)),
+                  ::testing::HasSubstr("after a daily check that had failed"));
       (void)appliance_->CloseSession(tess);
       (void)appliance_->Press(ButtonPress::kShort, kTester);  // acknowledges the fault
       services_->services().patients.OpenPatient(tess, patient, web::ScanPurpose::kReference, "",
@@ -356,7 +374,7 @@ TEST_F(ApplianceTest, AColdSensorTakesNoReference) {
                   ::testing::HasSubstr("the sensor is still warming up"));
       EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("15 min"));
       // What was scanned long ago is judged by how warm the sensor was then.
-      web::Scan scan = ScanOf(false);
+      web::Scan scan = ScanOf(DailyCheck::kPassed);
       scan.sensor_on_s = 899;
       EXPECT_THAT(appliance_->WhyNoReference(scan),
                   ::testing::HasSubstr("scan the reference again"));
@@ -392,9 +410,9 @@ TEST_F(ApplianceTest, TheDemoNeedsNoCheckForItsReference) {
   Play([&] {
     MakeReady();
     On([&] {
-      EXPECT_TRUE(appliance_->WebStatus().check_overdue);
+      EXPECT_EQ(appliance_->WebStatus().daily_check, DailyCheck::kOverdue);
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(true)), "");
+      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(DailyCheck::kOverdue)), "");
     });
   });
 }

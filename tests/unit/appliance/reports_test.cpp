@@ -16,6 +16,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
+using web::DailyCheck;
 using web::Language;
 
 const web::Actor kAnna{.user = "anna", .address = {}};
@@ -24,7 +25,7 @@ const web::Actor kClara{.user = "clara", .address = {}};
 
 class ReportsTest : public ::testing::Test {
  protected:
-  std::string Scan(const std::string& reference, const std::string& result, bool overdue = false,
+  std::string Scan(const std::string& reference, const std::string& result, DailyCheck check = {},
                    std::optional<double> sensor_on_s = {}, const std::string& result_file = {}) {
     const std::string id = store_.scans.Begin(
         {.patient_id = patient_,
@@ -33,7 +34,7 @@ class ReportsTest : public ::testing::Test {
          .sensor_serial = "S1",
          .reason = "",
          .sensor_on_s = sensor_on_s,
-         .check_overdue = overdue});
+         .daily_check = check});
     std::filesystem::create_directories(store_.folders.Staging(id) / "scene");
     WriteWholeFile(store_.folders.Staging(id) / "scene/scene.json",
                    R"({"frames":{"total":300,"tracked":270,"dropped":30},"keyframes":40})");
@@ -97,7 +98,7 @@ TEST_F(ReportsTest, AReasonThatIsNoUtf8EndsNoReport) {
 }
 
 TEST_F(ReportsTest, AScanIsToldInTheLanguageThatIsAskedFor) {
-  const std::string id = Scan(Approved(), kMove, /*overdue=*/true);
+  const std::string id = Scan(Approved(), kMove, DailyCheck::kOverdue);
   const web::Scan scan = *store_.scans.Find(id);
   const ScanReport english = DescribeScan(sources_, scan, Language::kEnglish);
   const ScanReport spanish = DescribeScan(sources_, scan, Language::kSpanish);
@@ -127,7 +128,7 @@ TEST_F(ReportsTest, AScanIsToldInTheLanguageThatIsAskedFor) {
 
 TEST_F(ReportsTest, ASensorThatWasOnForLessThanTheConfiguredTimeIsACaution) {
   const auto cautions = [&](double sensor_on_s) {
-    const std::string id = Scan("", "", /*overdue=*/false, sensor_on_s);
+    const std::string id = Scan("", "", DailyCheck::kPassed, sensor_on_s);
     return DescribeScan(sources_, *store_.scans.Find(id), Language::kEnglish).cautions;
   };
   // 20 min are configured.
@@ -136,7 +137,7 @@ TEST_F(ReportsTest, ASensorThatWasOnForLessThanTheConfiguredTimeIsACaution) {
 }
 
 TEST_F(ReportsTest, EachIgnoredMarkerIsACaution) {
-  const std::string id = Scan(Approved(), kMove, /*overdue=*/false, {},
+  const std::string id = Scan(Approved(), kMove, DailyCheck::kPassed, {},
                               R"({"alignment":{"markers_rejected":{"7":0.0121,"31":0.0306}}})");
   const web::Scan scan = *store_.scans.Find(id);
   EXPECT_THAT(CautionsOf(sources_, scan, Language::kEnglish),
@@ -211,6 +212,14 @@ TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
   ASSERT_TRUE(course.rows[1].values[0]);
   EXPECT_EQ(course.rows[1].values[0]->u95, 1.06);
   EXPECT_THAT(ValueOf(course.identity, "Aprobado por"), HasSubstr("clara"));
+  EXPECT_EQ(ValueOf(course.identity, "** Control diario"), "nothing");
+  const std::string failed = Scan("", "", DailyCheck::kFailed);
+  EXPECT_THAT(DescribeScan(sources_, *store_.scans.Find(failed), Language::kEnglish).cautions,
+              ::testing::Contains("The daily check had failed before this scan."));
+  const CourseReport marked =
+      DescribeCourse(sources_, *store_.patients.Find(patient_), Language::kSpanish);
+  EXPECT_EQ(marked.rows.back().verdict, "REFERENCIA **");
+  EXPECT_EQ(ValueOf(marked.identity, "** Control diario"), "no superado antes de este escaneo");
   EXPECT_TRUE(PdfOf(course).starts_with("%PDF-"));
 }
 

@@ -148,15 +148,5 @@ TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
   EXPECT_NE(pdf.find("/MediaBox [ 0 0 595"), std::string::npos);
 }
 
-TEST(PdfReport, AValueHasNoDigitBelowItsUncertainty) {
-  EXPECT_EQ(ValueWithUncertainty(-2.93, 1.06, 1, '.'), "\u22123 \u00b11.1");
-  EXPECT_EQ(ValueWithUncertainty(-2.93, 0.96, 1, '.'), "\u22122.9 \u00b11.0");
-  EXPECT_EQ(ValueWithUncertainty(-39.04, 1.1, 1, ','), "\u221239 \u00b11,1");
-  EXPECT_EQ(ValueWithUncertainty(-0.814, 0.09, 2, ','), "\u22120,81 \u00b10,09");
-  EXPECT_EQ(ValueWithUncertainty(-0.164, 0.12, 2, '.'), "\u22120.2 \u00b10.12");
-  EXPECT_EQ(ValueWithUncertainty(-0.02, 1.1, 1, '.'), "0 \u00b11.1") << "zero has no sign";
-  EXPECT_EQ(ValueWithUncertainty(4.26, 0.0, 1, '.'), "+4.3") << "no uncertainty is known";
-}
-
 }  // namespace
 }  // namespace plumb

@@ -14,6 +14,7 @@ using testing::kBert;
 using ::testing::SizeIs;
 using testing::StoreTest;
 using web::ChangeResult;
+using web::DailyCheck;
 
 /// What a check that ended in `status` stores after seeing the markers 1 to n in a row.
 TakenCheck CheckWith(int n, MarkerCheckStatus status) {
@@ -35,7 +36,52 @@ TEST_F(StoreTest, ACheckWithAStampOfTheFutureCountsForNoDay) {
       .Execute(
           "INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (9000000000000000, "
           "'anna', 'S1', 'passed', '{}')");
-  EXPECT_FALSE(store->checks.HasPassedSince(web::WallClock::now()));
+  EXPECT_EQ(store->checks.StateSince(web::WallClock::now()), DailyCheck::kOverdue);
+}
+
+TEST_F(StoreTest, TheNewestCheckOfTheDayAndSensorDecides) {
+  const auto store = Open();
+  const auto since = web::WallClock::now() - std::chrono::seconds(1);
+  const auto add = [&](const char* serial, MarkerCheckStatus status) {
+    store->checks.Add(kAnna, serial, CheckWith(4, status));
+  };
+  const auto state = [&](const std::string& serial) {
+    return store->checks.StateSince(since, serial);
+  };
+  add("S1", MarkerCheckStatus::kFailed);
+  EXPECT_EQ(state("S1"), DailyCheck::kFailed);
+  EXPECT_EQ(state("S2"), DailyCheck::kOverdue) << "a failure of another unit";
+  add("S1", MarkerCheckStatus::kPassed);
+  EXPECT_EQ(state("S1"), DailyCheck::kPassed) << "failed, then passed";
+  add("S2", MarkerCheckStatus::kFailed);
+  EXPECT_EQ(state("S1"), DailyCheck::kPassed) << "another unit failed";
+  EXPECT_EQ(state(""), DailyCheck::kFailed) << "any unit";
+  add("S1", MarkerCheckStatus::kFailed);
+  EXPECT_EQ(state("S1"), DailyCheck::kFailed) << "passed, then failed";
+  add("S1", MarkerCheckStatus::kNoBaseline);
+  EXPECT_EQ(state("S1"), DailyCheck::kFailed) << "it says neither";
+  add("S1", MarkerCheckStatus::kPassed);
+  add("", MarkerCheckStatus::kFailed);
+  EXPECT_EQ(state("S1"), DailyCheck::kFailed) << "it may have been this unit";
+}
+
+TEST_F(StoreTest, ACheckOfYesterdayDecidesNothingToday) {
+  const auto store = Open();
+  const auto at = [&](std::chrono::hours ago, const char* status) {
+    const auto time = std::chrono::duration_cast<std::chrono::microseconds>(
+        (web::WallClock::now() - ago).time_since_epoch());
+    Database(database(), Database::Access::kReadWrite)
+        .Execute("INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (" +
+                 std::to_string(time.count()) + ", 'anna', 'S1', '" + status + "', '{}')");
+  };
+  const auto midnight = web::WallClock::now() - std::chrono::hours(3);
+  const auto today = [&] { return store->checks.StateSince(midnight, "S1"); };
+  at(std::chrono::hours(4), "failed");
+  EXPECT_EQ(today(), DailyCheck::kOverdue) << "a failure of yesterday";
+  at(std::chrono::hours(2), "passed");
+  EXPECT_EQ(today(), DailyCheck::kPassed);
+  at(std::chrono::hours(4), "failed");  // the clock has been set back since
+  EXPECT_EQ(today(), DailyCheck::kOverdue) << "what came last has not passed";
 }
 
 TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) {
@@ -46,7 +92,7 @@ TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) 
                                                .reference_id = "",
                                                .sensor_serial = serial,
                                                .reason = "",
-                                               .check_overdue = true});
+                                               .daily_check = web::DailyCheck::kOverdue});
     store->scans.Finish(
         id, {.outcome = web::ScanOutcome::kFailed, .failure = "of this test", .result_json = ""});
     return id;
@@ -70,6 +116,10 @@ TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) 
   store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
   store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
   EXPECT_FALSE(store->checks.ConfirmsScan(doubtful)) << "a check failed in between";
+  const std::string unsure = scan("S1");
+  store->checks.Add(kAnna, "", CheckWith(4, MarkerCheckStatus::kFailed));
+  store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_FALSE(store->checks.ConfirmsScan(unsure)) << "a check of an unnamed unit failed";
 
   const std::string yesterday = scan("S1");
   store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
@@ -90,7 +140,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
     EXPECT_FALSE(store->checks.BaselineMarkers());
     const std::string first =
         store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
-    EXPECT_FALSE(store->checks.HasPassedSince(before)) << "without a baseline nothing has passed";
+    EXPECT_EQ(store->checks.StateSince(before), DailyCheck::kOverdue) << "there is no baseline";
     store->checks.SetBaseline(kBert, first);
     store->checks.Add(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kPassed));
   }
@@ -105,10 +155,11 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_EQ(checks[0].items[0].value, 1.25);
   EXPECT_EQ(checks[0].items[0].note, "marker 2");
   EXPECT_EQ(checks[1].reasons, std::vector<std::string>{"because"});
-  EXPECT_TRUE(store->checks.HasPassedSince(before));
-  EXPECT_FALSE(store->checks.HasPassedSince(web::WallClock::now() + std::chrono::hours(1)));
-  EXPECT_TRUE(store->checks.HasPassedSince(before, "S1"));
-  EXPECT_FALSE(store->checks.HasPassedSince(before, "S2")) << "another unit was not checked";
+  EXPECT_EQ(store->checks.StateSince(before), DailyCheck::kPassed);
+  EXPECT_EQ(store->checks.StateSince(web::WallClock::now() + std::chrono::hours(1)),
+            DailyCheck::kOverdue);
+  EXPECT_EQ(store->checks.StateSince(before, "S1"), DailyCheck::kPassed);
+  EXPECT_EQ(store->checks.StateSince(before, "S2"), DailyCheck::kOverdue) << "of another unit";
   const auto baseline = store->checks.Baseline();
   ASSERT_TRUE(baseline);
   EXPECT_EQ(baseline->check_id, checks[1].id);

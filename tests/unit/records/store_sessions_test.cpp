@@ -30,7 +30,7 @@ class StoreSessionsTest : public ::testing::Test {
                                               .reason = {},
                                               .session_id = session,
                                               .sensor_on_s = 90.0,
-                                              .check_overdue = true});
+                                              .daily_check = web::DailyCheck::kFailed});
     fs::create_directories(store.folders.Staging(id) / "scene");
     WriteWholeFile(store.folders.Staging(id) / "scene" / "scene.json", std::string_view("{}"));
     store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
@@ -83,7 +83,7 @@ TEST_F(StoreSessionsTest, FractionNumbersCountSessionsNotScans) {
   EXPECT_EQ(store.scans.Find(right)->fraction, 1);
   EXPECT_EQ(store.scans.Find(right)->session_id, first);
   EXPECT_EQ(store.scans.Find(right)->sensor_on_s, 90.0);
-  EXPECT_TRUE(store.scans.Find(right)->check_overdue);
+  EXPECT_EQ(store.scans.Find(right)->daily_check, web::DailyCheck::kFailed);
   (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
   EXPECT_EQ(store.treatments.Opened()->fraction, 2);
   (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);

@@ -50,8 +50,11 @@ TEST_F(ResultPageTest, AFreshResultIsNotOld) {
 TEST_F(ResultPageTest, WhatIsToBeKnownStandsBesideTheVerdict) {
   Add("s1", seconds(10));
   EXPECT_THAT(Page(), Not(HasSubstr("overdue")));
-  loop_->Do([&] { service_.scans.back().check_overdue = true; });
+  loop_->Do([&] { service_.scans.back().daily_check = web::DailyCheck::kOverdue; });
   EXPECT_THAT(Page(), HasSubstr("<p class=\"caution\">The daily check was overdue at this scan."));
+  loop_->Do([&] { service_.scans.back().daily_check = web::DailyCheck::kFailed; });
+  EXPECT_THAT(Page(), AllOf(HasSubstr("<p class=\"caution\">The daily check had failed before"),
+                            Not(HasSubstr("overdue"))));
 }
 
 TEST_F(ResultPageTest, AfterTwoMinutesItIsOld) {
@@ -88,18 +91,25 @@ TEST_F(ResultPageTest, ItSpeaksTheBrowsersLanguageOrTheOneThatIsAskedFor) {
     result.correction.emplace().vertical_mm = -8.04;
     result.u95.emplace().vertical_mm = 0.9;
     result.u95->pitch_deg = 0.14;
+    result.correction->yaw_deg = 0.05;
+    result.u95->yaw_deg = 0.04;
+    result.reasons = {"outside 3 mm and 1 deg: vertical -8.0 mm (down)"};
     result.words[0] = "down";
     result.body_after = {"left shoulder 9 mm high"};
   });
-  EXPECT_THAT(Page(), AllOf(HasSubstr("<html lang=\"en\">"), HasSubstr("-8.0 mm"),
+  EXPECT_THAT(Page(), AllOf(HasSubstr("<html lang=\"en\">"), HasSubstr("<td>\u22128.0 mm</td>"),
+                            HasSubstr(">\u00b10.9 mm</td>"), HasSubstr(">\u00b13 mm</td>"),
+                            HasSubstr("<td>+0.05\u00b0</td>"), HasSubstr(">\u00b10.04\u00b0</td>"),
+                            HasSubstr("outside 3 mm and 1\u00b0: vertical \u22128.0 mm (down)"),
                             HasSubstr("<td>down</td>"), HasSubstr(">MOVE<")));
   client_->extra_headers["Accept-Language"] = "fr, es-MX;q=0.9, en;q=0.8";
   const std::string spanish = Page();
-  EXPECT_THAT(spanish,
-              AllOf(HasSubstr("<html lang=\"es\">"), HasSubstr("-8,0 mm"), HasSubstr("0,14"),
-                    HasSubstr("<td>abajo</td>"), HasSubstr(">MOVER<"),
-                    HasSubstr("hombro izquierdo: 9 mm demasiado alto"), HasSubstr("hace 1 min"),
-                    HasSubstr("No es un producto sanitario"), HasSubstr("refresh")));
+  EXPECT_THAT(
+      spanish,
+      AllOf(HasSubstr("<html lang=\"es\">"), HasSubstr("\u22128,0 mm"),
+            HasSubstr("\u00b10,14\u00b0"), HasSubstr("<td>abajo</td>"), HasSubstr(">MOVER<"),
+            HasSubstr("hombro izquierdo: 9 mm demasiado alto"), HasSubstr("hace 1 min"),
+            HasSubstr("No es un producto sanitario"), HasSubstr("refresh")));
   for (const char* english : {"MOVE<", "tolerance<", "Scan ", "Patient", "down", "high"})
     EXPECT_THAT(spanish, Not(HasSubstr(english)));
   EXPECT_THAT(client_->Get("/result?language=en").body, HasSubstr(">MOVE<"));

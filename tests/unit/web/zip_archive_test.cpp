@@ -81,6 +81,7 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   scan.result = web::ResultSummary{};
   scan.result->verdict = "move";
   scan.result->correction.emplace().vertical_mm = -8.25;
+  scan.daily_check = web::DailyCheck::kFailed;
   scan.accepted_by = "anna";
   scan.accepted_reason = "=cmd|'/C calc'!A0, \"really\"";
   service_.scans.push_back(scan);
@@ -109,6 +110,8 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",-8.2500,")) << "a number stays one";
   EXPECT_THAT(files.at("numbers.csv"), HasSubstr(R"("'=cmd|'/C calc'!A0, ""really""")"))
       << "what a person typed is no formula";
+  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",check_overdue,check_failed\r\n"));
+  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",yes,yes\r\n"));
   EXPECT_EQ(service_.report_language, web::Language::kSpanish);
   EXPECT_EQ(client.Get("/api/v1/patients/p1/course.zip?language=fr").status, 400);
   EXPECT_EQ(client.Get("/api/v1/patients/p2/course.zip").status, 404);

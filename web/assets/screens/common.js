@@ -123,7 +123,7 @@ export function qualityFlags(scan, scene, valid = true) {
   if (scan.sensor_on_s !== null && scan.sensor_on_s !== undefined && isCold(scan.sensor_on_s)) {
     flags.push(text.warming(Math.floor(scan.sensor_on_s / 60)));
   }
-  if (scan.check_overdue) flags.push(text.overdue);
+  if (scan.check_overdue) flags.push(scan.check_failed ? text.checkFailed : text.overdue);
   return flags;
 }
 

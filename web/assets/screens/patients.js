@@ -207,7 +207,8 @@ function scanTable(scans) {
     h('td', {}, scan.fraction ?? S.none),
     h('td', {}, S.purposes[scan.purpose]),
     h('td', {}, outcomeBadge(scan), scan.check_overdue
-      && h('span', { class: 'badge move overdue' }, `▲ ${text.checkOverdue}`)),
+      && h('span', { class: 'badge move overdue' },
+        `▲ ${scan.check_failed ? text.checkFailed : text.checkOverdue}`)),
     h('td', { class: 'digits' }, isAdvice(scan) ? numbersLine(scan.result) : S.none),
     h('td', {}, accepted(scan))));
   const heads = [text.when, text.fraction, text.purpose, text.outcome, text.numbers,

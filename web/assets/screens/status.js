@@ -11,14 +11,14 @@ import {
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
 
 /// Whether the room was checked today, and how that went.
-function checkTile({ last_check: last, check_overdue: overdue }, tile) {
+function checkTile({ last_check: last, check_overdue: overdue, check_failed: failed }, tile) {
   const text = S.check;
   const good = last?.status === 'passed' && !overdue;
   const word = good ? text.verdicts.passed
     : last && last.status !== 'passed' ? text.verdicts[last.status] : text.overdue;
   return tile(text.tile, word.toLowerCase(), good ? 'good' : 'bad',
     last && h('p', {}, text.last(localTime(last.time), last.user)),
-    overdue && h('p', { class: 'caution' }, text.overdueText),
+    overdue && h('p', { class: 'caution' }, failed ? text.failedText : text.overdueText),
     h('p', {}, h('a', { href: '#/check' }, S.nav.check)));
 }
 

@@ -141,6 +141,7 @@ export const en = {
     archiveHint: 'Takes the patient out of the list. Nothing is deleted.',
     isArchived: 'This patient is archived and cannot be opened for a session.',
     showArchived: 'Show archived patients too', checkOverdue: 'check overdue',
+    checkFailed: 'check failed',
     reference: 'Reference', approved: 'approved', noReference: 'none',
     waits: 'waiting for approval', waitsForPlan: 'waiting for a plan',
     open: 'Session',
@@ -312,6 +313,7 @@ export const en = {
       overdue: 'The daily check was overdue at this scan.',
       posture: (part) => `Posture differs: ${part}.`,
       postureThen: (part) => `Posture differed: ${part}.`,
+      checkFailed: 'The daily check had failed before this scan.',
     },
     where: 'Where on the body', before: 'Before', after: 'After the correction',
     mapLabel: 'Map of height errors, current minus reference. Use the arrow keys to read values.',
@@ -400,6 +402,7 @@ export const en = {
     verdicts: { passed: 'PASSED', failed: 'FAILED', no_baseline: 'NO BASELINE' }, none: 'NOT DONE',
     never: 'No check has been done yet.', overdue: 'overdue',
     overdueText: 'No check has passed today. Do it before the first patient.',
+    failedText: 'Clear up why the check failed, then check again before the next patient.',
     today: 'Today’s check has passed.', start: 'Start a check',
     sweep: 'sweep over all markers of the room, without a patient',
     how: 'Take everything off the couch, then sweep over all markers as over a patient. The '

@@ -169,6 +169,7 @@ export const es = {
     archiveHint: 'Quita al paciente de la lista. No se borra nada.',
     isArchived: 'Este paciente está archivado y no se puede abrir para una sesión.',
     showArchived: 'Mostrar también los archivados', checkOverdue: 'control pendiente',
+    checkFailed: 'control no superado',
     reference: 'Referencia', approved: 'aprobada', noReference: 'ninguna',
     waits: 'pendiente de aprobación', waitsForPlan: 'pendiente de plan', open: 'Sesión',
     add: 'Añadir un paciente', codeHint: 'Un seudónimo: letras, cifras, . _ - (sin nombre)',
@@ -347,6 +348,7 @@ export const es = {
       overdue: 'El control diario estaba pendiente en este escaneo.',
       posture: (part) => `La postura difiere: ${part}.`,
       postureThen: (part) => `La postura difería: ${part}.`,
+      checkFailed: 'El control diario anterior a este escaneo no se superó.',
     },
     where: 'Dónde en el cuerpo', before: 'Antes', after: 'Después de la corrección',
     mapLabel: 'Mapa de errores de altura, actual menos referencia. Use las flechas para leer '
@@ -442,6 +444,7 @@ export const es = {
     verdicts: { passed: 'SUPERADO', failed: 'NO SUPERADO', no_baseline: 'SIN BASE' },
     none: 'NO HECHO', never: 'Aún no se ha hecho ningún control.', overdue: 'pendiente',
     overdueText: 'Hoy no se ha superado ningún control. Hágalo antes del primer paciente.',
+    failedText: 'Aclare por qué no se superó y repita el control antes del próximo paciente.',
     today: 'El control de hoy se ha superado.', start: 'Empezar un control',
     sweep: 'barrido sobre todos los marcadores de la sala, sin paciente',
     how: 'Retire todo de la camilla y barra todos los marcadores como si fueran un paciente. Los '

@@ -71,6 +71,15 @@ export const kWords = {
     + 'sweep over all markers of the room, then go on here']:
     'el control diario está pendiente y las referencias necesitan uno superado hoy: abra Control '
     + 'diario, barra todos los marcadores de la sala y siga después aquí',
+  ['the daily check has failed, and references need one that has passed since: open Daily check, '
+    + 'clear up why it failed, sweep over all markers of the room, then go on here']:
+    'el control diario no se ha superado y las referencias necesitan uno superado después: abra '
+    + 'Control diario, aclare por qué no se superó, barra todos los marcadores de la sala y siga '
+    + 'después aquí',
+  ['this scan was taken after a daily check that had failed, and no check of the same day and '
+    + 'sensor has confirmed it: scan the reference again']:
+    'este escaneo se hizo después de un control diario no superado y ningún control del mismo día '
+    + 'y sensor lo ha confirmado: escanee otra vez la referencia',
   ['this scan was taken while the daily check was overdue, and no check of the same day and sensor '
     + 'has confirmed it: scan the reference again']:
     'este escaneo se hizo con el control diario pendiente y ningún control del mismo día y sensor '
