@@ -7,7 +7,7 @@ namespace {
 
 constexpr ReportWords kEnglish = {
     .terms = web::kEnglishTerms,
-    .page = "Page {}",
+    .page = "Page {} of {}",
     .scan_title = "Scan report",
     .course_title = "Course of {}",
     .patient = "Patient",
@@ -87,7 +87,7 @@ constexpr ReportWords kEnglish = {
 
 constexpr ReportWords kSpanish = {
     .terms = web::kSpanishTerms,
-    .page = "Página {}",
+    .page = "Página {} de {}",
     .scan_title = "Informe del escaneo",
     .course_title = "Tratamiento de {}",
     .patient = "Paciente",

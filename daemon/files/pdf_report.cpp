@@ -37,8 +37,9 @@ constexpr Ink kGood{0.04, 0.4, 0.24}, kMove{0.58, 0.3, 0.0};
 /// Points, y down.
 class Pages {
  public:
-  Pages(const ReportTexts& texts, std::string footer, const Paper& paper)
-      : texts_(texts), footer_(std::move(footer)), paper_(paper) {
+  /// @param total  How many pages there will be.
+  Pages(const ReportTexts& texts, std::string footer, const Paper& paper, int total)
+      : texts_(texts), footer_(std::move(footer)), paper_(paper), total_(total) {
     surface_.reset(
         cairo_pdf_surface_create_for_stream(&Append, &bytes_, paper_.width, paper_.height));
     context_.reset(cairo_create(surface_.get()));
@@ -47,6 +48,7 @@ class Pages {
 
   double y = 0.0;
 
+  [[nodiscard]] int page() const { return page_; }
   /// Width between the margins, and where the space for contents ends.
   [[nodiscard]] double inner() const { return paper_.width - 2 * kMargin; }
   [[nodiscard]] double bottom() const { return paper_.height - 58.0; }
@@ -156,14 +158,14 @@ class Pages {
   void Foot() {
     Rule(paper_.height - 44);
     Text(kMargin, paper_.height - 30, footer_, 7.5, kGrey);
-    const std::string number = fmt::format(fmt::runtime(texts_.page), page_);
+    const std::string number = fmt::format(fmt::runtime(texts_.page), page_, total_);
     Text(paper_.width - kMargin - Width(number, 8), paper_.height - 30, number, 8, kGrey);
   }
 
   const ReportTexts& texts_;
   std::string bytes_, footer_;
   Paper paper_;
-  int page_ = 0;
+  int page_ = 0, total_;
   std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface_{
       nullptr, &cairo_surface_destroy};
   std::unique_ptr<cairo_t, decltype(&cairo_destroy)> context_{nullptr, &cairo_destroy};
@@ -282,10 +284,19 @@ CourseTable TableOf(Pages& pages, const CourseReport& report) {
   return table;
 }
 
-}  // namespace
+/// Drawn a second time if it has more than one page, because each page names their number.
+template <typename Contents>
+std::string Numbered(const ReportTexts& texts, const std::string& footer, const Paper& paper,
+                     const Contents& draw) {
+  Pages counted(texts, footer, paper, 1);
+  draw(counted);
+  if (counted.page() == 1) return counted.Finish();
+  Pages pages(texts, footer, paper, counted.page());
+  draw(pages);
+  return pages.Finish();
+}
 
-std::string PdfOf(const ScanReport& report) {
-  Pages pages(report.texts, report.footer, kUpright);
+void Draw(Pages& pages, const ScanReport& report) {
   pages.y += 6;
   pages.Paragraph(kMargin, pages.inner(), report.title, 16, kBlack, true);
   pages.y += 2;
@@ -307,12 +318,10 @@ std::string PdfOf(const ScanReport& report) {
     Facts(pages, report.quality);
   }
   Pictures(pages, report.pictures, report.pictures_note);
-  return pages.Finish();
 }
 
-std::string PdfOf(const CourseReport& report) {
+void Draw(Pages& pages, const CourseReport& report) {
   const ReportTexts& texts = report.texts;
-  Pages pages(texts, report.footer, kAcross);
   pages.y += 6;
   pages.Paragraph(kMargin, pages.inner(), report.title, 16, kBlack, true);
   Facts(pages, report.identity);
@@ -343,7 +352,17 @@ std::string PdfOf(const CourseReport& report) {
     pages.y += 8;
     pages.Paragraph(kMargin, pages.inner(), report.note, kSmall, kGrey);
   }
-  return pages.Finish();
+}
+
+}  // namespace
+
+std::string PdfOf(const ScanReport& report) {
+  return Numbered(report.texts, report.footer, kUpright,
+                  [&](Pages& pages) { Draw(pages, report); });
+}
+
+std::string PdfOf(const CourseReport& report) {
+  return Numbered(report.texts, report.footer, kAcross, [&](Pages& pages) { Draw(pages, report); });
 }
 
 }  // namespace plumb

@@ -16,7 +16,7 @@ using ReportFacts = std::vector<std::pair<std::string, std::string>>;
 
 /// Fixed texts of a report; with {} they are fmt patterns.
 struct ReportTexts {
-  std::string notice, page = "{}";                  ///< "Page {}".
+  std::string notice, page = "{} / {}";             ///< "Page {} of {}".
   std::string posture, quality;                     ///< Headings.
   std::string within, unsure, outside;              ///< Judgements.
   std::string not_known, tolerance = "\u00b1{}{}";  ///< Patterns for value and unit (" mm").

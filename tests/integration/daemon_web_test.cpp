@@ -195,7 +195,7 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   const std::string text = TextOfPdf(report.body, folder_.path() / "report.pdf");
   for (const std::string& expected :
        {std::string("PX-17"), std::string("MOVE"), std::string("Longitudinal"),
-        std::string("swelling"), std::string("second, 20"), std::string("Page 1"), fraction})
+        std::string("swelling"), std::string("second, 20"), std::string("Page 1 of 1"), fraction})
     EXPECT_THAT(text, HasSubstr(expected));
   const HttpAnswer course = technician.Get("/api/v1/patients/" + patient + "/report.pdf");
   EXPECT_THAT(TextOfPdf(course.body, folder_.path() / "course.pdf"), HasSubstr("Course of PX-17"));
