@@ -372,6 +372,10 @@ std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
     return "this scan was taken while the daily check was overdue, and no check of the same day "
            "and sensor has confirmed it: scan the reference again";
   }
+  if (scan && store_->checks.RefutesScan(scan->id)) {
+    return "the first daily check after this scan failed, and nobody knows since when the markers "
+           "were not as they should be: scan the reference again";
+  }
   return WhySensorIsCold(scan);
 }
 

@@ -94,6 +94,18 @@ bool CheckStore::ConfirmsScan(const std::string& scan_id) {
   return query.Bind(*number).Bind(Now()).Step();
 }
 
+bool CheckStore::RefutesScan(const std::string& scan_id) {
+  const std::optional<std::int64_t> number = ParseId(scan_id);
+  if (!number) return false;
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
+      "SELECT checks.status = 'failed' FROM scans JOIN checks ON checks.time >= scans.started_at "
+      "AND (checks.sensor_serial = scans.sensor_serial OR (checks.status = 'failed' AND "
+      "checks.sensor_serial = '')) WHERE scans.id = ?1 AND checks.status IN ('passed', 'failed') "
+      "ORDER BY checks.id LIMIT 1");
+  return query.Bind(*number).Step() && query.Integer(0) != 0;
+}
+
 std::optional<web::CheckBaseline> CheckStore::Baseline() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(

@@ -30,6 +30,9 @@ class CheckStore {
   /// unit, passed on the day of the scan and after it, with no failed check in between and against
   /// a baseline from before the scan.
   [[nodiscard]] bool ConfirmsScan(const std::string& scan_id);
+  /// Whether the first check after this scan, of the same or of an unnamed unit, failed: nobody
+  /// knows since when what it found was wrong.
+  [[nodiscard]] bool RefutesScan(const std::string& scan_id);
 
   [[nodiscard]] std::optional<web::CheckBaseline> Baseline();
   /// The markers of the baseline; nothing without a baseline.

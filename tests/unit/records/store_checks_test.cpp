@@ -132,6 +132,37 @@ TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) 
   EXPECT_FALSE(store->checks.ConfirmsScan(yesterday)) << "a check of another day";
 }
 
+TEST_F(StoreTest, TheFirstCheckAfterAScanRefutesItIfItFailed) {
+  const auto store = Open();
+  const std::string patient = store->patients.Add(kAnna, "P-1", "");
+  const auto scan = [&](const char* serial) {
+    return store->scans.Begin({.patient_id = patient,
+                               .reference_id = "",
+                               .sensor_serial = serial,
+                               .reason = "",
+                               .daily_check = web::DailyCheck::kPassed});
+  };
+  const auto check = [&](const char* serial, MarkerCheckStatus status) {
+    store->checks.Add(kAnna, serial, CheckWith(4, status));
+  };
+  check("S1", MarkerCheckStatus::kFailed);
+  const std::string good = scan("S1");
+  EXPECT_FALSE(store->checks.RefutesScan(good)) << "the check that failed is older";
+  check("S2", MarkerCheckStatus::kFailed);
+  check("S1", MarkerCheckStatus::kNoBaseline);
+  EXPECT_FALSE(store->checks.RefutesScan(good)) << "another unit, and a check that judges nothing";
+  check("S1", MarkerCheckStatus::kPassed);
+  check("S1", MarkerCheckStatus::kFailed);
+  EXPECT_FALSE(store->checks.RefutesScan(good)) << "a check passed before";
+
+  const std::string bad = scan("S1"), unsure = scan("S3");
+  check("", MarkerCheckStatus::kFailed);
+  EXPECT_TRUE(store->checks.RefutesScan(unsure)) << "of an unnamed unit";
+  check("S1", MarkerCheckStatus::kPassed);
+  EXPECT_TRUE(store->checks.RefutesScan(bad)) << "a later pass does not help";
+  EXPECT_FALSE(store->checks.RefutesScan("none"));
+}
+
 TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   const auto before = web::WallClock::now() - std::chrono::seconds(1);
   {

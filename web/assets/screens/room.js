@@ -83,7 +83,7 @@ function top(status, said, isSwapped) {
   const { session, sensor } = status;
   const warm = !isCold(sensor.powered_s);
   const mark = (good, words) => h('li', { class: good ? 'good' : 'bad' }, words);
-  const failed = status.last_check?.status === 'failed';
+  const failed = status.check_failed;
   const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
   return h('header', { class: 'room-top' },
     !said && (isSwapped && !isCheck
@@ -314,7 +314,7 @@ function display(main) {
     }
     const isSwapped = Boolean(session && swapped && since_s(swapped) < kSwap_s);
     const marks = JSON.stringify([S.languageName, session, isSwapped, said, status.check_overdue,
-      status.last_check?.status, status.next_purpose, status.sensor.present,
+      status.check_failed, status.next_purpose, status.sensor.present,
       Math.floor(status.sensor.powered_s / 60)]);
     if (marks !== shownMarks) {
       shownMarks = marks;

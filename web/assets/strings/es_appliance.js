@@ -76,6 +76,10 @@ export const kWords = {
     'el control diario no se ha superado y las referencias necesitan uno superado después: abra '
     + 'Control diario, aclare por qué no se superó, barra todos los marcadores de la sala y siga '
     + 'después aquí',
+  ['the first daily check after this scan failed, and nobody knows since when the markers were not '
+    + 'as they should be: scan the reference again']:
+    'el primer control diario después de este escaneo no se superó, y no se sabe desde cuándo los '
+    + 'marcadores no están como deben: escanee otra vez la referencia',
   ['this scan was taken after a daily check that had failed, and no check of the same day and '
     + 'sensor has confirmed it: scan the reference again']:
     'este escaneo se hizo después de un control diario no superado y ningún control del mismo día '
