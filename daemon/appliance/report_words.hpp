@@ -17,7 +17,7 @@ struct ReportWords {
   std::string_view page, scan_title, course_title;
   std::string_view patient, unassigned, site, fraction, scan, scans, reference, version, plan,
       region, corners, whole_body, isocentre, middle, planned_by, approved_by, not_approved,
-      checksum, session_by, accepted, accepted_by, accepted_outside, no, printed;
+      checksum, session_by, accepted, accepted_by, accepted_outside, accepted_unsure, no, printed;
   std::string_view room_markers, couch_markers, tolerance, tolerance_fact;
   std::array<std::string_view, 4> postures;    ///< HFS, HFP, FFS, FFP.
   std::array<std::string_view, 6> short_axes;  ///< With units, as column heads.

@@ -287,8 +287,10 @@ std::string AcceptedText(const web::Scan& scan, const ReportWords& words) {
   const std::string who = scan.accepted_at ? fmt::format("{}, {}", scan.accepted_by,
                                                          web::LocalTimeText(*scan.accepted_at))
                                            : scan.accepted_by;
-  return scan.accepted_reason.empty() ? Filled(words.accepted_by, who)
-                                      : Filled(words.accepted_outside, who, scan.accepted_reason);
+  if (scan.accepted_reason.empty()) return Filled(words.accepted_by, who);
+  const bool is_unsure = scan.result && scan.result->verdict == "unsure";
+  return Filled(is_unsure ? words.accepted_unsure : words.accepted_outside, who,
+                scan.accepted_reason);
 }
 
 ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>& patient,

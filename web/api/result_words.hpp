@@ -24,7 +24,7 @@ struct ResultWords {
   std::string_view log_in, name, password, wrong_password, first_password;
   std::string_view out_of_order, nobody_can;
   std::string_view none, patient, no_patient, scan_line, fraction, ago_min, ago_unknown, old;
-  std::string_view running, newer_failed, accepted_by, accepted_outside;
+  std::string_view running, newer_failed, accepted_by, accepted_outside, accepted_unsure;
   std::string_view reference_line, no_reference;
   VerdictWords in_tolerance, unsure, move;
   std::array<std::string_view, 6> heads;  ///< Of the table of the numbers.

@@ -211,6 +211,14 @@ TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
                                       "20[0-9-]+ [0-9:]+ UTC: the arm cannot be moved"));
   ASSERT_TRUE(course.rows[1].values[0]);
   EXPECT_EQ(course.rows[1].values[0]->u95, 1.06);
+  std::string unsure = kMove;
+  unsure.replace(unsure.find("move"), 4, "unsure");
+  const std::string unsure_id = Scan(Approved(), unsure);
+  store_.scans.Accept(kAnna, unsure_id, "as yesterday");
+  EXPECT_THAT(DescribeCourse(sources_, *store_.patients.Find(patient_), Language::kEnglish)
+                  .rows.back()
+                  .accepted,
+              HasSubstr("although not surely within by anna"));
   EXPECT_THAT(ValueOf(course.identity, "Aprobado por"), HasSubstr("clara"));
   EXPECT_EQ(ValueOf(course.identity, "** Control diario"), "nothing");
   const std::string failed = Scan("", "", DailyCheck::kFailed);

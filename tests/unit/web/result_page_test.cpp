@@ -57,6 +57,21 @@ TEST_F(ResultPageTest, WhatIsToBeKnownStandsBesideTheVerdict) {
                             Not(HasSubstr("overdue"))));
 }
 
+TEST_F(ResultPageTest, AnAcceptanceWithAReasonIsInTheWordsOfItsVerdict) {
+  Add("s1", seconds(10));
+  const auto accepted = [&](const char* verdict) {
+    loop_->Do([&] {
+      service_.scans.back().result->verdict = verdict;
+      service_.scans.back().accepted_by = "anna";
+      service_.scans.back().accepted_reason = "as <before>";
+    });
+    return Page();
+  };
+  EXPECT_THAT(accepted("move"), HasSubstr("Accepted outside tolerance by anna: as &lt;before&gt;"));
+  EXPECT_THAT(accepted("unsure"), AllOf(HasSubstr("Accepted although not surely within by anna"),
+                                        Not(HasSubstr("Accepted outside"))));
+}
+
 TEST_F(ResultPageTest, AfterTwoMinutesItIsOld) {
   Add("s1", seconds(121));
   EXPECT_THAT(Page(), HasSubstr(kOld));
