@@ -351,6 +351,7 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await room.locator('.room-word', { hasText: 'READY' }).waitFor();
   await room.locator('.room-marks .bad', { hasText: 'Daily check failed' }).waitFor();
   equal(await room.getByText('Daily check passed').count(), 0, 'not passed');
+  h.tell('checked');  // one more has passed: references are possible again
   // The next thing to press is the scan, not another session.
   await anna.goto(`${h.url}#/patient/${patient}`);
   await anna.locator('a.primary', { hasText: 'Go to scan' }).waitFor();
