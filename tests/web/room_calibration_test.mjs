@@ -63,7 +63,8 @@ await h.step('three scans, their spread, and a signature with the password', asy
   await bob.keyboard.press('Enter');
   await card(bob).getByText(/Version 1, signed by bob, .*\b(UTC|GMT)\b.*, gives every comparison the axes of the room/).waitFor();
   await anna.unroute(events);
-  await card(anna).getByText(/signed by bob/).waitFor();
+  // A stream is tried every 15 s; beside other work that takes longer than a step usually may.
+  await card(anna).getByText(/signed by bob/).waitFor({ timeout: 60000 });
   await h.look(bob, 'room-calibration-signed');
 });
 
