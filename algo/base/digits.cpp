@@ -24,7 +24,7 @@ ShownNumber Shown(double value, double u95, int most, char decimal) {
   const std::size_t first = half.find_first_not_of("0.");
   const bool begins_with_1 = first != std::string::npos && half[first] == '1';
   const int half_digits = std::min(most, digits + (begins_with_1 ? 1 : 0));
-  // A small one is not said to be nothing.
+  // A small uncertainty is never shown as 0.
   const double least = std::pow(10.0, -half_digits);
   shown.u95 = WithDecimal(fmt::format("{:.{}f}", std::max(u95, least), half_digits), decimal);
   return shown;

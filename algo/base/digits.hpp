@@ -1,4 +1,4 @@
-// How precisely a number is shown, and how: the same on paper and on the page without script.
+// How numbers and their uncertainties are written, in reports and on the page without scripts.
 #pragma once
 
 #include <algorithm>
@@ -17,19 +17,20 @@ namespace plumb {
 /// A value and its uncertainty as shown: "\u22123" and "1.1".
 struct ShownNumber {
   std::string value, u95;
-  bool is_zero = false;  ///< As shown: it has neither sign nor direction.
+  bool is_zero = false;  ///< The shown value is zero: it has neither sign nor direction.
 };
 
-/// The value has the decimals that its uncertainty justifies, a proper minus sign, and no sign if
-/// it is zero; the uncertainty has one decimal more if it begins with 1, and none if it is unknown.
-/// @param most     Largest number of decimals of the value.
+/// The value has the decimals that its uncertainty justifies, a true minus sign, and no sign if it
+/// is zero. The uncertainty has one more decimal if its first digit is 1 (JCGM 100, 7.2.6), and is
+/// empty if it is unknown.
+/// @param most     Largest number of decimals of either.
 /// @param decimal  Decimal sign of the language.
 [[nodiscard]] ShownNumber Shown(double value, double u95, int most, char decimal);
 
 /// Both in one: "\u22123 \u00b11.1".
 [[nodiscard]] std::string ValueWithUncertainty(double value, double u95, int most, char decimal);
 
-/// As short as it was typed: "2.5", "3".
+/// Without trailing zeros: "2.5", "3".
 [[nodiscard]] std::string PlainNumber(double value, char decimal);
 
 }  // namespace plumb

@@ -96,9 +96,9 @@ class Appliance {
   /// Why no reference may be scanned or approved now, with the next step: the daily check is
   /// overdue or has failed, or the sensor is still warming up. Empty if it may, as always in the
   /// demo.
-  /// @param scan  The scan that is to be the reference. One taken without a check that passed is
-  ///         confirmed by a check of the same day (CheckStore::ConfirmsScan), or has to be
-  ///         repeated.
+  /// @param scan  The scan that is to be the reference. One taken before a check had passed must be
+  ///         confirmed by a later check of the same day (CheckStore::ConfirmsScan), or repeated. It
+  ///         must also be repeated if the first check after it failed.
   [[nodiscard]] std::string WhyNoReference(const std::optional<web::Scan>& scan = {});
   /// Time that the sensor must have been on before a reference scan; from any thread.
   [[nodiscard]] double warm_up_min() const { return warm_up_min_; }

@@ -356,7 +356,7 @@ std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
   const web::DailyCheck today = DailyCheckToday();
   if (today == web::DailyCheck::kFailed) {
     return "the daily check has failed, and references need one that has passed since: open Daily "
-           "check, clear up why it failed, sweep over all markers of the room, then go on here";
+           "check, find out why it failed, sweep over all markers of the room, then go on here";
   }
   if (today == web::DailyCheck::kOverdue) {
     return "the daily check is overdue, and references need one that has passed today: open Daily "
@@ -365,16 +365,16 @@ std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
   const bool is_unconfirmed = scan && scan->daily_check != web::DailyCheck::kPassed &&
                               !store_->checks.ConfirmsScan(scan->id);
   if (is_unconfirmed && scan->daily_check == web::DailyCheck::kFailed) {
-    return "this scan was taken after a daily check that had failed, and no check of the same day "
-           "and sensor has confirmed it: scan the reference again";
+    return "this scan was taken after a failed daily check, and no check of the same day and "
+           "sensor has confirmed it: scan the reference again";
   }
   if (is_unconfirmed) {
     return "this scan was taken while the daily check was overdue, and no check of the same day "
            "and sensor has confirmed it: scan the reference again";
   }
   if (scan && store_->checks.RefutesScan(scan->id)) {
-    return "the first daily check after this scan failed, and nobody knows since when the markers "
-           "were not as they should be: scan the reference again";
+    return "the first daily check after this scan failed, so the markers may already have been out "
+           "of place during it: scan the reference again";
   }
   return WhySensorIsCold(scan);
 }

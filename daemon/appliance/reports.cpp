@@ -227,8 +227,8 @@ std::vector<std::string> CautionsIn(const web::Scan& scan, const Json& scene, co
   }
   if (scan.sensor_on_s && *scan.sensor_on_s < 60 * warm_up_min)
     cautions.emplace_back(words.warming);
-  if (const std::string_view said = web::SaidOf(scan.daily_check, words.terms); !said.empty())
-    cautions.emplace_back(said);
+  const std::string_view check_caution = web::DailyCheckCaution(scan.daily_check, words.terms);
+  if (!check_caution.empty()) cautions.emplace_back(check_caution);
   AddComparisonTo(cautions, result, language);
   AddWarningsTo(cautions, result, language);
   AddWarningsTo(cautions, scene, language);
@@ -288,8 +288,7 @@ std::string AcceptedText(const web::Scan& scan, const ReportWords& words) {
                                                          web::LocalTimeText(*scan.accepted_at))
                                            : scan.accepted_by;
   if (scan.accepted_reason.empty()) return Filled(words.accepted_by, who);
-  const bool is_unsure = scan.result && scan.result->verdict == "unsure";
-  return Filled(is_unsure ? words.accepted_unsure : words.accepted_outside, who,
+  return Filled(web::IsUnsure(scan) ? words.accepted_unsure : words.accepted_outside, who,
                 scan.accepted_reason);
 }
 

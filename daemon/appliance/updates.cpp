@@ -122,7 +122,7 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
       std::filesystem::remove(copy, ignored);
       done(why);
     };
-    // A scan may have begun while it was copied.
+    // A scan may have started during the copying.
     if (const std::string why = WhyNotInstall(); !why.empty()) return drop(Conflict(why));
     AddBundle(actor, copy, name, [this, actor, name, drop, done](const web::Change& added) {
       if (added.result != ChangeResult::kDone) return drop(added);

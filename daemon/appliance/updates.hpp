@@ -44,8 +44,8 @@ class Updates : public web::UpdateService {
                  const std::string& name, web::Done done) override;
   void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
   void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
-  /// Copies the open file to the bundles, off the loop, then installs it. The copy is removed at
-  /// the end.
+  /// Copies the open file to the bundles, off the loop, then installs it. The copy is removed
+  /// when the installation has ended or was refused.
   void InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
                    const std::string& name, web::Done done);
   [[nodiscard]] std::vector<std::string> StickBundles() override { return sticks_.Bundles(); }
@@ -56,7 +56,7 @@ class Updates : public web::UpdateService {
   void ForgetRollBack(const web::Actor& actor, web::Done done) override;
 
  private:
-  /// Also writes to the audit log what came of the request to install.
+  /// Passes the answer on to `done` and writes it to the audit log.
   [[nodiscard]] web::Done LogInstall(const web::Actor& actor, const std::string& bundle,
                                      web::Done done);
   /// Why no update may begin now; empty if it may.

@@ -284,7 +284,8 @@ CourseTable TableOf(Pages& pages, const CourseReport& report) {
   return table;
 }
 
-/// Drawn a second time if it has more than one page, because each page names their number.
+/// Each page states how many there are, which is known only after drawing: a report of several
+/// pages is drawn twice.
 template <typename Contents>
 std::string Numbered(const ReportTexts& texts, const std::string& footer, const Paper& paper,
                      const Contents& draw) {

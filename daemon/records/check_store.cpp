@@ -65,7 +65,7 @@ std::optional<web::CheckRecord> CheckStore::Last() {
 web::DailyCheck CheckStore::StateSince(web::WallClock::time_point since,
                                        const std::string& sensor_serial) {
   const StoreDatabase::Held rows = database_.ForRows();
-  // By number, not by time: the clock may have been set back between a pass and a failure.
+  // Ordered by id, not by time: the clock may have been set back between a pass and a failure.
   Statement query = rows->Prepare(
       "SELECT status = 'failed', time FROM checks WHERE (status = 'failed' AND (?1 = '' OR "
       "sensor_serial IN (?1, ''))) OR (status = 'passed' AND time <= ?2 AND (?1 = '' OR "

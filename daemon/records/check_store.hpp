@@ -21,17 +21,19 @@ class CheckStore {
                   const TakenCheck& taken);
   [[nodiscard]] std::vector<web::CheckRecord> List(int limit);  ///< Newest first.
   [[nodiscard]] std::optional<web::CheckRecord> Last();
-  /// By the newest check since then that passed or failed. Checks of other units do not count, but
-  /// a failed one of an unnamed unit does. A check that passed in the future counts for nothing.
-  /// @param sensor_serial  Unit that was to be checked; empty: any.
+  /// State by the newest check since then that passed or failed. Checks of other sensors do not
+  /// count, except that a failed check without a serial number counts for every sensor. A pass
+  /// dated in the future is ignored.
+  /// @param sensor_serial  Sensor that must have been checked; empty: any.
   [[nodiscard]] web::DailyCheck StateSince(web::WallClock::time_point since,
                                            const std::string& sensor_serial = {});
   /// Whether a later check confirms that sensor and markers were correct at this scan: of the same
   /// unit, passed on the day of the scan and after it, with no failed check in between and against
   /// a baseline from before the scan.
   [[nodiscard]] bool ConfirmsScan(const std::string& scan_id);
-  /// Whether the first check after this scan, of the same or of an unnamed unit, failed: nobody
-  /// knows since when what it found was wrong.
+  /// Whether the first check after this scan failed, so that the markers may already have been out
+  /// of place during it. Checks of other sensors do not count, except that a failed check without a
+  /// serial number counts for every sensor.
   [[nodiscard]] bool RefutesScan(const std::string& scan_id);
 
   [[nodiscard]] std::optional<web::CheckBaseline> Baseline();

@@ -34,8 +34,8 @@ constexpr const char* kScanColumns =
     "unavailable, accepted_at, sensor_serial, (SELECT opened_by FROM sessions WHERE sessions.id = "
     "session_id) FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
 
-/// The column check_overdue holds its number: older versions, which know only "overdue", read every
-/// one but 0 as that.
+/// The column check_overdue stores the value of the enum. Older versions read every value but 0 as
+/// overdue.
 web::DailyCheck DailyCheckOf(std::int64_t stored) {
   static_assert(static_cast<int>(web::DailyCheck::kPassed) == 0 &&
                 static_cast<int>(web::DailyCheck::kOverdue) == 1 &&

@@ -80,13 +80,13 @@ std::string WhyNoVersion(const std::string& version) {
   }
   if (is_number) return {};
   return fmt::format(
-      "this bundle holds version '{}': expected numbers with dots between them, such as 0.2.1; ask "
+      "this bundle holds version '{}': expected numbers separated by dots, such as 0.2.1; ask "
       "who made it",
       version);
 }
 
 bool IsOlder(const std::string& a, const std::string& b) {
-  // The digits of a number without leading zeros, so that no number is too large to be compared.
+  // Numbers are compared as text without leading zeros, so that none is too large.
   const auto next = [](std::string_view& rest) {
     const auto dot = rest.find('.');
     const std::string_view part = rest.substr(0, dot);

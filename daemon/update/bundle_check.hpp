@@ -19,14 +19,14 @@ enum class BundleState { kUnknown, kWhole, kDamaged };
 /// Verity bundles carry their manifest in the signature, and only the manifest is checked.
 [[nodiscard]] BundleState LookForDamage(const std::filesystem::path& file);
 
-/// Empty, or a sentence: the version of a bundle is not of the form that toolchain/image and
-/// toolchain/bundle demand, numbers with dots between them, and cannot be compared. A release
-/// candidate, say, would pass as the release.
+/// Empty if a version consists of numbers separated by dots, as toolchain/image and
+/// toolchain/bundle require; otherwise a sentence. Other versions cannot be compared: a release
+/// candidate, for example, would count as the release.
 [[nodiscard]] std::string WhyNoVersion(const std::string& version);
 
-/// True if `a` is an older version than `b`: numbers between dots, compared one by one, up to the
-/// first other character. A system that runs may have a version of another form and must remain one
-/// that can be updated.
+/// True if `a` is older than `b`. The numbers between the dots are compared one by one, up to the
+/// first other character: the version of the running system may have another form, and the system
+/// must still accept updates.
 [[nodiscard]] bool IsOlder(const std::string& a, const std::string& b);
 
 /// Version of the system that runs: the first word of its release file, as toolchain/image writes

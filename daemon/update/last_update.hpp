@@ -19,7 +19,7 @@ struct LastUpdate {
 [[nodiscard]] std::optional<LastUpdate> ReadLastUpdate(const std::filesystem::path& folder);
 /// Durably. @throws IoError
 void WriteLastUpdate(const std::filesystem::path& folder, const LastUpdate& update);
-/// Durably; it is no error if there is none. @throws IoError
+/// Durably. That there is none is not an error. @throws IoError
 void RemoveLastUpdate(const std::filesystem::path& folder);
 
 /// Empty, or a sentence: the machine was restarted since, and the running system is the one that

@@ -86,7 +86,7 @@ struct Updater::Impl {
   bool has_begun = false;  ///< It has then reported less than 100 %.
   double fraction = 0.0;
   std::string bundle;
-  std::string copy;  ///< Bundle that is removed when its installation ends.
+  std::string copy;  ///< Bundle to remove when its installation ends.
   web::Done done;
 
   void Disconnect() {
@@ -170,8 +170,8 @@ struct Updater::Impl {
     Notify();
   }
 
-  /// RAUC may still read the file if it was given up on; it has it open, and an open file outlives
-  /// its name.
+  /// If the installation was given up, RAUC may still be reading the file: it has it open, so that
+  /// the contents remain.
   void RemoveCopy(const std::string& name) {
     const web::Change removed = folder.Remove(name);
     if (removed.result == ChangeResult::kFailed) Log(LogLevel::kWarning, removed.message);
@@ -372,11 +372,12 @@ struct Updater::Impl {
     Notify();
   }
 
-  /// RAUC marks the other system as bad before it writes to it, so an earlier update there starts
-  /// no more. It is forgotten before RAUC is asked: after a crash in between the page only misses
-  /// that a restart is needed, while an update remembered too long would be reported as unfit for
-  /// work. It stays forgotten if RAUC does not begin, because RAUC is then busy with the systems
-  /// for somebody else or does not answer. A roll-back that nobody has seen remains true.
+  /// RAUC marks the other system as bad before writing to it, so that an update installed there
+  /// earlier can no longer start. The record of that update is removed before RAUC is called: after
+  /// a crash in between, the page merely fails to say that a restart is needed, whereas a record
+  /// that was kept would later be reported as a failed update. It stays removed if RAUC does not
+  /// begin, because RAUC is then busy for another program or does not answer. A roll-back that has
+  /// not been acknowledged yet is still reported.
   void Call() {
     is_called = true;
     if (last && RolledBack().empty()) ForgetLast();
@@ -433,7 +434,8 @@ struct Updater::Impl {
   }
 
   void InstallCopy(const std::string& name, web::Done asked) {
-    if (is_installing) return Install(name, std::move(asked));  // refuses; the file may be in use
+    if (is_installing)
+      return Install(name, std::move(asked));  // refused; that installation may use the file
     Install(name, [this, name, asked = std::move(asked)](const web::Change& change) {
       if (change.result == ChangeResult::kDone) {
         copy = name;

@@ -64,9 +64,9 @@ class Updater {
   /// Lets RAUC check and install NAME of the folder. `done` is called once it has begun, or with
   /// the reason why not.
   void Install(const std::string& name, web::Done done);
-  /// As Install(), of a bundle that was copied here for this installation alone. It is removed once
-  /// the installation was refused or has ended, whatever came of it: it can be copied again, and
-  /// otherwise copies would fill the folder.
+  /// Like Install(), for a bundle that was copied here only to be installed. The copy is removed
+  /// when the installation ends or is refused, whatever the outcome: it can be copied again, and
+  /// copies that stay would fill the folder.
   void InstallCopy(const std::string& name, web::Done done);
   /// The roll-back was acknowledged and is not reported any more.
   void ForgetRollBack();

@@ -350,7 +350,7 @@ TEST_F(DaemonDiskTest, ACopyOfTheDiskAtAnyMomentStartsWithEveryScanThatWasAnnoun
   Fill(plumbd);
   const fs::path copy = folder_ / "copy.img", mounted = folder_ / "copy";
   fs::create_directory(mounted);
-  // The newest ones: on this disk the quota removes what is older than about twenty scans.
+  // Only the newest: on a disk of this size the quota keeps about twenty scans.
   constexpr std::size_t kKept = 10;
   std::set<std::string> announced;
   std::size_t num_announced = 0;

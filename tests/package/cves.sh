@@ -1,14 +1,11 @@
 #!/usr/bin/env bash
 # The list of known vulnerabilities: from the list of packages of a root file system, and a small export of the tracker with every state that it knows.
 set -euo pipefail
+. "$(dirname "$0")/../support/check.sh"
 source=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
-failed=0
-check() { # NAME EXPECTED-REGEX FOUND
-  if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi
-}
 mkdir -p root/var/lib/dpkg
 package() { printf 'Package: %s\nStatus: install ok installed\nArchitecture: amd64\nVersion: %s\n%sMaintainer: x\nDescription: x\n\n' "$1" "$2" "${3:+Source: $3$'\n'}"; }
 {

@@ -3,6 +3,7 @@
 # units. Needs neither root nor a Debian: the root is a few empty files. Exit code 77: it
 # cannot run here, and the last line says why.
 set -euo pipefail
+. "$(dirname "$0")/../support/check.sh"
 source=$(cd "$(dirname "$0")/../.." && pwd)
 . "$source/tests/support/left_out.sh"
 generator=/usr/lib/systemd/system-generators/systemd-fstab-generator
@@ -10,15 +11,6 @@ generator=/usr/lib/systemd/system-generators/systemd-fstab-generator
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
-failed=0
-check() { # NAME EXPECTED-REGEX FOUND
-  if [[ $3 =~ $2 ]]; then
-    echo "ok      $1"
-  else
-    failed=1
-    printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"
-  fi
-}
 mkdir -p bin root/{boot,etc,var/lib/dpkg} out/{normal,early,late}
 touch root/boot/{vmlinuz-6.1,initrd.img-6.1} root/var/lib/dpkg/status ca.pem
 cat >bin/chroot <<'SCRIPT'
@@ -59,7 +51,7 @@ check "rules name services" \
 for unit in $named; do
   check "$unit is there" "^there$" "$([ -s "root/etc/systemd/system/$unit" ] && echo there)"
 done
-check "the check of the data partition asks nobody" ' fsck.repair=yes ' "$(grep 'set CMD=' "$source/toolchain/image.grub.cfg")"
+check "the check of the data partition repairs without asking" ' fsck.repair=yes ' "$(grep 'set CMD=' "$source/toolchain/image.grub.cfg")"
 check "plumbd may not mark a system" '^send_member="InstallBundle" send_member="Info" $' \
   "$(grep -oE 'rauc.Installer".*send_member="[A-Za-z]*"' root/usr/share/dbus-1/system.d/plumb-rauc.conf | grep -oE 'send_member="[A-Za-z]*"' | tr '\n' ' ')"
 check "a wrong clock refuses no update" \

@@ -29,7 +29,7 @@ for package in plumb plumbd; do
   dpkg-deb -R "$work/debs/new/${package}"_*.deb "$work/debs/unpacked"
   sed -Ei 's/^Version: .*/Version: 0.0.1-1/; s/\bplumb \(= [^)]*\)/plumb (= 0.0.1-1)/' \
     "$work/debs/unpacked/DEBIAN/control"
-  # dpkg asks about a changed configuration only if the delivered one is another, too.
+  # dpkg asks about a changed configuration file only if the packaged one has changed as well.
   [ ! -f "$work/debs/unpacked/etc/plumb/plumb.toml" ] || echo "# of the older package" >>"$work/debs/unpacked/etc/plumb/plumb.toml"
   dpkg-deb -Zgzip -z1 -b "$work/debs/unpacked" "$work/debs/old/" >/dev/null
   rm -r "$work/debs/unpacked"

@@ -205,7 +205,7 @@ void FakeAppliance::EndCheck() {
     checks.today = web::DailyCheck::kFailed;
     status.reference_block =
         "the daily check has failed, and references need one that has passed since: open Daily "
-        "check, clear up why it failed, sweep over all markers of the room, then go on here";
+        "check, find out why it failed, sweep over all markers of the room, then go on here";
   }
   status.last_check = check;
   status.daily_check = checks.today;

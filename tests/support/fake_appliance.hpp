@@ -164,8 +164,8 @@ class FakeAppliance : public web::BackgroundWork,
   }
   std::vector<std::string> Cautions(const std::string& scan_id, web::Language) override {
     const auto scan = FindScan(scan_id);
-    const std::string said(
-        web::SaidOf(scan ? scan->daily_check : web::DailyCheck::kPassed, web::kEnglishTerms));
+    const std::string said(web::DailyCheckCaution(
+        scan ? scan->daily_check : web::DailyCheck::kPassed, web::kEnglishTerms));
     return said.empty() ? std::vector<std::string>() : std::vector{said};
   }
   std::optional<std::string> PictureOf(const std::string&, web::ComparisonPicture picture,

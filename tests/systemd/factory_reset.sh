@@ -2,15 +2,12 @@
 # A factory reset outside the image: the command line asks for it, the unit's script and plumbd carry it out at the next start.
 #   factory_reset.sh BUILD_FOLDER
 set -euo pipefail
+. "$(dirname "$0")/../support/check.sh"
 plumb=$(realpath "$1/daemon/plumb") plumbd=$(realpath "$1/daemon/plumbd") source=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d)
 cd "$work"
 pid=
 trap '[ -z "$pid" ] || kill -KILL $pid 2>/dev/null; rm -rf "$work"' EXIT
-failed=0
-check() { # NAME EXPECTED-REGEX FOUND
-  if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi
-}
 PLUMB_GROUP=$(id -g)
 mkdir -p bin data/journal
 printf '#!/bin/sh\necho "$*" >>%s/journalctl.calls\n' "$work" >bin/journalctl

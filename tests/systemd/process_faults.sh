@@ -2,15 +2,12 @@
 # The real plumbd, without a sensor: a configuration with a mistake, a crash, a limit of the size of files.
 #   process_faults.sh BUILD_FOLDER
 set -euo pipefail
+. "$(dirname "$0")/../support/check.sh"
 plumbd=$(realpath "$1/daemon/plumbd") plumb=$(realpath "$1/daemon/plumb")
 work=$(mktemp -d)
 cd "$work"
 pid=
 trap '[ -z "$pid" ] || kill -KILL "$pid" 2>/dev/null; rm -rf "$work"' EXIT
-failed=0
-check() { # NAME EXPECTED-REGEX FOUND
-  if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi
-}
 start() { # OPTIONS...: until it answers
   "$plumbd" --state "$work/state" --control "$work/control" --listen 127.0.0.1:0 "$@" >log 2>&1 &
   pid=$!

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # What happens around plumbd's lives, with programs of the test's own in place of systemctl and sleep: pauses, counting, restarts of the machine, the light.
 set -euo pipefail
+. "$(dirname "$0")/../support/check.sh"
 watch=$(cd "$(dirname "$0")/../../systemd" && pwd)/service-watch
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -10,8 +11,6 @@ for program in systemctl sleep; do printf '#!/bin/sh\necho "%s $*" >>%s/calls\n'
 chmod +x bin/*
 echo "100.5 1" >uptime
 export PATH=$work/bin:$PATH PLUMB_WATCH_BOOT=$work/boot PLUMB_WATCH_KEPT=$work/kept PLUMB_UPTIME=$work/uptime
-failed=0
-check() { if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi; }
 called() { grep -c -- "$1" calls || true; }
 life() { # RESULT SECONDS: one life of plumbd; the output is in `log`
   : >calls

@@ -3,14 +3,11 @@
 # appliance's screen.
 #   unit_settings.sh BUILD_FOLDER
 set -euo pipefail
+. "$(dirname "$0")/../support/check.sh"
 plumbd=$(realpath "$1/daemon/plumbd") source=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
-failed=0
-check() { # NAME EXPECTED-REGEX FOUND
-  if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi
-}
 mkdir -p data/provision state stick bin
 printf '#!/bin/sh\nexec %q --state %q "$@"\n' "$plumbd" "$work/state" >bin/plumbd
 printf '#!/bin/sh\necho "$@" >>%q\n' "$work/asked" >bin/systemctl
@@ -69,10 +66,10 @@ chmod +x bin/*
 usb_stick() { "$source/systemd/usb-stick" "$1" sdx1 >out 2>&1 && code=0 || code=$?; }
 printf '[network]\naddress = "10.1.1.5"\n' >stage/plumb-provision.toml
 usb_stick mount
-check "a stick whose settings are refused is mounted all the same" '^0 .*was not taken over.*it stays readable v2.raucb$' \
+check "a stick with rejected settings stays mounted" '^0 .*was not taken over.*the stick stays mounted v2.raucb$' \
   "$code $(tr '\n' ' ' <out)$(basename run/plumb-stick/sdx1/*.raucb)"
 usb_stick unmount
-check "and nothing is left of it once it is pulled out" '^0 $' "$code $(ls run/plumb-stick)"
+check "and is unmounted when it is pulled out" '^0 $' "$code $(ls run/plumb-stick)"
 echo ntfs >type
 usb_stick mount
 check "another file system is left alone" '^1 .*left alone' "$code $(cat out)"
@@ -218,7 +215,7 @@ for line in 'Page         https://10.1.1.5:8080/' 'Page         https://\[fd00::
   'State        ready' 'enter the setup code: ABCD-EFGH'; do
   check "the screen shows: $line" "$line" "$screen"
 done
-check "no address at which the sandbox lets nobody in" '^none$' "$(grep -q 2001: <<<"$screen" || echo none)"
+check "a public IPv6 address, which the sandbox blocks, is not shown" '^none$' "$(grep -q 2001: <<<"$screen" || echo none)"
 sed -i s/:8080/:9443/ bin/plumb
 check "the screen shows another port" 'https://10.1.1.5:9443/' "$("$source/systemd/console-screen" once)"
 echo '{"setup_required":false}' >session

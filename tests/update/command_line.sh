@@ -3,6 +3,7 @@
 # restart, and a machine that starts the previous system.
 #   command_line.sh BUILD_FOLDER
 set -euo pipefail
+. "$(dirname "$0")/../support/check.sh"
 . "$(dirname "$0")/../support/left_out.sh"
 require rauc dbus-daemon openssl
 [ "$(id -u)" = 0 ] && [ -w /dev/loop-control ] || skip "needs root and loop devices: RAUC mounts bundles"
@@ -11,10 +12,6 @@ work=$(mktemp -d)
 cd "$work"
 pids=
 trap 'kill -KILL $pids 2>/dev/null; rm -rf "$work"' EXIT
-failed=0
-check() { # NAME EXPECTED-REGEX FOUND
-  if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi
-}
 mkdir machine
 "$here/make_bundles.sh" machine >made 2>&1 || { cat made; exit 1; }
 # A signer whose certificate ends before the bundle is installed.

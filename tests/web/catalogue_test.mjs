@@ -120,7 +120,7 @@ for (const [text, expected] of [
     'plumb-2.raucb no se instaló: este archivo contiene la versión 0.1.0, anterior a la 0.2.0, que '
     + 'está en uso'],
   ['plumb-2.raucb was not installed: this bundle holds version \'0.2.1-rc1\': expected numbers '
-    + 'with dots between them, such as 0.2.1; ask who made it',
+    + 'separated by dots, such as 0.2.1; ask who made it',
   'plumb-2.raucb no se instaló: este archivo contiene la versión «0.2.1-rc1»: se esperaban números '
     + 'separados por puntos, como 0.2.1; pregunte a quien lo hizo'],
   ['what is stored cannot be read: the stored settings cannot be read: expected a JSON object, '

@@ -150,7 +150,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0, 'not by who planned it');
   await anna.locator('.tile li', { hasText: 'Waiting for approval: PX-0417 version 1' }).waitFor();
   await h.logIn(clara, 'clara');
-  // The check had failed before it was scanned: the summary says so, as a result would.
+  // If the check had failed before the scan, the summary says so, as the result does.
   await clara.route(/\/api\/v1\/scans\/[^/]+$/, async (route) => {
     const response = await route.fetch();
     await route.fulfill({ response, json: { ...await response.json(), check_overdue: true, check_failed: true } });
@@ -600,7 +600,7 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   await h.look(anna, 'check-failed', { axe: false });
   await anna.goto(`${h.url}#/status`);
   await anna.locator('.tile', { hasText: 'Daily check' }).getByText('failed', { exact: true }).waitFor();
-  await anna.getByText('Clear up why the check failed').waitFor();
+  await anna.getByText('Find out why the check failed').waitFor();
   const { check_failed: failed, reference_block: block } = (await h.api(anna, 'status')).body;
   check(failed && /daily check has failed/.test(block), 'after a pass of the same day it counts, too');
   await h.look(anna, 'status-check-failed', { axe: false });

@@ -53,7 +53,7 @@ await h.step('three scans, their spread, and a signature with the password', asy
   await bob.keyboard.type('wrong horse battery');
   await bob.keyboard.press('Enter');
   await bob.getByRole('alert').getByText('the password is wrong').waitFor();
-  // Another page has no stream for a while, and is told of no change meanwhile.
+  // The other page has no event stream for a while, so it is not notified of this change.
   const events = '**/api/v1/events';
   await anna.route(events, (route) => route.fulfill({ status: 503 }));
   await anna.reload();
@@ -63,7 +63,7 @@ await h.step('three scans, their spread, and a signature with the password', asy
   await bob.keyboard.press('Enter');
   await card(bob).getByText(/Version 1, signed by bob, .*\b(UTC|GMT)\b.*, gives every comparison the axes of the room/).waitFor();
   await anna.unroute(events);
-  // A stream is tried every 15 s; beside other work that takes longer than a step usually may.
+  // The stream is retried every 15 s; on a busy machine that can take longer than other steps may.
   await card(anna).getByText(/signed by bob/).waitFor({ timeout: 60000 });
   await h.look(bob, 'room-calibration-signed');
 });

@@ -41,7 +41,7 @@ async function approvedPatient(code) {
   const open = (await state()).session?.id ?? '';
   await ok(anna, `patients/${id}/open`, 'POST', { purpose: 'reference', reason: '', replaces: open });
   await press();
-  // Where its line has space for half of it, the code of a draft goes to the next one as a whole.
+  // A code that does not fit on the line wraps as a whole and is not broken at its hyphen.
   const link = bob.locator('.tile .whole', { hasText: code });
   equal(await link.evaluate((element) => {
     const before = document.createRange();
@@ -212,7 +212,7 @@ await h.step('while a sweep runs or is computed no older result looks valid', as
   await anna.getByText('A NEW SCAN IS RUNNING').waitFor();
   equal(await anna.locator('.is-old').count(), 1, 'no longer valid');
   equal(await anna.getByRole('button', { name: /^Accept/ }).count(), 0, 'nothing to accept');
-  // The bar is seen in the colours of a system with high contrast, too.
+  // The progress bar is also visible in the high-contrast colours of the system.
   await clara.emulateMedia({ forcedColors: 'active' });
   await clara.goto(`${h.url}#/scan`);
   await clara.locator('.bar-text', { hasText: /[1-9]\d* %/ }).waitFor();
@@ -265,7 +265,7 @@ await h.step('in tolerance: one tap accepts, and nothing commands a move', async
   }
   await anna.getByRole('button', { name: 'Accept', exact: true }).click();
   await anna.getByText('Accepted by anna').waitFor();
-  // Old: from 3 m it is the note that is read, and nothing is green, ticked or told to do.
+  // An old result: the note is read from 3 m; nothing is green or ticked, and nothing says what to do.
   await room.locator('.room-result:not(.is-old) .verdict.in_tolerance').waitFor();
   h.tell('old');
   await room.locator('.room-result.is-old .verdict', { hasText: 'WAS IN TOLERANCE' }).waitFor();
@@ -279,7 +279,7 @@ await h.step('in tolerance: one tap accepts, and nothing commands a move', async
   await h.look(room, 'room-old', { axe: false, fullPage: false });
 });
 
-await h.step('no answer: the room gives three reasons in words, and nothing to unfold', async () => {
+await h.step('no answer: the room display shows three reasons, and no list to open', async () => {
   h.tell('stranger');
   await press();
   await room.locator('.verdict.no_answer').waitFor();
@@ -310,21 +310,24 @@ await h.step('three words: within, not surely within, outside; no digits below t
   }
   const lowest = await anna.locator('.number').last().evaluate((element) => {
     window.scrollTo(0, 0);
-    document.querySelector('.flags').hidden = true;
-    return element.getBoundingClientRect().bottom;
+    const flags = document.querySelector('.flags');
+    flags.hidden = true;
+    const { bottom } = element.getBoundingClientRect();
+    flags.hidden = false;
+    return bottom;
   });
   check(lowest <= 800, `six numbers in view, down to ${lowest}`);
   await h.look(anna, 'result-unsure', { axe: false });
   equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'not in one tap');
   equal(await anna.getByText('Accept outside tolerance').count(), 0, 'no value is outside');
-  await anna.getByText('Accept although not surely within…').click();
+  await anna.getByText('Accept although not surely within tolerance…').click();
   await anna.getByLabel('Reason', { exact: true }).fill('breathing');
   await anna.getByLabel('Your password').fill(h.password);
-  await anna.getByRole('button', { name: 'Accept although not surely within' }).click();
-  await anna.getByText(/^≈ Accepted although not surely within by anna, .*: breathing$/).waitFor();
+  await anna.getByRole('button', { name: 'Accept although not surely within tolerance' }).click();
+  await anna.getByText(/^≈ Accepted although not surely within tolerance by anna, .*: breathing$/).waitFor();
 });
 
-await h.step('where the room is not calibrated, its screen says so as large as a direction', async () => {
+await h.step('the room display says in large letters that the room is not calibrated', async () => {
   h.tell('moved z 8 HFS bare');
   await press();
   await room.locator('.room-answer section > .caution').waitFor();
@@ -341,7 +344,7 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await anna.goto(`${h.url}#/scan`);
   await anna.getByRole('button', { name: 'Close session' }).click();
   await anna.getByText('No session open').first().waitFor();
-  // A daily check that has failed meanwhile stays in the corner; the display is ready for the next session.
+  // A failed daily check stays in the corner, and the display is ready for the next session.
   await ok(anna, 'checks/open', 'POST');
   h.tell('markermoved');
   h.tell('press');
@@ -351,7 +354,7 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await room.locator('.room-word', { hasText: 'READY' }).waitFor();
   await room.locator('.room-marks .bad', { hasText: 'Daily check failed' }).waitFor();
   equal(await room.getByText('Daily check passed').count(), 0, 'not passed');
-  h.tell('checked');  // one more has passed: references are possible again
+  h.tell('checked');  // a later check passes, so that a reference can be scanned
   // The next thing to press is the scan, not another session.
   await anna.goto(`${h.url}#/patient/${patient}`);
   await anna.locator('a.primary', { hasText: 'Go to scan' }).waitFor();

@@ -146,7 +146,7 @@ await h.step('where the room was never said: the words are the patient’s, no a
   h.tell('moved y -8 HFS bare');  // to the feet: along the marker's x axis, where the head lies
   await scan();
   const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
-  // The head lies along the marker's x axis: its card is named by what lies there, as its direction is, and none by the couch's axes.
+  // The head lies along the marker's x axis: that card is named head/feet, like its direction, and no card is named after a couch axis.
   await card('Patient head/feet').waitFor();
   equal(await card('Patient head/feet').locator('.value').innerText(), '+8.0 mm', 'along the marker’s axis');
   equal(await card('Patient head/feet').locator('.word').innerText(), 'toward the head', 'the words');
@@ -298,7 +298,7 @@ await h.step('not as planned: no picture names a side of the patient, in a known
   const { found, views } = await marksOfResult('marks-room');
   equal(found[kPictures[0]].join(), 'gantry,roomMinusX,roomPlusX', 'the map');
   equal(found[kPictures[2]].join(), 'gantry,roomMinusX,roomPlusX', 'the overlay');
-  // The numbers at its edges are the marker's x and y: no mark could be taken for one of them.
+  // The ticks are the marker's x and y, so the marks of the room's axes say whose they are.
   equal(await anna.locator('.map-row .way[data-mark=roomPlusX]').textContent(), 'ROOM +X', 'whose axis');
   for (const where of kPictures) equal(sides(found[where]).join(), '', where);
   equal(sides(views).join(), '', '3-D views');

@@ -82,7 +82,7 @@ std::string_view Name(ScanPurpose purpose) { return NameIn(kPurposeNames, purpos
 
 namespace {
 
-/// A check that failed is overdue, too: for programs that know only that.
+/// A failed check also counts as overdue, for clients that know only that field.
 void AddDailyCheck(Json& json, DailyCheck check, const char* overdue, const char* failed) {
   json[overdue] = check != DailyCheck::kPassed;
   json[failed] = check == DailyCheck::kFailed;

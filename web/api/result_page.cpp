@@ -211,12 +211,11 @@ std::string AcceptedLine(const Scan& scan, const ResultWords& words) {
   const std::string who =
       EscapeHtml(scan.accepted_by) +
       (scan.accepted_at ? ", " + LocalTimeText(*scan.accepted_at) : std::string());
-  const bool is_unsure = scan.result && scan.result->verdict == "unsure";
   return fmt::format("<p>{}</p>",
                      scan.accepted_reason.empty()
                          ? Filled(words.accepted_by, who)
-                         : Filled(is_unsure ? words.accepted_unsure : words.accepted_outside, who,
-                                  EscapeHtml(scan.accepted_reason)));
+                         : Filled(IsUnsure(scan) ? words.accepted_unsure : words.accepted_outside,
+                                  who, EscapeHtml(scan.accepted_reason)));
 }
 
 /// Version and time of the reference, and who approved it, when.

@@ -35,7 +35,7 @@ constexpr ResultWords kEnglish = {
         "<strong>NO ANSWER</strong> from the last scan, of {}: {} What follows is from before it.",
     .accepted_by = "Accepted by {}.",
     .accepted_outside = "Accepted outside tolerance by {}: {}",
-    .accepted_unsure = "Accepted although not surely within by {}: {}",
+    .accepted_unsure = "Accepted although not surely within tolerance by {}: {}",
     .reference_line = "Reference version {} of {}, approved by {}.",
     .no_reference = "No comparison: this scan has no reference.",
     .in_tolerance = {"IN TOLERANCE", "WAS IN TOLERANCE"},

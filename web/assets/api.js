@@ -194,7 +194,7 @@ export const live = {
     } catch { /* the stream says that there is no connection */ }
   },
 
-  /// @param missed  Messages may have come since the last stream, and are not repeated.
+  /// @param missed  Messages may have been missed since the last stream: they are not repeated.
   lead(missed = true) {
     this.stopLeading();
     this.leads = true;

@@ -32,7 +32,7 @@ export function compassOf(room, body, posture) {
     return { by: 'posture', ways: known ? { ...ways, gantry } : ways };
   }
   if (known && body?.named_by !== 'axes') {
-    // The numbers at the edges of a map are the marker's x and y, which may lie otherwise.
+    // The ticks of a map are the marker's x and y, which may differ from the room's axes.
     return { by: 'room', ways: { gantry, roomPlusX: right, roomMinusX: times(right, -1) } };
   }
   return {

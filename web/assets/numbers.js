@@ -23,7 +23,7 @@ export function digitsOf(u95, most) {
   return Math.max(0, Math.min(most, -Math.floor(Math.log10(u95) + 1e-9)));
 }
 /// An uncertainty has one digit more than its value if its first digit is 1 (JCGM 100, 7.2.6), but
-/// never more than values of its kind. A small one is not said to be nothing.
+/// never more than values of its kind. A small one is never shown as 0.
 function shownUncertainty(u95, digits, most) {
   const shown = Math.min(most, digits + (/^[0.]*1/.test(u95.toFixed(3)) ? 1 : 0));
   return number(Math.max(u95, 10 ** -shown), shown);
@@ -95,9 +95,9 @@ const kWords = { in: 'within', unsure: 'unsure', out: 'outside' };
 
 const kNear = Math.sin(Math.PI / 8);  // as the comparison chooses one of eight directions
 
-/// Name of an axis. Where the room was not known the numbers run along the axes of the reference
-/// marker: then it is the patient's line that lies along them, as in the words of the direction, or
-/// the marker's own axis; never one of the couch.
+/// Name of an axis. If the room was not known, the numbers run along the axes of the reference
+/// marker. Each is then named after the patient's axis that lies along it, in agreement with the
+/// words of its direction, or else after the marker's axis; never after one of the couch.
 /// @param body  Of the result: whether the room was known, and the patient's sides if they were.
 export function axisTitle({ name }, body) {
   const text = S.result;
@@ -112,7 +112,7 @@ export function axisTitle({ name }, body) {
 
 /// @param commands  Whether this is a correction to apply, or was one; else a difference that is
 /// only reported.
-/// @param valid  Whether the result can be acted on; else the card asks for nothing.
+/// @param valid  Whether the result can be acted on; otherwise the card has no instruction.
 /// @param pictured  Whether an arrow shows the way: only for what is to be applied, and, but for up
 /// and down, only in a room whose axes are known.
 function card(axis, { correction, u95, words }, tolerance,
@@ -137,7 +137,7 @@ function card(axis, { correction, u95, words }, tolerance,
   return h('li', { class: `number ${kWords[judged]}${commands ? '' : ' told'}` },
     h('h3', {}, name), directed && pictured && drawing(axis.name, value),
     h('p', { class: 'value' }, signed(value, digits),
-      h('span', { class: 'unit' }, axis.unit === '°' ? '°' : ` ${axis.unit}`)),
+      h('span', { class: axis.shift ? 'unit' : 'unit degrees' }, axis.shift ? ' mm' : '°')),
     h('p', { class: 'word' }, word),
     bar(value, half, limit),
     h('p', { class: 'fine' },

@@ -56,8 +56,8 @@ inline constexpr ResultTerms kSpanishTerms = {
     .check_failed = "El control diario anterior a este escaneo no se superó.",
     .decimal = ','};
 
-/// What is to be read beside a result; empty if that check had passed.
-constexpr std::string_view SaidOf(DailyCheck check, const ResultTerms& terms) {
+/// Caution to show beside a result; empty if the check had passed.
+constexpr std::string_view DailyCheckCaution(DailyCheck check, const ResultTerms& terms) {
   return check == DailyCheck::kFailed    ? terms.check_failed
          : check == DailyCheck::kOverdue ? terms.overdue
                                          : std::string_view();

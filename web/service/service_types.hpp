@@ -103,7 +103,7 @@ struct ResultSummary {
   std::vector<std::string> body_after;  ///< The same after the correction: the posture.
 };
 
-/// Of one day and sensor: the newest check that passed or failed decides.
+/// State of the daily check for one day and sensor, by the newest check that passed or failed.
 enum class DailyCheck : std::uint8_t { kPassed, kOverdue, kFailed };
 
 struct Scan {
@@ -131,6 +131,11 @@ struct Scan {
   std::filesystem::path
       folder;  ///< DIR/scans/ID; contains scene/, result/ and recording/ as far as they exist.
 };
+
+/// Whether every value was within tolerance, but not with its uncertainty.
+[[nodiscard]] inline bool IsUnsure(const Scan& scan) {
+  return scan.result && scan.result->verdict == "unsure";
+}
 
 struct Patient {
   std::string id;    ///< Id in the store, never shown.

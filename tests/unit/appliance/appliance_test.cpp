@@ -204,7 +204,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
       check(MarkerCheckStatus::kPassed);
       EXPECT_EQ(appliance_->WhyNoReference(ScanOf(DailyCheck::kPassed)), "");
       EXPECT_THAT(appliance_->WhyNoReference(ScanOf(DailyCheck::kFailed)),
-                  ::testing::HasSubstr("after a daily check that had failed"));
+                  ::testing::HasSubstr("after a failed daily check"));
       (void)appliance_->CloseSession(tess);
       (void)appliance_->Press(ButtonPress::kShort, kTester);  // acknowledges the fault
       services_->services().patients.OpenPatient(tess, patient, web::ScanPurpose::kReference, "",

@@ -218,7 +218,7 @@ TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
   EXPECT_THAT(DescribeCourse(sources_, *store_.patients.Find(patient_), Language::kEnglish)
                   .rows.back()
                   .accepted,
-              HasSubstr("although not surely within by anna"));
+              HasSubstr("although not surely within tolerance by anna"));
   EXPECT_THAT(ValueOf(course.identity, "Aprobado por"), HasSubstr("clara"));
   EXPECT_EQ(ValueOf(course.identity, "** Control diario"), "nothing");
   const std::string failed = Scan("", "", DailyCheck::kFailed);

@@ -60,7 +60,7 @@ TEST(VersionTest, OnlyNumbersWithDotsBetweenThemAreAVersion) {
                           "0.2+b", " 1", "1 ", "-1", "\xd9\xa1"})
     EXPECT_NE(WhyNoVersion(bad), "") << bad;
   EXPECT_EQ(WhyNoVersion("0.2.1-rc1"),
-            "this bundle holds version '0.2.1-rc1': expected numbers with dots between them, such "
+            "this bundle holds version '0.2.1-rc1': expected numbers separated by dots, such "
             "as 0.2.1; ask who made it");
 }
 

@@ -68,8 +68,9 @@ TEST_F(ResultPageTest, AnAcceptanceWithAReasonIsInTheWordsOfItsVerdict) {
     return Page();
   };
   EXPECT_THAT(accepted("move"), HasSubstr("Accepted outside tolerance by anna: as &lt;before&gt;"));
-  EXPECT_THAT(accepted("unsure"), AllOf(HasSubstr("Accepted although not surely within by anna"),
-                                        Not(HasSubstr("Accepted outside"))));
+  EXPECT_THAT(accepted("unsure"),
+              AllOf(HasSubstr("Accepted although not surely within tolerance by anna"),
+                    Not(HasSubstr("Accepted outside"))));
 }
 
 TEST_F(ResultPageTest, AfterTwoMinutesItIsOld) {

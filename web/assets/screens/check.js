@@ -140,7 +140,7 @@ export async function showCheck(place) {
   const load = async () => {
     const mine = ++asked;
     const { checks, baseline, overdue } = await get('checks', true);
-    // Answers may overtake each other: an older one does not replace a newer.
+    // Answers may arrive out of order: an older one must not replace a newer one.
     if (mine !== asked) return;
     const of = baseline
       ? text.baselineOf(baseline.set_by, signedTime(baseline.set_at), baseline.num_markers)

@@ -26,7 +26,8 @@ export function faultWords({ fault, fault_kind: kind }) {
 export const verdictIcon = (verdict) =>
   ({ in_tolerance: '✓', unsure: '≈', move: '↔', no_answer: '?' })[verdict] ?? '–';
 
-/// Of a result that was accepted: with a reason it was not in tolerance, or not surely.
+/// Mark of an accepted result. One that was accepted with a reason was outside tolerance, or not
+/// surely within it.
 export const acceptanceMark = (scan) => (!scan.accepted_reason ? kJudgements.in
   : scan.result?.verdict === 'unsure' ? kJudgements.unsure : kJudgements.out);
 
@@ -43,10 +44,6 @@ export const outcomeBadge = (scan) => (scan.result ? verdictBadge(scan.result.ve
 /// could apply.
 export const isAdvice = (scan) =>
   Boolean(scan.result?.correction) && scan.result.verdict !== 'no_answer';
-
-/// Shows in `place` what asks for something only while the result can be acted on.
-export const showOrders = (place, valid) => place.querySelectorAll('.order')
-  .forEach((element) => { element.hidden = !valid; });
 
 /// Where the comparison found the patient's sides and the room's, for the marks on pictures: no
 /// answer, no side of the patient.
@@ -110,8 +107,8 @@ export function ageText(seconds) {
   return text.days(Math.floor(seconds / 86400));
 }
 
-/// What lessens the trust in a result, beside its verdict; first what no verdict about the six
-/// numbers says: that the posture differs.
+/// Cautions to show beside a verdict. A difference of posture comes first, because the verdict is
+/// about the six numbers only.
 export function qualityFlags(scan, scene, valid = true) {
   const text = S.result.flags;
   const flags = [];

@@ -92,9 +92,9 @@ export async function showPatients(place) {
   return live.listen((kind) => { if (kind === 'data') load().catch(() => {}); });
 }
 
-/// Where another patient's session is open, it is named and closed by the same tap. What is open
-/// already, and scanned next, is not offered again.
-/// @return {element, draw}  draw() when the connection is lost or back, or the session another.
+/// If another patient's session is open, it is named and closed by the same tap. A session that is
+/// open already is not offered again.
+/// @return {element, draw}  Call draw() when the connection or the session has changed.
 function openButtons(patient) {
   const text = S.patients;
   const reason = h('input', { maxlength: 200, autocomplete: 'off' });

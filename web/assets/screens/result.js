@@ -99,7 +99,7 @@ function overlay(map, scan) {
 }
 
 /// Where on the body, in words: what lies high or low now, and what the correction will leave.
-/// @param valid  Whether it can be acted on; else it says what was found, and asks for nothing.
+/// @param valid  Whether the result can be acted on; otherwise it only says what was found.
 function bodyWords({ scan, details }, valid) {
   const text = S.result;
   if (!scan.result?.body || !details?.body || !isAdvice(scan)) return null;

@@ -10,8 +10,7 @@ import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseTheme } from '../preferences.js';
 import { chooseLanguage, kLanguages, languageOf, S, translated } from '../strings.js';
 import {
-  ageText, faultWords, flagList, isAdvice, isCold, lastKnownNote, minutesOf, sentence, showOrders,
-  sidesOf,
+  ageText, faultWords, flagList, isAdvice, isCold, lastKnownNote, minutesOf, sentence, sidesOf,
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { preview, surfaceIn } from './scan.js';
@@ -20,7 +19,7 @@ import { ageOf, validityNote, verdictStrip } from './verdict.js';
 const kAsk_ms = 2000;
 const kWho = 'room';
 const kPartsShown = 3;
-const kReasonsBelow = 2;  // below the first, which stands in the verdict
+const kReasonsBelow = 2;  // besides the first, which is part of the verdict
 const kSwap_s = 8;
 const optional = (path) => get(path, true).catch(() => null);
 const wait = (ms) => new Promise((ready) => { setTimeout(ready, ms); });
@@ -83,7 +82,6 @@ function top(status, said, isSwapped) {
   const { session, sensor } = status;
   const warm = !isCold(sensor.powered_s);
   const mark = (good, words) => h('li', { class: good ? 'good' : 'bad' }, words);
-  const failed = status.check_failed;
   const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
   return h('header', { class: 'room-top' },
     !said && (isSwapped && !isCheck
@@ -95,7 +93,7 @@ function top(status, said, isSwapped) {
       ? S.purposes.reference : S.session.fraction(session.fraction),
     h('span', {}, ` · ${S.session.scans(session.num_scans)}`)),
     h('ul', { class: 'room-marks' },
-      mark(!failed && !status.check_overdue, failed ? text.checkFailed
+      mark(!status.check_overdue, status.check_failed ? text.checkFailed
         : status.check_overdue ? text.checkOverdue : text.checkDone),
       sensor.present && mark(warm, warm ? text.warm
         : text.warming(Math.floor(sensor.powered_s / 60), minutesOf(sensor.warm_up_s)))));
@@ -156,7 +154,7 @@ function posture(scan) {
   const parts = isAdvice(scan) ? scan.result.body?.after : null;
   if (!parts) return null;
   return h('section', { class: 'room-posture' }, h('h2', {}, S.result.bodyAfter),
-    parts.length > 0 && h('p', { class: 'order', hidden: true }, S.result.bodyAfterHint),
+    parts.length > 0 && h('p', {}, S.result.bodyAfterHint),
     h('ul', { class: 'findings' }, parts.length
       ? parts.slice(0, kPartsShown).map((part) => h('li', {}, translated(part)))
       : h('li', { class: 'fine-part' }, `✓ ${S.result.asReference}`)));
@@ -205,7 +203,7 @@ function result() {
       if (isValid === !why) return;
       isValid = !why;
       clear(strip, scan.result ? verdictStrip(data, isValid) : withoutResult(scan));
-      strip.querySelector('details')?.remove();  // nobody can open it here
+      strip.querySelector('details')?.remove();  // a display has nothing to open it with
       if (six) {
         clear(six, h('h2', { class: 'visually-hidden' }, S.result.atIsocentre),
           details?.body?.room_known === false && h('p', { class: 'caution' }, S.result.roomUnknown),
@@ -245,7 +243,6 @@ function result() {
       if (note) judge(why);
       age();
       place.classList.toggle('is-old', Boolean(why));
-      showOrders(place, !why);
     },
   };
 }
@@ -275,7 +272,7 @@ function display(main) {
   const seen = h('div', { class: 'seen-so-far' });
   const showSurface = surfaceIn(seen);
   let camera = null;
-  let lastPurpose = null;  // of the scan that was seen last, in the session that is open
+  let lastPurpose = null;  // of the last scan seen in the open session
   let lastSession;
   let drawn = '';
   let shownMarks = '';

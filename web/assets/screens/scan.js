@@ -103,7 +103,7 @@ export function adviceOf(status) {
   return { hint, words: S.scan.guidance[hint], tone: hint === 'none' ? 'good' : 'bad' };
 }
 
-/// @param what  "board": a check that was opened for the calibration of the room.
+/// @param what  "board" for a check that was opened to calibrate the room.
 export async function showScan(place, what) {
   const text = S.scan;
   const camera = preview();

@@ -289,7 +289,7 @@ export const en = {
       vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Pitch',
       roll: 'Roll', yaw: 'Yaw',
     },
-    // The same where the room was not known: along the patient, or along the reference marker.
+    // The same if the room was not calibrated: along the patient, or along the reference marker.
     lines: {
       head: 'Patient head/feet', left: 'Patient left/right',
       marker: (axis) => `Along marker ${axis}`,
@@ -378,8 +378,10 @@ export const en = {
     trendEmpty: 'The trend begins with the second scan.',
     rescan: 'Scan again', accept: 'Accept', acceptedBy: (who) => `Accepted by ${who}`,
     acceptedOutside: (who, reason) => `Accepted outside tolerance by ${who}: ${reason}`,
-    acceptedUnsure: (who, reason) => `Accepted although not surely within by ${who}: ${reason}`,
-    acceptOutside: 'Accept outside tolerance', acceptUnsure: 'Accept although not surely within',
+    acceptedUnsure: (who, reason) =>
+      `Accepted although not surely within tolerance by ${who}: ${reason}`,
+    acceptOutside: 'Accept outside tolerance',
+    acceptUnsure: 'Accept although not surely within tolerance',
     acceptOutsideHint: 'Your reason, the verdict and the numbers are stored in the log.',
     acceptReason: 'Reason', acceptPassword: 'Your password',
     cannotAccept: 'Only the newest result of the open session can be accepted, for 2 minutes.',
@@ -402,7 +404,7 @@ export const en = {
     verdicts: { passed: 'PASSED', failed: 'FAILED', no_baseline: 'NO BASELINE' }, none: 'NOT DONE',
     never: 'No check has been done yet.', overdue: 'overdue',
     overdueText: 'No check has passed today. Do it before the first patient.',
-    failedText: 'Clear up why the check failed, then check again before the next patient.',
+    failedText: 'Find out why the check failed, then repeat it before the next patient.',
     today: 'Today’s check has passed.', start: 'Start a check',
     sweep: 'sweep over all markers of the room, without a patient',
     how: 'Take everything off the couch, then sweep over all markers as over a patient. The '
@@ -442,8 +444,8 @@ export const en = {
       + 'lasers, the arrow to the gantry, and its lines along the lasers.',
     scan: 'Sweep three times over the board and the markers of the room, without touching either.',
     sweep: 'sweep over the board and all markers of the room, without a patient',
-    isCheck: 'Each of them is a daily check as well, and the room display calls it so: the board '
-      + 'must be in the sweep.',
+    isCheck: 'Each scan is also a daily check, and the room display calls it that. Include the '
+      + 'board in the sweep.',
     start: 'Start a scan of the board', scans: 'Scans of the board', when: 'When',
     markers: 'Markers', misfit: 'Misfit (RMS)', size: 'Size of the sheet',
     uncertainty: 'Uncertainty (95 %)',

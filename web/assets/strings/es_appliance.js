@@ -72,16 +72,16 @@ export const kWords = {
     'el control diario está pendiente y las referencias necesitan uno superado hoy: abra Control '
     + 'diario, barra todos los marcadores de la sala y siga después aquí',
   ['the daily check has failed, and references need one that has passed since: open Daily check, '
-    + 'clear up why it failed, sweep over all markers of the room, then go on here']:
+    + 'find out why it failed, sweep over all markers of the room, then go on here']:
     'el control diario no se ha superado y las referencias necesitan uno superado después: abra '
     + 'Control diario, aclare por qué no se superó, barra todos los marcadores de la sala y siga '
     + 'después aquí',
-  ['the first daily check after this scan failed, and nobody knows since when the markers were not '
-    + 'as they should be: scan the reference again']:
-    'el primer control diario después de este escaneo no se superó, y no se sabe desde cuándo los '
-    + 'marcadores no están como deben: escanee otra vez la referencia',
-  ['this scan was taken after a daily check that had failed, and no check of the same day and '
-    + 'sensor has confirmed it: scan the reference again']:
+  ['the first daily check after this scan failed, so the markers may already have been out of '
+    + 'place during it: scan the reference again']:
+    'el primer control diario después de este escaneo no se superó, por lo que los marcadores ya '
+    + 'podían estar fuera de su sitio durante el escaneo: escanee otra vez la referencia',
+  ['this scan was taken after a failed daily check, and no check of the same day and sensor has '
+    + 'confirmed it: scan the reference again']:
     'este escaneo se hizo después de un control diario no superado y ningún control del mismo día '
     + 'y sensor lo ha confirmado: escanee otra vez la referencia',
   ['this scan was taken while the daily check was overdue, and no check of the same day and sensor '

@@ -358,7 +358,7 @@ export const kFaultPatterns = [
     'este archivo es para otra máquina: es para «$1» y esta es «$2»'],
   ['^this bundle holds version (\\S+), older than (\\S+) which runs$',
     'este archivo contiene la versión $1, anterior a la $2, que está en uso'],
-  ['^this bundle holds version \'(.*)\': expected numbers with dots between them, such as 0.2.1; '
+  ['^this bundle holds version \'(.*)\': expected numbers separated by dots, such as 0.2.1; '
     + 'ask who made it$',
   'este archivo contiene la versión «$1»: se esperaban números separados por puntos, como 0.2.1; '
     + 'pregunte a quien lo hizo'],
