@@ -8,7 +8,6 @@
 // on an idle machine.
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -28,8 +27,8 @@
 #include "daemon/evaluation/evaluation.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
-#include "drivers/replay/tum_recording.hpp"
 #include "drivers/simulated/suite.hpp"
+#include "tests/bench/measured_run.hpp"
 
 namespace plumb {
 namespace {
@@ -38,22 +37,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kPaperKeyframes = 15;
 constexpr int kPaperIterations = 50;
-
-double CpuSeconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-struct Cost {
-  double cpu_s = 0, wall_s = 0;
-};
-
-Cost Measure(const std::function<void()>& work) {
-  const double cpu_s = CpuSeconds(), wall_s = SteadySeconds();
-  work();
-  return {.cpu_s = CpuSeconds() - cpu_s, .wall_s = SteadySeconds() - wall_s};
-}
 
 /// Values of one row over the repeats.
 struct Samples {
@@ -73,19 +56,6 @@ std::string Spread(const std::vector<double>& values, double unit, const char* n
 
 std::string InSeconds(const std::vector<double>& values) { return Spread(values, 1.0, "s"); }
 std::string InMilliseconds(const std::vector<double>& values) { return Spread(values, 1e-3, "ms"); }
-
-struct Recorded {
-  StreamInfo info;
-  std::vector<Frame> frames;
-};
-
-Recorded Load(const fs::path& recording) {
-  const auto source = TumRecording::Open(recording);
-  Recorded recorded;
-  while (std::optional<Frame> frame = source->Next()) recorded.frames.push_back(std::move(*frame));
-  recorded.info = source->info();
-  return recorded;
-}
 
 struct ScanCosts {
   Samples tracking_per_frame, after_last_frame;
