@@ -86,7 +86,7 @@ std::string WhyNoVersion(const std::string& version) {
 }
 
 bool IsOlder(const std::string& a, const std::string& b) {
-  // Numbers are compared as text without leading zeros, so that none is too large.
+  // Numbers are compared as text without leading zeros, so that no number is too large.
   const auto next = [](std::string_view& rest) {
     const auto dot = rest.find('.');
     const std::string_view part = rest.substr(0, dot);

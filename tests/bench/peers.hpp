@@ -11,22 +11,22 @@
 
 namespace plumb {
 
-/// All that a peer gets of a keyframe.
+/// Everything that a peer is given of a keyframe.
 struct PeerView {
-  PointCloud cloud_in_camera;              ///< Every valid pixel, the stated lens undone.
+  PointCloud cloud_in_camera;              ///< Every valid pixel, undistorted by the stated lens.
   Pose T_world_camera = Pose::Identity();  ///< As tracked: the start of the registration.
 };
 
 struct PeerMethod {
   std::string name;
   std::string parameters;  ///< For the table's caption.
-  /// New T_world_camera, one a view; the first view's may move, too.
+  /// Returns T_world_camera for each view. The first view may move, too.
   std::function<std::vector<Pose>(std::span<const PeerView>)> solve;
 };
 
-/// As in the tutorials of both libraries for clouds that are nearly aligned.
+/// Both libraries' tutorials use these values for clouds that are nearly aligned.
 inline constexpr double kPeerVoxel_m = 0.02;
-inline constexpr double kPeerMaxDistance_m = 0.03;  ///< Of two points that correspond.
+inline constexpr double kPeerMaxDistance_m = 0.03;  ///< Between corresponding points.
 
 [[nodiscard]] PeerMethod Open3dMethod();
 [[nodiscard]] PeerMethod PclMethod();

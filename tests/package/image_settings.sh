@@ -51,7 +51,7 @@ check "rules name services" \
 for unit in $named; do
   check "$unit is there" "^there$" "$([ -s "root/etc/systemd/system/$unit" ] && echo there)"
 done
-check "the check of the data partition repairs without asking" ' fsck.repair=yes ' "$(grep 'set CMD=' "$source/toolchain/image.grub.cfg")"
+check "fsck repairs the data partition without prompting" ' fsck.repair=yes ' "$(grep 'set CMD=' "$source/toolchain/image.grub.cfg")"
 check "plumbd may not mark a system" '^send_member="InstallBundle" send_member="Info" $' \
   "$(grep -oE 'rauc.Installer".*send_member="[A-Za-z]*"' root/usr/share/dbus-1/system.d/plumb-rauc.conf | grep -oE 'send_member="[A-Za-z]*"' | tr '\n' ' ')"
 check "a wrong clock refuses no update" \

@@ -27,7 +27,7 @@ function definePixelsOf() {
   };
 }
 
-/// Runs in the page: switches off antialiasing in 3-D, for which the software renderer draws four samples a pixel.
+/// Runs in the page: switches off antialiasing in 3-D, for which the software renderer draws four samples per pixel.
 function switchOffAntialiasing() {
   const { prototype } = HTMLCanvasElement;
   const { getContext } = prototype;
