@@ -1,5 +1,5 @@
-// Start button and light of a real plumbd: its GPIO library is replaced by one of files, everything
-// above it is the product's.
+// Start button and light of a real plumbd: its GPIO library is replaced by one of files, and its
+// disk has room, whatever the machine's has; everything above them is the product's.
 #include <algorithm>
 #include <csignal>
 #include <fstream>
@@ -51,7 +51,9 @@ class DaemonPanelTest : public ::testing::Test {
     std::vector<std::string> arguments = {"--config", folder_ / "plumb.toml"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return {.arguments = arguments,
-            .environment = {{"LD_PRELOAD", PLUMB_FAKE_GPIOD}, {"PLUMB_FAKE_GPIO", folder_.path()}}};
+            .environment = {{"LD_PRELOAD", PLUMB_FAKE_GPIOD ":" PLUMB_DISK_USE},
+                            {"PLUMB_FAKE_GPIO", folder_.path()},
+                            {"PLUMB_DISK_USED_PERCENT", "50"}}};
   }
 
   void Edge(char edge) const { ASSERT_EQ(::write(button_, &edge, 1), 1); }
@@ -225,6 +227,19 @@ TEST_F(DaemonPanelTest, TheLightShowsNoSensorReadyAndFault) {
   ExpectLength({}, 80);
   EXPECT_EQ(plumbd.Stop(), 0);
   EXPECT_EQ(Phases().back().on, Lamps{}) << "the lamps are off after plumbd has ended";
+}
+
+TEST_F(DaemonPanelTest, TheLightShowsThatTheDiskIsNearlyFull) {
+  testing::PlumbdOptions options = Options();
+  options.environment["PLUMB_DISK_USED_PERCENT"] = "80";
+  Plumbd plumbd(folder_.path(), options);
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  WaitForPhases(plumbd, {"green"}, 1);
+  ForgetLamps();
+  WaitForPhases(plumbd, {"red", "green"}, 4);
+  EXPECT_EQ(Seen(), (Lamps{"red", "green"}));
+  ExpectLength({"red", "green"}, 150);
 }
 
 TEST_F(DaemonPanelTest, WhileTheServiceDoesNotRunTheLightSaysSo) {

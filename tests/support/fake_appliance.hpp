@@ -162,12 +162,16 @@ class FakeAppliance : public web::BackgroundWork,
     const auto scan = FindScan(scan_id);
     return scan && make_map ? make_map(scan->folder, name) : std::nullopt;
   }
-  std::vector<std::string> Cautions(const std::string& scan_id, web::Language) override {
+  web::ResultNotes Notes(const std::string& scan_id, web::Language) override {
     const auto scan = FindScan(scan_id);
     const std::string said(web::DailyCheckCaution(
         scan ? scan->daily_check : web::DailyCheck::kPassed, web::kEnglishTerms));
-    return said.empty() ? std::vector<std::string>() : std::vector{said};
+    web::ResultNotes notes{.axes = axis_names, .cautions = {}};
+    if (!said.empty()) notes.cautions.push_back(said);
+    return notes;
   }
+  std::array<std::string, 6> axis_names = {"Vertical", "Longitudinal", "Lateral",
+                                           "Pitch",    "Roll",         "Yaw"};
   std::optional<std::string> PictureOf(const std::string&, web::ComparisonPicture picture,
                                        web::Language language) override {
     if (!draws_pictures) return std::nullopt;

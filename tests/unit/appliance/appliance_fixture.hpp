@@ -2,10 +2,12 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <future>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -49,6 +51,11 @@ class ApplianceTest : public ::testing::Test {
     parts_.config.appliance.state = folder_ / "state";
     parts_.config.update.folder = folder_ / "updates";
     parts_.demo_patient = "demo";
+    // Not the machine's disk: where that is nearly full, the light is another.
+    parts_.space = [](const std::filesystem::path&, std::error_code&) {
+      return std::filesystem::space_info{
+          .capacity = 100'000'000'000, .free = 50'000'000'000, .available = 50'000'000'000};
+    };
     parts_.make_provider = [this] { return std::make_unique<SlowProvider>(bus_, may_open_); };
   }
 
