@@ -33,11 +33,12 @@ void JudgeRegion(const Evidence& evidence, const AcceptanceLimits& limits, Reaso
   if (std::isnan(evidence.largest_hole_m)) {
     reasons.emplace_back("the holes of the current scan could not be measured");
   } else if (!(evidence.largest_hole_m <= limits.max_hole_m)) {
+    const std::string place =
+        evidence.hole_place.empty() ? "" : fmt::format(" ({})", evidence.hole_place);
     reasons.push_back(fmt::format(
-        "the current scan has a hole of {:.0f} mm in the region at x {:.2f} m, y {:.2f} m; at most "
-        "{:g} mm are allowed; sweep over it",
-        evidence.largest_hole_m / kMillimetre, evidence.hole_centre_m.x(),
-        evidence.hole_centre_m.y(), limits.max_hole_m / kMillimetre));
+        "the current scan has a hole of {:.0f} mm in the region{}; at most {:g} mm are allowed; "
+        "sweep over it",
+        evidence.largest_hole_m / kMillimetre, place, limits.max_hole_m / kMillimetre));
   }
   if (std::isnan(evidence.residual_p95_m)) {
     reasons.emplace_back("how well the surfaces fit could not be measured");

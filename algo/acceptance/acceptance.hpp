@@ -72,7 +72,7 @@ struct Evidence {
 
   double coverage = kNotMeasured;
   double largest_hole_m = kNotMeasured;
-  Eigen::Vector2d hole_centre_m = Eigen::Vector2d::Zero();  ///< In the reference marker's frame.
+  std::string hole_place;  ///< The part of the body that it lies on, such as "left shoulder".
   double residual_p95_m = kNotMeasured;
   double reference_lost_s = kNotMeasured;
   double current_lost_s = kNotMeasured;

@@ -314,13 +314,18 @@ BodyParts DescribeBody(const BodyView& view) {
       .by_posture = axes.by_posture,
       .room = is_room_known ? std::optional(WaysOfRoom(*view.T_iec_reference)) : std::nullopt,
       .patient = std::nullopt,
-      .parts = {}};
+      .parts = {},
+      .hole_place = {}};
   if (axes.by_posture) result.patient = PatientAxes{.head = -axes.along, .left = axes.side};
   if (profile.size() == 0) return result;
   const Words words = axes.by_posture ? Words::kPatient
                       : is_room_known ? Words::kRoom
                                       : Words::kMarker;
   const Naming naming(profile, words);
+  if (view.hole_centre_m) {
+    result.hole_place = naming.NameOf(
+        naming.RankOf(view.hole_centre_m->dot(axes.along), view.hole_centre_m->dot(axes.side)));
+  }
 
   std::map<int, Collected> collected;
   for (std::size_t i = 0; i < view.region_mask.size(); ++i) {

@@ -52,6 +52,8 @@ struct BodyParts {
   /// Directions of head and left; exact where by_posture is set.
   std::optional<PatientAxes> patient;
   std::vector<BodyPart> parts;  ///< Ordered from head to feet (by the room: from the gantry away).
+  /// Name of the part that BodyView::hole_centre_m lies on; empty without one.
+  std::string hole_place;
 };
 
 /// Input of DescribeBody(). All maps and masks share the reference scene's grid.
@@ -67,6 +69,8 @@ struct BodyView {
   MarkerKind marker_kind = MarkerKind::kRoom;
   std::optional<PatientPosture> posture;     ///< Not set: posture unknown.
   const Deformation* deformation = nullptr;  ///< May be null: no displacements of parts.
+  /// Middle of the largest hole, in the reference frame. Not set: there is none to name.
+  std::optional<Eigen::Vector2d> hole_centre_m = std::nullopt;
 };
 
 /// Splits the region into parts and measures each.

@@ -292,7 +292,8 @@ class Comparer {
                       .T_iec_reference = options_.T_iec_reference,
                       .marker_kind = options_.marker_kind,
                       .posture = options_.posture,
-                      .deformation = result_.deformation ? &*result_.deformation : nullptr});
+                      .deformation = result_.deformation ? &*result_.deformation : nullptr,
+                      .hole_centre_m = result_.region->hole_centre_m});
     const std::optional<PatientPosture> posture =
         result_.body_parts->by_posture ? std::optional(options_.posture) : std::nullopt;
     result_.correction =
@@ -301,7 +302,7 @@ class Comparer {
                      options_.marker_kind, posture, result_.body_parts->patient);
     evidence_.coverage = result_.region->coverage;
     evidence_.largest_hole_m = result_.region->largest_hole_m;
-    evidence_.hole_centre_m = result_.region->hole_centre_m;
+    evidence_.hole_place = result_.body_parts->hole_place;
     TakeNumbers();
     if (options_.marker_kind == MarkerKind::kCouch) {
       result_.warnings.emplace_back(

@@ -12,6 +12,7 @@
 #include "algo/render/error_image.hpp"
 #include "algo/render/height_image.hpp"
 #include "algo/render/overlay_image.hpp"
+#include "daemon/appliance/result_directions.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/loop/log.hpp"
 #include "drivers/files/image_file.hpp"
@@ -32,14 +33,6 @@ std::vector<cv::Mat> Drawn(const fs::path& folder,
                                         folder.filename().string(), error.what()));
     return {};
   }
-}
-
-std::optional<Eigen::Vector2d> WayIn(const Json& body, const char* name) {
-  const auto found = body.find(name);
-  if (found == body.end() || !found->is_array() || found->size() != 2) return std::nullopt;
-  const Eigen::Vector2d way((*found)[0].get<double>(), (*found)[1].get<double>());
-  if (!way.allFinite() || way.norm() < 1e-6) return std::nullopt;
-  return way.normalized();
 }
 
 std::vector<MapMark> MarksIn(const Json& result, const SideWords& words) {

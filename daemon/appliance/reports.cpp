@@ -11,6 +11,7 @@
 #include "algo/base/units.hpp"
 #include "daemon/appliance/report_pictures.hpp"
 #include "daemon/appliance/report_words.hpp"
+#include "daemon/appliance/result_directions.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/loop/log.hpp"
 #include "drivers/files/file_io.hpp"
@@ -111,21 +112,22 @@ bool IsAdvice(const web::Scan& scan) {
   return scan.result && scan.result->correction && scan.result->verdict != "no_answer";
 }
 
-std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const web::Tolerance& tolerance,
-                                    Language language) {
+std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const Json& result,
+                                    const web::Tolerance& tolerance, Language language) {
   std::vector<ReportNumber> numbers;
   if (!IsAdvice(scan)) return numbers;
   const ReportWords& words = WordsOf(language);
   const auto values = ValuesOf(scan.result->correction), u95 = ValuesOf(scan.result->u95);
+  const std::array<std::string, 6> names = AxisNames(result, words.terms);
   const bool moves = scan.result->verdict == "move";
-  for (std::size_t i = 0; i < words.terms.axes.size(); ++i) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
     const bool is_shift = i < 3;
     const double half = u95[i].value_or(0.0);
     const double limit = is_shift ? tolerance.shift_mm : tolerance.rotation_deg;
     const bool known = values[i] && std::abs(*values[i]) > half;
     const bool is_within = values[i] && std::abs(*values[i]) + half <= limit;
     numbers.push_back(
-        {.name = std::string(words.terms.axes[i]),
+        {.name = names[i],
          .unit = is_shift ? "mm" : "\u00b0",
          .value = values[i],
          .u95 = half,
@@ -199,11 +201,11 @@ void AddComparisonTo(std::vector<std::string>& cautions, const Json& result, Lan
           Filled(words.marker_ignored, id, Said(1000 * residual_m.get<double>(), 0, words)));
   }
   if (const Json motion = part("motion"); motion.is_object()) {
+    const std::array<std::string, 6> names = AxisNames(result, words.terms);
     for (const Json& weak : motion.value("weak_directions", Json::array())) {
       const std::string name = weak.value("name", "");
       const std::optional<std::size_t> axis = AxisNamed(name);
-      cautions.push_back(
-          Filled(words.weak_direction, axis ? std::string(words.terms.axes[*axis]) : name));
+      cautions.push_back(Filled(words.weak_direction, axis ? names[*axis] : name));
     }
   }
 }
@@ -363,7 +365,7 @@ ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Lang
                     .verdict = std::string(VerdictOf(scan, words)),
                     .why = WhyOf(scan, language),
                     .identity = IdentityOf(scan, patient, reference, words),
-                    .numbers = NumbersOf(scan, tolerance, language),
+                    .numbers = NumbersOf(scan, result, tolerance, language),
                     .cautions = CautionsIn(scan, scene, result, stored.warm_up_min, language),
                     .quality = QualityOf(scan, scene, result, words),
                     .body = {},
@@ -421,13 +423,17 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
   return report;
 }
 
-std::vector<std::string> CautionsOf(const ReportSources& stored, const web::Scan& scan,
-                                    Language language) {
+web::ResultNotes NotesOf(const ReportSources& stored, const web::Scan& scan, Language language) {
+  const auto notes = [&](const Json& scene, const Json& result) {
+    return web::ResultNotes{
+        .axes = AxisNames(result, WordsOf(language).terms),
+        .cautions = CautionsIn(scan, scene, result, stored.warm_up_min, language)};
+  };
   try {
-    return CautionsIn(scan, JsonIn(scan.folder / "scene/scene.json"),
-                      JsonIn(scan.folder / "result/result.json"), stored.warm_up_min, language);
+    return notes(JsonIn(scan.folder / "scene/scene.json"),
+                 JsonIn(scan.folder / "result/result.json"));
   } catch (const Json::exception&) {  // a file that another version wrote differently
-    return CautionsIn(scan, {}, {}, stored.warm_up_min, language);
+    return notes({}, {});
   }
 }
 

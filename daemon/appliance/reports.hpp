@@ -31,10 +31,11 @@ struct ReportSources {
 [[nodiscard]] CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& patient,
                                           web::Language language);
 
-/// Cautions to read beside the verdict: lost frames, a cold sensor, an overdue check, a room
-/// that is not calibrated, ignored markers, uncertain directions, warnings.
-[[nodiscard]] std::vector<std::string> CautionsOf(const ReportSources& stored,
-                                                  const web::Scan& scan, web::Language language);
+/// Names of the six numbers, and cautions to read beside the verdict: lost frames, a cold sensor,
+/// an overdue check, a room that is not calibrated, ignored markers, uncertain directions,
+/// warnings.
+[[nodiscard]] web::ResultNotes NotesOf(const ReportSources& stored, const web::Scan& scan,
+                                       web::Language language);
 
 /// The pictures of the comparison as PNG files, in the order of web::ComparisonPicture; empty if
 /// the scan was not compared, or a record or file that they need is missing or damaged.

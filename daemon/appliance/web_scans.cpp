@@ -78,10 +78,10 @@ std::optional<std::string> WebScans::CompactMap(const std::string& scan_id,
   }
 }
 
-std::vector<std::string> WebScans::Cautions(const std::string& scan_id, web::Language language) {
-  return store_.Read([&](Store& store) -> std::vector<std::string> {
+web::ResultNotes WebScans::Notes(const std::string& scan_id, web::Language language) {
+  return store_.Read([&](Store& store) -> web::ResultNotes {
     const std::optional<web::Scan> scan = store.scans.Find(scan_id);
-    return scan ? CautionsOf(SourcesIn(store), *scan, language) : std::vector<std::string>();
+    return scan ? NotesOf(SourcesIn(store), *scan, language) : web::ResultNotes{};
   });
 }
 

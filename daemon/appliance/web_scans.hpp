@@ -26,8 +26,7 @@ class WebScans : public web::ScanService {
                   web::Done done) override;
   [[nodiscard]] std::optional<std::string> CompactMap(const std::string& scan_id,
                                                       const std::string& name) override;
-  [[nodiscard]] std::vector<std::string> Cautions(const std::string& scan_id,
-                                                  web::Language language) override;
+  [[nodiscard]] web::ResultNotes Notes(const std::string& scan_id, web::Language language) override;
   [[nodiscard]] std::optional<std::string> PictureOf(const std::string& scan_id,
                                                      web::ComparisonPicture picture,
                                                      web::Language language) override;

@@ -195,8 +195,11 @@ void Heading(Pages& pages, const std::string& text) {
 }
 
 void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& texts) {
-  const double line = pages.y += 15;
-  pages.Text(kMargin, line, number.name, 9.5, kBlack, true);
+  const double line = pages.y + 15;
+  constexpr double kNameSize = 9.5, kNameWidth = 82;
+  pages.y = line - 1.3 * kNameSize;  // the first line of the name is on this line
+  pages.Paragraph(kMargin, kNameWidth, number.name, kNameSize, kBlack, true);
+  const double name_end = pages.y;
   if (!number.value) {
     pages.Text(kMargin + 85, line, texts.not_known, 9.5, kGrey);
     return;
@@ -221,7 +224,7 @@ void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& tex
   constexpr double kWordsAt = 372, kWordsSize = 8;
   pages.y = line - 1.3 * kWordsSize;  // the first line of the words is on this line
   pages.Paragraph(kMargin + kWordsAt, pages.inner() - kWordsAt, number.words, kWordsSize);
-  pages.y = std::max(pages.y, line);
+  pages.y = std::max({pages.y, line, name_end});
 }
 
 /// One below the other, each as large as the space for all of them permits.

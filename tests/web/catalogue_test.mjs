@@ -145,6 +145,10 @@ for (const [text, expected] of [
     + 'the current one with 0.15 m; scan both with the same markers',
   'el escaneo falló: no se pueden comparar los escaneos: la referencia se hizo con marcadores de '
     + '0,104 m y el actual con marcadores de 0,15 m; escanee ambos con los mismos marcadores'],
+  ['the current scan has a hole of 63 mm in the region (left side at the head end); at most 50 mm '
+    + 'are allowed; sweep over it',
+  'el escaneo actual tiene un hueco de 63 mm en la región (lado izquierdo en el extremo de la '
+    + 'cabeza); se admiten 50 mm como máximo; barra sobre él'],
   ['scan needs at least 3 markers shared with the reference, found 1 (id 7); keep the markers in '
     + 'view', 'el escaneo necesita al menos 3 marcadores comunes con la referencia y tiene 1; '
     + 'mantenga los marcadores a la vista']]) {
@@ -180,6 +184,15 @@ for (const file of ['algo/acceptance/acceptance.cpp', 'algo/comparison/compariso
     if (!spanish.some((one) => fixed.every((part) => one.includes(part)))) {
       failures.push(`${file}: "${literal}" has no Spanish`);
     }
+  }
+}
+// The print view and the reports name the numbers as the page does.
+const terms = readFileSync(join(source, 'web/service/result_terms.hpp'), 'utf8');
+for (const { axes, lines, tilts } of [en.result, es.result]) {
+  const names = [lines, tilts].flatMap(({ head, left, marker }) =>
+    [head, left, marker('X'), marker('Y')]);
+  for (const name of [...Object.values(axes), ...names]) {
+    if (!terms.includes(`"${name}"`)) failures.push(`the reports do not say "${name}"`);
   }
 }
 if (en.patients && en.session.scans(1) === en.session.scans(2).replace('2', '1')) {

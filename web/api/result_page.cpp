@@ -141,13 +141,13 @@ std::string_view TableTitle(const std::string& verdict, bool review, const Resul
 }
 
 /// A correction without an answer must not be applied, so it is left out.
-std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance, bool review,
-                         const ResultWords& words) {
+std::string NumbersTable(const ResultSummary& result, const std::array<std::string, 6>& names,
+                         const Tolerance& tolerance, bool review, const ResultWords& words) {
   if (!result.correction || result.verdict == "no_answer") return "";
   std::string rows, heads;
   std::size_t i = 0;
   for (const NumberRow& row : Rows(*result.correction, result.u95.value_or(SixNumbers{}))) {
-    rows += NumberCells(row, words.terms.axes[i], result.words[i],
+    rows += NumberCells(row, EscapeHtml(names[i]), result.words[i],
                         i < 3 ? tolerance.shift_mm : tolerance.rotation_deg,
                         result.verdict == "move", words);
     ++i;
@@ -275,11 +275,12 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
                       EscapeHtml(verdict), VerdictText(verdict, review, words));
   for (const std::string& reason : scan.result->reasons)
     body += fmt::format("<p>{}</p>", Said(reason, words));
-  for (const std::string& caution : records.scans.Cautions(scan.id, wanted.language))
+  const ResultNotes notes = records.scans.Notes(scan.id, wanted.language);
+  for (const std::string& caution : notes.cautions)
     body += fmt::format("<p class=\"caution\">{}</p>", EscapeHtml(caution));
   return body +
-         NumbersTable(*scan.result, reference ? reference->plan.tolerance : Tolerance{}, review,
-                      words) +
+         NumbersTable(*scan.result, notes.axes, reference ? reference->plan.tolerance : Tolerance{},
+                      review, words) +
          BodyList(*scan.result, words) + Pictures(scan, words) + "</section>";
 }
 

@@ -9,9 +9,16 @@
 
 namespace plumb::web {
 
+/// Names of numbers that run along the axes of the reference marker.
+struct AxisTerms {
+  std::string_view head, left;          ///< Along the patient's axes.
+  std::string_view marker_x, marker_y;  ///< Where those are not known.
+};
+
 struct ResultTerms {
   std::string_view notice;
   std::array<std::string_view, 6> axes;
+  AxisTerms lines, tilts;                        ///< Of shifts and rotations without a known room.
   std::string_view within, not_surely, outside;  ///< The assessment of one number.
   std::string_view no_answer;                    ///< As a verdict.
   std::string_view not_known, no_move, scan_again, insignificant;  ///< In place of a direction.
@@ -23,6 +30,14 @@ struct ResultTerms {
 inline constexpr ResultTerms kEnglishTerms = {
     .notice = kResearchNotice,
     .axes = {"Vertical", "Longitudinal", "Lateral", "Pitch", "Roll", "Yaw"},
+    .lines = {.head = "Patient head/feet",
+              .left = "Patient left/right",
+              .marker_x = "Along marker X",
+              .marker_y = "Along marker Y"},
+    .tilts = {.head = "Tilt head/feet",
+              .left = "Tilt left/right",
+              .marker_x = "Tilt along marker X",
+              .marker_y = "Tilt along marker Y"},
     .within = "in tolerance",
     .not_surely = "not surely within",
     .outside = "outside tolerance",
@@ -42,6 +57,14 @@ inline constexpr ResultTerms kSpanishTerms = {
         "Solo para investigación. No es un producto sanitario. No lo use para posicionar "
         "pacientes para un tratamiento ni para sustituir la guía por imagen.",
     .axes = {"Vertical", "Longitudinal", "Lateral", "Cabeceo", "Balanceo", "Guiñada"},
+    .lines = {.head = "Paciente: cabeza/pies",
+              .left = "Paciente: izq./der.",
+              .marker_x = "Según X del marcador",
+              .marker_y = "Según Y del marcador"},
+    .tilts = {.head = "Inclinación cabeza/pies",
+              .left = "Inclinación izq./der.",
+              .marker_x = "Inclinación según X del marcador",
+              .marker_y = "Inclinación según Y del marcador"},
     .within = "en tolerancia",
     .not_surely = "no concluyente",
     .outside = "fuera de tolerancia",

@@ -1,6 +1,7 @@
 // Scans, their files and their reports.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,12 @@ enum class Language { kEnglish, kSpanish };
 
 /// Pictures that are made of a comparison.
 enum class ComparisonPicture { kErrorMap, kOverlay };
+
+/// What is read beside the numbers of a result.
+struct ResultNotes {
+  std::array<std::string, 6> axes;    ///< Names of the six numbers.
+  std::vector<std::string> cautions;  ///< Whole sentences.
+};
 
 /// The rules of services.hpp hold.
 class ScanService {
@@ -40,9 +47,8 @@ class ScanService {
   ///         surface.
   [[nodiscard]] virtual std::optional<std::string> CompactMap(const std::string& scan_id,
                                                               const std::string& name) = 0;
-  /// Cautions to read beside the verdict of a scan, as whole sentences (background).
-  [[nodiscard]] virtual std::vector<std::string> Cautions(const std::string& scan_id,
-                                                          Language language) = 0;
+  /// What to read beside the verdict and the numbers of a scan (background).
+  [[nodiscard]] virtual ResultNotes Notes(const std::string& scan_id, Language language) = 0;
   /// A picture of a comparison as a PNG file, with texts and marks in a language; nothing if there
   /// is no such comparison, or it cannot be drawn (background).
   [[nodiscard]] virtual std::optional<std::string> PictureOf(const std::string& scan_id,

@@ -74,7 +74,16 @@ TEST(AcceptanceTest, CoverageAtItsBoundary) {
 }
 
 TEST(AcceptanceTest, HoleAtItsBoundary) {
-  ExpectGate(&Evidence::largest_hole_m, 0.049, 0.051, "hole of 51 mm");
+  ExpectGate(&Evidence::largest_hole_m, 0.049, 0.051, "hole of 51 mm in the region; at most 50 mm");
+}
+
+TEST(AcceptanceTest, AHoleIsNamedByThePartOfTheBodyItLiesOn) {
+  Evidence evidence = GoodEvidence();
+  evidence.largest_hole_m = 0.051;
+  evidence.hole_place = "left shoulder";
+  EXPECT_THAT(Decide(evidence, {}).reasons,
+              ElementsAre("the current scan has a hole of 51 mm in the region (left shoulder); at "
+                          "most 50 mm are allowed; sweep over it"));
 }
 
 TEST(AcceptanceTest, ResidualAtItsBoundary) {

@@ -140,9 +140,44 @@ TEST_F(ReportsTest, EachIgnoredMarkerIsACaution) {
   const std::string id = Scan(Approved(), kMove, DailyCheck::kPassed, {},
                               R"({"alignment":{"markers_rejected":{"7":0.0121,"31":0.0306}}})");
   const web::Scan scan = *store_.scans.Find(id);
-  EXPECT_THAT(CautionsOf(sources_, scan, Language::kEnglish),
+  EXPECT_THAT(NotesOf(sources_, scan, Language::kEnglish).cautions,
               ::testing::IsSupersetOf({"Marker 7 was ignored: it moved 12 mm.",
                                        "Marker 31 was ignored: it moved 31 mm."}));
+}
+
+TEST_F(ReportsTest, WithoutAKnownRoomTheNumbersAreNamedAfterThePatientAndNotTheCouch) {
+  const auto names_in = [&](const std::string& body, Language language = Language::kEnglish) {
+    const std::string id =
+        Scan(Approved(), kMove, DailyCheck::kPassed, {},
+             R"({"motion":{"weak_directions":[{"name":"lateral"}]},"body":)" + body + "}");
+    const web::Scan scan = *store_.scans.Find(id);
+    const web::ResultNotes notes = NotesOf(sources_, scan, language);
+    const ScanReport report = DescribeScan(sources_, scan, language);
+    EXPECT_EQ(report.cautions, notes.cautions);
+    for (std::size_t i = 0; i < notes.axes.size(); ++i)
+      EXPECT_EQ(report.numbers[i].name, notes.axes[i]);
+    EXPECT_THAT(notes.cautions, ::testing::Contains(HasSubstr(notes.axes[2])));
+    return notes.axes;
+  };
+  EXPECT_THAT(names_in(R"({"room_known":true,"head_xy":[1,0],"left_xy":[0,1]})"),
+              ElementsAre("Vertical", "Longitudinal", "Lateral", "Pitch", "Roll", "Yaw"));
+  EXPECT_THAT(names_in(R"({"room_known":false,"head_xy":[0.2,0.98],"left_xy":[0.98,-0.2]})"),
+              ElementsAre("Vertical", "Patient head/feet", "Patient left/right", "Tilt head/feet",
+                          "Tilt left/right", "Yaw"));
+  EXPECT_THAT(names_in(R"({"room_known":false,"head_xy":[-1,0],"left_xy":[0,1]})"),
+              ElementsAre("Vertical", "Patient left/right", "Patient head/feet", "Tilt left/right",
+                          "Tilt head/feet", "Yaw"));
+  // Neither side within 67.5 degrees alone, not known at all, or damaged.
+  for (const char* body :
+       {R"({"room_known":false,"head_xy":[0.7,0.7],"left_xy":[0.7,-0.7]})",
+        R"({"room_known":false})", R"({"room_known":false,"head_xy":["1","0"],"left_xy":[0]})"}) {
+    EXPECT_THAT(names_in(body), ElementsAre("Vertical", "Along marker Y", "Along marker X",
+                                            "Tilt along marker Y", "Tilt along marker X", "Yaw"));
+  }
+  EXPECT_THAT(
+      names_in(R"({"room_known":false,"head_xy":[0,1],"left_xy":[1,0]})", Language::kSpanish),
+      ElementsAre("Vertical", "Paciente: cabeza/pies", "Paciente: izq./der.",
+                  "Inclinación cabeza/pies", "Inclinación izq./der.", "Guiñada"));
 }
 
 TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {

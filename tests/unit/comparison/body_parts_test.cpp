@@ -106,6 +106,20 @@ class Lying {
     return DescribeBody(view);
   }
 
+  /// The name of the place (down, left), for each way in which the orientation can be known.
+  [[nodiscard]] std::string PlaceOfHole(double down, double left,
+                                        std::optional<PatientPosture> posture,
+                                        bool is_room_known = true) const {
+    const Eigen::Vector2d room = left * how_.left - (down - 0.8) * how_.head;
+    const std::optional<Pose> T_iec_reference =
+        is_room_known ? std::optional(T_iec_reference_) : std::nullopt;
+    BodyView view{reference_,      deviation_,        mask_,  mask_, Pose::Identity(),
+                  T_iec_reference, MarkerKind::kRoom, posture};
+    view.hole_centre_m =
+        (T_iec_reference_.inverse() * Eigen::Vector3d(room.x(), room.y(), 0.0)).head<2>();
+    return DescribeBody(view).hole_place;
+  }
+
   /// As where the room's directions were never set.
   [[nodiscard]] BodyParts DescribeWithoutRoom(std::optional<PatientPosture> posture) const {
     return DescribeBody({reference_, deviation_, mask_, mask_, Pose::Identity(), std::nullopt,
@@ -342,6 +356,18 @@ TEST(BodyPartsTest, RefusesMapsThatDoNotBelongTogether) {
   const HeightMap map(GridShape{0, 0, 0.01, 10, 10});
   const std::vector<std::uint8_t> mask(99, 1), whole(100, 1);
   EXPECT_THROW((void)DescribeBody({map, map, mask, whole, {}, {}, {}, {}}), std::invalid_argument);
+}
+
+TEST(BodyPartsTest, AHoleIsNamedByThePartItLiesOn) {
+  for (const Case& how : kCases) {
+    const Lying person(how, 0.4, IsPerson, [](double, double) { return 0.0; });
+    EXPECT_EQ(person.PlaceOfHole(0.32, 0.15, how.posture), "left shoulder");
+    EXPECT_EQ(person.PlaceOfHole(1.0, -0.1, how.posture), "right thigh");
+  }
+  const Lying person(kCases[0], 0.0, IsPerson, [](double, double) { return 0.0; });
+  EXPECT_EQ(person.PlaceOfHole(0.32, 0.15, std::nullopt), "+X side at the gantry end");
+  EXPECT_EQ(person.PlaceOfHole(0.32, 0.15, std::nullopt, false), "+X side at the +Y end");
+  EXPECT_EQ(person.Describe(kCases[0].posture).hole_place, "") << "there is none";
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ using test::BodyShape;
 using test::MakeSyntheticScene;
 using test::SyntheticOptions;
 using testing::Contains;
+using testing::ContainsRegex;
 using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -266,8 +267,9 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   hole.hidden = [](const Eigen::Vector3d& p) {
     return (p.head<2>() - Eigen::Vector2d(0.6, 0.45)).norm() < 0.035;
   };
-  EXPECT_THAT(Compare(PerfectReference(), MakeSyntheticScene(hole)).reasons.at(0),
-              HasSubstr("hole of"));
+  const Comparison holed = Compare(PerfectReference(), MakeSyntheticScene(hole));
+  EXPECT_THAT(holed.reasons.at(0), ContainsRegex("hole of 7[0-9] mm in the region \\(.*side "));
+  EXPECT_THAT(holed.reasons.at(0), HasSubstr(holed.body_parts->hole_place));
 
   SyntheticOptions other = ReferenceOptions(BodyShape::kCylinder);
   EXPECT_EQ(Compare(PerfectReference(), MakeSyntheticScene(other)).verdict, Verdict::kNoAnswer);

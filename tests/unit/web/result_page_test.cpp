@@ -57,6 +57,16 @@ TEST_F(ResultPageTest, WhatIsToBeKnownStandsBesideTheVerdict) {
                             Not(HasSubstr("overdue"))));
 }
 
+TEST_F(ResultPageTest, TheNumbersHaveTheNamesThatTheResultGivesThem) {
+  Add("s1", seconds(10));
+  loop_->Do([&] {
+    service_.scans.back().result->correction = web::SixNumbers{.longitudinal_mm = 1.0};
+    service_.axis_names[1] = "Patient <head>";
+  });
+  EXPECT_THAT(Page(), AllOf(HasSubstr("<th scope=\"row\">Patient &lt;head&gt;</th>"),
+                            Not(HasSubstr("Longitudinal"))));
+}
+
 TEST_F(ResultPageTest, AnAcceptanceWithAReasonIsInTheWordsOfItsVerdict) {
   Add("s1", seconds(10));
   const auto accepted = [&](const char* verdict) {

@@ -204,10 +204,14 @@ export const kPatterns = [
   ['^the current scan covers ([\\d.]+) % of the region, at least ([\\d.]+) % are needed; sweep '
     + 'all of it$',
   'el escaneo actual cubre el $1 % de la región y se necesita al menos el $2 %; bárrala toda'],
-  ['^the current scan has a hole of ([\\d.]+) mm in the region at x ([-\\d.]+) m, y ([-\\d.]+) m; '
-    + 'at most ([\\d.]+) mm are allowed; sweep over it$',
-  'el escaneo actual tiene un hueco de $1 mm en la región, en x $2 m, y $3 m; se admiten $4 mm '
-    + 'como máximo; barra sobre él'],
+  ['^the current scan has a hole of ([\\d.]+) mm in the region; at most ([\\d.]+) mm are allowed; '
+    + 'sweep over it$',
+  'el escaneo actual tiene un hueco de $1 mm en la región; se admiten $2 mm como máximo; barra '
+    + 'sobre él'],
+  ['^the current scan has a hole of ([\\d.]+) mm in the region \\(([^)]+)\\); at most ([\\d.]+) mm '
+    + 'are allowed; sweep over it$',
+  'el escaneo actual tiene un hueco de $1 mm en la región ($2); se admiten $3 mm como máximo; '
+    + 'barra sobre él'],
   ['^the body does not look like this reference: 5 % of the region lie more than ([\\d.]+) mm away '
     + 'after the best motion$',
   'el cuerpo no se parece a esta referencia: el 5 % de la región queda a más de $1 mm tras el '
