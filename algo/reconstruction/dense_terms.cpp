@@ -52,7 +52,8 @@ constexpr float kMinIncidence = 0.35F;       // Cosine of the steepest incidence
 
 struct Correspondence {
   double residual = 0;
-  double sigma = 0;
+  float cos_a = 0;  // Of the incidence on either side.
+  float cos_b = 0;
   Eigen::Vector3f normal;  // In b's depth camera.
 };
 
@@ -66,15 +67,18 @@ std::optional<Correspondence> Correspond(const View& a, const View& b, std::size
   Correspondence match;
   match.residual = n.dot(q - p_b);
   if (std::abs(match.residual) > gate_m) return std::nullopt;
-  const float cos_b = -n.dot(p_b.normalized());
-  const float cos_a = -a.keyframe->dense.normals[i].dot(a.points[i].normalized());
-  if (cos_b < kMinIncidence || cos_a < kMinIncidence) return std::nullopt;
-  // Point-to-plane distance, with depth noise along the ray.
-  const double sigma_a = DepthSigma(a.points[i].z(), cos_a) * cos_a;
-  const double sigma_b = DepthSigma(p_b.z(), cos_b) * cos_b;
-  match.sigma = std::sqrt(sigma_a * sigma_a + sigma_b * sigma_b + 0.001 * 0.001);
+  match.cos_b = -n.dot(p_b.normalized());
+  match.cos_a = -a.keyframe->dense.normals[i].dot(a.points[i].normalized());
+  if (match.cos_b < kMinIncidence || match.cos_a < kMinIncidence) return std::nullopt;
   match.normal = n;
   return match;
+}
+
+// Standard deviation of the point-to-plane distance, with depth noise along the ray.
+double SigmaOf(const Correspondence& match, const DepthNoise& noise, float z_a_m, float z_b_m) {
+  const double sigma_a = DepthSigma(noise, z_a_m, match.cos_a) * match.cos_a;
+  const double sigma_b = DepthSigma(noise, z_b_m, match.cos_b) * match.cos_b;
+  return std::sqrt(sigma_a * sigma_a + sigma_b * sigma_b + 0.001 * 0.001);
 }
 
 // Derivative of a cell's corrected depth with respect to the depth calibration, except for its
@@ -186,7 +190,8 @@ Offset OffsetOfPair(std::size_t pair, int stride) {
 }
 
 void FindDenseTerm(const Sensor& sensor, const View& a, const View& b, const KeyframePair& pair,
-                   Offset offset, int stride, double gate_m, double weight, QuadraticTerm& term) {
+                   Offset offset, int stride, double gate_m, double weight, const DepthNoise& noise,
+                   QuadraticTerm& term) {
   term = {};
   term.keyframe_a = pair.a;
   term.keyframe_b = pair.b;
@@ -215,9 +220,9 @@ void FindDenseTerm(const Sensor& sensor, const View& a, const View& b, const Key
             PositionJacobian(sensor, a, i, J_depth, n_a) -
             PositionJacobian(sensor, b, j, DepthJacobian(b, j), n_b);
         const double residual = InRawUnits(a, i, J_depth, match->residual, J);
-        const double in_sigmas = residual / match->sigma;
-        const double w = weight * CauchyWeight(in_sigmas * in_sigmas, kLossScale) /
-                         (match->sigma * match->sigma);
+        const double sigma = SigmaOf(*match, noise, a.points[i].z(), b.points[j].z());
+        const double in_sigmas = residual / sigma;
+        const double w = weight * CauchyWeight(in_sigmas * in_sigmas, kLossScale) / (sigma * sigma);
         sum.Add(J, residual, w);
       });
   sum.Finish();
@@ -227,7 +232,8 @@ void FindDenseTerm(const Sensor& sensor, const View& a, const View& b, const Key
 // to the markers' side length. Zero where too few cells lie on the face.
 void FindMarkerFaceTerm(const Sensor& sensor, const View& view, int keyframe,
                         const MarkerObservation& observation, const MapMarker& marker,
-                        double half_side_m, double gate_m, QuadraticTerm& term) {
+                        double half_side_m, double gate_m, const DepthNoise& noise,
+                        QuadraticTerm& term) {
   term = {};
   term.keyframe_a = keyframe;
   term.marker = observation.id;
@@ -265,7 +271,7 @@ void FindMarkerFaceTerm(const Sensor& sensor, const View& view, int keyframe,
       J.tail<CalibrationModel::kDepthSize>() = PositionJacobian(sensor, view, i, J_depth, n_depth);
       J.segment<QuadraticTerm::kFocal>(QuadraticTerm::kFocalAt) = FocalJacobian(view, i, n_depth);
       const double cosine = std::clamp(-n_depth.dot(p.normalized()), 0.2, 1.0);
-      const double sigma = std::hypot(DepthSigma(p.z(), cosine) * cosine, 0.001);
+      const double sigma = std::hypot(DepthSigma(noise, p.z(), cosine) * cosine, 0.001);
       // Neighbouring cells share their noise: four cells count as one.
       const double residual = InRawUnits(view, i, J_depth, in_marker.z(), J);
       const double in_sigmas = residual / sigma;
@@ -439,7 +445,8 @@ void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
     if (i >= pairs.size()) {
       const Face& face = faces[i - pairs.size()];
       FindMarkerFaceTerm(sensor, views[face.view], static_cast<int>(face.view), *face.observation,
-                         *face.marker, options.marker_length_m / 2, gate_m + 0.03, terms[i]);
+                         *face.marker, options.marker_length_m / 2, gate_m + 0.03,
+                         options.depth_noise, terms[i]);
       return;
     }
     const auto a = static_cast<std::size_t>(pairs[i].a);
@@ -449,7 +456,7 @@ void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
     const double weight = options.dense_weight * cells_for_one * 2.0 /
                           std::sqrt(static_cast<double>(uses[a]) * uses[b]);
     FindDenseTerm(sensor, views[a], views[b], pairs[i], OffsetOfPair(i, stride), stride, gate_m,
-                  weight, terms[i]);
+                  weight, options.depth_noise, terms[i]);
   });
 }
 

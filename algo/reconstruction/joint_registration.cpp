@@ -102,6 +102,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   bundle.calibrate = options.calibrate;
   bundle.keypoint_sigma_px = options.keypoint_sigma_px * KeypointSigmaFactor(map);
   bundle.keypoint_depth_sigmas = options.keypoint_depth_sigmas;
+  bundle.depth_noise = options.depth_noise;
   bundle.prior = options.prior;
   bundle.keep_witnesses_out = options.use_dense;
   if (options.calibrate) MoveCalibration(options.prior.mean, result.calibration);

@@ -8,6 +8,7 @@
 #include "algo/sensor_model/sensor_profile.hpp"
 #include "algo/tracking/bundle_adjustment.hpp"
 #include "algo/tracking/witnesses.hpp"
+#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 
@@ -20,9 +21,10 @@ struct JointRegistrationOptions {
   /// Largest point-to-plane residual of the first round; multiplied by 0.6 in each round.
   double max_gate_m = 0.06;
   double min_gate_m = 0.012;
-  double settled_m = 0.002;  ///< The rounds end when no camera moves farther than this.
-  int max_pairs = 8;         ///< Overlapping keyframes with which each keyframe is registered.
-  double min_overlap = 0.2;  ///< Fraction of a keyframe's cells that project into the other.
+  double settled_m = 0.002;     ///< The rounds end when no camera moves farther than this.
+  int max_pairs = 8;            ///< Overlapping keyframes with which each keyframe is registered.
+  double min_overlap = 0.2;     ///< Fraction of a keyframe's cells that project into the other.
+  DepthNoise depth_noise = {};  ///< The sensor's, see StreamInfo.
   /// Weight of the dense terms relative to their noise model, because errors outside the model are
   /// shared by neighbouring cells and views.
   double dense_weight = 0.1;

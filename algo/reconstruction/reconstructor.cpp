@@ -243,6 +243,7 @@ struct Reconstructor::Impl {
     stage = Now();
     JointRegistrationOptions joint_options;
     joint_options.marker_length_m = info.marker_length_m;
+    joint_options.depth_noise = info.depth_noise;
     joint_options.use_depth_field = options.use_depth_field;
     joint_options.use_dense = options.use_dense_depth;
     joint_options.use_row_motion = options.use_row_motion;
@@ -296,6 +297,7 @@ struct Reconstructor::Impl {
     report(0.5, "surface");
     stage = Now();
     ViewSurfaceOptions view_options;
+    view_options.depth_noise = info.depth_noise;
     view_options.stop = stop;
     const std::vector<ViewSurface> surfaces = PrepareCorrectedViews(
         map, info.intrinsics, joint.calibration, SceneFromWorld(info, map), view_options);
@@ -325,6 +327,7 @@ struct Reconstructor::Impl {
     const double start = Now();
     JointRegistrationOptions joint_options;
     joint_options.marker_length_m = info.marker_length_m;
+    joint_options.depth_noise = info.depth_noise;
     joint_options.calibrate = false;
     joint_options.use_dense = false;
     const CalibrationModel stated =
@@ -366,9 +369,10 @@ struct Reconstructor::Impl {
       scene.keyframes.push_back({keyframes[j].depth_time_s, view.T_world_camera});
       views.push_back(std::move(view));
     }
-    scene.cloud = MergeSurface(views, {.with_colors = options.keep_color, .stop = stop});
-    if (scene.cloud.empty())
-      throw DataError(WhyNoSurface(PrepareViews(views), Median(median_depths_m)));
+    const std::vector<ViewSurface> surfaces =
+        PrepareViews(views, {.depth_noise = info.depth_noise, .stop = stop});
+    scene.cloud = MergeSurface(surfaces, {.with_colors = options.keep_color, .stop = stop});
+    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, Median(median_depths_m)));
     if (paper.height_map) KeepHeightMap(*paper.height_map, scene);
   }
 

@@ -63,7 +63,8 @@ struct TrackingReport {
 /// give the same scene bit for bit on any number of threads.
 class Reconstructor {
  public:
-  /// @throws DataError if the stream's marker dictionary is unknown or its intrinsics are invalid.
+  /// @throws DataError if the stream's marker dictionary is unknown, or its intrinsics or depth
+  ///         noise are invalid.
   Reconstructor(const StreamInfo& info, const ReconstructorOptions& options);
   ~Reconstructor();
 

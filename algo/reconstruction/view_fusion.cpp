@@ -94,7 +94,7 @@ void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m,
     const float distance = std::max(0.1F, p.norm());
     const float cos_incidence =
         std::max(0.0F, -n_world.dot(camera.R_camera_world.transpose() * p) / distance);
-    const float sigma = AxialSigma(distance, 1.0F);
+    const float sigma = camera.view->depth_noise.SigmaFacing_m(distance);
     rated.emplace_back((cos_incidence + (holds_centre ? 0.2F : 0.0F)) / (sigma * sigma),
                        static_cast<std::uint16_t>(i));
   }
@@ -181,7 +181,8 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
       // The measured point lies on the seed's own ray, beyond it by this fraction of its length.
       const float beyond = measured * inverse_z - 1.0F;
       const float distance = -beyond * along;
-      const float band = std::max(options_.min_band_m, kBandSigmas * AxialSigma(p.z(), 1.0F));
+      const float band =
+          std::max(options_.min_band_m, kBandSigmas * view.depth_noise.SigmaFacing_m(p.z()));
       if (std::abs(distance) > band) {
         if (beyond * p.z() > options_.see_through_m) ++fused.num_through;
         continue;

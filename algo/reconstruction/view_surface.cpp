@@ -72,8 +72,8 @@ class BoxSums {
 };
 
 /// Step in depth between neighbouring working pixels that is too large for any plausible surface.
-float EdgeStep(float depth_m, float pixel_angle) {
-  return kEdgeSlope * depth_m * pixel_angle + kEdgeSigmas * AxialSigma(depth_m, 1.0F);
+float EdgeStep(const DepthNoise& noise, float depth_m, float pixel_angle) {
+  return kEdgeSlope * depth_m * pixel_angle + kEdgeSigmas * noise.SigmaFacing_m(depth_m);
 }
 
 /// Computes the inverse depth of the working image.
@@ -100,8 +100,8 @@ void Bin(const DepthView& view, const ViewSurfaceOptions& options, ViewSurface& 
           ++count;
         }
       }
-      const bool usable =
-          count >= min_count && farthest - nearest <= EdgeStep(nearest, pixel_angle);
+      const bool usable = count >= min_count &&
+                          farthest - nearest <= EdgeStep(surface.depth_noise, nearest, pixel_angle);
       surface.pixels[i].inverse_depth = usable ? sum / static_cast<float>(count) : 0.0F;
     }
   }
@@ -118,7 +118,8 @@ std::vector<std::uint8_t> WithoutEdges(const ViewSurface& surface) {
     if (inverse(a) <= 0.0F || inverse(b) <= 0.0F) return;
     const float nearer = 1.0F / std::max(inverse(a), inverse(b));
     // |1/a - 1/b| as a step in depth at the nearer of the two
-    if (std::abs(inverse(a) - inverse(b)) * nearer * nearer > EdgeStep(nearer, pixel_angle))
+    if (std::abs(inverse(a) - inverse(b)) * nearer * nearer >
+        EdgeStep(surface.depth_noise, nearer, pixel_angle))
       good[a] = good[b] = 0;
   };
   for (std::size_t row = 0; row < static_cast<std::size_t>(surface.height()); ++row) {
@@ -182,7 +183,7 @@ void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, 
       const float length = plane.norm();
       const float cos_incidence = inverse / (length * std::sqrt(ray.squaredNorm() + 1.0F));
       if (!(cos_incidence >= min_cos)) continue;
-      const float sigma = AxialSigma(1.0F / inverse, cos_incidence);
+      const float sigma = AxialSigma(surface.depth_noise, 1.0F / inverse, cos_incidence);
       surface.normals[i] = plane * (-1.0F / length);
       surface.pixels[i].weight = cos_incidence / (sigma * sigma);
     }
@@ -191,16 +192,11 @@ void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, 
 
 }  // namespace
 
-float AxialSigma(float depth_m, float cos_incidence) {
-  const float off = depth_m - 0.4F;
-  float sigma = 0.0012F + 0.0019F * off * off;
-  if (cos_incidence < 1.0F) {
-    constexpr float kRightAngle = std::numbers::pi_v<float> / 2.0F;
-    const float angle = std::acos(std::max(cos_incidence, 0.02F));
-    const float ratio = angle / (kRightAngle - angle);
-    sigma += 0.0001F / std::sqrt(depth_m) * ratio * ratio;
-  }
-  return sigma;
+float AxialSigma(const DepthNoise& noise, float depth_m, float cos_incidence) {
+  if (!(cos_incidence < 1.0F)) return noise.SigmaFacing_m(depth_m);
+  constexpr float kRightAngle = std::numbers::pi_v<float> / 2.0F;
+  const float angle = std::acos(std::max(cos_incidence, 0.02F));
+  return noise.Sigma_m(depth_m, angle / (kRightAngle - angle));
 }
 
 Color ViewSurface::ColorAt(std::size_t i) const {
@@ -252,6 +248,7 @@ ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTa
   ViewSurface surface;
   surface.rays = working_rays;
   surface.intrinsics = working_rays->intrinsics();
+  surface.depth_noise = options.depth_noise;
   surface.block = depth.cols / surface.intrinsics.width;
   surface.color_rgb = view.color_rgb;
   surface.T_world_camera = view.T_world_camera;

@@ -12,21 +12,22 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/geometry/back_projection.hpp"
+#include "algo/types/depth_noise.hpp"
 #include "algo/types/keyframe.hpp"
 #include "algo/types/point_cloud.hpp"
 
 namespace plumb {
 
-/// Axial noise of a structured-light depth camera, one standard deviation in metres (Nguyen et al.
-/// 2012).
+/// Standard deviation of one depth measurement, metres.
 /// @param depth_m  Along the optical axis.
 /// @param cos_incidence  Between surface normal and viewing ray, in (0, 1].
-[[nodiscard]] float AxialSigma(float depth_m, float cos_incidence);
+[[nodiscard]] float AxialSigma(const DepthNoise& noise, float depth_m, float cos_incidence);
 
 struct ViewSurfaceOptions {
   float min_depth_m = 0.3F;
   float max_depth_m = 4.0F;
   float max_incidence_deg = 75.0F;  ///< Steeper views of a surface are left out; in (0, 89].
+  DepthNoise depth_noise = {};      ///< The sensor's, see StreamInfo.
   std::stop_token stop = {};        ///< Polled by PrepareViews(); see CheckStop().
 };
 
@@ -43,9 +44,10 @@ struct ViewSurface {
     float weight = 0.0F;
   };
 
-  Intrinsics intrinsics;  ///< Camera of the working image.
-  int block = 1;          ///< Image pixels per working pixel in each direction.
-  cv::Mat color_rgb;      ///< As in the view: at image or working resolution, or empty.
+  Intrinsics intrinsics;   ///< Camera of the working image.
+  DepthNoise depth_noise;  ///< Of the depth image's pixels, not of their means.
+  int block = 1;           ///< Image pixels per working pixel in each direction.
+  cv::Mat color_rgb;       ///< As in the view: at image or working resolution, or empty.
   Pose T_world_camera = Pose::Identity();
   std::shared_ptr<const RayTable>
       rays;  ///< Of the working pixels; shared by the views of one camera.

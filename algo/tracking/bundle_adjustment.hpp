@@ -8,6 +8,7 @@
 
 #include "algo/sensor_model/calibration_prior.hpp"
 #include "algo/tracking/map.hpp"
+#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 
@@ -48,7 +49,8 @@ struct BundleOptions {
   double initial_damping = 1e-4;
   double keypoint_sigma_px = 0.6;  ///< In pixels at 640 columns.
   double keypoint_depth_sigmas =
-      1.5;  ///< Standard deviation of a keypoint's depth relative to the noise model.
+      1.5;  ///< Standard deviation of a keypoint's depth relative to `depth_noise`.
+  DepthNoise depth_noise = {};  ///< The sensor's, see StreamInfo.
   double min_corner_sigma_px = 0.05;
   double marker_length_m = 0.0;  ///< Required: the room's, see CornersInMarkerFrame().
   std::stop_token stop = {};     ///< Polled in each iteration.

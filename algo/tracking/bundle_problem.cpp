@@ -118,7 +118,8 @@ void Problem::CollectPoints() {
               DepthPlace(o.pixel, stated_),
               {o.z_m, o.inverse_depth_slope}};
       if (o.z_m > 0)
-        view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
+        view.weight_z =
+            1.0 / (options_.keypoint_depth_sigmas * DepthSigma(options_.depth_noise, o.z_m, 0.8));
     }
   });
 }

@@ -43,13 +43,8 @@ double Grazing(double cos_incidence) {
   return theta / (std::numbers::pi / 2 - theta);
 }
 
-double DepthSigmaAt(double z_m, double grazing) {
-  return 0.0012 + 0.0019 * (z_m - 0.4) * (z_m - 0.4) +
-         0.0001 / std::sqrt(std::max(z_m, 0.1)) * grazing * grazing;
-}
-
-double DepthSigma(double z_m, double cos_incidence) {
-  return DepthSigmaAt(z_m, Grazing(cos_incidence));
+double DepthSigma(const DepthNoise& noise, double z_m, double cos_incidence) {
+  return noise.Sigma_m(z_m, Grazing(cos_incidence));
 }
 
 DenseViewMaker::DenseViewMaker(const Intrinsics& intrinsics)

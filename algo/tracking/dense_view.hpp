@@ -8,6 +8,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/base/intrinsics.hpp"
+#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 
@@ -53,11 +54,10 @@ class DenseViewMaker {
   std::shared_ptr<const std::vector<Eigen::Vector2f>> rays_;
 };
 
-/// Standard deviation of one depth measurement (Nguyen et al. 2012, axial), metres; cos_incidence
-/// in (0, 1].
-[[nodiscard]] double DepthSigma(double z_m, double cos_incidence);
-/// The same in two steps for repeated measurements of one surface; the first step is the slow one.
+/// The incidence as DepthNoise::Sigma_m() takes it, at most that of 80 deg; cos_incidence in (0,
+/// 1]. Slow: for repeated measurements of one surface it is computed once.
 [[nodiscard]] double Grazing(double cos_incidence);
-[[nodiscard]] double DepthSigmaAt(double z_m, double grazing);
+/// Standard deviation of one depth measurement, metres; cos_incidence in (0, 1].
+[[nodiscard]] double DepthSigma(const DepthNoise& noise, double z_m, double cos_incidence);
 
 }  // namespace plumb

@@ -37,7 +37,7 @@ void FollowedPoints::Follow(const Pyramid& last, const GrayImage& image, const c
     point.sigma = 1.2 * SigmaPx() / intrinsics_.fx;
     if (const double z = DepthAt(depth_m, pixel); z > 0) {
       point.inverse_z = 1.0 / z;
-      point.inverse_z_sigma = (2.0 * DepthSigma(z, 0.8) + 0.003) / (z * z);
+      point.inverse_z_sigma = (2.0 * DepthSigma(depth_noise_, z, 0.8) + 0.003) / (z * z);
     }
     points.push_back(point);
     followed.push_back({active_[i].landmark, klt.points[i]});

@@ -14,6 +14,7 @@
 #include "algo/tracking/keypoints.hpp"
 #include "algo/tracking/map.hpp"
 #include "algo/tracking/pose_optimizer.hpp"
+#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 
@@ -32,8 +33,8 @@ struct GrayImage {
 class FollowedPoints {
  public:
   /// @param map  Must outlive this object.
-  FollowedPoints(const Intrinsics& intrinsics, TrackingMap& map)
-      : intrinsics_(intrinsics), map_(map) {}
+  FollowedPoints(const Intrinsics& intrinsics, const DepthNoise& depth_noise, TrackingMap& map)
+      : intrinsics_(intrinsics), depth_noise_(depth_noise), map_(map) {}
 
   [[nodiscard]] const std::vector<ActivePoint>& points() const { return active_; }
   void SetPoints(std::vector<ActivePoint> points) { active_ = std::move(points); }
@@ -75,6 +76,7 @@ class FollowedPoints {
   [[nodiscard]] Pyramid PyramidOfKeyframe(std::size_t keyframe);
 
   const Intrinsics intrinsics_;
+  const DepthNoise depth_noise_;
   const KeypointOptions options_;
   TrackingMap& map_;
   std::vector<ActivePoint> active_;

@@ -131,7 +131,8 @@ class LocalBundle {
       PointView& view = views_[next[s]++];
       view = {k, Undistort(intrinsics_, o.pixel), o.z_m, 0.0};
       if (o.z_m > 0)
-        view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
+        view.weight_z =
+            1.0 / (options_.keypoint_depth_sigmas * DepthSigma(options_.depth_noise, o.z_m, 0.8));
     });
   }
 

@@ -6,6 +6,7 @@
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/tracking/map.hpp"
+#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 
@@ -18,7 +19,8 @@ struct LocalBundleOptions {
   double min_relative_decrease = 1e-3;
   double keypoint_sigma_px = 0.6;  ///< In pixels at 640 columns.
   double keypoint_depth_sigmas =
-      1.5;  ///< Standard deviation of a keypoint's depth relative to the noise model.
+      1.5;  ///< Standard deviation of a keypoint's depth relative to `depth_noise`.
+  DepthNoise depth_noise = {};       ///< The sensor's, see StreamInfo.
   double min_corner_sigma_px = 0.3;  ///< In pixels at 640 columns.
   double marker_length_m = 0.0;      ///< Required: the room's, see CornersInMarkerFrame().
 };

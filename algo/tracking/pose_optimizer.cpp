@@ -119,7 +119,9 @@ DenseSum AddDense(const PoseProblem& problem, const std::vector<DensePoint>& poi
     const double residual = n.dot(q - target.point(j));
     if (std::abs(residual) > gate_m) continue;
     const double sigma =
-        std::sqrt(2.0) * DepthSigmaAt(q.z(), GrazingOf(target, j, grazing_of_cells)) + 0.002;
+        std::sqrt(2.0) * problem.depth_noise.Sigma_m(static_cast<double>(q.z()),
+                                                     GrazingOf(target, j, grazing_of_cells)) +
+        0.002;
     // The motion is on the colour camera's side: q = T_target_color * exp(x) * p_color.
     const Eigen::Vector3d n_color = R_target_color.transpose() * n.cast<double>();
     Vector6d J;

@@ -5,6 +5,7 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/tracking/dense_view.hpp"
+#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 
@@ -28,6 +29,7 @@ struct PoseProblem {
       Pose::Identity();  ///< Motion from the frame's colour stamp to its depth stamp.
   /// Camera of the full image; the cells of the dense views are scaled from it.
   Intrinsics intrinsics;
+  DepthNoise depth_noise = {};  ///< Of both dense views; the sensor's, see StreamInfo.
   int num_iterations = 10;
 };
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "algo/base/errors.hpp"
 #include "algo/tracking/tracker_impl.hpp"
 
 namespace plumb {
@@ -24,7 +25,11 @@ Tracker::Impl::Impl(const StreamInfo& stream, const TrackerOptions& tracker_opti
     : info(stream),
       options(tracker_options),
       dense_maker(stream.intrinsics),
-      followed_points(stream.intrinsics, map) {
+      followed_points(stream.intrinsics, stream.depth_noise, map) {
+  if (const std::optional<std::string> fault = FaultOf(info.depth_noise))
+    throw DataError(fmt::format(
+        "the depth noise stated for the sensor cannot be used: {}; correct what states it",
+        *fault));
   if (options.use_markers) detector.emplace(MarkerDictionary::ByName(info.marker_dictionary));
 }
 
@@ -136,6 +141,7 @@ void Tracker::Impl::AddMarkerPoints(const std::vector<MarkerObservation>& marker
 PoseProblem Tracker::Impl::MakeProblem(const FrameData& prepared, double dt_depth_s) const {
   PoseProblem problem;
   problem.intrinsics = info.intrinsics;
+  problem.depth_noise = info.depth_noise;
   problem.T_color_depth = PoseFromTwist(velocity * dt_depth_s);
   if (options.use_dense) {
     const MapKeyframe& keyframe = ReferenceKeyframe();

@@ -55,7 +55,8 @@ struct TrackedFrame {
 /// Not thread-safe: call from one thread. Deterministic.
 class Tracker {
  public:
-  /// @param info  Intrinsics, marker dictionary (DataError if unknown) and marker length.
+  /// @param info  Intrinsics, depth noise, marker dictionary and marker length.
+  /// @throws DataError if the dictionary is unknown or the depth noise impossible.
   Tracker(const StreamInfo& info, const TrackerOptions& options);
   ~Tracker();
 

@@ -249,6 +249,7 @@ void Tracker::Impl::AdjustLocally(int index) {
   if (index == 0) return;
   LocalBundleOptions bundle;
   bundle.marker_length_m = info.marker_length_m;
+  bundle.depth_noise = info.depth_noise;
   for (int k = std::max(1, index + 1 - options.local_keyframes); k <= index; ++k)
     if (IsConstrained(map, map.keyframes[static_cast<std::size_t>(k)]))
       bundle.free_keyframes.push_back(k);

@@ -9,6 +9,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/base/intrinsics.hpp"
+#include "algo/types/depth_noise.hpp"
 #include "algo/types/marker.hpp"
 
 namespace plumb {
@@ -27,7 +28,8 @@ struct Frame {
 
 /// Properties of a stream that are known before its first frame.
 struct StreamInfo {
-  Intrinsics intrinsics;  ///< Of the colour camera (and therefore of the registered depth).
+  Intrinsics intrinsics;        ///< Of the colour camera (and therefore of the registered depth).
+  DepthNoise depth_noise = {};  ///< Of the sensor; structured light unless stated otherwise.
   bool intrinsics_assumed = false;  ///< The recording has no calibration; nominal values are used.
   /// OpenCV's name, or DICT_ARUCO_MIP_36h12.
   std::string marker_dictionary = kDefaultMarkerDictionary;

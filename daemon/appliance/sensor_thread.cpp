@@ -12,6 +12,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/loop/explain.hpp"
+#include "drivers/live/sensor_driver.hpp"
 
 namespace plumb {
 
@@ -137,7 +138,7 @@ struct SensorThread::Impl {
       return;
     }
     retry_at.reset();
-    std::shared_ptr<LiveSensor> opened = provider->Open(match->serial);
+    std::shared_ptr<LiveSensor> opened = OpenSensor(*provider, match->serial);
     const std::lock_guard lock(mutex);
     sensor = std::move(opened);
     ready = false;

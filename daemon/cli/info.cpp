@@ -62,6 +62,12 @@ ordered_json RecordingFacts(const fs::path& path) {
       {"calibration", info.intrinsics_assumed  ? "assumed"
                       : fs::is_directory(path) ? "from camera.yaml"
                                                : "from the file beside it"},
+      {"depth_noise",
+       {{"constant_m", info.depth_noise.constant_m},
+        {"linear_m_per_m", info.depth_noise.linear_m_per_m},
+        {"quadratic_m_per_m2", info.depth_noise.quadratic_m_per_m2},
+        {"origin_m", info.depth_noise.origin_m},
+        {"grazing_m", info.depth_noise.grazing_m}}},
       {"marker_dictionary", info.marker_dictionary},
       {"marker_length_m", info.marker_length_m},
       {"reference_marker", nullptr},

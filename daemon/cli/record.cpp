@@ -73,7 +73,7 @@ struct Attached {
                   progress.Update("rendering", fraction, scene);
                 });
     provider = setup->MakeProvider();
-    sensor = provider->Open(options.serial);
+    sensor = OpenSensor(*provider, options.serial);
     sensor->LockExposure(true);
   }
 

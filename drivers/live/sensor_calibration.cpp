@@ -79,12 +79,13 @@ std::filesystem::path CalibrationFile(const std::filesystem::path& folder,
 
 StreamInfo CalibratedStreamInfo(const SensorSettings& settings, const std::string& text,
                                 const std::string& name, const std::string& serial, int width,
-                                int height) {
+                                int height, const DepthNoise& depth_noise) {
   const CameraFile camera =
       ForSensor(serial, [&] { return ParseCalibration(text, name, width, height); });
   if (settings.markers_are_the_rooms) RefuseOtherMarkers(settings, camera, name);
   StreamInfo info;
   info.intrinsics = Resized(camera.color, width, height);
+  info.depth_noise = camera.depth_noise.value_or(depth_noise);
   info.marker_dictionary = camera.marker_dictionary.value_or(settings.marker_dictionary);
   info.marker_length_m = camera.marker_length_m.value_or(settings.marker_length_m);
   info.reference_marker =
@@ -94,16 +95,17 @@ StreamInfo CalibratedStreamInfo(const SensorSettings& settings, const std::strin
 }
 
 StreamInfo LiveStreamInfo(const SensorSettings& settings, const std::string& serial, int width,
-                          int height, double horizontal_fov_rad) {
+                          int height, double horizontal_fov_rad, const DepthNoise& depth_noise) {
   const std::filesystem::path file = CalibrationFile(settings.calibration_folder, serial);
   std::error_code error;
   if (!settings.calibration_folder.empty() &&
       std::filesystem::exists(std::filesystem::symlink_status(file, error))) {
     return CalibratedStreamInfo(
         settings, ForSensor(serial, [&] { return ReadTextFile(file, kMaxFileBytes); }),
-        file.string(), serial, width, height);
+        file.string(), serial, width, height, depth_noise);
   }
   StreamInfo info;
+  info.depth_noise = depth_noise;
   info.marker_dictionary = settings.marker_dictionary;
   info.marker_length_m = settings.marker_length_m;
   info.reference_marker = settings.reference_marker;

@@ -17,15 +17,18 @@ namespace plumb {
 /// The unit's calibration file, scaled to the image size, or nominal intrinsics with a warning.
 /// @param horizontal_fov_rad  Of the colour camera as stated by the driver; outside (0.2, 2.5):
 ///         TUM's published 525 pixels.
+/// @param depth_noise  Of the model, as the driver knows it; the unit's file may state its own.
 /// @throws DeviceError if the unit's file exists but is damaged, is for images of another shape, or
 ///         names other markers than the room's (SensorSettings::markers_are_the_rooms).
 [[nodiscard]] StreamInfo LiveStreamInfo(const SensorSettings& settings, const std::string& serial,
-                                        int width, int height, double horizontal_fov_rad);
+                                        int width, int height, double horizontal_fov_rad,
+                                        const DepthNoise& depth_noise = {});
 
 /// As LiveStreamInfo() for a unit whose calibration file has this text.
 /// @param name  Name of the file for messages.
 [[nodiscard]] StreamInfo CalibratedStreamInfo(const SensorSettings& settings,
                                               const std::string& text, const std::string& name,
-                                              const std::string& serial, int width, int height);
+                                              const std::string& serial, int width, int height,
+                                              const DepthNoise& depth_noise = {});
 
 }  // namespace plumb

@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 namespace {
@@ -34,6 +35,16 @@ const SensorDriver& NoDriver() {
 std::string SensorSetup::Command(const std::string& command) const {
   throw DeviceError(
       fmt::format("sim {}: there is no virtual sensor; start plumbd with --simulated", command));
+}
+
+std::unique_ptr<LiveSensor> OpenSensor(SensorProvider& provider, const std::string& serial) {
+  std::unique_ptr<LiveSensor> sensor = provider.Open(serial);
+  if (const std::optional<std::string> fault = FaultOf(sensor->info().depth_noise)) {
+    throw DeviceError(fmt::format(
+        "the driver of sensor {} states a depth noise that cannot be used: {}; correct the driver",
+        sensor->description().serial, *fault));
+  }
+  return sensor;
 }
 
 void SensorRegistry::Add(SensorDriver driver) {

@@ -92,6 +92,12 @@ struct SensorDriver {
   std::function<std::vector<SensorFinding>()> examine = {};
 };
 
+/// Opens a sensor as SensorProvider::Open() does, and checks what its driver states of it, so that
+/// no scan begins that could not be reconstructed.
+/// @throws DeviceError also if StreamInfo::depth_noise is impossible.
+[[nodiscard]] std::unique_ptr<LiveSensor> OpenSensor(SensorProvider& provider,
+                                                     const std::string& serial);
+
 /// Records an open sensor into a file, from construction until Finish().
 class FileRecorder {
  public:

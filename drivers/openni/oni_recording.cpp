@@ -208,6 +208,7 @@ void OniRecording::Impl::ReadCamera(const oni::Header& header, const RecordingDe
                                   header.width, header.height));
     }
     info.intrinsics = camera.color;
+    info.depth_noise = camera.depth_noise.value_or(DepthNoise());
     info.marker_dictionary = camera.marker_dictionary.value_or(info.marker_dictionary);
     info.marker_length_m = camera.marker_length_m.value_or(info.marker_length_m);
     if (camera.reference_marker) info.reference_marker = camera.reference_marker;

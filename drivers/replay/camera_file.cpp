@@ -5,6 +5,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -103,6 +104,22 @@ class Keys {
       throw DataError(fmt::format("{} is not a matrix of numbers", Where(key)));
     std::vector<double> values;
     for (const YAML::Node& element : data) values.push_back(Number(element, key));
+    return values;
+  }
+
+  /// The numbers of a map that has these keys and no others.
+  template <std::size_t N>
+  [[nodiscard]] std::array<double, N> Numbers(const char* key,
+                                              const std::array<const char*, N>& names) const {
+    const YAML::Node node = Required(key);
+    bool fits = node.IsMap() && node.size() == N;
+    for (const char* name : names) fits = fits && node[name].IsDefined();
+    if (!fits)
+      throw DataError(fmt::format("{} does not hold what is expected: the keys {}, one number each",
+                                  Where(key), fmt::join(names, ", ")));
+    std::array<double, N> values{};
+    for (std::size_t i = 0; i < N; ++i)
+      values[i] = Number(node[names[i]], fmt::format("{}: {}", key, names[i]).c_str());
     return values;
   }
 
@@ -258,6 +275,26 @@ void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
   camera.depth_camera = depth;
 }
 
+void ReadDepthNoise(const Keys& keys, CameraFile& camera) {
+  constexpr const char* kKey = "depth_noise";
+  if (!keys.has(kKey)) return;
+  constexpr std::array<const char*, 5> kNames = {"constant_m", "linear_m_per_m",
+                                                 "quadratic_m_per_m2", "origin_m", "grazing_m"};
+  const std::array<double, 5> values = keys.Numbers(kKey, kNames);
+  const DepthNoise noise = {.constant_m = values[0],
+                            .linear_m_per_m = values[1],
+                            .quadratic_m_per_m2 = values[2],
+                            .origin_m = values[3],
+                            .grazing_m = values[4]};
+  if (const std::optional<std::string> fault = FaultOf(noise)) {
+    throw DataError(fmt::format(
+        "{}: {}; state one standard deviation of the depth in metres, or remove the key for the "
+        "noise of structured light",
+        keys.Where(kKey), *fault));
+  }
+  camera.depth_noise = noise;
+}
+
 void ReadMarkers(const Keys& keys, CameraFile& camera) {
   if (keys.has("marker_dictionary")) {
     const std::string name = keys.Text("marker_dictionary");
@@ -311,6 +348,7 @@ CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
     }
   }
   ReadDepthCamera(keys, camera);
+  ReadDepthNoise(keys, camera);
   ReadMarkers(keys, camera);
   return camera;
 } catch (const YAML::Exception& error) {

@@ -8,6 +8,7 @@
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
+#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 
@@ -27,15 +28,16 @@ struct CameraFile {
   std::optional<std::string> marker_dictionary;
   std::optional<double> marker_length_m;
   std::optional<int> reference_marker;
+  std::optional<DepthNoise> depth_noise;
   std::vector<std::string> warnings;
 };
 
 /// Reads OpenCV's FileStorage YAML. Keys: image_width, image_height, camera_matrix,
 /// distortion_coefficients, depth_scale, depth_registered, marker_dictionary, marker_length
-/// (metres), reference_marker; for depth_registered 0 also depth_camera_matrix,
-/// depth_distortion_coefficients, T_color_depth (4x4) and, if they differ from the colour image's,
-/// depth_image_width and depth_image_height. Without the first three of these the depth camera is
-/// unknown, with a warning.
+/// (metres), reference_marker, depth_noise (a map with each member of DepthNoise); for
+/// depth_registered 0 also depth_camera_matrix, depth_distortion_coefficients, T_color_depth (4x4)
+/// and, if they differ from the colour image's, depth_image_width and depth_image_height. Without
+/// the first three of these the depth camera is unknown, with a warning.
 /// @param name  Name of the file for messages.
 /// @throws DataError naming file, key, what was found and what is expected.
 [[nodiscard]] CameraFile ParseCameraFile(std::string_view text, const std::string& name);

@@ -206,6 +206,7 @@ void TumRecording::Impl::ReadCamera(const fs::path& folder, const RecordingDefau
             : AssumedCamera(plans.front().color_file);
   info.intrinsics = camera.color;
   info.intrinsics_assumed = !given;
+  info.depth_noise = camera.depth_noise.value_or(DepthNoise());
   info.marker_dictionary = camera.marker_dictionary.value_or(defaults.marker_dictionary);
   info.marker_length_m = camera.marker_length_m.value_or(defaults.marker_length_m);
   info.reference_marker =

@@ -87,6 +87,13 @@ std::string CameraFileText(const StreamInfo& info, double depth_scale) {
       Real(camera.cy), Real(d[0]), Real(d[1]), Real(d[2]), Real(d[3]), Real(d[4]),
       Real(depth_scale), info.marker_dictionary, Real(info.marker_length_m));
   if (info.reference_marker) text += fmt::format("reference_marker: {}\n", *info.reference_marker);
+  if (const DepthNoise& noise = info.depth_noise; noise != DepthNoise()) {
+    text += fmt::format(
+        "depth_noise:\n   constant_m: {}\n   linear_m_per_m: {}\n   quadratic_m_per_m2: {}\n"
+        "   origin_m: {}\n   grazing_m: {}\n",
+        Real(noise.constant_m), Real(noise.linear_m_per_m), Real(noise.quadratic_m_per_m2),
+        Real(noise.origin_m), Real(noise.grazing_m));
+  }
   return text;
 }
 

@@ -59,6 +59,8 @@ void WriteTexts(const fs::path& root) {
   info.reference_marker = 3;
   const std::string camera = CameraFileText(info, 5000);
   WriteWholeFile(Folder(root / "camera") / "registered", camera);
+  info.depth_noise.constant_m = 0.003;
+  WriteWholeFile(root / "camera/noisy", CameraFileText(info, 5000));
   std::string depth_camera = camera;
   depth_camera.replace(
       depth_camera.find("depth_registered: 1"), 19,

@@ -41,6 +41,10 @@ class FakeBus {
   void RefuseToOpen(const std::string& why) {
     Change([&] { refusal_ = why; });
   }
+  /// What sensors that are opened from now on state.
+  void StateNoise(const DepthNoise& noise) {
+    Change([&] { noise_ = noise; });
+  }
   /// One frame comes; frame numbers count over all sensors.
   void GiveFrame() {
     Change([&] { ++given_; });
@@ -96,6 +100,7 @@ class FakeBus {
   std::vector<std::string> attached_;
   std::string failure_, stall_, refusal_;
   std::function<void()> listener_;
+  DepthNoise noise_;
   int given_ = 0, taken_ = 0, opened_ = 0, flushed_ = 0;
   bool locked_ = false;
 };
@@ -103,7 +108,9 @@ class FakeBus {
 class FakeSensor : public LiveSensor {
  public:
   FakeSensor(FakeBus& bus, const std::string& serial)
-      : bus_(bus), description_{.uri = "fake/" + serial, .serial = serial, .name = "fake"} {}
+      : bus_(bus), description_{.uri = "fake/" + serial, .serial = serial, .name = "fake"} {
+    info_.depth_noise = bus.noise_;  // its provider holds the lock
+  }
   [[nodiscard]] const StreamInfo& info() const override { return info_; }
   [[nodiscard]] const SensorDescription& description() const override { return description_; }
   [[nodiscard]] SensorStatistics statistics() const override { return {}; }

@@ -13,9 +13,11 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "algo/reconstruction/reconstructor.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "drivers/live/sensor_driver.hpp"
+#include "drivers/replay/tum_recording.hpp"
 #include "drivers/simulated/suite.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 #include "tests/support/message_of.hpp"
@@ -29,6 +31,13 @@ using ::testing::HasSubstr;
 using testing::MessageOf;
 
 constexpr int kFrames = 90;
+
+/// What the driver states of its sensor: the depth of a stereo camera.
+constexpr DepthNoise kItsNoise = {.constant_m = 0.0005,
+                                  .linear_m_per_m = 0.0,
+                                  .quadratic_m_per_m2 = 0.004,
+                                  .origin_m = 0.0,
+                                  .grazing_m = 0.0};
 
 /// A sweep of the simulator's demo at 15 Hz: made once, read by all sensors.
 struct Sweep {
@@ -54,6 +63,7 @@ class SweepSensor : public LiveSensor {
  public:
   SweepSensor(std::shared_ptr<Sweep> sweep, const SensorSettings& settings)
       : sweep_(std::move(sweep)), info_(sweep_->info) {
+    info_.depth_noise = kItsNoise;
     info_.marker_dictionary = settings.marker_dictionary;
     info_.marker_length_m = settings.marker_length_m;
     info_.reference_marker = settings.reference_marker;
@@ -148,7 +158,18 @@ class OwnDriverTest : public ::testing::Test {
   SensorRegistry registry_;
 };
 
-TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReference) {
+/// The surface of a recording if its sensor has this noise.
+std::vector<Eigen::Vector3f> Surface(const std::filesystem::path& recording,
+                                     const std::optional<DepthNoise>& noise) {
+  const auto source = TumRecording::Open(recording);
+  StreamInfo info = source->info();
+  info.depth_noise = noise.value_or(info.depth_noise);
+  Reconstructor reconstructor(info, {});
+  while (const std::optional<Frame> frame = source->Next()) reconstructor.AddFrame(*frame);
+  return reconstructor.Finish().cloud.points;
+}
+
+TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReferenceAndItsNoiseWithTheRecording) {
   EventLoop loop;  // first: blocks signals before any thread starts
   const testing::TempFolder folder;
   Config config =
@@ -158,6 +179,7 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReference) {
                               sweep_->info.reference_marker.value()),
                   "plumb.toml");
   config.appliance.state = folder / "state";
+  config.appliance.keep_recordings = true;
   const std::unique_ptr<SensorSetup> setup = registry_.Choose(config.appliance.sensor_driver, false)
                                                  .set_up(SensorSettingsOf(config), {}, {}, {});
   ApplianceParts parts;
@@ -209,9 +231,15 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReference) {
   person.join();
   EXPECT_EQ(status["sensor"]["serial"], "SWEEP-1") << status.dump(2);
   EXPECT_EQ(status["last_result"]["is_reference"], true);
-  EXPECT_TRUE(std::filesystem::exists(folder / "state" / "scans" /
-                                      status["last_result"]["scan"].get<std::string>() / "scene" /
-                                      "scene.json"));
+  const std::filesystem::path scan =
+      folder / "state" / "scans" / status["last_result"]["scan"].get<std::string>();
+  EXPECT_TRUE(std::filesystem::exists(scan / "scene" / "scene.json"));
+  const std::filesystem::path recording = scan / "recording";
+  ASSERT_TRUE(std::filesystem::exists(recording));
+  EXPECT_EQ(TumRecording::Open(recording)->info().depth_noise, kItsNoise);
+  const auto replayed = Surface(recording, {});
+  EXPECT_EQ(replayed, Surface(recording, kItsNoise));
+  EXPECT_NE(replayed, Surface(recording, DepthNoise())) << "what the driver states has no effect";
 }
 
 TEST_F(OwnDriverTest, ANameThatIsMisspeltIsAnsweredWithTheNamesThatAreKnown) {

@@ -273,5 +273,21 @@ TEST_F(SensorThreadTest, AStalledProcessFailsTheScanAndKeepsTheSensor) {
   EXPECT_TRUE(next->Next({}));
 }
 
+TEST_F(SensorThreadTest, ASensorWhoseDepthNoiseIsImpossibleIsNotUsed) {
+  Start();
+  bus_.StateNoise({.constant_m = 1.2});
+  bus_.Plug("A");
+  EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
+  EXPECT_THAT(events_.At(1).reason,
+              ::testing::AllOf(::testing::HasSubstr("sensor A"),
+                               ::testing::HasSubstr("constant_m is 1.2, expected"),
+                               ::testing::HasSubstr("correct the driver")));
+  const DepthNoise possible = {.constant_m = 0.004};
+  bus_.StateNoise(possible);
+  bus_.GiveFrame();
+  EXPECT_EQ(events_.At(2).kind, Kind::kReady);
+  EXPECT_EQ(thread_->snapshot().info.depth_noise, possible);
+}
+
 }  // namespace
 }  // namespace plumb

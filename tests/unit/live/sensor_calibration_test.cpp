@@ -79,5 +79,24 @@ TEST_F(SensorCalibrationTest, WithoutARoomTheFileSaysWhichMarkersThereAre) {
   EXPECT_EQ(info.reference_marker, 8);
 }
 
+TEST_F(SensorCalibrationTest, TheDepthNoiseIsTheDriversUnlessTheUnitsFileStatesOne) {
+  const DepthNoise of_model = {.constant_m = 0.003, .quadratic_m_per_m2 = 0.0};
+  const auto noise = [&] {
+    return LiveStreamInfo(room_, "S1", 640, 480, 0.0, of_model).depth_noise;
+  };
+  EXPECT_EQ(noise(), of_model) << "without a file";
+  EXPECT_EQ(Info().depth_noise, DepthNoise()) << "of a driver that states none";
+  Write("");
+  EXPECT_EQ(noise(), of_model);
+  Write(
+      "depth_noise: {constant_m: 0.002, linear_m_per_m: 0, quadratic_m_per_m2: 0.001, "
+      "origin_m: 0, grazing_m: 0}\n");
+  const DepthNoise of_unit = {
+      .constant_m = 0.002, .quadratic_m_per_m2 = 0.001, .origin_m = 0.0, .grazing_m = 0.0};
+  EXPECT_EQ(noise(), of_unit);
+  EXPECT_THAT(Complaint("depth_noise: {constant_m: 2}\n"),
+              AllOf(HasSubstr("S1.yaml: depth_noise"), HasSubstr("correct or remove the file")));
+}
+
 }  // namespace
 }  // namespace plumb

@@ -17,6 +17,7 @@
 #include "drivers/openni/oni_file.hpp"
 #include "drivers/openni/oni_recorder.hpp"
 #include "drivers/openni/oni_recording.hpp"
+#include "drivers/replay/tum_writer.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 #include "drivers/virtual/openni/oni_writer.hpp"
 #include "tests/support/message_of.hpp"
@@ -320,6 +321,17 @@ TEST(OniFileTest, TheBeginsComeBackFromTheSideCar) {
   EXPECT_EQ(begin.color_us, 1'700'000'000'134'187);
   EXPECT_EQ(begin.depth_us, 42);
   EXPECT_EQ(ParseOniBegin("a: 1\ncolor_begin_us: -5\ndepth_begin_us: x\n").color_us, 0);
+}
+
+TEST(OniTest, TheDepthNoiseOfTheSideCarComesBack) {
+  const TempFolder folder;
+  const fs::path file = folder / "noisy.oni";
+  fs::copy_file(Recording(), file);
+  StreamInfo info = Source()->info();
+  info.depth_noise.constant_m = 0.004;
+  WriteWholeFile(OniSideCar(file), CameraFileText(info, 1000.0));
+  EXPECT_EQ(OniRecording::Open(file)->info().depth_noise, info.depth_noise);
+  EXPECT_EQ(OniRecording::Open(Recording())->info().depth_noise, DepthNoise());
 }
 
 }  // namespace

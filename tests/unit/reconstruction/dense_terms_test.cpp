@@ -1,5 +1,7 @@
 #include "algo/reconstruction/dense_terms.hpp"
 
+#include <array>
+
 #include <gtest/gtest.h>
 
 #include "tests/unit/tracking/synthetic_map.hpp"
@@ -84,6 +86,26 @@ TEST(DenseTerms, AreTheSameInMemoryThatHeldOthers) {
     EXPECT_EQ(used[i].H, fresh[i].H);
     EXPECT_EQ(used[i].g, fresh[i].g);
     EXPECT_EQ(used[i].marker, fresh[i].marker);
+  }
+}
+
+TEST(DenseTerms, WeighByTheNoiseThatIsStatedForTheSensor) {
+  Scene scene({.num_keyframes = 4, .num_landmarks = 40, .dense = true});
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  const auto weight_m2 = [&](const DepthNoise& noise) {
+    std::vector<QuadraticTerm> terms;
+    MakeTerms(scene.sensor, {.marker_length_m = synthetic::kMarkerLength, .depth_noise = noise},
+              scene.truth.map, scene.views, pairs, kGate_m, Density::kFine, {}, terms);
+    std::array<double, 2> sums{};  // Between views, and on markers' faces.
+    for (const QuadraticTerm& term : terms)
+      sums[term.marker ? 1 : 0] += term.H.topLeftCorner<6, 6>().trace();
+    return sums;
+  };
+  const auto usual = weight_m2({}), noisy = weight_m2({.constant_m = 0.02});
+  for (const std::size_t i : {0U, 1U}) {
+    EXPECT_GT(usual[i], 0.0) << i;
+    EXPECT_LT(noisy[i], 0.05 * usual[i]) << i;  // sigma of 21 mm instead of 2
   }
 }
 

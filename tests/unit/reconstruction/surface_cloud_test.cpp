@@ -15,6 +15,7 @@ namespace plumb {
 namespace {
 
 using testing::DomeScene;
+using testing::ShiftDepth;
 using testing::SweepOverDome;
 
 /// Distance from the dome's surface along its normal (first order), where the surface is not steep;
@@ -124,6 +125,58 @@ TEST(MergeSurfaceTest, EmptyInputsAndCallersMistakes) {
                std::invalid_argument);
   blind.T_world_camera.translation().x() = std::nan("");
   EXPECT_THROW((void)MergeSurface(std::vector<DepthView>{blind}), std::invalid_argument);
+}
+
+TEST(PrepareViewsTest, WeightsAndEdgesFollowTheNoiseThatIsStatedForTheSensor) {
+  const DomeScene scene;
+  const std::vector<DepthView> views = SweepOverDome(scene, 2, 320, 0.0);
+  const auto prepared = [&](const DepthNoise& noise) {
+    return PrepareViews(views, {.depth_noise = noise}).front();
+  };
+  const ViewSurface usual = prepared({});
+  const DepthNoise twice = {
+      .constant_m = 2 * 0.0012, .quadratic_m_per_m2 = 2 * 0.0019, .grazing_m = 2 * 0.0001};
+  const ViewSurface noisy = prepared(twice);
+  EXPECT_EQ(noisy.depth_noise, twice);
+  int num_compared = 0, num_usual = 0, num_blurred = 0;
+  for (std::size_t i = 0; i < usual.size(); ++i) {
+    num_usual += usual.pixels[i].inverse_depth > 0 ? 1 : 0;
+    if (!(usual.pixels[i].weight > 0) || usual.normals[i] != noisy.normals[i]) continue;
+    ++num_compared;
+    ASSERT_NEAR(usual.pixels[i].weight / noisy.pixels[i].weight, 4.0F, 1e-4F);
+  }
+  EXPECT_GT(num_compared, 10000);
+  // Where depth scatters by 5 cm, a step of a few centimetres is no edge.
+  const ViewSurface blurred = prepared({.constant_m = 0.05});
+  for (const ViewSurface::Pixel& pixel : blurred.pixels) num_blurred += pixel.weight > 0 ? 1 : 0;
+  EXPECT_GT(num_blurred, num_compared);
+  EXPECT_GE(num_usual, num_compared);
+}
+
+TEST(MergeSurfaceTest, ViewsAgreeWithinFourSigmasOfTheirSensor) {
+  const DomeScene scene;
+  std::vector<DepthView> views = SweepOverDome(scene, 6, 320, 0.0);
+  for (std::size_t i = 0; i < views.size(); i += 2)
+    ShiftDepth(views[i], cv::Rect(0, 0, 320, 240), 0.02F);
+  // Standard deviation of the floor's height.
+  const auto thickness_m = [&](double constant_m) {
+    const DepthNoise noise = {.constant_m = constant_m, .quadratic_m_per_m2 = 0.0};
+    double sum = 0.0, sum_squared = 0.0;
+    int count = 0;
+    for (const Eigen::Vector3f& p :
+         MergeSurface(PrepareViews(views, {.depth_noise = noise})).points) {
+      if (std::hypot(p.x() - scene.x, p.y() - scene.y) < 1.5 * scene.a) continue;
+      sum += p.z();
+      sum_squared += p.z() * p.z();
+      ++count;
+    }
+    EXPECT_GT(count, 1000);
+    return std::sqrt(sum_squared / count - (sum / count) * (sum / count));
+  };
+  // Two layers that are 2 cm apart; the same surface where 4 sigma are 8 cm.
+  const double apart_m = thickness_m(0.001), merged_m = thickness_m(0.02);
+  EXPECT_GT(apart_m, 0.007);
+  EXPECT_LT(merged_m, 0.7 * apart_m);
 }
 
 }  // namespace

@@ -64,6 +64,7 @@ TEST(CameraFileTest, AbsentKeysKeepTheirDefaults) {
   EXPECT_EQ(camera.color.fx, 262.0);
   EXPECT_EQ(camera.depth_scale, 5000.0);
   EXPECT_FALSE(camera.marker_dictionary || camera.marker_length_m || camera.reference_marker);
+  EXPECT_FALSE(camera.depth_noise);
   EXPECT_THAT(camera.warnings, SizeIs(1));  // no lens
 }
 
@@ -196,6 +197,58 @@ TEST(CameraFileTest, ATransformThatIsNotRigidIsNamed) {
   EXPECT_THAT(Refusal(text), AllOf(HasSubstr("T_color_depth"), HasSubstr("metres")));
   EXPECT_THAT(Refusal(With("depth_registered: 1", "depth_registered: 2")),
               HasSubstr("expected 0 or 1"));
+}
+
+constexpr const char* kNoise =
+    "reference_marker: 7\ndepth_noise:\n   constant_m: 0.0005\n   linear_m_per_m: 0.\n"
+    "   quadratic_m_per_m2: 0.004\n   origin_m: 0.\n   grazing_m: 2e-4\n";
+
+/// The good file with a depth noise, with one piece of its text exchanged.
+std::string WithNoise(std::string_view old_text, std::string_view new_text) {
+  std::string text = With("reference_marker: 7\n", kNoise);
+  const std::size_t at = text.find(old_text, text.find("depth_noise"));
+  EXPECT_NE(at, std::string::npos) << old_text;
+  return text.replace(at, old_text.size(), new_text);
+}
+
+TEST(CameraFileTest, TheDepthNoiseIsReadAsItIsStated) {
+  const DepthNoise expected = {.constant_m = 0.0005,
+                               .linear_m_per_m = 0.0,
+                               .quadratic_m_per_m2 = 0.004,
+                               .origin_m = 0.0,
+                               .grazing_m = 0.0002};
+  EXPECT_EQ(ParseCameraFile(WithNoise("0.0005", "0.0005"), "c").depth_noise, expected);
+  EXPECT_EQ(ParseCameraFile(With("reference_marker: 7",
+                                 "depth_noise: {grazing_m: 0.0002, constant_m: 0.0005, origin_m: 0,"
+                                 " quadratic_m_per_m2: 0.004, linear_m_per_m: 0}"),
+                            "c")
+                .depth_noise,
+            expected);
+}
+
+TEST(CameraFileTest, ADepthNoiseThatIsNotWholeIsNamedWithItsKeys) {
+  const auto keys = AllOf(HasSubstr("rec/camera.yaml: depth_noise"),
+                          HasSubstr("constant_m, linear_m_per_m, quadratic_m_per_m2, origin_m, "
+                                    "grazing_m"));
+  EXPECT_THAT(Refusal(WithNoise("   origin_m: 0.\n", "")), keys);
+  EXPECT_THAT(Refusal(WithNoise("origin_m", "orign_m")), keys);
+  EXPECT_THAT(Refusal(WithNoise("   origin_m: 0.\n", "   origin_m: 0.\n   cubic: 0.\n")), keys);
+  for (const char* other : {"0.0012", "[0.0012, 0, 0.0019, 0.4, 0.0001]", "{}", "kinect"})
+    EXPECT_THAT(Refusal(With("reference_marker: 7", std::string("depth_noise: ") + other)), keys)
+        << other;
+}
+
+TEST(CameraFileTest, ADepthNoiseThatIsImpossibleIsNamedWithWhatToDo) {
+  EXPECT_THAT(Refusal(WithNoise("0.0005", "1.2")),
+              AllOf(HasSubstr("rec/camera.yaml: depth_noise: constant_m is 1.2"),
+                    HasSubstr("from -0.1 to 0.1"), HasSubstr("in metres"), HasSubstr("remove")));
+  EXPECT_THAT(Refusal(WithNoise("0.0005", "-0.0005")), HasSubstr("falls to -0.0005 m"));
+  EXPECT_THAT(Refusal(WithNoise("0.004", "-0.004")), HasSubstr("quadratic_m_per_m2 is -0.004"));
+  EXPECT_THAT(Refusal(WithNoise("0.004", "0.2")), HasSubstr("at 1 m"));
+  for (const char* hostile : {".Nan", ".Inf", "-.Inf", "1e999", "[1]", "{a: 1}", "\"many\"", ""})
+    EXPECT_THAT(Refusal(WithNoise("0.0005", hostile)),
+                AllOf(HasSubstr("depth_noise: constant_m"), HasSubstr("finite numbers")))
+        << hostile;
 }
 
 }  // namespace

@@ -382,5 +382,24 @@ TEST_F(TumRecordingTest, DepthBeyondSixteenBitsIsWrittenAsNothing) {
   EXPECT_EQ(units.at<std::uint16_t>(0, 2), 2500);
 }
 
+TEST_F(TumRecordingTest, TheSensorsDepthNoiseComesBackToTheBit) {
+  EXPECT_EQ(TumRecording::Open(recording_)->info().depth_noise, DepthNoise());
+  EXPECT_EQ(ReadTextFile(recording_ / "camera.yaml", 1 << 16).find("depth_noise"),
+            std::string::npos)
+      << "recordings of structured light stay as they were";
+  for (double DepthNoise::*member :
+       {&DepthNoise::constant_m, &DepthNoise::linear_m_per_m, &DepthNoise::quadratic_m_per_m2,
+        &DepthNoise::origin_m, &DepthNoise::grazing_m}) {
+    StreamInfo info = SmallCamera();
+    info.depth_noise.*member += 0.001 / 3;
+    const fs::path folder = folder_ / "other";
+    TumWriter writer(folder, info, {.jpeg_quality = 0});
+    for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i));
+    writer.Finish();
+    EXPECT_EQ(TumRecording::Open(folder)->info().depth_noise, info.depth_noise);
+    fs::remove_all(folder);
+  }
+}
+
 }  // namespace
 }  // namespace plumb

@@ -267,5 +267,22 @@ TEST(BundleAdjust, QuadraticTermPullsToItsMinimum) {
         << i;  // Measured: 2e-10; the solver's first trust region.
 }
 
+TEST(BundleAdjust, DepthCostsByTheNoiseThatIsStatedForIt) {
+  const auto truth = MakeTrueMap({.markers = false});
+  const auto cost = [&](double constant_m) {
+    TrackingMap map = truth.map;
+    for (MapKeyframe& keyframe : map.keyframes)
+      for (KeypointObservation& o : keyframe.keypoints) o.z_m += 0.02;  // the pixels still fit
+    BundleOptions options = FreeAllButTheFirst(map);
+    options.keypoint_depth_sigmas = 1.0;
+    options.depth_noise.constant_m = constant_m;
+    options.max_iterations = 1;
+    CalibrationModel calibration;
+    return BundleAdjust(truth.stated, options, {}, map, calibration).initial_cost;
+  };
+  EXPECT_LT(cost(0.1), 0.05 * cost(0.001));
+  EXPECT_EQ(cost(DepthNoise().constant_m), cost(0.0012));
+}
+
 }  // namespace
 }  // namespace plumb

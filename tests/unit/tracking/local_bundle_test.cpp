@@ -161,5 +161,20 @@ TEST(LocalBundle, LeavesAMapThatShowsNothingAsItIs) {
   EXPECT_DOUBLE_EQ(map.keyframes[1].T_world_color.translation().x(), 0.1);
 }
 
+TEST(LocalBundle, DepthCostsByTheNoiseThatIsStatedForIt) {
+  const auto truth = MakeTrueMap({.markers = false});
+  const auto cost = [&](double constant_m) {
+    TrackingMap map = truth.map;
+    for (MapKeyframe& keyframe : map.keyframes)
+      for (KeypointObservation& o : keyframe.keypoints) o.z_m += 0.02;  // the pixels still fit
+    LocalBundleOptions options = FreeFrom(1, map);
+    options.depth_noise.constant_m = constant_m;
+    options.max_iterations = 1;
+    return AdjustLocalMap(truth.stated, options, map).initial_cost;
+  };
+  EXPECT_LT(cost(0.1), 0.05 * cost(0.001));
+  EXPECT_EQ(cost(DepthNoise().constant_m), cost(0.0012));
+}
+
 }  // namespace
 }  // namespace plumb

@@ -112,5 +112,23 @@ TEST(OptimizePose, NothingToGoByLeavesTheStart) {
   EXPECT_EQ(estimate.num_inliers, 0);
 }
 
+TEST(OptimizePose, DepthIsTrustedByTheNoiseThatIsStatedForIt) {
+  const auto truth = synthetic::MakeTrueMap(
+      {.num_keyframes = 2, .num_landmarks = 0, .markers = false, .dense = true});
+  const auto information = [&](double factor) {
+    PoseProblem problem;
+    problem.intrinsics = truth.stated;
+    problem.dense_frame = &truth.map.keyframes[1].dense;
+    problem.dense_target = &truth.map.keyframes[0].dense;
+    problem.T_world_target = truth.map.keyframes[0].T_world_color;
+    problem.depth_noise.constant_m *= factor;
+    problem.depth_noise.quadratic_m_per_m2 *= factor;
+    problem.depth_noise.grazing_m *= factor;
+    return OptimizePose(problem, truth.map.keyframes[1].T_world_color).information.trace();
+  };
+  // sqrt(2) sigma + 2 mm, with sigma of about 2 mm and of 20 mm: (4.8 / 30)^2 of the information.
+  EXPECT_NEAR(information(10.0) / information(1.0), 0.025, 0.015);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -132,5 +132,37 @@ TEST_F(TrackerTest, RefusesWhatItCannotUse) {
   EXPECT_THROW(Tracker(unknown, {}), DataError);
 }
 
+TEST_F(TrackerTest, UsesTheDepthNoiseThatTheSensorStates) {
+  const auto pose_of_last = [](const DepthNoise& noise, const TrackerOptions& options) {
+    StreamInfo info = sweep().info;
+    info.depth_noise = noise;
+    Tracker tracker(info, options);
+    for (std::size_t i = 0; i < 10; ++i) tracker.Track(sweep().frames[i]);
+    EXPECT_TRUE(tracker.frames().back().tracked);
+    return tracker.T_world_color(tracker.frames().back()).matrix();
+  };
+  // Without local bundle adjustment, which would hide them: depth against the keyframe, and that of
+  // followed points.
+  const TrackerOptions means[] = {{.use_keypoints = false, .local_keyframes = 0},
+                                  {.use_markers = false, .use_dense = false, .local_keyframes = 0}};
+  for (const TrackerOptions& options : means) {
+    const auto usual = pose_of_last({}, options);
+    EXPECT_EQ(usual, pose_of_last({}, options));
+    EXPECT_NE(usual, pose_of_last({.constant_m = 0.02}, options)) << options.use_dense;
+  }
+}
+
+TEST_F(TrackerTest, RefusesADepthNoiseThatIsImpossible) {
+  StreamInfo info = sweep().info;
+  info.depth_noise.quadratic_m_per_m2 = -1;
+  try {
+    Tracker tracker(info, {});
+    FAIL() << "taken";
+  } catch (const DataError& error) {
+    EXPECT_NE(std::string(error.what()).find("quadratic_m_per_m2 is -1"), std::string::npos)
+        << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace plumb
