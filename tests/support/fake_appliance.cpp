@@ -23,6 +23,14 @@ Change FakeAppliance::Refusal(ChangeResult result, std::string message) {
   return {result, std::move(message), "", ""};
 }
 
+Status FakeAppliance::GetStatus() {
+  Status told = status;
+  if (told.last_result && told.last_result->finished_at && !told.last_result->age_s)
+    told.last_result->age_s =
+        std::chrono::duration<double>(WallClock::now() - *told.last_result->finished_at).count();
+  return told;
+}
+
 void FakeAppliance::Notify(EventKind kind) const {
   if (listener_) listener_(kind);
 }

@@ -103,7 +103,8 @@ class FakeAppliance : public web::BackgroundWork,
   // --- the services
   bool RunInBackground(web::BackgroundPool where, std::function<void()> work,
                        std::function<void()> done) override;
-  web::Status GetStatus() override { return status; }
+  /// With the age of the last result, unless a test has set one.
+  web::Status GetStatus() override;
   web::Health GetHealth() override { return health; }
   std::shared_ptr<const std::string> Preview() override { return preview; }
   std::shared_ptr<const std::string> SweptSurface() override {

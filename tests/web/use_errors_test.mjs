@@ -177,6 +177,11 @@ await h.step('a result that can no longer be acted on says what was found, and c
   await anna.getByText('every part as in the reference').first().waitFor();
   equal(await anna.getByText('Correct the posture first').count(), 0, 'nothing to correct');
   equal(await anna.locator('.number .arrow').count(), 1, 'while it is valid it commands');
+  // After a restart only the wall clock tells how old it is, and that may have been set.
+  h.tell('restarted');
+  await anna.getByRole('heading', { name: /^Correction found then/ }).waitFor();
+  await anna.locator('.old-note', { hasText: 'OLD' }).waitFor();
+  equal(await anna.locator('.number .arrow').count(), 0, 'nothing is commanded');
   h.tell('old');
   await anna.getByRole('heading', { name: /^Correction found then/ }).waitFor();
   for (const where of [`${h.url}#/result`, `${h.url}#/result/${shown.id}`]) {

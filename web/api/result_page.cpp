@@ -18,7 +18,6 @@
 namespace plumb::web {
 namespace {
 
-constexpr std::chrono::minutes kOldAfter{2};
 constexpr std::chrono::seconds kRefreshEvery{10};
 
 /// A pattern of the words, filled in.
@@ -201,10 +200,41 @@ struct Records {
 /// What was requested.
 struct Wanted {
   std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
-  bool runs = false;                ///< A new scan is running or being computed.
+  Status status;                    ///< Of the appliance at the request.
   Language language = Language::kEnglish;
   const ResultWords& words = ResultWordsOf(language);
+
+  /// A new scan is running or being computed.
+  [[nodiscard]] bool runs() const {
+    return status.state == ApplianceState::kScanning || status.state == ApplianceState::kWorking;
+  }
 };
+
+/// Time since the end of the scan by the appliance's steady clock; not set for a scan that is not
+/// the last one since its start.
+std::optional<double> SteadyAge_s(const Scan& scan, const Status& status) {
+  return status.last_result && status.last_result->id == scan.id ? status.last_result->age_s
+                                                                 : std::nullopt;
+}
+
+/// Whether the result must not be acted on. The wall clock does not count: it may have been set.
+/// @param has_newer  A later scan has ended without a result.
+bool IsOld(const Scan& scan, bool has_newer, const Wanted& wanted) {
+  const std::optional<double> age_s = SteadyAge_s(scan, wanted.status);
+  const std::optional<TreatmentSession>& session = wanted.status.session;
+  const bool is_on_couch =
+      scan.patient_id.empty() || (session && session->patient_id == scan.patient_id);
+  return !age_s || *age_s > kResultValid_s || has_newer || wanted.runs() || !is_on_couch;
+}
+
+/// "5 min ago": by the steady clock if it knows, otherwise by the wall clock.
+std::string AgoText(const Scan& scan, const Wanted& wanted) {
+  std::chrono::duration<double> age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
+  if (const auto steady_s = SteadyAge_s(scan, wanted.status))
+    age = std::chrono::duration<double>(*steady_s);
+  if (age < age.zero()) return std::string(wanted.words.ago_unknown);
+  return Filled(wanted.words.ago_min, std::chrono::floor<std::chrono::minutes>(age).count());
+}
 
 std::string AcceptedLine(const Scan& scan, const ResultWords& words) {
   if (scan.accepted_by.empty()) return "";
@@ -233,33 +263,29 @@ std::string Identity(const Records& records, const Scan& scan, const Scan* newer
                      const Wanted& wanted) {
   const ResultWords& words = wanted.words;
   const auto patient = records.patients.FindPatient(scan.patient_id);
-  const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
-  const std::string when =
-      age >= age.zero()
-          ? Filled(words.ago_min, std::chrono::floor<std::chrono::minutes>(age).count())
-          : std::string(words.ago_unknown);
   std::string text;
   if (newer != nullptr) {
     text += fmt::format(
         "<p role=\"alert\">{}</p>",
         Filled(words.newer_failed, LocalTimeText(newer->started_at), Said(newer->failure, words)));
   }
-  if (wanted.runs) text += fmt::format("<p role=\"alert\">{}</p>", words.running);
+  if (wanted.runs()) text += fmt::format("<p role=\"alert\">{}</p>", words.running);
   text += fmt::format(
       "<h1>{}</h1><p>{}{}{}</p>",
       patient ? Filled(words.patient, EscapeHtml(patient->code)) : std::string(words.no_patient),
       scan.fraction > 0 ? Filled(words.fraction, scan.fraction) + " " : "",
-      Filled(words.scan_line, EscapeHtml(scan.id), LocalTimeText(scan.started_at), when),
+      Filled(words.scan_line, EscapeHtml(scan.id), LocalTimeText(scan.started_at),
+             AgoText(scan, wanted)),
       old ? fmt::format(" <strong>{}</strong>", words.old) : "");
   return text + AcceptedLine(scan, words);
 }
 
-std::string ResultBody(const Records& records, const Scan& scan, const Scan* newer,
+/// @param newer      A later scan without a result that is mentioned; null if there is none.
+/// @param has_newer  There is one, whether it is mentioned or not.
+std::string ResultBody(const Records& records, const Scan& scan, const Scan* newer, bool has_newer,
                        const Wanted& wanted) {
   const ResultWords& words = wanted.words;
-  const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
-  const bool is_known = age >= age.zero();  // otherwise the clock has stepped
-  const bool old = !is_known || age > kOldAfter || newer != nullptr || wanted.runs;
+  const bool old = scan.result && IsOld(scan, has_newer, wanted);
   std::string body = Identity(records, scan, newer, old, wanted);
   if (scan.outcome != ScanOutcome::kDone)
     return body + fmt::format(
@@ -284,26 +310,32 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
          BodyList(*scan.result, words) + Pictures(scan, words) + "</section>";
 }
 
-/// The newest completed scan if none is named; a later failed one is mentioned.
+/// The scan that is named, else the newest completed one; a later failed one is mentioned.
 Response ResultPage(const Records& records, const Wanted& wanted) {
+  constexpr int kLookedThrough = 20;
   std::optional<Scan> scan, failed;
-  if (wanted.scan) {
-    scan = records.scans.FindScan(*wanted.scan);
-  } else {
-    for (Scan& candidate : records.scans.Scans("", 20)) {
-      if (candidate.outcome == ScanOutcome::kFailed && !failed) failed = candidate;
-      if (candidate.outcome != ScanOutcome::kDone) continue;
+  bool has_newer = false;
+  for (Scan& candidate : records.scans.Scans("", kLookedThrough)) {
+    const bool is_wanted =
+        wanted.scan ? candidate.id == *wanted.scan : candidate.outcome == ScanOutcome::kDone;
+    if (is_wanted) {
       scan = std::move(candidate);
       break;
     }
-    if (!scan) std::swap(scan, failed);
+    if (candidate.outcome != ScanOutcome::kFailed) continue;
+    has_newer = true;
+    if (!failed) failed = std::move(candidate);
   }
+  if (!scan && wanted.scan) scan = records.scans.FindScan(*wanted.scan);
+  // Of a scan that is named, only that one is read or printed.
+  if (wanted.scan) failed.reset();
+  if (!scan) std::swap(scan, failed);
   Response response;
   response.type = "text/html; charset=utf-8";
   // A page for a named scan is read or printed, so it does not reload itself.
   response.body =
       Document(wanted.words,
-               scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, wanted)
+               scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, has_newer, wanted)
                     : fmt::format("<h1>{}</h1>", wanted.words.none),
                scan && wanted.scan ? fmt::format("scan={}&amp;", scan->id) : "", !wanted.scan);
   if (scan) response.about = scan->id;
@@ -349,10 +381,9 @@ void AddResultPage(Router& router, const Services& services) {
          if (!request.session)
            return respond(LoginPage(request, ResultWordsOf(language), accounts.WhyUnreadable()));
          const auto named = request.query.find("scan");
-         const ApplianceState state = appliance.GetStatus().state;
          const Wanted wanted{
              .scan = named == request.query.end() ? std::nullopt : std::optional(named->second),
-             .runs = state == ApplianceState::kScanning || state == ApplianceState::kWorking,
+             .status = appliance.GetStatus(),
              .language = language};
          RespondAside(
              background, "GET /result", [records, wanted] { return ResultPage(records, wanted); },

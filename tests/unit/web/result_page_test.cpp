@@ -21,7 +21,8 @@ class ResultPageTest : public WebTest {
     SetUpAccounts();
     client_ = std::make_unique<HttpClient>(LoggedIn("technician"));
   }
-  /// A scan in tolerance that ended so long ago, by the wall clock.
+  /// A scan in tolerance that ended so long ago, by both clocks. A completed one is the last result
+  /// that the status names.
   void Add(const std::string& id, seconds age, web::ScanOutcome outcome = web::ScanOutcome::kDone) {
     loop_->Do([&] {
       web::Scan scan;
@@ -33,6 +34,9 @@ class ResultPageTest : public WebTest {
       scan.result = web::ResultSummary{};
       scan.result->verdict = "in_tolerance";
       service_.scans.push_back(scan);
+      if (outcome != web::ScanOutcome::kDone) return;
+      scan.age_s = static_cast<double>(age.count());
+      service_.status.last_result = scan;
     });
   }
   [[nodiscard]] std::string Page() { return client_->Get("/result").body; }
@@ -60,7 +64,7 @@ TEST_F(ResultPageTest, WhatIsToBeKnownStandsBesideTheVerdict) {
 TEST_F(ResultPageTest, TheNumbersHaveTheNamesThatTheResultGivesThem) {
   Add("s1", seconds(10));
   loop_->Do([&] {
-    service_.scans.back().result->correction = web::SixNumbers{.longitudinal_mm = 1.0};
+    service_.scans.back().result->correction.emplace().longitudinal_mm = 1.0;
     service_.axis_names[1] = "Patient <head>";
   });
   EXPECT_THAT(Page(), AllOf(HasSubstr("<th scope=\"row\">Patient &lt;head&gt;</th>"),
@@ -84,15 +88,50 @@ TEST_F(ResultPageTest, AnAcceptanceWithAReasonIsInTheWordsOfItsVerdict) {
 }
 
 TEST_F(ResultPageTest, AfterTwoMinutesItIsOld) {
-  Add("s1", seconds(121));
+  Add("s1", seconds(120));
+  EXPECT_THAT(Page(), Not(HasSubstr(kOld)));
+  loop_->Do([&] { service_.status.last_result->age_s = 120.5; });
   EXPECT_THAT(Page(), HasSubstr(kOld));
   EXPECT_THAT(Page(), HasSubstr("class=\"old\""));
 }
 
-TEST_F(ResultPageTest, AResultOfTheFutureIsOldBecauseTheClockHasStepped) {
+TEST_F(ResultPageTest, TheWallClockMakesNoResultFresh) {
+  Add("s1", seconds(10));
+  loop_->Do([&] { service_.status.last_result->age_s = 600; });  // it was set back meanwhile
+  EXPECT_THAT(Page(), AllOf(HasSubstr(kOld), HasSubstr("10 min ago")));
+  loop_->Do([&] {
+    service_.status.last_result->age_s.reset();
+    service_.status.last_result->finished_at.reset();
+  });
+  EXPECT_THAT(Page(), HasSubstr(kOld)) << "its age is not known";
+  loop_->Do([&] { service_.status.last_result.reset(); });  // a restart of the appliance
+  for (const char* path : {"/result", "/result?scan=s1"})
+    EXPECT_THAT(client_->Get(path).body, HasSubstr(kOld)) << path;
+}
+
+TEST_F(ResultPageTest, AResultOfTheFutureIsOldUnlessTheSteadyClockKnowsItsAge) {
   Add("s1", seconds(-60));
+  loop_->Do([&] { service_.status.last_result->age_s = 30; });
+  EXPECT_THAT(Page(), AllOf(Not(HasSubstr(kOld)), Not(HasSubstr("the clock has stepped"))));
+  loop_->Do([&] { service_.status.last_result.reset(); });
   EXPECT_THAT(Page(), HasSubstr("the clock has stepped"));
   EXPECT_THAT(Page(), HasSubstr(kOld));
+}
+
+TEST_F(ResultPageTest, OnlyTheResultOfThePatientWhoseSessionIsOpenIsNotOld) {
+  Add("s1", seconds(10));
+  const auto open = [&](const std::string& patient) {
+    loop_->Do([&] {
+      service_.status.session.reset();
+      if (!patient.empty()) service_.status.session.emplace().patient_id = patient;
+    });
+  };
+  loop_->Do([&] { service_.scans.back().patient_id = "p1"; });
+  EXPECT_THAT(Page(), HasSubstr(kOld)) << "the session is closed";
+  open("p1");
+  EXPECT_THAT(Page(), Not(HasSubstr(kOld)));
+  open("p2");
+  EXPECT_THAT(Page(), HasSubstr(kOld)) << "another patient is on the couch";
 }
 
 TEST_F(ResultPageTest, AfterAScanThatFailedTheOneBeforeItIsOld) {
@@ -100,6 +139,8 @@ TEST_F(ResultPageTest, AfterAScanThatFailedTheOneBeforeItIsOld) {
   Add("s2", seconds(5), web::ScanOutcome::kFailed);
   EXPECT_THAT(Page(), HasSubstr("from before it"));
   EXPECT_THAT(Page(), HasSubstr(kOld));
+  EXPECT_THAT(client_->Get("/result?scan=s1").body,
+              AllOf(HasSubstr(kOld), Not(HasSubstr("from before it"))));
 }
 
 TEST_F(ResultPageTest, WhileAScanRunsTheOneBeforeItIsOld) {

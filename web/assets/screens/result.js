@@ -215,8 +215,10 @@ export async function showResult(place, id) {
     const received = now();
     let last = null;
     if (!id) {
-      ({ last_result: last } = await get('status', true));
+      const status = await get('status', true);
+      last = status.last_result;
       latest = last?.id ?? null;
+      live.take(status);  // its event may come later, and the result is judged by it
     }
     const found = id ? await find(id) : await newest(last);
     const data = found && await collect(found, received);

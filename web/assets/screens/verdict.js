@@ -14,7 +14,8 @@ export function ageOf(scan, received) {
 
 /// Why this result must not be used: "running", "superseded", "closed" (its patient's session is
 /// not the one that is open), "old", "offline" (nobody knows here whether one of these holds by
-/// now); null: it is valid.
+/// now); null: it is valid. The appliance measures the age of its last result since its start by a
+/// steady clock; that of any other one is the wall clock's, which may have been set, so it is old.
 export function whyNotValid(scan, received) {
   if (!scan.result) return null;
   const { status } = live;
@@ -23,6 +24,7 @@ export function whyNotValid(scan, received) {
       && status.last_result.patient_id === scan.patient_id) return 'superseded';
   if (ageOf(scan, received) > kOldAfter_s) return 'old';
   if (status && scan.patient_id && status.session?.patient_id !== scan.patient_id) return 'closed';
+  if (status?.last_result?.id !== scan.id) return 'old';
   return live.connected ? null : 'offline';
 }
 
