@@ -11,6 +11,7 @@
 #include "web/api/accounts.hpp"
 #include "web/api/api.hpp"
 #include "web/api/disclosures.hpp"
+#include "web/api/display_view.hpp"
 #include "web/api/json.hpp"
 #include "web/assets/assets.hpp"
 #include "web/http/checks.hpp"
@@ -76,6 +77,7 @@ class HttpServer::Impl {
     AddResultPage(router_, services);
     AddExportRoutes(router_, services);
     AddRoomCalibrationRoutes(router_, services);
+    LimitDisplays(router_, services);
     LogDisclosures(router_, services.audit, options_.now);
     AddPageRoutes();
     epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);

@@ -7,6 +7,7 @@
 
 #include "algo/base/digits.hpp"
 #include "web/api/api.hpp"
+#include "web/api/display_view.hpp"
 #include "web/api/json.hpp"
 #include "web/api/local_time.hpp"
 #include "web/api/result_words.hpp"
@@ -201,6 +202,7 @@ struct Records {
 struct Wanted {
   std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
   Status status;                    ///< Of the appliance at the request.
+  bool is_display = false;          ///< By a display in the room.
   Language language = Language::kEnglish;
   const ResultWords& words = ResultWordsOf(language);
 
@@ -313,20 +315,26 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
 /// The scan that is named, else the newest completed one; a later failed one is mentioned.
 Response ResultPage(const Records& records, const Wanted& wanted) {
   constexpr int kLookedThrough = 20;
+  const auto may_show = [&](const Scan& one) {
+    return !wanted.is_display || IsForDisplay(one, wanted.status);
+  };
   std::optional<Scan> scan, failed;
   bool has_newer = false;
   for (Scan& candidate : records.scans.Scans("", kLookedThrough)) {
     const bool is_wanted =
         wanted.scan ? candidate.id == *wanted.scan : candidate.outcome == ScanOutcome::kDone;
     if (is_wanted) {
-      scan = std::move(candidate);
+      if (may_show(candidate)) scan = std::move(candidate);
       break;
     }
     if (candidate.outcome != ScanOutcome::kFailed) continue;
     has_newer = true;
-    if (!failed) failed = std::move(candidate);
+    if (!failed && may_show(candidate)) failed = std::move(candidate);
   }
-  if (!scan && wanted.scan) scan = records.scans.FindScan(*wanted.scan);
+  if (!scan && wanted.scan) {
+    scan = records.scans.FindScan(*wanted.scan);
+    if (scan && !may_show(*scan)) scan.reset();
+  }
   // Of a scan that is named, only that one is read or printed.
   if (wanted.scan) failed.reset();
   if (!scan) std::swap(scan, failed);
@@ -384,6 +392,7 @@ void AddResultPage(Router& router, const Services& services) {
          const Wanted wanted{
              .scan = named == request.query.end() ? std::nullopt : std::optional(named->second),
              .status = appliance.GetStatus(),
+             .is_display = request.session->role == Role::kDisplay,
              .language = language};
          RespondAside(
              background, "GET /result", [records, wanted] { return ResultPage(records, wanted); },
