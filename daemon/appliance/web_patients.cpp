@@ -36,9 +36,11 @@ void WebPatients::AddPatient(const web::Actor& actor, const std::string& code,
 }
 
 void WebPatients::ChangePatient(const web::Actor& actor, const std::string& id,
-                                const std::string& site, const std::string& note, web::Done done) {
-  store_.Change(&Store::patients, std::move(done),
-                [=](PatientStore& patients) { patients.Change(actor, id, site, note); });
+                                const web::CourseNotes& wanted,
+                                const std::optional<web::CourseNotes>& shown, web::Done done) {
+  store_.Change(&Store::patients, std::move(done), [=](PatientStore& patients) {
+    patients.Change(actor, id, wanted.site, wanted.note, shown);
+  });
 }
 
 void WebPatients::ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,

@@ -15,8 +15,8 @@ class WebPatients : public web::PatientService {
   [[nodiscard]] std::optional<web::Patient> FindPatient(const std::string& id) override;
   void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site,
                   web::Done done) override;
-  void ChangePatient(const web::Actor& actor, const std::string& id, const std::string& site,
-                     const std::string& note, web::Done done) override;
+  void ChangePatient(const web::Actor& actor, const std::string& id, const web::CourseNotes& wanted,
+                     const std::optional<web::CourseNotes>& shown, web::Done done) override;
   void ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
                       web::Done done) override;
   void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override;

@@ -40,13 +40,15 @@ web::Settings WebSettings::GetSettings() {
   return store_.Read(&Store::settings, [](SettingsStore& settings) { return settings.Get(); });
 }
 
-void WebSettings::ChangeSettings(const web::Actor& actor, const web::Settings& settings,
+void WebSettings::ChangeSettings(const web::Actor& actor, const web::SettingsChange& change,
                                  web::Done done) {
-  if (const std::string wrong = CheckSettings(settings); !wrong.empty()) {
+  if (const std::string wrong = CheckSettings(change.AppliedTo({})); !wrong.empty()) {
     return done(Refusal(ChangeResult::kInvalid, wrong));
   }
-  store_.Change(&Store::settings, std::move(done),
-                [=](SettingsStore& stored) { stored.Change(actor, settings); });
+  // The store's thread makes one change after the other, so none comes between reading and writing.
+  store_.Change(&Store::settings, std::move(done), [=](SettingsStore& stored) {
+    stored.Change(actor, change.AppliedTo(change.is_complete() ? web::Settings{} : stored.Get()));
+  });
 }
 
 std::vector<web::PlanTemplate> WebSettings::Templates() {

@@ -12,7 +12,7 @@ class WebSettings : public web::SettingsService {
   explicit WebSettings(StoreAccess& store) : store_(store) {}
 
   [[nodiscard]] web::Settings GetSettings() override;
-  void ChangeSettings(const web::Actor& actor, const web::Settings& settings,
+  void ChangeSettings(const web::Actor& actor, const web::SettingsChange& change,
                       web::Done done) override;
   [[nodiscard]] std::vector<web::PlanTemplate> Templates() override;
   void SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,

@@ -95,9 +95,17 @@ std::string PatientStore::Add(const web::Actor& actor, const std::string& code,
 }
 
 void PatientStore::Change(const web::Actor& actor, const std::string& id, const std::string& site,
-                          const std::string& note) {
+                          const std::string& note, const std::optional<web::CourseNotes>& shown) {
   const std::int64_t number = RequireId(id, "patient");
   StoreChange change(database_);
+  {
+    Statement query = change.Prepare("SELECT site, note FROM patients WHERE id = ? AND id > 0");
+    if (shown && query.Bind(number).Step() &&
+        *shown != web::CourseNotes{.site = query.Text(0), .note = query.Text(1)})
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "this patient was changed by somebody else meanwhile: look again, then "
+                         "save");
+  }
   change.Prepare("UPDATE patients SET site = ?, note = ? WHERE id = ? AND id > 0")
       .Bind(site)
       .Bind(note)

@@ -21,8 +21,10 @@ class PatientStore {
   [[nodiscard]] std::optional<web::Patient> FindByCode(const std::string& code);
   /// Returns the id. kConflict for a code that another patient has.
   std::string Add(const web::Actor& actor, const std::string& code, const std::string& site);
+  /// @param shown  What the person has seen; kConflict if something else is stored by now. Not set:
+  ///        what is stored is replaced in any case.
   void Change(const web::Actor& actor, const std::string& id, const std::string& site,
-              const std::string& note);
+              const std::string& note, const std::optional<web::CourseNotes>& shown = {});
   /// kConflict while a session of the patient is open.
   void Archive(const web::Actor& actor, const std::string& id, bool archived);
 

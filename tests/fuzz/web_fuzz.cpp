@@ -74,7 +74,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       case 5:
         return (void)ParsePlan(std::string(text));
       default:
-        return (void)ParseSettings(std::string(text));
+        return (void)ParseSettingsChange(std::string(text));
     }
   });
 }

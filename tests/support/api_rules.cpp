@@ -318,10 +318,52 @@ TEST_F(ApiRules, SettingsAreKeptAsTheyWereWrittenAndBounded) {
     const HttpAnswer answer = engineer.Put("/api/v1/settings", wrong);
     EXPECT_EQ(answer.status, 400) << field;
     EXPECT_THAT(answer.body, HasSubstr(field));
-    wrong.erase(field);
-    EXPECT_EQ(engineer.Put("/api/v1/settings", wrong).status, 400) << "without " << field;
+    EXPECT_EQ(engineer.Put("/api/v1/settings", {{field, value}}).status, 400) << field;
   }
   EXPECT_EQ(engineer.Get("/api/v1/settings").json(), wanted);
+}
+
+TEST_F(ApiRules, ASettingThatIsNotSentStaysAsItIsStored) {
+  HttpClient engineer = LoggedIn("engineer");
+  json wanted = engineer.Get("/api/v1/settings").json();
+  for (const auto& [field, value] : std::map<std::string, json>{{"shift_tolerance_mm", 2.5},
+                                                                {"rotation_tolerance_deg", 0.7},
+                                                                {"posture", "HFP"},
+                                                                {"couch_markers", true},
+                                                                {"auto_stop_s", 7.0},
+                                                                {"scan_limit_s", 33.0},
+                                                                {"keep_recordings", true},
+                                                                {"retention_days", 730},
+                                                                {"idle_logout_min", 11}}) {
+    ASSERT_NE(wanted[field], value) << field;
+    wanted[field] = value;
+    EXPECT_EQ(engineer.Put("/api/v1/settings", {{field, value}}).status, 200) << field;
+    EXPECT_EQ(engineer.Get("/api/v1/settings").json(), wanted) << field;
+  }
+  EXPECT_EQ(engineer.Put("/api/v1/settings", json::object()).status, 400);
+  EXPECT_EQ(engineer.Put("/api/v1/settings", {{"nothing", 1}}).status, 400);
+}
+
+TEST_F(ApiRules, ANoteThatSomebodyElseHasChangedMeanwhileIsNotReplaced) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const std::string path = "/api/v1/patients/" + AddPatient(technician, "PX-17");
+  const std::string site = technician.Get(path).json()["site"];
+  const auto save = [&](HttpClient& client, const std::string& note, const std::string& before) {
+    return client.Put(
+        path, {{"site", site}, {"note", note}, {"site_before", site}, {"note_before", before}});
+  };
+  EXPECT_EQ(save(physicist, "arms up", "").status, 200);
+  const HttpAnswer refused = save(technician, "knee rest", "");
+  EXPECT_EQ(refused.status, 409);
+  EXPECT_THAT(refused.body, HasSubstr("changed by somebody else meanwhile"));
+  EXPECT_EQ(technician.Get(path).json()["note"], "arms up");
+  EXPECT_EQ(save(technician, "arms up, knee rest", "arms up").status, 200);
+  EXPECT_EQ(technician.Get(path).json()["note"], "arms up, knee rest");
+  EXPECT_EQ(
+      technician.Put(path, {{"site", ""}, {"note", ""}, {"note_before", "arms up, knee rest"}})
+          .status,
+      400)
+      << "what was shown is both, or neither";
 }
 
 TEST_F(ApiRules, AWipedPatientIsGoneWithEverythingThatBelongsToThem) {

@@ -487,8 +487,8 @@ std::vector<AuditEntry> FakeAppliance::Audit(const web::AuditQuery& query) {
   return found;
 }
 
-void FakeAppliance::ChangeSettings(const Actor& actor, const Settings& changed, Done done) {
-  settings = changed;
+void FakeAppliance::ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) {
+  settings = change.AppliedTo(settings);
   Did(actor, "settings.change", "", done);
 }
 

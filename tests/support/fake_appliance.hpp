@@ -133,8 +133,8 @@ class FakeAppliance : public web::BackgroundWork,
   void SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
                    web::Done done) override;
   void RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) override;
-  void ChangePatient(const web::Actor& actor, const std::string& id, const std::string& site,
-                     const std::string& note, web::Done done) override;
+  void ChangePatient(const web::Actor& actor, const std::string& id, const web::CourseNotes& wanted,
+                     const std::optional<web::CourseNotes>& shown, web::Done done) override;
   void ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
                       web::Done done) override;
   void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override;
@@ -221,7 +221,7 @@ class FakeAppliance : public web::BackgroundWork,
            const std::string& detail) override;
   std::vector<web::AuditEntry> Audit(const web::AuditQuery& query) override;
   web::Settings GetSettings() override { return settings; }
-  void ChangeSettings(const web::Actor& actor, const web::Settings& changed,
+  void ChangeSettings(const web::Actor& actor, const web::SettingsChange& change,
                       web::Done done) override;
   web::UpdateStatus GetUpdate() override { return update; }
   void AddBundle(const web::Actor& actor, const std::filesystem::path& file,

@@ -62,11 +62,16 @@ void FakeAppliance::AddPatient(const Actor& actor, const std::string& code, cons
 }
 
 void FakeAppliance::ChangePatient(const Actor& actor, const std::string& id,
-                                  const std::string& site, const std::string& note, Done done) {
+                                  const CourseNotes& wanted,
+                                  const std::optional<CourseNotes>& shown, Done done) {
   for (Patient& patient : patients) {
     if (patient.id != id) continue;
-    patient.site = site;
-    patient.note = note;
+    if (shown && *shown != CourseNotes{.site = patient.site, .note = patient.note})
+      return Finish(done, Refusal(ChangeResult::kConflict,
+                                  "this patient was changed by somebody else meanwhile: look "
+                                  "again, then save"));
+    patient.site = wanted.site;
+    patient.note = wanted.note;
     return Did(actor, "patient.change", id, done);
   }
   Finish(done, Refusal(ChangeResult::kNotFound, "there is no such patient"));

@@ -654,8 +654,13 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.unroute(settingsUrl);
   await engineer.reload();
   await engineer.getByLabel('Log out after … min of inactivity').fill('20');
+  const elsewhere = { retention_days: 365, keep_recordings: true };
+  equal((await h.api(engineer, 'settings', 'PUT', elsewhere)).status, 200, 'another page changes other settings');
   await engineer.getByRole('button', { name: 'Save' }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  const both = (await h.api(engineer, 'settings')).body;
+  equal([both.retention_days, both.keep_recordings, both.idle_logout_min].join(), '365,true,20', 'nobody undoes what another has changed');
+  equal(await numbers.nth(4).inputValue(), '365', 'what is stored is shown');
   await engineer.getByText('No backup has been made yet.').waitFor();
   await engineer.getByRole('button', { name: 'Back up now' }).click();
   await engineer.getByText(/Last backup: .*, by engineer\./).waitFor();

@@ -638,6 +638,30 @@ await h.step('two at one plan: neither saves over or approves what they have not
   await h.look(clara, 'plan-changed');
 });
 
+await h.step('two at one note: neither saves over what they have not seen', async () => {
+  const path = 'patients/p0001';
+  await anna.goto(`${h.url}#/patient/p0001`);
+  const note = anna.locator('textarea');
+  await note.waitFor();
+  // As if bob had saved a moment ago, and the page did not know yet.
+  const requests = `**/api/v1/${path}`;
+  await anna.route(requests, (route) => (route.request().method() === 'GET' ? route.abort() : route.continue()));
+  const { site } = (await h.api(bob, path)).body;
+  const [, saved] = await Promise.all([anna.waitForEvent('requestfailed', (one) => one.url().endsWith(path)),
+    h.api(bob, path, 'PUT', { site, note: 'arms up' })]);
+  equal(saved.status, 200, 'bob saves');
+  await anna.unroute(requests);
+  await note.fill('knee rest');
+  const save = anna.locator('section', { has: note }).getByRole('button', { name: 'Save' });
+  await save.click();
+  await anna.getByRole('alert').getByText('This patient was changed by somebody else meanwhile').waitFor();
+  equal(await note.inputValue(), 'arms up', 'what is stored');
+  await note.fill('arms up, knee rest');
+  await save.click();
+  await anna.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  equal((await h.api(bob, path)).body.note, 'arms up, knee rest', 'what was seen and changed');
+});
+
 await h.step('half an isocentre is refused at its field', async () => {
   for (const axis of ['x', 'y', 'z']) await clara.getByLabel(`Isocentre ${axis}`).fill('');
   await clara.getByLabel('Isocentre x').fill('0.5');

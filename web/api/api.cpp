@@ -234,10 +234,14 @@ void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& 
   table.Write("PUT", "/api/v1/patients/{id}", Permission::kPatients, BodyKind::kJson,
               [&patients](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
-                const std::string site = fields.Text("site", 0, kMaxSite),
-                                  note = fields.Text("note", 0, kMaxNote);
+                const CourseNotes wanted{.site = fields.Text("site", 0, kMaxSite),
+                                         .note = fields.Text("note", 0, kMaxNote)};
+                std::optional<CourseNotes> shown;
+                if (fields.Has("site_before") || fields.Has("note_before"))
+                  shown = {.site = fields.Text("site_before", 0, kMaxSite),
+                           .note = fields.Text("note_before", 0, kMaxNote)};
                 fields.Finish();
-                patients.ChangePatient(request.actor(), request.arguments[0], site, note,
+                patients.ChangePatient(request.actor(), request.arguments[0], wanted, shown,
                                        Answer(respond));
               });
   table.Write("POST", "/api/v1/patients/{id}/archive", Permission::kPlan, BodyKind::kJson,
@@ -403,7 +407,7 @@ void AddSettingsRoutes(Table& table, SettingsService& settings, AuditLog& audit)
              [&settings](const Request&) { return JsonResponse(ToJson(settings.GetSettings())); });
   table.Write("PUT", "/api/v1/settings", Permission::kSettings, BodyKind::kJson,
               [&settings](const Request& request, const Respond& respond) {
-                settings.ChangeSettings(request.actor(), ParseSettings(request.body),
+                settings.ChangeSettings(request.actor(), ParseSettingsChange(request.body),
                                         Answer(respond));
               });
 }

@@ -168,19 +168,30 @@ std::pair<ReferencePlan, int> ParsePlan(const std::string& body) {
   return {plan, revision};
 }
 
-Settings ParseSettings(const std::string& body) {
+SettingsChange ParseSettingsChange(const std::string& body) {
   Fields fields(body);
-  Settings settings;
-  settings.tolerance = ToleranceIn(fields);
-  settings.posture = PostureIn(fields);
-  settings.couch_markers = fields.Flag("couch_markers");
-  settings.auto_stop_s = NumberIn(fields, "auto_stop_s", kAutoStop_s);
-  settings.scan_limit_s = NumberIn(fields, "scan_limit_s", kScanLimit_s);
-  settings.keep_recordings = fields.Flag("keep_recordings");
-  settings.retention_days = IntegerIn(fields, "retention_days", kRetention_days);
-  settings.idle_logout_min = IntegerIn(fields, "idle_logout_min", kIdleLogout_min);
+  const auto number = [&](const char* name, Range range) {
+    return fields.Has(name) ? std::optional(NumberIn(fields, name, range)) : std::nullopt;
+  };
+  const auto whole = [&](const char* name, Range range) {
+    return fields.Has(name) ? std::optional(IntegerIn(fields, name, range)) : std::nullopt;
+  };
+  const auto flag = [&](const char* name) {
+    return fields.Has(name) ? std::optional(fields.Flag(name)) : std::nullopt;
+  };
+  SettingsChange change;
+  change.shift_mm = number("shift_tolerance_mm", kShiftTolerance_mm);
+  change.rotation_deg = number("rotation_tolerance_deg", kRotationTolerance_deg);
+  if (fields.Has("posture")) change.posture = PostureIn(fields);
+  change.couch_markers = flag("couch_markers");
+  change.auto_stop_s = number("auto_stop_s", kAutoStop_s);
+  change.scan_limit_s = number("scan_limit_s", kScanLimit_s);
+  change.keep_recordings = flag("keep_recordings");
+  change.retention_days = whole("retention_days", kRetention_days);
+  change.idle_logout_min = whole("idle_logout_min", kIdleLogout_min);
   fields.Finish();
-  return settings;
+  if (change.is_empty()) throw DataError("the body states no setting to change");
+  return change;
 }
 
 }  // namespace plumb::web

@@ -7,6 +7,7 @@
 
 #include "web/security/sessions.hpp"
 #include "web/service/service_types.hpp"
+#include "web/service/settings_change.hpp"
 
 namespace plumb::web {
 
@@ -64,7 +65,8 @@ class Fields {
 inline constexpr int kMaxRevision = 1'000'000'000;
 /// Includes the revision on which it is based.
 [[nodiscard]] std::pair<ReferencePlan, int> ParsePlan(const std::string& body);
-[[nodiscard]] Settings ParseSettings(const std::string& body);
+/// Of any of them, but of one at least.
+[[nodiscard]] SettingsChange ParseSettingsChange(const std::string& body);
 [[nodiscard]] PlanTemplate ParseTemplate(const std::string& body);
 [[nodiscard]] ScanPurpose ParsePurpose(const std::string& name);
 

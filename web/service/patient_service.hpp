@@ -20,8 +20,10 @@ class PatientService {
   [[nodiscard]] virtual std::optional<Patient> FindPatient(const std::string& id) = 0;
   virtual void AddPatient(const Actor& actor, const std::string& code, const std::string& site,
                           Done done) = 0;  ///< Returns the id.
-  virtual void ChangePatient(const Actor& actor, const std::string& id, const std::string& site,
-                             const std::string& note, Done done) = 0;
+  /// @param shown  What the person has seen; kConflict if something else is stored by now. Not set:
+  ///        what is stored is replaced in any case.
+  virtual void ChangePatient(const Actor& actor, const std::string& id, const CourseNotes& wanted,
+                             const std::optional<CourseNotes>& shown, Done done) = 0;
   /// Moves the patient to the archive or back. kConflict while a session of the patient is open.
   virtual void ArchivePatient(const Actor& actor, const std::string& id, bool archived,
                               Done done) = 0;

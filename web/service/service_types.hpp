@@ -152,6 +152,12 @@ struct Patient {
 
 inline constexpr std::size_t kMaxSite = 64, kMaxNote = 500;  // bytes
 
+/// What people write about a patient's course.
+struct CourseNotes {
+  std::string site, note;
+  bool operator==(const CourseNotes&) const = default;
+};
+
 /// A patient on the couch, from opening to closing. At most one at a time.
 struct TreatmentSession {
   std::string id;

@@ -6,6 +6,7 @@
 
 #include "web/service/change.hpp"
 #include "web/service/service_types.hpp"
+#include "web/service/settings_change.hpp"
 
 namespace plumb::web {
 
@@ -15,8 +16,9 @@ class SettingsService {
   virtual ~SettingsService() = default;
 
   [[nodiscard]] virtual Settings GetSettings() = 0;
-  virtual void ChangeSettings(const Actor& actor, const Settings& settings,
-                              Done done) = 0;                       ///< kInvalid names the field.
+  /// kInvalid names the field. Settings that are not part of the change keep what is stored when it
+  /// is made.
+  virtual void ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) = 0;
   [[nodiscard]] virtual std::vector<PlanTemplate> Templates() = 0;  ///< By site.
   /// Replaces the template of that site; at most 100 sites.
   virtual void SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) = 0;

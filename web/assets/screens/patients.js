@@ -161,8 +161,16 @@ function aboutPatient(patient, reload) {
   const editable = may('patients');
   return h('section', { class: 'card' }, h('h2', {}, text.about),
     editable ? form({ class: 'form' }, async () => {
-      const body = { site: site.value.trim(), note: note.value.replace(/\s+/g, ' ').trim() };
-      await put(`patients/${patient.id}`, body);
+      const body = {
+        site: site.value.trim(), note: note.value.replace(/\s+/g, ' ').trim(),
+        site_before: patient.site, note_before: patient.note,
+      };
+      try {
+        await put(`patients/${patient.id}`, body);
+      } catch (error) {
+        if (error.status === 409) await reload();  // shows what somebody else has saved
+        throw error;
+      }
       done(S.saved);
       await reload();
     }, field(text.site, site, text.siteHint), field(text.note, note, text.noteHint),

@@ -69,22 +69,35 @@ export async function showSettings(place) {
     if (fault) {  // A box is never empty, a choice can be.
       const choice = select({ true: S.audit.yes, false: S.audit.no }, undefined,
         { required: true, disabled: !editable });
-      inputs[name] = { isOn: () => choice.value === 'true' };
+      inputs[name] = {
+        isOn: () => choice.value === 'true', turn: (on) => { choice.value = String(on); },
+      };
       return field(text[name], choice);
     }
     const { box, element } = checkbox(text[name], settings[name], { disabled: !editable });
-    inputs[name] = { isOn: () => box.checked };
+    inputs[name] = { isOn: () => box.checked, turn: (on) => { box.checked = on; } };
     return element;
   });
   const posture = select(S.plan.postures, settings.posture,
     { required: true, disabled: !editable });
   const alert = fault && h('p', { class: 'caution', role: 'alert' }, text.enterAll, ' ',
     h('code', {}, fault));
+  let stored = settings;
+  const entered = () => ({
+    posture: posture.value,
+    ...Object.fromEntries(Object.keys(kNumbers).map((name) => [name, Number(inputs[name].value)])),
+    ...Object.fromEntries(kFlags.map((name) => [name, inputs[name].isOn()])),
+  });
+  /// Sends only what was changed here: somebody else may have changed other settings since they
+  /// were read. Those are then shown, too.
   const save = async () => {
-    const changed = { posture: posture.value };
-    for (const name of Object.keys(kNumbers)) changed[name] = Number(inputs[name].value);
-    for (const name of kFlags) changed[name] = inputs[name].isOn();
-    await put('settings', changed);
+    const wanted = entered();
+    const changed = Object.entries(wanted).filter(([name, value]) => value !== stored[name]);
+    if (changed.length) await put('settings', Object.fromEntries(changed));
+    stored = await get('settings').catch(() => ({ ...stored, ...wanted }));
+    posture.value = stored.posture;
+    for (const name of Object.keys(kNumbers)) inputs[name].value = stored[name];
+    for (const name of kFlags) inputs[name].turn(stored[name]);
     alert?.remove();
     done(S.saved);
   };

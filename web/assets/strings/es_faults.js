@@ -86,6 +86,8 @@ export const kFaultWords = {
   'there is an account of this name already: choose another name':
     'ya hay una cuenta con este nombre: elija otro',
   'there is no such account': 'no existe esa cuenta',
+  'this patient was changed by somebody else meanwhile: look again, then save':
+    'otra persona ha cambiado este paciente entretanto: vuelva a mirarlo y luego guarde',
   'the account has been changed by somebody else meanwhile: log in again':
     'otra persona ha cambiado la cuenta entretanto: inicie sesión de nuevo',
   'no enabled engineer would be left: make another one first':
