@@ -295,6 +295,44 @@ struct Transport::Callbacks {
                                              held.release(), FreeStream);
   }
 
+  /// A body that the library holds until it is sent or its connection ends.
+  struct UnsentBody {
+    std::string bytes;
+    std::size_t& all_unsent;
+
+    UnsentBody(std::string body, std::size_t& unsent) : bytes(std::move(body)), all_unsent(unsent) {
+      all_unsent += bytes.size();
+    }
+    ~UnsentBody() { all_unsent -= bytes.size(); }
+    UnsentBody(const UnsentBody&) = delete;
+    UnsentBody& operator=(const UnsentBody&) = delete;
+  };
+
+  static void FreeBody(void* cls) { delete static_cast<UnsentBody*>(cls); }
+
+  /// Replaces a large body by a refusal while too much waits for slow readers.
+  static void BoundUnsent(Exchange& exchange) {
+    const HttpServerOptions& options = exchange.owner->options_;
+    const std::size_t size = exchange.response->body.size();
+    const std::size_t unsent = exchange.owner->unsent_bytes_;
+    if (size <= options.small_answer_bytes ||
+        (unsent <= options.max_unsent_bytes && size <= options.max_unsent_bytes - unsent))
+      return;
+    exchange.response = ErrorResponse(503, "too much is being sent; try again in a few seconds");
+    exchange.response->headers.emplace_back("Retry-After", "5");
+  }
+
+  /// Takes the body: there is never a second copy of it.
+  static MHD_Response* MakeFromMemory(Exchange& exchange) {
+    BoundUnsent(exchange);
+    auto body = std::make_unique<UnsentBody>(std::move(exchange.response->body),
+                                             exchange.owner->unsent_bytes_);
+    MHD_Response* made = MHD_create_response_from_buffer_with_free_callback_cls(
+        body->bytes.size(), body->bytes.data(), FreeBody, body.get());
+    if (made != nullptr) static_cast<void>(body.release());  // FreeBody() has it from now on
+    return made;
+  }
+
   static MHD_Response* MakeBody(Exchange& exchange) {
     Response& response = *exchange.response;
     if (response.event_stream && !exchange.head_only) {
@@ -309,8 +347,7 @@ struct Transport::Callbacks {
                                              const_cast<char*>(response.constant_body.data()),
                                              MHD_RESPMEM_PERSISTENT);
     }
-    return MHD_create_response_from_buffer(response.body.size(), response.body.data(),
-                                           MHD_RESPMEM_MUST_COPY);
+    return MakeFromMemory(exchange);
   }
 
   static MHD_Result Queue(Exchange& exchange) {

@@ -1,5 +1,6 @@
 // What a hostile or clumsy client sends, on the wire.
 #include <gmock/gmock.h>
+#include <malloc.h>
 #include <sys/resource.h>
 
 #include <unistd.h>
@@ -215,6 +216,70 @@ TEST_F(ServerTest, ASlowHeadEndsInTenSecondsUnlessOneIsLoggedIn) {
   EXPECT_TRUE(kept.IsClosedBySoon()) << "a further request of a stranger";
   EXPECT_TRUE(known.Send("t: localhost\r\n\r\n"));
   EXPECT_EQ(known.Read().status, 200);
+}
+
+/// Asks for maps of any size; /maps/N has N bytes.
+class SlowReaderTest : public ServerTest {
+ protected:
+  static constexpr std::size_t kMega = std::size_t{1} << 20;
+
+  void SetUp() override {
+    Start([](web::HttpServerOptions& options) { options.max_unsent_bytes = 48 * kMega; });
+    SetUpAccounts();
+    loop_->Do([&] {
+      service_.scans.emplace_back().id = "s1";
+      service_.make_map = [](const std::filesystem::path&, const std::string& size) {
+        return std::string(std::stoul(size), 'm');
+      };
+    });
+    client_ = std::make_unique<HttpClient>(LoggedIn("technician"));
+  }
+
+  static std::string PathOf(std::size_t bytes) {
+    return "/api/v1/scans/s1/maps/" + std::to_string(bytes);
+  }
+  /// Reads the head of the answer and then nothing more.
+  [[nodiscard]] HttpConnection AskedAndUnread(std::size_t bytes) const {
+    HttpConnection connection(port_);
+    connection.SetReceiveBuffer(4096);
+    connection.Send("GET " + PathOf(bytes) +
+                    " HTTP/1.1\r\nHost: localhost\r\nCookie: " + client_->cookie + "\r\n\r\n");
+    EXPECT_THAT(connection.ReadUntil("\r\n\r\n"), HasSubstr("200 OK"));
+    return connection;
+  }
+
+  std::unique_ptr<HttpClient> client_;
+};
+
+TEST_F(SlowReaderTest, AnswersThatWaitAreBoundedAndSmallOnesAlwaysAdmitted) {
+  EXPECT_EQ(client_->Get(PathOf(48 * kMega + 1)).status, 503);
+  EXPECT_EQ(client_->Get(PathOf(48 * kMega)).status, 200);
+  {
+    const HttpConnection slow = AskedAndUnread(40 * kMega);
+    EXPECT_EQ(client_->Get(PathOf(8 * kMega)).body.size(), 8 * kMega);
+    const HttpAnswer refused = client_->Get(PathOf(8 * kMega + 1));
+    EXPECT_EQ(refused.status, 503);
+    EXPECT_EQ(refused.Header("retry-after"), "5");
+    EXPECT_EQ(refused.Header("x-content-type-options"), "nosniff");
+    const HttpConnection another = AskedAndUnread(8 * kMega);
+    EXPECT_EQ(client_->Get(PathOf(kMega)).status, 200);
+    EXPECT_EQ(client_->Get(PathOf(kMega + 1)).status, 503);
+  }
+  // Both have hung up; the server sees it at its next turns.
+  int status = 503;
+  for (int i = 0; i < 100 && status == 503; ++i) {
+    status = client_->Get(PathOf(48 * kMega)).status;
+    if (status == 503) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_EQ(status, 200);
+}
+
+TEST_F(SlowReaderTest, AnAnswerIsHeldOnce) {
+  // Sizes above 32 MiB are mapped one by one, and this counts them; under sanitizers it is 0.
+  const auto mapped = [] { return mallinfo2().hblkhd; };
+  const std::size_t before = mapped();
+  const HttpConnection slow = AskedAndUnread(40 * kMega);
+  EXPECT_LT(mapped(), before + 60 * kMega);
 }
 
 class CrowdTest : public ServerTest {

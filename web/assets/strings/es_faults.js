@@ -113,6 +113,8 @@ export const kFaultWords = {
   'too much waits already: try again': 'ya hay demasiado en espera: pruebe de nuevo',
   'too much is asked at once; try again in a few seconds':
     'se pide demasiado a la vez; pruebe en unos segundos',
+  'too much is being sent; try again in a few seconds':
+    'se está enviando demasiado; pruebe en unos segundos',
   'no folder for backups is configured: set backup_folder in [storage]':
     'no hay carpeta de copias configurada: indique backup_folder en [storage]',
   'a backup is being made already': 'ya se está haciendo una copia',
