@@ -695,6 +695,11 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.goto(`${h.url}#/update`);
   await engineer.getByText('plumb-0.2.0.raucb').waitFor();
   await h.look(engineer, 'update', { axe: false });
+  const focused = () => engineer.evaluate(() => document.activeElement.getAttribute('aria-label'));
+  await engineer.getByRole('button', { name: 'Install plumb-0.2.0.raucb' }).focus();
+  h.tell('plugged');
+  await engineer.getByText('plumb-0.5.0.raucb').waitFor();
+  equal(await focused(), 'Install plumb-0.2.0.raucb', 'the list is drawn again below the keyboard');
   const send = async (name, text) => {
     await engineer.getByLabel('Update file', { exact: true }).setInputFiles({ name, mimeType: 'application/octet-stream', buffer: Buffer.from(text.padEnd(100000, 'x')) });
     await engineer.getByRole('button', { name: 'Upload' }).click();
@@ -705,6 +710,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByRole('button', { name: 'Install plumb-0.3.0.raucb' }).click();
   await engineer.getByText('Copying image to rootfs.1').waitFor();
   equal(await engineer.locator('progress[value="0.4"]').count(), 1, 'the progress');
+  equal(await focused(), 'Install plumb-0.3.0.raucb', 'a button that is off keeps the focus');
   equal(await engineer.getByRole('button', { name: 'Install plumb-0.2.0.raucb' }).isDisabled(), true, 'one installation at a time');
   equal(await engineer.getByRole('button', { name: 'Install plumb-0.4.0.raucb from the USB stick' }).isDisabled(), true, 'nor the one on the stick beside it');
   await h.look(engineer, 'update-installing');

@@ -4,7 +4,7 @@
 // scan), nobackup (backups fail), overdue (no check has passed, references are blocked), checked,
 // slow (long sweeps), fast, toil (long computing), swift (half a second from the start to the
 // result), old (the last result becomes 10 minutes old), restarted (the status names no last
-// result), quit; of what the next scan shows:
+// result), plugged (another bundle is on the stick), quit; of what the next scan shows:
 // markermoved (a check), stranger (another body), shoulder (lifted), across (the body lies across
 // the room's axes), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by
 // pitch, roll, yaw by degrees); hole (in the region), shifted (one marker, by 12 mm), weak (roll is
@@ -390,6 +390,10 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "restarted") {  // the appliance: what was measured before is known by the store alone
     service.status.last_result.reset();
     service.Notify(web::EventKind::kStatus);
+  }
+  if (name == "plugged") {
+    service.stick.push_back("plumb-0.5.0.raucb");
+    service.Notify(web::EventKind::kUpdate);
   }
   if (name == "old" && !service.scans.empty()) {
     service.scans.back().finished_at = web::WallClock::now() - std::chrono::minutes(10);

@@ -1,6 +1,8 @@
 // Which system runs, updates of it, the restart into them, and the diagnostics.
 import { currentSession, get, live, may, post, postForFile, remove } from '../api.js';
-import { action, clear, done, field, form, h, signingPassword } from '../dom.js';
+import {
+  action, clear, done, enable, field, form, h, redraw, signingPassword,
+} from '../dom.js';
 import { S, translated } from '../strings.js';
 
 function refusalIn(answer) {
@@ -94,29 +96,46 @@ function diagnostics() {
     }, {}));
 }
 
-function bundles(update) {
+/// Buttons that are built again while what they began still runs: they stay off until it is done.
+/// One that is off keeps the focus.
+function lastingButtons(redrawn) {
+  const running = new Set();
+  return (label, what, task, { isOff, ...properties }) => {
+    const name = `${label} ${what}`;
+    const button = action(label, async () => {
+      running.add(name);
+      try {
+        await task();
+      } finally {
+        running.delete(name);
+        redrawn();
+      }
+    }, { 'aria-label': name, ...properties });
+    enable(button, !isOff && !running.has(name));
+    return button;
+  };
+}
+
+function bundles(update, button) {
   const text = S.update;
+  const isOff = update.installing;
   const rows = update.bundles.map((name) => h('li', { class: 'row' },
     h('span', { class: 'bundle' }, name), may('update') && [
-      action(text.install, () => post('update', { bundle: name }), {
-        class: 'primary', 'aria-label': `${text.install} ${name}`, disabled: update.installing,
-      }),
-      action(text.remove, () => remove(`update/bundles/${name}`), {
-        'aria-label': `${text.remove} ${name}`, disabled: update.installing,
-      })]));
+      button(text.install, name, () => post('update', { bundle: name }),
+        { class: 'primary', isOff }),
+      button(text.remove, name, () => remove(`update/bundles/${name}`), { isOff })]));
   return [h('h2', {}, text.bundles),
     rows.length ? h('ul', { class: 'files' }, rows) : h('p', { class: 'hint' }, text.noBundles)];
 }
 
 /// Offered only: somebody has to want it.
-function onStick(update) {
+function onStick(update, button) {
   const text = S.update;
   if (!update.stick.length || !may('update')) return null;
   return [h('h2', {}, text.stick), h('ul', { class: 'files' }, update.stick.map((name) => h('li',
-    { class: 'row' }, h('span', { class: 'bundle' }, name), action(text.install,
-      () => post('update', { bundle: name, from_stick: true }), {
-        'aria-label': `${text.install} ${name} ${text.fromStick}`, disabled: update.installing,
-      }))))];
+    { class: 'row' }, h('span', { class: 'bundle' }, name), button(text.install,
+      `${name} ${text.fromStick}`, () => post('update', { bundle: name, from_stick: true }),
+      { isOff: update.installing }))))];
 }
 
 export async function showUpdate(place) {
@@ -124,10 +143,11 @@ export async function showUpdate(place) {
   const body = h('div', {});
   const sender = upload();
   const starter = restart();
+  const button = lastingButtons(() => draw().catch(() => {}));
   const draw = async () => {
     const update = await get('update', true);
     const { supported, installing, message, failure } = update;
-    clear(body,
+    redraw(body,
       update.rolled_back && h('div', { class: 'rolled-back' },
         h('p', { class: 'caution' }, translated(update.rolled_back)),
         may('update') && action(text.seen, () => post('update/seen'), {})),
@@ -137,8 +157,8 @@ export async function showUpdate(place) {
       installing && [h('p', { class: 'lead' }, text.installing, ' ', translated(message)),
         h('progress', { max: 1, value: update.fraction, 'aria-label': text.installing })],
       failure && !installing && h('p', { class: 'caution' }, translated(failure)),
-      supported && onStick(update),
-      supported ? bundles(update)
+      supported && onStick(update, button),
+      supported ? bundles(update, button)
         : h('p', { class: 'caution' }, `${text.unsupported}: ${translated(message)}`),
       supported && !installing && message && message !== failure
         && h('p', { class: 'lead' }, translated(message)));
