@@ -90,7 +90,6 @@ struct Reconstructor::Impl {
   std::int64_t dropped = 0;
   std::vector<double> median_depths_m;  // One per frame that has valid depth.
   std::vector<double> tracking_times_s;
-  double finish_start_s = 0;
 
   Impl(const StreamInfo& stream, const ReconstructorOptions& reconstructor_options)
       : info(stream),
@@ -274,6 +273,7 @@ struct Reconstructor::Impl {
           fmt::format("{}, {} sweep{}", options.profile->name, options.profile->num_sweeps,
                       options.profile->num_sweeps == 1 ? "" : "s");
     for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
+    WarnOfScale(scene.calibration.at("depth_scale"), scene);
     if (tone) {
       scene.calibration["tone_gamma"] = tone->gamma;
       scene.calibration["marker_edge_shift_px"] = tone->edge_shift_px;

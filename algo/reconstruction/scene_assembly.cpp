@@ -16,6 +16,8 @@ namespace {
 // hardly moves gives only one keyframe, so frames count too.
 constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
+// Sensors of the Kinect and Xtion class err by about 1 %, prints by up to 3 %.
+constexpr double kUsualDepthScale = 0.02;
 constexpr double kGapToReport_s = 0.5;  // The comparison gives no answer above 1 s.
 
 SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
@@ -110,6 +112,14 @@ void WarnOfFrame(const StreamInfo& info, const TrackingMap& map, Scene& scene) {
                     "less certain than that of a sweep",
                     *info.reference_marker, views, views == 1 ? "" : "s"));
   }
+}
+
+void WarnOfScale(double depth_scale, Scene& scene) {
+  if (scene.markers.empty() || !(std::abs(depth_scale - 1.0) > kUsualDepthScale)) return;
+  scene.warnings.push_back(
+      fmt::format("the sensor's depth and the stated size of the markers disagree by {:.1f} %: "
+                  "measure the side of a marker",
+                  100 * std::abs(depth_scale - 1.0)));
 }
 
 void KeepHeightMap(HeightMap map, Scene& scene) {

@@ -27,6 +27,11 @@ namespace plumb {
 /// it once the frame is decided, which each preset does in its own way.
 void WarnOfFrame(const StreamInfo& info, const TrackingMap& map, Scene& scene);
 
+/// Adds a warning if depth and markers disagree about lengths by more than a sensor's depth errs:
+/// then the markers are probably printed in another size than stated.
+/// @param depth_scale  Factor of the measured depth as estimated, `depth_scale` of the calibration.
+void WarnOfScale(double depth_scale, Scene& scene);
+
 /// Keeps a map that contains cells and warns about any other: a map without cells cannot be stored,
 /// and an empty one compares with nothing.
 void KeepHeightMap(HeightMap map, Scene& scene);

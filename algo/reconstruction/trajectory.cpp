@@ -7,6 +7,8 @@ namespace {
 
 constexpr double kMaxGap_s = 0.3;  // Frames farther apart do not determine a velocity.
 
+constexpr double kLeastShare = 0.5;  // Of the usual spacing, for a velocity.
+
 constexpr double kUsualSpacings =
     3.0;  // A live stream on a busy machine may skip one or two images in a row.
 
@@ -121,13 +123,16 @@ std::vector<Pose> ColorPoses(const std::vector<TrackedFrame>& frames, const Trac
 }
 
 void RefreshVelocities(std::vector<TrackedFrame>& frames, TrackingMap& map) {
+  if (frames.size() < 2) return;
   const std::vector<Pose> poses = ColorPoses(frames, map);
+  // Closer stamps are not those of the images, and the chord between them is no velocity.
+  const double least_s = kLeastShare * UsualSpacing(frames);
   std::size_t begin = 0;
   for (std::size_t end = 1; end <= frames.size(); ++end) {
-    const bool goes_on = end < frames.size() && frames[end - 1].tracked && frames[end].tracked &&
-                         frames[end].color_time_s > frames[end - 1].color_time_s &&
-                         frames[end].color_time_s - frames[end - 1].color_time_s < kMaxGap_s;
-    if (goes_on) continue;
+    if (end < frames.size() && frames[end - 1].tracked && frames[end].tracked) {
+      const double spacing_s = frames[end].color_time_s - frames[end - 1].color_time_s;
+      if (spacing_s > least_s && spacing_s < kMaxGap_s) continue;
+    }
     if (end - begin >= 2) RefreshStretch(begin, end, poses, frames);
     begin = end;
   }

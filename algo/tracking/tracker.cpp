@@ -157,6 +157,32 @@ Pose Tracker::Impl::DepthPose(const MapKeyframe& keyframe) {
                    keyframe.data.depth_time_s - keyframe.data.color_time_s);
 }
 
+// Time since an earlier image, as far as it can be believed. Where stamps are made on arrival, two
+// images can come within a millisecond; their motion divided by that would be no velocity.
+double Tracker::Impl::BelievedStep_s(double step_s) const {
+  constexpr std::size_t kRecent = 15;
+  const std::size_t count = std::min(kRecent, frames.empty() ? 0 : frames.size() - 1);
+  if (count < 3) return step_s;
+  std::array<double, kRecent> spacings_s{};
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t later = frames.size() - 1 - i;
+    spacings_s[i] = frames[later].color_time_s - frames[later - 1].color_time_s;
+  }
+  const auto middle = spacings_s.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(spacings_s.begin(), middle,
+                   spacings_s.begin() + static_cast<std::ptrdiff_t>(count));
+  return std::max(step_s, 0.5 * *middle);
+}
+
+bool Tracker::Impl::IsHeldByPoints(const PoseEstimate& estimate, std::size_t num_points) {
+  const double share =
+      num_points > 0 ? static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points)
+                     : 0.0;
+  const bool by_keypoints = estimate.num_inliers >= 12 && share > 0.35;
+  const bool by_markers = num_points > 0 && estimate.num_inliers >= 4 && share > 0.6;
+  return by_keypoints || by_markers;
+}
+
 // True if the estimate is reliable: enough inliers, all six directions constrained, and a
 // plausible speed for a hand.
 bool Tracker::Impl::Plausible(const PoseEstimate& estimate, std::size_t num_points,
@@ -165,10 +191,9 @@ bool Tracker::Impl::Plausible(const PoseEstimate& estimate, std::size_t num_poin
       num_points > 0 ? static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points)
                      : 0.0;
   const bool by_points = estimate.num_inliers >= 12 && share > 0.35;
-  const bool by_markers = num_points > 0 && estimate.num_inliers >= 4 && share > 0.6;
   const bool by_depth =
       estimate.num_dense > 600 && estimate.dense_overlap > 0.4 && estimate.dense_rms_m < 0.012;
-  if (!by_points && !by_markers && !by_depth) return false;
+  if (!IsHeldByPoints(estimate, num_points) && !by_depth) return false;
   // Depth that contradicts a pose from few points: the start was wrong.
   if (!by_points && estimate.num_dense > 0 && estimate.dense_overlap < 0.25) return false;
   const Matrix6d covariance = estimate.information.ldlt().solve(Matrix6d::Identity());
@@ -185,35 +210,45 @@ bool Tracker::Impl::Plausible(const PoseEstimate& estimate, std::size_t num_poin
 std::optional<PoseEstimate> Tracker::Impl::FollowFrame(const Frame& frame,
                                                        const FrameData& prepared,
                                                        TrackedFrame& result) {
-  const double dt = frame.color_time_s - last_time_s;
+  const double dt = BelievedStep_s(frame.color_time_s - last_time_s);
   const double dt_depth = frame.depth_time_s - frame.color_time_s;
-  // Starts from constant velocity; if that fails (a jerk), from the last pose.
+  struct Attempt {
+    PoseEstimate estimate;
+    std::vector<ActivePoint> followed;
+    std::size_t num_corners = 0;
+  };
+  std::optional<Attempt> best;
+  // Starts from constant velocity; if that fails (a jerk), from the last pose. Depth alone also
+  // fits beside the right place, so it decides only where neither start finds the points.
   const std::array<Pose, 2> guesses = {PredictedPose(frame), T_world_last};
   for (const Pose& T_guess : guesses) {
+    Attempt attempt;
     PoseProblem problem = MakeProblem(prepared, dt_depth);
     AddMarkerPoints(prepared.markers, problem.points);
-    const std::size_t num_corners = problem.points.size();
-    std::vector<ActivePoint> followed;
+    attempt.num_corners = problem.points.size();
     if (options.use_keypoints)
-      followed_points.Follow(last_pyramid, prepared.image, frame.depth_m, T_guess, followed,
+      followed_points.Follow(last_pyramid, prepared.image, frame.depth_m, T_guess, attempt.followed,
                              problem.points);
-    PoseEstimate estimate = OptimizePose(problem, T_guess);
-    if (!Plausible(estimate, problem.points.size(), dt)) continue;
-    std::vector<ActivePoint> agreeing;
-    for (std::size_t i = 0; i < followed.size(); ++i) {
-      Landmark& landmark = map.landmarks[static_cast<std::size_t>(followed[i].landmark)];
-      if (estimate.inlier[num_corners + i]) {
-        agreeing.push_back(followed[i]);
-      } else if (++landmark.num_rejections > 3 && landmark.num_observations < 3) {
-        landmark.usable = false;
-      }
-    }
-    followed_points.SetPoints(std::move(agreeing));
-    result.num_keypoints = static_cast<int>(followed_points.points().size());
-    result.num_markers = CountMarkers(prepared.markers, estimate);
-    return estimate;
+    attempt.estimate = OptimizePose(problem, T_guess);
+    if (!Plausible(attempt.estimate, problem.points.size(), dt)) continue;
+    const bool is_held = IsHeldByPoints(attempt.estimate, problem.points.size());
+    if (is_held || !best) best = std::move(attempt);
+    if (is_held) break;
   }
-  return std::nullopt;
+  if (!best) return std::nullopt;
+  std::vector<ActivePoint> agreeing;
+  for (std::size_t i = 0; i < best->followed.size(); ++i) {
+    Landmark& landmark = map.landmarks[static_cast<std::size_t>(best->followed[i].landmark)];
+    if (best->estimate.inlier[best->num_corners + i]) {
+      agreeing.push_back(best->followed[i]);
+    } else if (++landmark.num_rejections > 3 && landmark.num_observations < 3) {
+      landmark.usable = false;
+    }
+  }
+  followed_points.SetPoints(std::move(agreeing));
+  result.num_keypoints = static_cast<int>(followed_points.points().size());
+  result.num_markers = CountMarkers(prepared.markers, best->estimate);
+  return std::move(best->estimate);
 }
 
 // Marks the markers whose corners all agree with the pose. Their points come first in the
@@ -271,7 +306,7 @@ std::optional<PoseEstimate> Tracker::Impl::Relocalize(const Frame& frame, FrameD
 
 void Tracker::Impl::Accept(const Frame& frame, FrameData& prepared, const PoseEstimate& estimate,
                            TrackedFrame& result) {
-  const double dt = frame.color_time_s - last_time_s;
+  const double dt = BelievedStep_s(frame.color_time_s - last_time_s);
   if (!lost && dt > 0)
     velocity = TwistFromPose(T_world_last.inverse() * estimate.T_world_camera) / dt;
   result.tracked = true;
@@ -295,7 +330,7 @@ void Tracker::Impl::RefreshKeyframeVelocity(const Frame& frame, const Pose& T_wo
   const std::optional<int> last = frames.back().keyframe;
   if (!last) return;
   MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(*last)];
-  const double dt_after = frame.color_time_s - keyframe.data.color_time_s;
+  const double dt_after = BelievedStep_s(frame.color_time_s - keyframe.data.color_time_s);
   if (dt_after <= 0) return;
   const Vector6d after = TwistFromPose(keyframe.T_world_color.inverse() * T_world_now) / dt_after;
   keyframe.velocity_per_s = *last == 0 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));

@@ -64,11 +64,15 @@ class FrameReader : public FrameFeed {
 
   bool WaitForItsTime(double stamp_s, const std::stop_token& stop) {
     using Clock = std::chrono::steady_clock;
-    if (!first_stamp_s_) {
-      first_stamp_s_ = stamp_s;
+    // A recording may have been paused, or its clock may have been set: what comes after a gap does
+    // not keep anybody waiting for hours.
+    constexpr double kLongestGap_s = 5.0;
+    if (!last_stamp_s_ || stamp_s - *last_stamp_s_ > kLongestGap_s) {
+      first_stamp_s_ = last_stamp_s_ ? stamp_s - kLongestGap_s : stamp_s;
       start_ = Clock::now();
     }
-    const std::chrono::duration<double> after_start(stamp_s - *first_stamp_s_);
+    last_stamp_s_ = stamp_s;
+    const std::chrono::duration<double> after_start(stamp_s - first_stamp_s_);
     std::unique_lock lock(wait_mutex_);
     waiting_.wait_until(lock, stop,
                         start_ + std::chrono::duration_cast<Clock::duration>(after_start),
@@ -81,7 +85,8 @@ class FrameReader : public FrameFeed {
   BoundedQueue<Frame> queue_;
   std::atomic<int> dropped_ = 0;
   std::atomic<double> last_frame_s_ = 0.0;
-  std::optional<double> first_stamp_s_;
+  std::optional<double> last_stamp_s_;
+  double first_stamp_s_ = 0.0;  ///< Of the frame that came, or would have come, at start_.
   std::chrono::steady_clock::time_point start_;
   std::mutex wait_mutex_;
   std::condition_variable_any waiting_;

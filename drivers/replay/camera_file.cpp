@@ -34,12 +34,13 @@ void CheckText(std::string_view text, const std::string& name) {
     throw DataError(fmt::format("{} holds zero bytes: it is not text", name));
   int depth = 0;
   int dashes = 0;
-  for (const char c : text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
     if (c == '[' || c == '{') ++depth;
     if ((c == ']' || c == '}') && depth > 0) --depth;
-    if (c == '-') {
-      ++dashes;  // "- - - x" nests without brackets
-    } else if (c != ' ') {
+    if (c == '-' && i + 1 < text.size() && (text[i + 1] == ' ' || text[i + 1] == '\t')) {
+      ++dashes;  // "- - - x" nests without brackets; a rule of dashes does not
+    } else if (c != ' ' && c != '\t') {
       dashes = 0;
     }
     if (depth > kMaxNesting || dashes > kMaxNesting)

@@ -362,7 +362,7 @@ TEST(BodyPartsTest, AHoleIsNamedByThePartItLiesOn) {
   for (const Case& how : kCases) {
     const Lying person(how, 0.4, IsPerson, [](double, double) { return 0.0; });
     EXPECT_EQ(person.PlaceOfHole(0.32, 0.15, how.posture), "left shoulder");
-    EXPECT_EQ(person.PlaceOfHole(1.0, -0.1, how.posture), "right thigh");
+    EXPECT_EQ(person.PlaceOfHole(1.3, -0.1, how.posture), "right thigh");
   }
   const Lying person(kCases[0], 0.0, IsPerson, [](double, double) { return 0.0; });
   EXPECT_EQ(person.PlaceOfHole(0.32, 0.15, std::nullopt), "+X side at the gantry end");

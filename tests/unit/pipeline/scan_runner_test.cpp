@@ -25,13 +25,16 @@ class WallSource : public FrameSource {
     if (index_ == num_frames_) return std::nullopt;
     Frame frame;
     frame.index = index_;
-    frame.color_time_s = frame.depth_time_s = 0.01 * static_cast<double>(index_);
+    frame.color_time_s = frame.depth_time_s =
+        0.01 * static_cast<double>(index_) + (index_ < gap_at ? 0.0 : 1e10);
     frame.color_rgb = cv::Mat(120, 160, CV_8UC3, cv::Scalar::all(128));
     frame.depth_m = cv::Mat(120, 160, CV_32FC1, cv::Scalar(1.0));
     ++index_;
     return frame;
   }
   [[nodiscard]] std::int64_t num_read() const { return index_; }
+
+  std::int64_t gap_at = 1'000'000'000;  ///< From this frame on, stamps are some centuries later.
 
  private:
   StreamInfo info_;
@@ -81,6 +84,18 @@ TEST(ScanRunnerTest, LiveItDropsTheOldestAndCounts) {
   });
   EXPECT_GT(scene.frames_dropped, 5);
   EXPECT_EQ(scene.frames_total, 40);
+}
+
+TEST(ScanRunnerTest, LiveItDoesNotWaitThroughAGapInTheStamps) {
+  WallSource source(8);
+  source.gap_at = 4;
+  ScanRunnerOptions live;
+  live.realtime = true;
+  std::int64_t last = 0;
+  const Scene scene =
+      RunScan(source, live, {}, [&](const ScanProgress& progress) { last = progress.frames; });
+  EXPECT_EQ(last, 8) << "after five seconds";
+  EXPECT_EQ(scene.frames_total, 8);
 }
 
 }  // namespace

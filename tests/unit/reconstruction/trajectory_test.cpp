@@ -133,6 +133,15 @@ TEST(Trajectory, VelocityIsNotTakenAcrossAGap) {
       << "backward difference";
 }
 
+TEST(Trajectory, VelocityIsNotTakenOverAStampThatCannotBe) {
+  Path path = Tracked();
+  path.frames[2].color_time_s = path.frames[3].color_time_s - 0.001;  // stamped on arrival
+  for (TrackedFrame& frame : path.frames) frame.velocity_per_s.setZero();
+  RefreshVelocities(path.frames, path.map);
+  for (const TrackedFrame& frame : path.frames)
+    EXPECT_LT(frame.velocity_per_s.tail<3>().norm(), 1.2) << frame.frame_index << ": 1 m/s";
+}
+
 TEST(LongestLost, CountsTheTimeWithoutAPose) {
   Path path = Tracked();
   EXPECT_EQ(LongestLost(path.frames), 0.0);

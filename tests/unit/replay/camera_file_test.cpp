@@ -147,6 +147,11 @@ TEST(CameraFileTest, WhatIsNoYamlIsRefused) {
   EXPECT_THAT(Refusal(std::string(70000, ' ')), HasSubstr("70000 bytes"));
 }
 
+TEST(CameraFileTest, ARuleOfDashesInACommentIsNoNesting) {
+  const std::string refusal = Refusal("%YAML:1.0\n---\n# ---------- camera ----------\na: 1\n");
+  EXPECT_THAT(refusal, ::testing::Not(HasSubstr("nests")));
+}
+
 TEST(CameraFileTest, TextsThatParsersDoNotReturnFromAreRefused) {
   // Found by fuzzing: the reader of OpenCV 4.6 loops for ever on the first.
   for (const char* text : {"%YAML:1.0\n---%YAML:1.0\ni\n-m", "%YAML:1.0", "%", "---\n---\n---",

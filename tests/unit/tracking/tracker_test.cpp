@@ -84,6 +84,26 @@ TEST_F(TrackerTest, FollowsThroughAStepOfTheExposure) {
   EXPECT_LT(worst, 0.002);
 }
 
+TEST_F(TrackerTest, FollowsThroughAFrameThatWasStampedLate) {
+  const double spacing_s = sweep().frames[1].color_time_s - sweep().frames[0].color_time_s;
+  for (const double before_next_s : {0.2 * spacing_s, 0.001}) {
+    Tracker tracker(sweep().info, {});
+    for (std::size_t i = 0; i < sweep().frames.size(); ++i) {
+      Frame frame = sweep().frames[i];
+      if (i == 9) {
+        frame.color_time_s += spacing_s - before_next_s;
+        frame.depth_time_s += spacing_s - before_next_s;
+      }
+      const TrackedFrame result = tracker.Track(frame);
+      EXPECT_TRUE(result.tracked) << "frame " << i;
+      EXPECT_GE(result.num_keypoints + result.num_markers, i == 0 ? 0 : 12) << "frame " << i;
+    }
+    const double worst = WorstError(tracker);
+    fmt::print("{:.0f} ms before the next: worst {:.2e} m\n", 1000 * before_next_s, worst);
+    EXPECT_LT(worst, 0.001);
+  }
+}
+
 TEST_F(TrackerTest, SaysLostOnBlankFramesAndComesBack) {
   for (const bool use_markers : {true, false}) {
     Tracker tracker(sweep().info, {.use_markers = use_markers});

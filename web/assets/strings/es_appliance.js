@@ -297,6 +297,10 @@ export const kPatterns = [
     'Hay que calibrar la sala de nuevo; hasta entonces las direcciones son las del paciente: $1'],
   ['^the calibration of the room, version (\\d+), is not used: (.+)$',
     'la calibración de la sala, versión $1, no se usa: $2'],
+  ['^the sensor\'s depth and the stated size of the markers disagree by ([\\d.]+) %: measure the '
+    + 'side of a marker$',
+  'la profundidad del sensor y el tamaño indicado de los marcadores difieren un $1 %: mida el lado '
+    + 'de un marcador'],
   // A cold sensor.
   ['^the sensor is still warming up, and references need one that has been on for ([\\d.]+) min: '
     + 'wait, then scan$',
