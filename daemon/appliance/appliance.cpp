@@ -108,8 +108,25 @@ Appliance::Answer Appliance::WhyNotIdle() const {
 
 Appliance::Answer Appliance::WhyNotRestart() const {
   if (std::string why = WhyNotIdle(); !why.empty()) return why;
-  if (opening_ || (!session_id_.empty() && !IsOwnSession()))
-    return "the session of a patient is open: close it first, then restart";
+  if (HasPatientsSession()) return "the session of a patient is open: close it first, then restart";
+  return {};
+}
+
+Appliance::Answer Appliance::WhyNotInstall() const {
+  if (std::string why = WhyNotIdle(); !why.empty()) return why;
+  if (HasPatientsSession())
+    return "the session of a patient is open: close it first, then install the update";
+  return {};
+}
+
+bool Appliance::HasPatientsSession() const {
+  return opening_ || (!session_id_.empty() && !IsOwnSession());
+}
+
+/// Otherwise the store's session and the page's could become different ones.
+Appliance::Answer Appliance::WhyNotChangeSession() const {
+  if (opening_) return "a patient is being opened: try again in a moment";
+  if (wiping_) return "this patient's data is being removed: try again in a moment";
   return {};
 }
 
@@ -135,12 +152,11 @@ Appliance::Answer Appliance::Cancel(const web::Actor& actor) {
 /// Checks beyond the state, which has accepted the event already.
 Appliance::Answer Appliance::WhyNotScan() const {
   if (stopped_) return "the appliance is being switched off";
-  if (std::string blocking_reason = blocking_reason_ ? blocking_reason_() : std::string();
-      !blocking_reason.empty())
-    return blocking_reason;
+  if (std::string why = WhyBlocked(); !why.empty()) return why;
   if (store_ == nullptr || !storage_fault_.empty()) return "nothing can be stored";
   if (std::string why = store_->WhyOtherScans(); !why.empty()) return why;
   if (opening_) return "a patient is being opened: press again in a moment";
+  if (wiping_) return "this patient's data is being removed: press again in a moment";
   return WhyNoSpace();
 }
 
@@ -286,7 +302,6 @@ void Appliance::LogSensor(const SensorEvent& event) {
                 event.others.size() + 1, serial, fmt::join(event.others, ", ")));
 }
 
-/// Updates arrive at most ten times a second.
 void Appliance::OpenSession(const std::string& session_id, const std::string& patient_id,
                             web::ScanPurpose purpose, const std::string& reason,
                             const web::Actor& actor) {
@@ -311,6 +326,7 @@ void Appliance::ForgetSession() {
 
 Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
   if (std::string why = WhyNotIdle(); !why.empty()) return why;
+  if (std::string why = WhyNotChangeSession(); !why.empty()) return why;
   if (session_id_.empty()) return "no session is open";
   ForgetSession();
   (void)store_thread_.Post([this, actor] {
@@ -332,7 +348,7 @@ void Appliance::ArmSessionTimer() {
 }
 
 void Appliance::OnSessionTimer() {
-  if (IsRunning()) return ArmSessionTimer();
+  if (IsRunning() || !WhyNotChangeSession().empty()) return ArmSessionTimer();
   Log(LogLevel::kNotice, fmt::format("the session was closed: nothing was scanned for {:g} minutes",
                                      parts_.config.appliance.session_idle_min));
   (void)CloseSession(kSelf);

@@ -93,6 +93,9 @@ class Appliance {
   void SetBlockingReason(std::function<std::string()> blocking_reason) {
     blocking_reason_ = std::move(blocking_reason);
   }
+  [[nodiscard]] Answer WhyBlocked() const {
+    return blocking_reason_ ? blocking_reason_() : std::string();
+  }
   /// Why no reference may be scanned or approved now, with the next step: the daily check is
   /// overdue or has failed, or the sensor is still warming up. Empty if it may, as always in the
   /// demo.
@@ -107,17 +110,24 @@ class Appliance {
                    web::ScanPurpose purpose, const std::string& reason, const web::Actor& actor);
   /// Ends the session, also in the store. Not while a scan runs.
   Answer CloseSession(const web::Actor& actor);
-  /// Until the store has opened a session, no scan begins.
+  /// Until the store has opened a session, no scan begins, and no session is opened or closed.
   void SetOpening(bool opening) { opening_ = opening; }
+  /// The same while the store removes the data of the patient whose session is open.
+  void SetWiping(bool wiping) { wiping_ = wiping; }
+  /// Why no session can be opened or closed at the moment; empty: one can.
+  [[nodiscard]] Answer WhyNotChangeSession() const;
   [[nodiscard]] bool IsRunning() const;
   /// For what has to wait until no scan runs; empty: none does.
   [[nodiscard]] Answer WhyNotIdle() const;
   /// Why the machine may not be restarted now: a scan runs, or a patient's session is open (the
   /// demo's does not count). Empty if it may.
   [[nodiscard]] Answer WhyNotRestart() const;
+  /// The same for a system update, during which no scan can begin.
+  [[nodiscard]] Answer WhyNotInstall() const;
   /// Shown by status and light until it is empty: the machine has gone back to the previous system.
   void SetRolledBack(const std::string& text);
   [[nodiscard]] const std::string& session_id() const { return session_id_; }
+  [[nodiscard]] const std::string& open_patient() const { return open_patient_; }
   /// Closes this patient if it is open. An open daily check stays open.
   void ClosePatient(const std::string& patient_id);
   /// The next scan is the daily check of the room's markers; scans after it belong to the open
@@ -250,6 +260,7 @@ class Appliance {
   void OnSessionTimer();
   void ForgetSession();
   [[nodiscard]] bool IsOwnSession() const;
+  [[nodiscard]] bool HasPatientsSession() const;
   [[nodiscard]] std::optional<double> SecondsSinceSensor() const;
   [[nodiscard]] std::string WhySensorIsCold(const std::optional<web::Scan>& scan) const;
   [[nodiscard]] web::DailyCheck DailyCheckToday();
@@ -347,6 +358,7 @@ class Appliance {
   web::Actor opened_by_;  ///< The user who opened the session.
   web::ScanPurpose purpose_ = web::ScanPurpose::kFraction;
   bool opening_ = false;
+  bool wiping_ = false;
   std::optional<web::Actor>
       check_;  ///< If set, the next or running scan is the daily check requested by this user.
   CurrentScan scan_;

@@ -131,14 +131,16 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
                     actor = opened_by_, patient = record.patient_id](const ScanOutcome& outcome) {
     if (id->empty()) return;  // it never began
     using Kind = ScanOutcome::Kind;
+    // A scan that was discarded or failed while its result was written has none.
+    const bool is_done = outcome.kind == Kind::kDone;
     FinishedScan finished{.failure = outcome.reason,
-                          .result_json = outcome.result_json,
+                          .result_json = is_done ? outcome.result_json : std::string(),
                           .swept_area_m2 = outcome.swept_area_m2};
-    if (outcome.kind == Kind::kDone) finished.outcome = web::ScanOutcome::kDone;
+    if (is_done) finished.outcome = web::ScanOutcome::kDone;
     if (outcome.kind == Kind::kCancelled) finished.outcome = web::ScanOutcome::kCancelled;
     store_->scans.Finish(*id, finished);
     const auto demo = store_->patients.FindByCode(parts_.demo_patient);
-    if (!is_reference || outcome.kind != Kind::kDone) return;
+    if (!is_reference || !is_done) return;
     if (!is_demo || !demo || demo->id != patient || !demo->approved_reference_id.empty()) {
       (void)store_->references.Add(actor, *id, reason, plan);  // a draft that a physicist will plan
       return;

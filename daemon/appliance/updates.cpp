@@ -67,7 +67,7 @@ std::string Updates::WhyNotScan() const {
 
 std::string Updates::WhyNotInstall() const {
   if (restarting_) return "the machine is being restarted";
-  return appliance_.WhyNotIdle();
+  return appliance_.WhyNotInstall();
 }
 
 std::string Updates::WhyNotRestart() const {

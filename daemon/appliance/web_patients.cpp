@@ -54,8 +54,19 @@ void WebPatients::WipePatient(const web::Actor& actor, const std::string& id, we
   if (status.scan && status.scan->patient_id == id) {
     return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
   }
-  appliance_.ClosePatient(id);
-  store_.Change(&Store::removal, std::move(done),
+  const bool is_open = appliance_.open_patient() == id;
+  if (is_open) {
+    if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
+      return done(AnswerOf(why));
+    appliance_.SetWiping(true);
+  }
+  // The session ends with the data. Where the removal is refused, nothing has changed.
+  const web::Done wiped = [this, id, is_open, done = std::move(done)](const web::Change& change) {
+    if (is_open) appliance_.SetWiping(false);
+    if (change.result == ChangeResult::kDone) appliance_.ClosePatient(id);
+    done(change);
+  };
+  store_.Change(&Store::removal, wiped,
                 [=](StoreRemoval& removal) { removal.WipePatient(actor, id); });
 }
 
@@ -70,6 +81,9 @@ void WebPatients::OpenPatient(const web::Actor& actor, const std::string& id,
   }
   if (const std::string why = WhyNotOpen(appliance_.state().phase, *patient, purpose); !why.empty())
     return done(AnswerOf(why));
+  if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
+    return done(AnswerOf(why));
+  if (const std::string why = appliance_.WhyBlocked(); !why.empty()) return done(AnswerOf(why));
   if (purpose == web::ScanPurpose::kReference) {
     if (const std::string why = appliance_.WhyNoReference(); !why.empty())
       return done(AnswerOf(why));

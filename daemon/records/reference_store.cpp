@@ -27,12 +27,9 @@ constexpr const char* kReferenceColumns =
 /// SHA-256 of the data that an approval signs: all that the summary shows, and the files of the
 /// surface that later scans are compared with.
 std::string DigestOf(const Statement& row) {
-  const std::string text =
-      fmt::format("patient {}\nversion {}\nscan {}\nreason {}\n{}\n{}", row.Text(1), row.Integer(2),
-                  ScanId(row.Integer(3)), row.Text(6), row.Text(9), row.Text(12));
-  Sha256 hash;
-  hash.Add(text.data(), text.size());
-  return hash.Hex();
+  return Sha256Of(fmt::format("patient {}\nversion {}\nscan {}\nreason {}\n{}\n{}", row.Text(1),
+                              row.Integer(2), ScanId(row.Integer(3)), row.Text(6), row.Text(9),
+                              row.Text(12)));
 }
 
 /// @throws DataError naming the version whose plan cannot be read: it must not be used.
@@ -167,6 +164,11 @@ std::string ReferenceStore::Add(const web::Actor& actor, const std::string& scan
                          "this scan has no scene: only a finished scan can become a reference");
     }
     patient = query.Integer(0);
+    if (patient == 0) {
+      throw StoreRefusal(
+          ChangeResult::kConflict,
+          "this scan belongs to no patient: open the patient, then scan a reference");
+    }
   }
   change
       .Prepare(
@@ -253,6 +255,13 @@ void ReferenceStore::Approve(const web::Actor& actor, const std::string& id, int
     if (!reference.approved_by.empty())
       throw StoreRefusal(ChangeResult::kConflict, "this reference is approved already");
     RequireRevision(reference.revision, revision);
+    Statement newer = change.Prepare(
+        "SELECT 1 FROM refs AS other JOIN refs ON other.patient_id = refs.patient_id AND "
+        "other.version > refs.version WHERE refs.id = ? AND other.approved_by <> '' LIMIT 1");
+    if (newer.Bind(number).Step())
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "a newer version of this reference is approved, and scans are compared "
+                         "with the newest: change the plan of that one");
     signed_digest = reference.digest;
     if (!digest.empty() && digest != signed_digest)
       throw StoreRefusal(ChangeResult::kConflict,

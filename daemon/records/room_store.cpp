@@ -1,5 +1,7 @@
 #include "daemon/records/room_store.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
@@ -39,11 +41,32 @@ SignedRoom ReadRoom(const Statement& row) {
   return room;
 }
 
+/// Id of the last check that a calibration was made from. Order is told by ids: the clock may have
+/// been set back since the signature.
+std::int64_t LastCheckOf(const SignedRoom& room) {
+  std::int64_t last = 0;
+  for (const std::string& id : room.check_ids)
+    last = std::max(last, store::ParseId(id).value_or(0));
+  return last;
+}
+
+/// 0 if there is no calibration, or the newest cannot be read and has to be made again.
+std::int64_t LastCheckUsed(Database& database) {
+  Statement query = database.Prepare(kNewestRooms);
+  if (!query.Bind(std::int64_t{1}).Step()) return 0;
+  try {
+    return LastCheckOf(ReadRoom(query));
+  } catch (const DataError&) {
+    return 0;
+  }
+}
+
 RoomCandidate ReadCandidate(Database& database, const std::string& serial, std::int64_t since) {
+  const std::int64_t last_used = LastCheckUsed(database);
   Statement query = database.Prepare(
-      "SELECT id, time, user, json FROM checks WHERE sensor_serial = ? AND time >= ? AND time > "
-      "(SELECT COALESCE(MAX(signed_at), 0) FROM room_calibrations) ORDER BY id DESC LIMIT ?");
-  query.Bind(serial).Bind(since).Bind(std::int64_t{kScansShown});
+      "SELECT id, time, user, json FROM checks WHERE sensor_serial = ? AND time >= ? AND id > ? "
+      "ORDER BY id DESC LIMIT ?");
+  query.Bind(serial).Bind(since).Bind(last_used).Bind(std::int64_t{kScansShown});
   std::vector<BoardScan> scans;
   while (query.Step()) {
     std::optional<BoardScan> scan = BoardScanIn(query.Text(3));
@@ -112,9 +135,8 @@ std::string RoomStore::Sign(const web::Actor& actor, const std::string& sensor_s
 
 std::string RoomStore::WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits) {
   const StoreDatabase::Held rows = database_.ForRows();
-  Statement query =
-      rows->Prepare("SELECT json FROM checks WHERE time > ? ORDER BY id DESC LIMIT ?");
-  query.Bind(ToStored(room.signed_at)).Bind(std::int64_t{kChecksSearched});
+  Statement query = rows->Prepare("SELECT json FROM checks WHERE id > ? ORDER BY id DESC LIMIT ?");
+  query.Bind(LastCheckOf(room)).Bind(std::int64_t{kChecksSearched});
   while (query.Step()) {
     if (const auto why = WhyRoomIsDue(room, query.Text(0), limits)) return *why;
   }

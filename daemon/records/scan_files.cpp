@@ -83,6 +83,12 @@ std::string Sha256::Hex() {
   return fmt::format("{:02x}", fmt::join(hash, ""));
 }
 
+std::string Sha256Of(std::string_view text) {
+  Sha256 hash;
+  hash.Add(text.data(), text.size());
+  return hash.Hex();
+}
+
 FileLook LookAt(const fs::path& path) {
   FileLook look;
   const Descriptor file(path);

@@ -25,6 +25,8 @@ class Sha256 {
   crypto_hash_sha256_state state_{};
 };
 
+[[nodiscard]] std::string Sha256Of(std::string_view text);
+
 /// Result of examining a path.
 struct FileLook {
   int error = 0;         ///< As errno; 0: it can be opened for reading.

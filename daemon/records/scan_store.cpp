@@ -258,7 +258,7 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
       .Bind(std::int64_t{has_folder})
       .Bind(number)
       .Run();
-  if (!finished.result_json.empty()) {
+  if (finished.outcome == web::ScanOutcome::kDone && !finished.result_json.empty()) {
     database.Prepare("INSERT INTO results (scan_id, json) VALUES (?, ?)")
         .Bind(number)
         .Bind(finished.result_json)
@@ -276,7 +276,9 @@ void ScanStore::Accept(const web::Actor& actor, const std::string& id, const std
     Statement query = change.Prepare(
         "SELECT outcome, accepted_by, (SELECT json FROM results WHERE scan_id = scans.id), "
         "EXISTS (SELECT 1 FROM scans AS newer WHERE newer.patient_id = scans.patient_id AND "
-        "newer.id > scans.id AND newer.outcome IN ('done', 'running')) FROM scans WHERE id = ?");
+        "newer.id > scans.id AND newer.outcome IN ('done', 'running')), reference_id = (SELECT id "
+        "FROM refs WHERE refs.patient_id = scans.patient_id AND approved_by <> '' ORDER BY version "
+        "DESC LIMIT 1) FROM scans WHERE id = ?");
     if (!number || !query.Bind(*number).Step())
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
     if (query.Text(0) != "done" || query.IsNull(2)) {
@@ -292,6 +294,10 @@ void ScanStore::Accept(const web::Actor& actor, const std::string& id, const std
     if (query.Integer(3) != 0)
       throw StoreRefusal(ChangeResult::kConflict,
                          "there is a newer scan of this patient: accept that one");
+    if (query.Integer(4) == 0)
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "another version of the reference has been approved since this scan: scan "
+                         "again, then accept");
     if (result.verdict != "in_tolerance" && reason.empty())
       throw StoreRefusal(ChangeResult::kConflict,
                          "this result is not in tolerance: accepting it requires a reason and "

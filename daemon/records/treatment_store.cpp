@@ -1,5 +1,7 @@
 #include "daemon/records/treatment_store.hpp"
 
+#include <algorithm>
+
 #include "daemon/records/store_refusal.hpp"
 #include "daemon/records/stored_values.hpp"
 
@@ -37,17 +39,21 @@ std::string TreatmentStore::Open(const web::Actor& actor, const std::string& pat
   CloseOpenSessions(change, actor);
   std::int64_t fraction = 0;
   {
-    // Fractions are counted by sessions in which something was compared, not by scans.
+    // A fraction is a session in which something was compared, and the next one follows it. It is
+    // not counted how many there are: their scans may have been removed meanwhile.
     Statement query = change.Prepare(
-        "SELECT (SELECT count(*) FROM sessions WHERE patient_id = patients.id AND purpose = "
-        "'fraction' AND EXISTS (SELECT 1 FROM scans JOIN results ON scan_id = scans.id WHERE "
-        "session_id = sessions.id)), archived FROM patients WHERE id = ?");
+        "WITH newest AS (SELECT ifnull(max(fraction), 0) AS fraction FROM sessions WHERE "
+        "patient_id = ?1 AND purpose = 'fraction') SELECT newest.fraction, archived, EXISTS "
+        "(SELECT 1 FROM sessions JOIN scans ON session_id = sessions.id JOIN results ON scan_id = "
+        "scans.id WHERE sessions.patient_id = ?1 AND sessions.purpose = 'fraction' AND "
+        "sessions.fraction = newest.fraction) FROM patients, newest WHERE patients.id = ?1");
     if (!patient || !query.Bind(*patient).Step())
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
     if (query.Integer(1) != 0)
       throw StoreRefusal(ChangeResult::kConflict,
                          "this patient is archived: take it out of the archive first");
-    if (purpose == web::ScanPurpose::kFraction) fraction = 1 + query.Integer(0);
+    if (purpose == web::ScanPurpose::kFraction)
+      fraction = std::max<std::int64_t>(1, query.Integer(0) + query.Integer(2));
   }
   change
       .Prepare(

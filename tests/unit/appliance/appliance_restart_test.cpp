@@ -22,6 +22,14 @@ web::Change Restarted(WebServices& services) {
   return answer;
 }
 
+/// What InstallUpdate() answers at once about a bundle that is not there, on the loop.
+web::Change Installed(WebServices& services) {
+  const auto answer = std::make_shared<web::Change>();  // it may also come later
+  services.updates().InstallUpdate({.user = "erik", .address = {}}, "plumb-9.raucb",
+                                   [answer](const web::Change& change) { *answer = change; });
+  return *answer;
+}
+
 TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedUnderAScan) {
   Play([&] {
     MakeReady();
@@ -82,6 +90,12 @@ TEST_F(ApplianceRestartTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
     On([&] {
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester),
                   ::testing::HasSubstr("being restarted"));
+      const std::string patient = appliance_->store()->patients.Add(kTester, "P-1", "");
+      web::Change answer;
+      services_->services().patients.OpenPatient(
+          kTester, patient, web::ScanPurpose::kReference, "", "",
+          [&](const web::Change& change) { answer = change; });
+      EXPECT_THAT(answer.message, ::testing::HasSubstr("being restarted"));
     });
   });
 }
@@ -97,7 +111,10 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedInASessionAndAFailedRestart
       EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("session of a patient is open"));
       EXPECT_EQ(restart_->num_asked, 0);
+      EXPECT_THAT(Installed(*services_).message,
+                  ::testing::HasSubstr("close it first, then install the update"));
       EXPECT_EQ(appliance_->CloseSession({.user = "tess", .address = {}}), "");
+      EXPECT_THAT(Installed(*services_).message, ::testing::Not(::testing::HasSubstr("session")));
       restart_->failure = "the machine cannot be restarted from here: no";
       const web::Change failed = Restarted(*services_);
       EXPECT_EQ(failed.result, web::ChangeResult::kFailed);

@@ -107,6 +107,104 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
   });
 }
 
+/// Two patients, as the store knows them.
+struct TwoPatients {
+  std::string a, b;
+};
+
+TwoPatients AddTwoPatients(Store& store) {
+  return {store.patients.Add(web::Actor{.user = "tess", .address = {}}, "A", ""),
+          store.patients.Add(web::Actor{.user = "tess", .address = {}}, "B", "")};
+}
+
+TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClosed) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
+  const web::Actor tess{.user = "tess", .address = {}};
+  Play([&] {
+    MakeReady();
+    std::promise<web::Change> first;
+    web::Change second, closed;
+    TwoPatients patients;
+    On([&] {
+      patients = AddTwoPatients(*appliance_->store());
+      (void)appliance_->store()->checks.Add(
+          tess, appliance_->WebStatus().sensor.serial,
+          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      auto& service = services_->services().patients;
+      service.OpenPatient(tess, patients.a, web::ScanPurpose::kReference, "", "",
+                          [&](const web::Change& change) { first.set_value(change); });
+      service.OpenPatient(tess, patients.b, web::ScanPurpose::kReference, "", "",
+                          [&](const web::Change& change) { second = change; });
+      service.CloseSession(tess, "", [&](const web::Change& change) { closed = change; });
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
+                  ::testing::HasSubstr("a patient is being opened"));
+    });
+    EXPECT_EQ(first.get_future().get().result, web::ChangeResult::kDone);
+    for (const web::Change& refused : {second, closed}) {
+      EXPECT_EQ(refused.result, web::ChangeResult::kConflict);
+      EXPECT_EQ(refused.message, "a patient is being opened: try again in a moment");
+    }
+    On([&] {
+      ASSERT_TRUE(appliance_->WebStatus().session);
+      EXPECT_EQ(appliance_->WebStatus().session->patient_id, patients.a);
+      EXPECT_EQ(appliance_->open_patient(), patients.a);
+      EXPECT_EQ(appliance_->CloseSession(tess), "");
+    });
+  });
+}
+
+TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
+  const web::Actor tess{.user = "tess", .address = {}};
+  Play([&] {
+    MakeReady();
+    std::promise<web::Change> opened, refused, wiped;
+    TwoPatients patients;
+    std::string running;
+    On([&] {
+      patients = AddTwoPatients(*appliance_->store());
+      (void)appliance_->store()->checks.Add(
+          tess, appliance_->WebStatus().sensor.serial,
+          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      services_->services().patients.OpenPatient(
+          tess, patients.a, web::ScanPurpose::kReference, "", "",
+          [&](const web::Change& change) { opened.set_value(change); });
+    });
+    EXPECT_EQ(opened.get_future().get().result, web::ChangeResult::kDone);
+    On([&] {
+      running = appliance_->store()->scans.Begin({.patient_id = patients.a,
+                                                  .reference_id = {},
+                                                  .purpose = web::ScanPurpose::kReference,
+                                                  .sensor_serial = "A",
+                                                  .reason = {}});
+      services_->services().patients.WipePatient(
+          tess, patients.a, [&](const web::Change& change) { refused.set_value(change); });
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
+                  ::testing::HasSubstr("data is being removed"));
+      EXPECT_THAT(appliance_->CloseSession(tess), ::testing::HasSubstr("data is being removed"));
+    });
+    EXPECT_THAT(refused.get_future().get().message,
+                ::testing::HasSubstr("a scan of this patient is running"));
+    On([&] {
+      ASSERT_TRUE(appliance_->WebStatus().session) << "nothing was removed";
+      EXPECT_EQ(appliance_->open_patient(), patients.a);
+      appliance_->store()->scans.Finish(running, {.outcome = web::ScanOutcome::kCancelled,
+                                                  .failure = "discarded",
+                                                  .result_json = {},
+                                                  .swept_area_m2 = 0.0});
+      services_->services().patients.WipePatient(
+          tess, patients.a, [&](const web::Change& change) { wiped.set_value(change); });
+    });
+    EXPECT_EQ(wiped.get_future().get().result, web::ChangeResult::kDone);
+    On([&] {
+      EXPECT_FALSE(appliance_->WebStatus().session);
+      EXPECT_EQ(appliance_->open_patient(), "");
+    });
+  });
+}
+
 TEST_F(ApplianceTest, ASurfaceIsPackedOnceAndAFailureIsNotKept) {
   Play([&] {
     MakeReady();

@@ -118,6 +118,31 @@ TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
   EXPECT_EQ(after(0), "") << "it was put back";
 }
 
+TEST_F(StoreRoomTest, AClockThatIsSetBackAfterTheSignatureHidesNoCheck) {
+  Scan(), Scan(), Scan();
+  (void)Sign(Candidate().digest);
+  store_ = nullptr;
+  {
+    Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
+    // As if the clock had been a day ahead until after the signature.
+    direct.Execute(
+        "DROP TRIGGER room_calibrations_no_update; DROP TRIGGER checks_no_update; UPDATE "
+        "room_calibrations SET signed_at = "
+        "signed_at + 86400000000; UPDATE checks SET time = time + 86400000000");
+  }
+  store_ = std::make_unique<Store>(folder_ / "state");
+  const SignedRoom room = *store_->room.Newest();
+  MarkerMap markers = MarkersOfRoom();
+  for (Eigen::Vector3d& corner : markers.at(4).corners) corner.x() += 0.02;
+  store_->checks.Add(kEve, "S1", CheckOver(0, 0, markers));
+  EXPECT_THAT(store_->room.WhyDue(room, {}), HasSubstr("marker 4 moved 20 mm"));
+  EXPECT_THAT(Candidate().scans, IsEmpty()) << "those of the signature are used up";
+  Scan(), Scan(), Scan();
+  const RoomCandidate candidate = Candidate();
+  EXPECT_THAT(candidate.why_not, IsEmpty()) << "the room can be calibrated again";
+  EXPECT_EQ(Sign(candidate.digest), std::pair(ChangeResult::kDone, std::string("2")));
+}
+
 TEST_F(StoreRoomTest, OneThatWasTamperedWithIsNotUsed) {
   Scan(), Scan(), Scan();
   (void)Sign(Candidate().digest);

@@ -1,5 +1,7 @@
 // Treatment sessions, waiting references and paired screens in the store.
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -88,6 +90,45 @@ TEST_F(StoreSessionsTest, FractionNumbersCountSessionsNotScans) {
   EXPECT_EQ(store.treatments.Opened()->fraction, 2);
   (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
   EXPECT_EQ(store.treatments.Opened()->fraction, 2) << "nothing was scanned in the session before";
+}
+
+TEST_F(StoreSessionsTest, FractionNumbersGoOnWhereScansHaveBeenRemoved) {
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "");
+  std::vector<std::string> scans;
+  for (int fraction = 1; fraction <= 4; ++fraction) {
+    const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+    EXPECT_EQ(store.treatments.Opened()->fraction, fraction);
+    scans.push_back(Scan(store, patient, session, R"({"verdict":"move"})"));
+  }
+  for (std::size_t i = 0; i < 3; ++i) store.removal.RemoveScan(kAnna, scans[i], "room on the disk");
+  (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->fraction, 5);
+  (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->fraction, 5) << "nothing was scanned in the session before";
+  (void)store.treatments.Open(kAnna, store.patients.Add(kAnna, "P-2", ""), ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->fraction, 1) << "each patient's own";
+}
+
+TEST_F(StoreSessionsTest, AScanThatWasDiscardedHasNoResultAndIsNoFraction) {
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "");
+  const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  for (const web::ScanOutcome outcome : {web::ScanOutcome::kCancelled, web::ScanOutcome::kFailed}) {
+    const std::string id = store.scans.Begin({.patient_id = patient,
+                                              .reference_id = {},
+                                              .purpose = ScanPurpose::kFraction,
+                                              .sensor_serial = "S1",
+                                              .reason = {},
+                                              .session_id = session});
+    store.scans.Finish(id, {.outcome = outcome,
+                            .failure = "discarded",
+                            .result_json = R"({"verdict":"move"})",
+                            .swept_area_m2 = 1.0});
+    EXPECT_FALSE(store.scans.Find(id)->result);
+  }
+  (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->fraction, 1);
 }
 
 TEST_F(StoreSessionsTest, AScanWithoutASessionIsOfNoPatient) {

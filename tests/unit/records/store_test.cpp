@@ -353,6 +353,43 @@ TEST_F(StoreTest, OnlyAScanWithAnAnswerIsAccepted) {
   EXPECT_EQ(store->scans.Find(fine)->accepted_by, "anna");
 }
 
+TEST_F(StoreTest, AResultAgainstAReferenceThatIsNoLongerTheApprovedOneIsNotAccepted) {
+  const auto store = Open();
+  const std::string patient = store->patients.Add(kAnna, "A", "");
+  const std::string first = ApprovedReference(*store, patient);
+  const std::string scan = Scan(*store, patient, first, R"({"verdict":"in_tolerance"})");
+  const std::string second = store->references.Plan(kAnna, first, 2, {});
+  store->references.Approve(kBert, second, 1);
+  EXPECT_EQ(RefusalOf([&] { store->scans.Accept(kAnna, scan); }), ChangeResult::kConflict);
+  EXPECT_EQ(store->scans.Find(scan)->accepted_by, "");
+  const std::string again = Scan(*store, patient, second, R"({"verdict":"in_tolerance"})");
+  store->scans.Accept(kAnna, again);
+  EXPECT_EQ(store->scans.Find(again)->accepted_by, "anna");
+}
+
+TEST_F(StoreTest, AnOlderDraftIsNotApprovedAfterANewerOne) {
+  const auto store = Open();
+  const std::string patient = store->patients.Add(kAnna, "A", "");
+  const std::string first = ApprovedReference(*store, patient);
+  const std::string older = store->references.Plan(kAnna, first, 2, {});
+  const std::string newer = store->references.Plan(kAnna, first, 2, {});
+  ASSERT_NE(older, newer);
+  store->references.Approve(kBert, newer, 1);
+  EXPECT_EQ(RefusalOf([&] { store->references.Approve(kBert, older, 1); }),
+            ChangeResult::kConflict);
+  EXPECT_EQ(store->references.Find(older)->approved_by, "");
+  EXPECT_EQ(store->references.Approved(patient)->id, newer);
+}
+
+TEST_F(StoreTest, AScanOfNoPatientBecomesNoReference) {
+  const auto store = Open();
+  const std::string scan = Scan(*store, "");
+  EXPECT_EQ(RefusalOf([&] { (void)store->references.Add(kAnna, scan, "first", {}); }),
+            ChangeResult::kConflict);
+  store->removal.RemoveScan(kAnna, scan, "of nobody");
+  EXPECT_FALSE(store->scans.Find(scan)) << "it can still be removed";
+}
+
 TEST_F(StoreTest, ATemplateIsOfOneSiteWhateverItsCaseAndIsLogged) {
   {
     const auto store = Open();

@@ -21,6 +21,23 @@ export const kFaultWords = {
   'nothing can be stored': 'no se puede guardar nada',
   'a patient is being opened: press again in a moment':
     'se está abriendo un paciente: pulse de nuevo en un momento',
+  'a patient is being opened: try again in a moment':
+    'se está abriendo un paciente: inténtelo de nuevo en un momento',
+  'this patient\'s data is being removed: press again in a moment':
+    'se están borrando los datos de este paciente: pulse de nuevo en un momento',
+  'this patient\'s data is being removed: try again in a moment':
+    'se están borrando los datos de este paciente: inténtelo de nuevo en un momento',
+  'this scan belongs to no patient: open the patient, then scan a reference':
+    'este escaneo no es de ningún paciente: abra el paciente y escanee una referencia',
+  ['a newer version of this reference is approved, and scans are compared with the newest: change '
+    + 'the plan of that one']:
+    'hay aprobada una versión más nueva de esta referencia, y los escaneos se comparan con la más '
+    + 'nueva: cambie el plan de esa',
+  'another version of the reference has been approved since this scan: scan again, then accept':
+    'desde este escaneo se ha aprobado otra versión de la referencia: escanee de nuevo y acepte '
+    + 'después',
+  'the session of a patient is open: close it first, then install the update':
+    'la sesión de un paciente está abierta: ciérrela primero e instale después la actualización',
   'a scan of this patient is running: end or cancel it first':
     'hay un escaneo de este paciente en curso: termínelo o descártelo primero',
   'this session is closed already, or another one is open by now':
@@ -110,7 +127,6 @@ export const kFaultWords = {
   'there is no such display': 'no existe esa pantalla',
   // Storage.
   'the store is busy: try again': 'el almacén está ocupado: pruebe de nuevo',
-  'too much waits already: try again': 'ya hay demasiado en espera: pruebe de nuevo',
   'too much is asked at once; try again in a few seconds':
     'se pide demasiado a la vez; pruebe en unos segundos',
   'too much is being sent; try again in a few seconds':
