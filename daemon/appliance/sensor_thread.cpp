@@ -250,7 +250,6 @@ struct SensorThread::Impl {
     std::shared_ptr<LiveSensor> gone;
     const std::lock_guard lock(mutex);
     gone = std::move(sensor);
-    sensor.reset();
     current.present = false;
     newest.reset();
   }

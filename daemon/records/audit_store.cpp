@@ -21,12 +21,6 @@ using store::Now;
 
 namespace {
 
-std::string Sha256Of(const std::string& text) {
-  Sha256 hash;
-  hash.Add(text.data(), text.size());
-  return hash.Hex();
-}
-
 /// One entry of the log as the chain covers it; lengths separate the fields.
 std::string ChainText(const std::string& before, std::int64_t number, std::int64_t time,
                       const std::array<std::string, 5>& fields) {

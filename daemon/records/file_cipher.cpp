@@ -89,34 +89,6 @@ class Pieces {
   std::vector<std::uint8_t> ahead_;
 };
 
-/// The copy, with the digests of the result and of the original.
-class Target {
- public:
-  Target(const fs::path& to, const std::string& path) : path_(path), file_(Made(to / path)) {}
-  void Write(const std::vector<std::uint8_t>& bytes) {
-    hash_.Add(bytes.data(), bytes.size());
-    file_.Write(bytes);
-    bytes_ += bytes.size();
-  }
-  FileDigest Close(const fs::path& to) {
-    file_.Close();
-    ::chmod((to / path_).c_str(), 0640);
-    return {.path = path_, .bytes = bytes_, .sha256 = hash_.Hex()};
-  }
-
- private:
-  static const fs::path& Made(const fs::path& file) {
-    std::error_code error;
-    fs::create_directories(file.parent_path(), error);
-    if (error) throw IoError(DescribeWriteError(file.parent_path(), error.value()));
-    return file;
-  }
-  std::string path_;
-  FileWriter file_;
-  Sha256 hash_;
-  std::uint64_t bytes_ = 0;
-};
-
 const unsigned char* Bytes(const std::string& text) {
   return reinterpret_cast<const unsigned char*>(text.data());
 }
@@ -219,7 +191,7 @@ FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
   const std::string& place = PlaceOf(path);
   Pieces pieces(from / path, kPiece);
   pieces.Begin();
-  Target target(to, path);
+  DigestingWriter target(to, path);
   crypto_secretstream_xchacha20poly1305_state state;
   std::vector<std::uint8_t> sealed(crypto_secretstream_xchacha20poly1305_HEADERBYTES);
   ::crypto_secretstream_xchacha20poly1305_init_push(&state, sealed.data(), key_.data());
@@ -238,7 +210,7 @@ FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
     written.plain.bytes += piece.size();
   } while (!pieces.is_last());
   ::sodium_memzero(&state, sizeof state);
-  written.sealed = target.Close(to);
+  written.sealed = target.Close();
   written.plain.sha256 = hash.Hex();
   return written;
 }
@@ -257,7 +229,7 @@ FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
       ::crypto_secretstream_xchacha20poly1305_init_pull(&state, header.data(), key_.data()) != 0)
     fail();
   pieces.Begin();
-  Target target(to, path);
+  DigestingWriter target(to, path);
   Sha256 sealed_hash;
   sealed_hash.Add(header.data(), header.size());
   Written written{.plain = {}, .sealed = {.path = path, .bytes = header.size(), .sha256 = {}}};
@@ -277,7 +249,7 @@ FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
     written.sealed.bytes += piece.size();
   } while (!pieces.is_last());
   ::sodium_memzero(&state, sizeof state);
-  written.plain = target.Close(to);
+  written.plain = target.Close();
   written.sealed.sha256 = sealed_hash.Hex();
   return written;
 }

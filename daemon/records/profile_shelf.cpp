@@ -28,12 +28,6 @@ constexpr const char* kSetAside = "set-aside";
 constexpr std::size_t kMaxBytes = 1U << 20U;
 constexpr int kMaxVersion = 999'999'999;
 
-std::string SumOf(std::string_view text) {
-  Sha256 hash;
-  hash.Add(text.data(), text.size());
-  return hash.Hex();
-}
-
 // Includes a plain serial itself, so that two serials never share a folder.
 std::string FolderName(const std::string& serial) {
   constexpr std::size_t kLongest = 64;
@@ -44,7 +38,7 @@ std::string FolderName(const std::string& serial) {
   std::replace_if(
       name.begin(), name.end(), [&](char c) { return !is_plain(c); }, '_');
   if (name == serial && name != kSetAside) return name;
-  return fmt::format("{}-{}", name, SumOf(serial).substr(0, 16));
+  return fmt::format("{}-{}", name, Sha256Of(serial).substr(0, 16));
 }
 
 // @throws DataError, nlohmann::json::exception
@@ -54,7 +48,7 @@ ProfileVersion Parse(const std::string& text, const std::string& serial, int ver
   if (line == std::string::npos || !text.starts_with(head))
     throw DataError("it does not begin as a profile of this version of Plumb");
   const std::string body = text.substr(line + 1);
-  if (text.substr(head.size(), line - head.size()) != SumOf(body))
+  if (text.substr(head.size(), line - head.size()) != Sha256Of(body))
     throw DataError("its checksum is wrong: it was damaged or changed");
   const Json json = ParseBoundedJson<Json>(body);
   if (json.at("serial") != serial)
@@ -160,7 +154,7 @@ int ProfileShelf::Write(const std::string& serial, const char* cause,
   fs::create_directories(folder, error);
   if (error) throw IoError(DescribeWriteError(folder, error.value()));
   WriteFileAtomically(folder / fmt::format("{:06}{}", version, kEnding), [&](const fs::path& at) {
-    WriteWholeFile(at, kHead + SumOf(body) + "\n" + body);
+    WriteWholeFile(at, kHead + Sha256Of(body) + "\n" + body);
   });
   for (std::size_t i = kKeptVersions - 1; i < entries.size(); ++i)
     fs::remove(entries[i].file, error);

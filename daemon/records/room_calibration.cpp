@@ -44,12 +44,6 @@ Pose PoseIn(const Json& rows) {
   return T;
 }
 
-std::string Digest(const std::string& text) {
-  Sha256 sum;
-  sum.Add(text.data(), text.size());
-  return sum.Hex();
-}
-
 std::string JsonOf(const RoomFit& fit, std::span<const BoardScan> scans) {
   Json json = {{"format", kFormat},
                {"dictionary", scans[0].dictionary},
@@ -136,7 +130,7 @@ RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibratio
   candidate.fit = std::get<RoomFit>(std::move(fit));
   candidate.why_not = WhyNotSign(*candidate.fit, used.size(), limits);
   candidate.json = JsonOf(*candidate.fit, used);
-  candidate.digest = Digest(candidate.json);
+  candidate.digest = Sha256Of(candidate.json);
   return candidate;
 }
 
@@ -146,7 +140,7 @@ SignedRoom SignedRoomIn(const std::string& text) {
     if (json.at("format").get<int>() != kFormat)
       throw DataError(fmt::format("expected format {}, found {}", kFormat, json["format"].dump()));
     SignedRoom room;
-    room.digest = Digest(text);
+    room.digest = Sha256Of(text);
     room.dictionary = json.at("dictionary").get<std::string>();
     room.marker_length_m = json.at("marker_length_m").get<double>();
     room.reference_marker = json.at("reference_marker").get<int>();

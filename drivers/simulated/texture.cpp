@@ -186,10 +186,6 @@ void Texture::Stroke(const Vector2f& from, const Vector2f& to, float width, cons
   }
 }
 
-void Texture::Disc(const Vector2f& centre, float radius, const Vector3f& color, float opacity) {
-  Stroke(centre, centre, 2 * radius, color, opacity);
-}
-
 Texture PaintFloor(std::uint64_t seed) {
   RandomStream random(Hash(seed, 11));
   const auto warmth = static_cast<float>(random.Within(0.05));

@@ -30,9 +30,6 @@ class Texture {
   /// Blends a colour over a thick straight stroke.
   void Stroke(const Eigen::Vector2f& from, const Eigen::Vector2f& to, float width,
               const Eigen::Vector3f& color, float opacity);
-  /// Blends a colour over a disc.
-  void Disc(const Eigen::Vector2f& centre, float radius, const Eigen::Vector3f& color,
-            float opacity);
 
   [[nodiscard]] Eigen::Vector2f low() const { return low_; }
   [[nodiscard]] Eigen::Vector2f high() const {

@@ -88,7 +88,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
     phase_begun_.reset();
     status.state = ApplianceState::kWorking;
     status.light = "working";
-    status.scan->step = "surfaces";
+    status.scan->step = "surface";
     Notify(EventKind::kStatus);
     return Did(actor, "scan.end", status.scan->id, done);
   }
@@ -164,7 +164,7 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
       phase_begun_ = now;
       status.state = ApplianceState::kWorking;
       status.light = "working";
-      scan.step = "surfaces";
+      scan.step = "surface";
       scan.guidance = Guidance::kNone;
     }
     Notify(EventKind::kProgress);

@@ -186,6 +186,17 @@ for (const file of ['algo/acceptance/acceptance.cpp', 'algo/comparison/compariso
     }
   }
 }
+// Each step of the computation that the appliance reports has its words.
+for (const file of ['algo/reconstruction/reconstructor.cpp', 'daemon/appliance/scan_session.cpp']) {
+  const text = readFileSync(join(source, file), 'utf8');
+  const steps = [...text.matchAll(/\b(?:report|ReportProgress)\((?:[^"();]+, )?"([^"]+)"/g)];
+  if (steps.length < 4) failures.push(`${file} reports ${steps.length} steps`);
+  for (const [, step] of steps) {
+    for (const catalogue of [en, es]) {
+      if (!Object.hasOwn(catalogue.scan.step, step)) failures.push(`no words for step "${step}"`);
+    }
+  }
+}
 // The print view and the reports name the numbers as the page does.
 const terms = readFileSync(join(source, 'web/service/result_terms.hpp'), 'utf8');
 for (const { axes, lines, tilts } of [en.result, es.result]) {

@@ -64,7 +64,6 @@ export const es = {
   action: 'Acción',
   saved: 'Guardado.',
   cancel: 'Cancelar',
-  back: 'Atrás',
   language: 'Idioma',
   theme: 'Tema',
   themes: { auto: 'Como el sistema', dark: 'Oscuro', light: 'Claro' },
@@ -91,7 +90,7 @@ export const es = {
   outcomes: { running: 'en curso', done: 'hecho', cancelled: 'cancelado', failed: 'fallido' },
   login: {
     title: 'Identificarse', name: 'Nombre', password: 'Contraseña', submit: 'Entrar',
-    wait: 'Comprobando…', faultTitle: 'Fuera de servicio',
+    faultTitle: 'Fuera de servicio',
     faultText: 'Nadie puede identificarse ni escanear hasta que se arregle esto:',
     setupTitle: 'Primer arranque',
     setupText: 'Este equipo aún no tiene cuentas. Escriba el código de instalación impreso en su '
@@ -214,8 +213,11 @@ export const es = {
     discarded: 'El escaneo se ha descartado.',
     lost: 'El sensor se desconectó: el escaneo se ha descartado.',
     step: {
-      tracking: 'Terminando el seguimiento', surfaces: 'Uniendo superficies',
-      comparing: 'Comparando', saving: 'Guardando', checking: 'Comprobando los marcadores',
+      tracking: 'Terminando el seguimiento', markers: 'Midiendo los marcadores',
+      registration: 'Alineando las imágenes', 'global ICP': 'Alineando las imágenes',
+      surface: 'Uniendo superficies', 'height map': 'Creando el mapa de alturas',
+      mesh: 'Creando la superficie', done: 'Reconstruido', comparing: 'Comparando',
+      saving: 'Guardando', checking: 'Comprobando los marcadores',
     },
     seconds: (s) => `${s.toFixed(1).replace('.', ',')} s`,
   },
