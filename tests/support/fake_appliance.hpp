@@ -2,6 +2,7 @@
 // Tick() goes.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <functional>
@@ -163,14 +164,18 @@ class FakeAppliance : public web::BackgroundWork,
     const auto scan = FindScan(scan_id);
     return scan && make_map ? make_map(scan->folder, name) : std::nullopt;
   }
-  web::ResultNotes Notes(const std::string& scan_id, web::Language) override {
+  web::ResultNotes Notes(const std::string& scan_id, web::Language language) override {
     const auto scan = FindScan(scan_id);
-    const std::string said(web::DailyCheckCaution(
-        scan ? scan->daily_check : web::DailyCheck::kPassed, web::kEnglishTerms));
+    const bool is_spanish = language == web::Language::kSpanish;
+    const web::ResultTerms& terms = is_spanish ? web::kSpanishTerms : web::kEnglishTerms;
+    const std::string said(
+        web::DailyCheckCaution(scan ? scan->daily_check : web::DailyCheck::kPassed, terms));
     web::ResultNotes notes{.axes = axis_names, .cautions = {}};
+    if (is_spanish) std::ranges::copy(terms.axes, notes.axes.begin());
     if (!said.empty()) notes.cautions.push_back(said);
     return notes;
   }
+  /// In English.
   std::array<std::string, 6> axis_names = {"Vertical", "Longitudinal", "Lateral",
                                            "Pitch",    "Roll",         "Yaw"};
   std::optional<std::string> PictureOf(const std::string&, web::ComparisonPicture picture,
