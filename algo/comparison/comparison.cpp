@@ -153,7 +153,8 @@ class Comparer {
   [[nodiscard]] Eigen::Affine3d StretchedAlignment() const {
     const Alignment& alignment = *result_.alignment;
     return Eigen::Translation3d(alignment.centre_m) * Eigen::Affine3d(alignment.stretch) *
-           Eigen::Translation3d(-alignment.centre_m) * T_joined_ * alignment.T_reference_current;
+           Eigen::Translation3d(-alignment.centre_m) * T_sensor_correction_ *
+           alignment.T_reference_current;
   }
 
   void Segment() {
@@ -257,15 +258,14 @@ class Comparer {
            std::abs(map.z[*cell] - p.z()) < kNear_m;
   }
 
-  // Moves the current scan's surface against the reference frame, and the motion with it. The
-  // alignment stays that of the markers, which its residuals and covariance describe: what the two
-  // sweeps share improves the body's motion, not the place of the markers.
+  // Moves the current scan's surface in the reference frame, and the motion with it. The alignment
+  // remains the fit of the markers, which its residuals and covariance describe.
   void JoinSensor(const SharedSensor& sensor, BodyMotion& motion) {
     const Eigen::Vector3d moved = motion.T * motion.centroid_m;
     const Pose by(Eigen::Translation3d(moved) * PoseFromTwist(sensor.correction) *
                   Eigen::Translation3d(-moved));
     motion.T = by * motion.T;
-    T_joined_ = by;
+    T_sensor_correction_ = by;
     current_cloud_ = TransformedCloud(by, current_cloud_);
   }
 
@@ -365,9 +365,10 @@ class Comparer {
   Comparison result_;
   std::mutex timings_mutex_;
   Evidence evidence_;
-  Pose T_joined_ = Pose::Identity();  // Applied to the current surface after the alignment.
-  PointCloud reference_cloud_;        // reference frame
-  PointCloud current_cloud_;          // reference frame, after alignment
+  Pose T_sensor_correction_ =
+      Pose::Identity();         // Applied to the current surface after the alignment.
+  PointCloud reference_cloud_;  // reference frame
+  PointCloud current_cloud_;    // reference frame, after alignment
   Body reference_body_;
   Body current_body_;
 };

@@ -16,7 +16,7 @@ namespace {
 // hardly moves gives only one keyframe, so frames count too.
 constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
-// Sensors of the Kinect and Xtion class err by about 1 %, prints by up to 3 %.
+// The depth of Kinect and Xtion sensors errs by about 1 %, the size of prints by up to 3 %.
 constexpr double kUsualDepthScale = 0.02;
 constexpr double kGapToReport_s = 0.5;  // The comparison gives no answer above 1 s.
 

@@ -27,9 +27,9 @@ namespace plumb {
 /// it once the frame is decided, which each preset does in its own way.
 void WarnOfFrame(const StreamInfo& info, const TrackingMap& map, Scene& scene);
 
-/// Adds a warning if depth and markers disagree about lengths by more than a sensor's depth errs:
-/// then the markers are probably printed in another size than stated.
-/// @param depth_scale  Factor of the measured depth as estimated, `depth_scale` of the calibration.
+/// Adds a warning if the sensor's depth and the markers disagree about lengths by more than the
+/// depth of such sensors usually errs. The markers are then probably not of the stated size.
+/// @param depth_scale  `depth_scale` of the estimated calibration.
 void WarnOfScale(double depth_scale, Scene& scene);
 
 /// Keeps a map that contains cells and warns about any other: a map without cells cannot be stored,

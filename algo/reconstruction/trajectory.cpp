@@ -7,20 +7,8 @@ namespace {
 
 constexpr double kMaxGap_s = 0.3;  // Frames farther apart do not determine a velocity.
 
-constexpr double kLeastShare = 0.5;  // Of the usual spacing, for a velocity.
-
 constexpr double kUsualSpacings =
     3.0;  // A live stream on a busy machine may skip one or two images in a row.
-
-// The median is not affected by gaps and adapts to any frame rate.
-double UsualSpacing(const std::vector<TrackedFrame>& frames) {
-  std::vector<double> spacings_s;
-  for (std::size_t i = 1; i < frames.size(); ++i)
-    spacings_s.push_back(frames[i].color_time_s - frames[i - 1].color_time_s);
-  const auto middle = spacings_s.begin() + static_cast<std::ptrdiff_t>(spacings_s.size() / 2);
-  std::nth_element(spacings_s.begin(), middle, spacings_s.end());
-  return *middle;
-}
 
 const Pose& KeyframePose(const TrackingMap& map, int keyframe) {
   return map.keyframes.at(static_cast<std::size_t>(keyframe)).T_world_color;
@@ -125,8 +113,7 @@ std::vector<Pose> ColorPoses(const std::vector<TrackedFrame>& frames, const Trac
 void RefreshVelocities(std::vector<TrackedFrame>& frames, TrackingMap& map) {
   if (frames.size() < 2) return;
   const std::vector<Pose> poses = ColorPoses(frames, map);
-  // Closer stamps are not those of the images, and the chord between them is no velocity.
-  const double least_s = kLeastShare * UsualSpacing(frames);
+  const double least_s = kLeastOfUsualSpacing * UsualSpacing(frames);
   std::size_t begin = 0;
   for (std::size_t end = 1; end <= frames.size(); ++end) {
     if (end < frames.size() && frames[end - 1].tracked && frames[end].tracked) {

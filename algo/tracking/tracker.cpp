@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/statistics.hpp"
 #include "algo/tracking/tracker_impl.hpp"
 
 namespace plumb {
@@ -19,7 +20,28 @@ namespace {
 constexpr double kMaxSpeed = 2.5;
 constexpr double kMaxTurn = 4.0;  // Radians per second.
 
+// How keypoints and marker corners agree with a pose.
+struct PointSupport {
+  bool by_many = false;     // Enough keypoints or corners in any case.
+  bool by_markers = false;  // Few, but most of them.
+  [[nodiscard]] bool is_enough() const { return by_many || by_markers; }
+};
+
+PointSupport SupportOf(const PoseEstimate& estimate, std::size_t num_points) {
+  if (num_points == 0) return {};
+  const double share = static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points);
+  return {.by_many = estimate.num_inliers >= 12 && share > 0.35,
+          .by_markers = estimate.num_inliers >= 4 && share > 0.6};
+}
+
 }  // namespace
+
+double UsualSpacing(std::span<const TrackedFrame> frames) {
+  std::vector<double> spacings_s;
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    spacings_s.push_back(frames[i].color_time_s - frames[i - 1].color_time_s);
+  return TakeMedian(spacings_s);
+}
 
 Tracker::Impl::Impl(const StreamInfo& stream, const TrackerOptions& tracker_options)
     : info(stream),
@@ -157,45 +179,27 @@ Pose Tracker::Impl::DepthPose(const MapKeyframe& keyframe) {
                    keyframe.data.depth_time_s - keyframe.data.color_time_s);
 }
 
-// Time since an earlier image, as far as it can be believed. Where stamps are made on arrival, two
-// images can come within a millisecond; their motion divided by that would be no velocity.
-double Tracker::Impl::BelievedStep_s(double step_s) const {
-  constexpr std::size_t kRecent = 15;
-  const std::size_t count = std::min(kRecent, frames.empty() ? 0 : frames.size() - 1);
-  if (count < 3) return step_s;
-  std::array<double, kRecent> spacings_s{};
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t later = frames.size() - 1 - i;
-    spacings_s[i] = frames[later].color_time_s - frames[later - 1].color_time_s;
-  }
-  const auto middle = spacings_s.begin() + static_cast<std::ptrdiff_t>(count / 2);
-  std::nth_element(spacings_s.begin(), middle,
-                   spacings_s.begin() + static_cast<std::ptrdiff_t>(count));
-  return std::max(step_s, 0.5 * *middle);
-}
-
-bool Tracker::Impl::IsHeldByPoints(const PoseEstimate& estimate, std::size_t num_points) {
-  const double share =
-      num_points > 0 ? static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points)
-                     : 0.0;
-  const bool by_keypoints = estimate.num_inliers >= 12 && share > 0.35;
-  const bool by_markers = num_points > 0 && estimate.num_inliers >= 4 && share > 0.6;
-  return by_keypoints || by_markers;
+// The time since an earlier image, but at least half of the usual spacing. If stamps are made on
+// arrival, two images may be stamped within a millisecond, and dividing their motion by that would
+// give an absurd velocity.
+double Tracker::Impl::PlausibleStep_s(double step_s) const {
+  constexpr std::size_t kRecent = 16, kLeast = 4;
+  if (frames.size() < kLeast) return step_s;
+  const std::span<const TrackedFrame> recent =
+      std::span(frames).last(std::min(kRecent, frames.size()));
+  return std::max(step_s, kLeastOfUsualSpacing * UsualSpacing(recent));
 }
 
 // True if the estimate is reliable: enough inliers, all six directions constrained, and a
 // plausible speed for a hand.
 bool Tracker::Impl::Plausible(const PoseEstimate& estimate, std::size_t num_points,
                               double dt_s) const {
-  const double share =
-      num_points > 0 ? static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points)
-                     : 0.0;
-  const bool by_points = estimate.num_inliers >= 12 && share > 0.35;
+  const PointSupport support = SupportOf(estimate, num_points);
   const bool by_depth =
       estimate.num_dense > 600 && estimate.dense_overlap > 0.4 && estimate.dense_rms_m < 0.012;
-  if (!IsHeldByPoints(estimate, num_points) && !by_depth) return false;
+  if (!support.is_enough() && !by_depth) return false;
   // Depth that contradicts a pose from few points: the start was wrong.
-  if (!by_points && estimate.num_dense > 0 && estimate.dense_overlap < 0.25) return false;
+  if (!support.by_many && estimate.num_dense > 0 && estimate.dense_overlap < 0.25) return false;
   const Matrix6d covariance = estimate.information.ldlt().solve(Matrix6d::Identity());
   const double rotation_rad = std::sqrt(std::max(0.0, covariance.topLeftCorner<3, 3>().trace()));
   const double translation_m =
@@ -210,7 +214,7 @@ bool Tracker::Impl::Plausible(const PoseEstimate& estimate, std::size_t num_poin
 std::optional<PoseEstimate> Tracker::Impl::FollowFrame(const Frame& frame,
                                                        const FrameData& prepared,
                                                        TrackedFrame& result) {
-  const double dt = BelievedStep_s(frame.color_time_s - last_time_s);
+  const double dt = PlausibleStep_s(frame.color_time_s - last_time_s);
   const double dt_depth = frame.depth_time_s - frame.color_time_s;
   struct Attempt {
     PoseEstimate estimate;
@@ -218,8 +222,8 @@ std::optional<PoseEstimate> Tracker::Impl::FollowFrame(const Frame& frame,
     std::size_t num_corners = 0;
   };
   std::optional<Attempt> best;
-  // Starts from constant velocity; if that fails (a jerk), from the last pose. Depth alone also
-  // fits beside the right place, so it decides only where neither start finds the points.
+  // Starts from constant velocity; if that fails (a jerk), from the last pose. Depth alone
+  // can also fit at a wrong pose, so it decides only if neither start finds the points.
   const std::array<Pose, 2> guesses = {PredictedPose(frame), T_world_last};
   for (const Pose& T_guess : guesses) {
     Attempt attempt;
@@ -231,9 +235,9 @@ std::optional<PoseEstimate> Tracker::Impl::FollowFrame(const Frame& frame,
                              problem.points);
     attempt.estimate = OptimizePose(problem, T_guess);
     if (!Plausible(attempt.estimate, problem.points.size(), dt)) continue;
-    const bool is_held = IsHeldByPoints(attempt.estimate, problem.points.size());
-    if (is_held || !best) best = std::move(attempt);
-    if (is_held) break;
+    const bool is_supported = SupportOf(attempt.estimate, problem.points.size()).is_enough();
+    if (is_supported || !best) best = std::move(attempt);
+    if (is_supported) break;
   }
   if (!best) return std::nullopt;
   std::vector<ActivePoint> agreeing;
@@ -306,7 +310,7 @@ std::optional<PoseEstimate> Tracker::Impl::Relocalize(const Frame& frame, FrameD
 
 void Tracker::Impl::Accept(const Frame& frame, FrameData& prepared, const PoseEstimate& estimate,
                            TrackedFrame& result) {
-  const double dt = BelievedStep_s(frame.color_time_s - last_time_s);
+  const double dt = PlausibleStep_s(frame.color_time_s - last_time_s);
   if (!lost && dt > 0)
     velocity = TwistFromPose(T_world_last.inverse() * estimate.T_world_camera) / dt;
   result.tracked = true;
@@ -330,7 +334,7 @@ void Tracker::Impl::RefreshKeyframeVelocity(const Frame& frame, const Pose& T_wo
   const std::optional<int> last = frames.back().keyframe;
   if (!last) return;
   MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(*last)];
-  const double dt_after = BelievedStep_s(frame.color_time_s - keyframe.data.color_time_s);
+  const double dt_after = PlausibleStep_s(frame.color_time_s - keyframe.data.color_time_s);
   if (dt_after <= 0) return;
   const Vector6d after = TwistFromPose(keyframe.T_world_color.inverse() * T_world_now) / dt_after;
   keyframe.velocity_per_s = *last == 0 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));

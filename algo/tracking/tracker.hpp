@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "algo/tracking/map.hpp"
@@ -51,6 +52,14 @@ struct TrackedFrame {
   int num_keypoints = 0;
   int num_markers = 0;
 };
+
+/// Median time between consecutive frames, in seconds: it is not affected by gaps.
+/// @throws std::invalid_argument for fewer than two frames.
+[[nodiscard]] double UsualSpacing(std::span<const TrackedFrame> frames);
+
+/// Two stamps that are closer than this share of the usual spacing are not the times at which the
+/// images were taken. The motion between them, divided by their difference, is not a velocity.
+inline constexpr double kLeastOfUsualSpacing = 0.5;
 
 /// Not thread-safe: call from one thread. Deterministic.
 class Tracker {

@@ -65,9 +65,7 @@ struct Tracker::Impl {
                        std::vector<PosePoint>& points) const;
   PoseProblem MakeProblem(const FrameData& prepared, double dt_depth_s) const;
   static Pose DepthPose(const MapKeyframe& keyframe);
-  [[nodiscard]] double BelievedStep_s(double step_s) const;
-  /// Whether markers or keypoints agree with the pose, and not depth alone.
-  static bool IsHeldByPoints(const PoseEstimate& estimate, std::size_t num_points);
+  [[nodiscard]] double PlausibleStep_s(double step_s) const;
   [[nodiscard]] bool Plausible(const PoseEstimate& estimate, std::size_t num_points,
                                double dt_s) const;
   std::optional<PoseEstimate> FollowFrame(const Frame& frame, const FrameData& prepared,

@@ -45,13 +45,14 @@ struct DepthNoise {
 };
 
 /// Limits of what a driver or a recording may state. The smallest is below the noise of any depth
-/// camera; the largest, at a distance of 1 m, is useless for the method, or in millimetres.
+/// camera; a larger one than the largest, at 1 m, is useless for the method or was given in
+/// millimetres.
 inline constexpr double kLeastDepthNoise_m = 1e-5;
 inline constexpr double kMostDepthNoiseAt1m_m = 0.1;
 
-/// What is impossible about a statement, as the name of the value, what it is and what is expected;
-/// nothing if it can be used. A statement that can be used gives at least kLeastDepthNoise_m at
-/// every distance from 0 on, and a finite value at every finite one.
+/// Why a stated noise cannot be used: the value's name, what it is and what is expected. Nothing if
+/// it can be used: then it is at least kLeastDepthNoise_m at every distance from 0 on, and finite
+/// at every finite one.
 [[nodiscard]] std::optional<std::string> FaultOf(const DepthNoise& noise);
 
 }  // namespace plumb

@@ -123,7 +123,7 @@ bool Appliance::HasPatientsSession() const {
   return opening_ || (!session_id_.empty() && !IsOwnSession());
 }
 
-/// Otherwise the store's session and the page's could become different ones.
+/// Otherwise the store and the page could end up with different sessions.
 Appliance::Answer Appliance::WhyNotChangeSession() const {
   if (opening_) return "a patient is being opened: try again in a moment";
   if (wiping_) return "this patient's data is being removed: try again in a moment";

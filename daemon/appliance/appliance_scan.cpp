@@ -131,7 +131,7 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
                     actor = opened_by_, patient = record.patient_id](const ScanOutcome& outcome) {
     if (id->empty()) return;  // it never began
     using Kind = ScanOutcome::Kind;
-    // A scan that was discarded or failed while its result was written has none.
+    // A scan that is discarded or fails while its result is being written has no result.
     const bool is_done = outcome.kind == Kind::kDone;
     FinishedScan finished{.failure = outcome.reason,
                           .result_json = is_done ? outcome.result_json : std::string(),

@@ -90,7 +90,7 @@ web::WallClock::time_point StartOfDay() {
   std::tm local{};
   ::localtime_r(&now, &local);
   local.tm_hour = local.tm_min = local.tm_sec = 0;
-  local.tm_isdst = -1;  // midnight's own: on two days of the year it is not that of now
+  local.tm_isdst = -1;  // summer time may have begun or ended since midnight
   return web::WallClock::from_time_t(std::mktime(&local));
 }
 

@@ -60,7 +60,7 @@ void WebPatients::WipePatient(const web::Actor& actor, const std::string& id, we
       return done(AnswerOf(why));
     appliance_.SetWiping(true);
   }
-  // The session ends with the data. Where the removal is refused, nothing has changed.
+  // The session ends once the data is removed. A removal that is refused changes nothing.
   const web::Done wiped = [this, id, is_open, done = std::move(done)](const web::Change& change) {
     if (is_open) appliance_.SetWiping(false);
     if (change.result == ChangeResult::kDone) appliance_.ClosePatient(id);

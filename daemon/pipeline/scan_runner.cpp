@@ -64,8 +64,7 @@ class FrameReader : public FrameFeed {
 
   bool WaitForItsTime(double stamp_s, const std::stop_token& stop) {
     using Clock = std::chrono::steady_clock;
-    // A recording may have been paused, or its clock may have been set: what comes after a gap does
-    // not keep anybody waiting for hours.
+    // A recording may have been paused, or its clock changed: long gaps are cut short.
     constexpr double kLongestGap_s = 5.0;
     if (!last_stamp_s_ || stamp_s - *last_stamp_s_ > kLongestGap_s) {
       first_stamp_s_ = last_stamp_s_ ? stamp_s - kLongestGap_s : stamp_s;

@@ -41,8 +41,8 @@ SignedRoom ReadRoom(const Statement& row) {
   return room;
 }
 
-/// Id of the last check that a calibration was made from. Order is told by ids: the clock may have
-/// been set back since the signature.
+/// Id of the newest check that the calibration was made from. Checks are ordered by id, because the
+/// clock may have been set back since the calibration was signed.
 std::int64_t LastCheckOf(const SignedRoom& room) {
   std::int64_t last = 0;
   for (const std::string& id : room.check_ids)
@@ -50,7 +50,7 @@ std::int64_t LastCheckOf(const SignedRoom& room) {
   return last;
 }
 
-/// 0 if there is no calibration, or the newest cannot be read and has to be made again.
+/// 0 if there is no calibration, or if the newest one cannot be read and must be made again.
 std::int64_t LastCheckUsed(Database& database) {
   Statement query = database.Prepare(kNewestRooms);
   if (!query.Bind(std::int64_t{1}).Step()) return 0;

@@ -39,8 +39,8 @@ std::string TreatmentStore::Open(const web::Actor& actor, const std::string& pat
   CloseOpenSessions(change, actor);
   std::int64_t fraction = 0;
   {
-    // A fraction is a session in which something was compared, and the next one follows it. It is
-    // not counted how many there are: their scans may have been removed meanwhile.
+    // A fraction is a session in which something was compared. The next number follows the highest
+    // one; sessions are not counted, because their scans may have been removed.
     Statement query = change.Prepare(
         "WITH newest AS (SELECT ifnull(max(fraction), 0) AS fraction FROM sessions WHERE "
         "patient_id = ?1 AND purpose = 'fraction') SELECT newest.fraction, archived, EXISTS "

@@ -39,7 +39,7 @@ void CheckText(std::string_view text, const std::string& name) {
     if (c == '[' || c == '{') ++depth;
     if ((c == ']' || c == '}') && depth > 0) --depth;
     if (c == '-' && i + 1 < text.size() && (text[i + 1] == ' ' || text[i + 1] == '\t')) {
-      ++dashes;  // "- - - x" nests without brackets; a rule of dashes does not
+      ++dashes;  // "- - - x" nests without brackets; a line of dashes does not
     } else if (c != ' ' && c != '\t') {
       dashes = 0;
     }

@@ -1,5 +1,5 @@
 // Start button and light of a real plumbd: its GPIO library is replaced by one of files, and its
-// disk has room, whatever the machine's has; everything above them is the product's.
+// disk has room, regardless of the machine's. Everything above them is the product's.
 #include <algorithm>
 #include <csignal>
 #include <fstream>

@@ -1,5 +1,5 @@
-// A library to be loaded before the others: each disk is of 100 GB and as full as
-// PLUMB_DISK_USED_PERCENT says, whatever the machine's are.
+// A library to be preloaded: every disk has 100 GB and is as full as PLUMB_DISK_USED_PERCENT says,
+// regardless of the machine's disks.
 #include <dlfcn.h>
 #include <sys/statvfs.h>
 

@@ -41,7 +41,7 @@ class FakeBus {
   void RefuseToOpen(const std::string& why) {
     Change([&] { refusal_ = why; });
   }
-  /// What sensors that are opened from now on state.
+  /// Stated by the sensors that are opened from now on.
   void StateNoise(const DepthNoise& noise) {
     Change([&] { noise_ = noise; });
   }

@@ -177,7 +177,7 @@ await h.step('a result that can no longer be acted on says what was found, and c
   await anna.getByText('every part as in the reference').first().waitFor();
   equal(await anna.getByText('Correct the posture first').count(), 0, 'nothing to correct');
   equal(await anna.locator('.number .arrow').count(), 1, 'while it is valid it commands');
-  // After a restart only the wall clock tells how old it is, and that may have been set.
+  // After a restart only the wall clock gives its age, and somebody may have changed that clock.
   h.tell('restarted');
   await anna.getByRole('heading', { name: /^Correction found then/ }).waitFor();
   await anna.locator('.old-note', { hasText: 'OLD' }).waitFor();
@@ -643,7 +643,7 @@ await h.step('two at one note: neither saves over what they have not seen', asyn
   await anna.goto(`${h.url}#/patient/p0001`);
   const note = anna.locator('textarea');
   await note.waitFor();
-  // As if bob had saved a moment ago, and the page did not know yet.
+  // As if bob had just saved, and the page had not been notified yet.
   const requests = `**/api/v1/${path}`;
   await anna.route(requests, (route) => (route.request().method() === 'GET' ? route.abort() : route.continue()));
   const { site } = (await h.api(bob, path)).body;

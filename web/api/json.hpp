@@ -65,7 +65,7 @@ class Fields {
 inline constexpr int kMaxRevision = 1'000'000'000;
 /// Includes the revision on which it is based.
 [[nodiscard]] std::pair<ReferencePlan, int> ParsePlan(const std::string& body);
-/// Of any of them, but of one at least.
+/// Any of the settings, but at least one.
 [[nodiscard]] SettingsChange ParseSettingsChange(const std::string& body);
 [[nodiscard]] PlanTemplate ParseTemplate(const std::string& body);
 [[nodiscard]] ScanPurpose ParsePurpose(const std::string& name);

@@ -202,7 +202,7 @@ struct Records {
 struct Wanted {
   std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
   Status status;                    ///< Of the appliance at the request.
-  bool is_display = false;          ///< By a display in the room.
+  bool is_display = false;          ///< Requested by a display in the room.
   Language language = Language::kEnglish;
   const ResultWords& words = ResultWordsOf(language);
 
@@ -219,7 +219,8 @@ std::optional<double> SteadyAge_s(const Scan& scan, const Status& status) {
                                                                  : std::nullopt;
 }
 
-/// Whether the result must not be acted on. The wall clock does not count: it may have been set.
+/// Whether the result must not be acted on. The wall clock does not count, because it may have been
+/// changed.
 /// @param has_newer  A later scan has ended without a result.
 bool IsOld(const Scan& scan, bool has_newer, const Wanted& wanted) {
   const std::optional<double> age_s = SteadyAge_s(scan, wanted.status);
@@ -229,7 +230,7 @@ bool IsOld(const Scan& scan, bool has_newer, const Wanted& wanted) {
   return !age_s || *age_s > kResultValid_s || has_newer || wanted.runs() || !is_on_couch;
 }
 
-/// "5 min ago": by the steady clock if it knows, otherwise by the wall clock.
+/// "5 min ago": by the steady clock if that has measured it, otherwise by the wall clock.
 std::string AgoText(const Scan& scan, const Wanted& wanted) {
   std::chrono::duration<double> age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
   if (const auto steady_s = SteadyAge_s(scan, wanted.status))

@@ -8,8 +8,8 @@
 
 namespace plumb::web {
 
-/// Those that are not set keep what is stored: two people who change different ones at the same
-/// time do not undo each other's.
+/// Settings that are not set keep their stored value, so that two people who change different ones
+/// at the same time do not undo each other's change.
 struct SettingsChange {
   std::optional<double> shift_mm, rotation_deg;
   std::optional<std::string> posture;
@@ -19,7 +19,7 @@ struct SettingsChange {
   std::optional<int> retention_days, idle_logout_min;
 
   SettingsChange() = default;
-  /// All of them.
+  /// Changes all of them.
   SettingsChange(const Settings& all) {  // NOLINT(google-explicit-constructor): it is a change, too
     Pair(*this, all, [](auto& change, const auto& value) { change = value; });
   }

@@ -51,7 +51,7 @@ class ApplianceTest : public ::testing::Test {
     parts_.config.appliance.state = folder_ / "state";
     parts_.config.update.folder = folder_ / "updates";
     parts_.demo_patient = "demo";
-    // Not the machine's disk: where that is nearly full, the light is another.
+    // Independent of the machine's disk: the light shows whether it is nearly full.
     parts_.space = [](const std::filesystem::path&, std::error_code&) {
       return std::filesystem::space_info{
           .capacity = 100'000'000'000, .free = 50'000'000'000, .available = 50'000'000'000};
@@ -107,6 +107,12 @@ class ApplianceTest : public ::testing::Test {
     bus_.Plug("A");
     bus_.GiveFrame();
     ASSERT_TRUE(Becomes([&] { return appliance_->state().phase == ScanPhase::kReady; }));
+  }
+  /// On the loop's thread.
+  void AddPassedCheck(const web::Actor& actor) {
+    (void)appliance_->store()->checks.Add(
+        actor, appliance_->WebStatus().sensor.serial,
+        TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
   }
   [[nodiscard]] bool IsRunning() const {
     const ScanPhase phase = appliance_->state().phase;

@@ -79,9 +79,7 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     const std::string id = added.get_future().get().id;
     std::promise<web::Change> opened;
     On([&] {
-      (void)appliance_->store()->checks.Add(
-          actor, appliance_->WebStatus().sensor.serial,
-          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      AddPassedCheck(actor);
       services_->services().patients.OpenPatient(
           actor, id, web::ScanPurpose::kReference, "", "",
           [&](const web::Change& change) { opened.set_value(change); });
@@ -107,16 +105,6 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
   });
 }
 
-/// Two patients, as the store knows them.
-struct TwoPatients {
-  std::string a, b;
-};
-
-TwoPatients AddTwoPatients(Store& store) {
-  return {store.patients.Add(web::Actor{.user = "tess", .address = {}}, "A", ""),
-          store.patients.Add(web::Actor{.user = "tess", .address = {}}, "B", "")};
-}
-
 TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClosed) {
   parts_.demo_patient.clear();
   parts_.config.appliance.warm_up_min = 0;
@@ -125,16 +113,15 @@ TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClose
     MakeReady();
     std::promise<web::Change> first;
     web::Change second, closed;
-    TwoPatients patients;
+    std::string patient;
     On([&] {
-      patients = AddTwoPatients(*appliance_->store());
-      (void)appliance_->store()->checks.Add(
-          tess, appliance_->WebStatus().sensor.serial,
-          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      patient = appliance_->store()->patients.Add(tess, "A", "");
+      const std::string other = appliance_->store()->patients.Add(tess, "B", "");
+      AddPassedCheck(tess);
       auto& service = services_->services().patients;
-      service.OpenPatient(tess, patients.a, web::ScanPurpose::kReference, "", "",
+      service.OpenPatient(tess, patient, web::ScanPurpose::kReference, "", "",
                           [&](const web::Change& change) { first.set_value(change); });
-      service.OpenPatient(tess, patients.b, web::ScanPurpose::kReference, "", "",
+      service.OpenPatient(tess, other, web::ScanPurpose::kReference, "", "",
                           [&](const web::Change& change) { second = change; });
       service.CloseSession(tess, "", [&](const web::Change& change) { closed = change; });
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
@@ -147,8 +134,8 @@ TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClose
     }
     On([&] {
       ASSERT_TRUE(appliance_->WebStatus().session);
-      EXPECT_EQ(appliance_->WebStatus().session->patient_id, patients.a);
-      EXPECT_EQ(appliance_->open_patient(), patients.a);
+      EXPECT_EQ(appliance_->WebStatus().session->patient_id, patient);
+      EXPECT_EQ(appliance_->open_patient(), patient);
       EXPECT_EQ(appliance_->CloseSession(tess), "");
     });
   });
@@ -161,26 +148,23 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
   Play([&] {
     MakeReady();
     std::promise<web::Change> opened, refused, wiped;
-    TwoPatients patients;
-    std::string running;
+    std::string patient, running;
     On([&] {
-      patients = AddTwoPatients(*appliance_->store());
-      (void)appliance_->store()->checks.Add(
-          tess, appliance_->WebStatus().sensor.serial,
-          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      patient = appliance_->store()->patients.Add(tess, "A", "");
+      AddPassedCheck(tess);
       services_->services().patients.OpenPatient(
-          tess, patients.a, web::ScanPurpose::kReference, "", "",
+          tess, patient, web::ScanPurpose::kReference, "", "",
           [&](const web::Change& change) { opened.set_value(change); });
     });
     EXPECT_EQ(opened.get_future().get().result, web::ChangeResult::kDone);
     On([&] {
-      running = appliance_->store()->scans.Begin({.patient_id = patients.a,
+      running = appliance_->store()->scans.Begin({.patient_id = patient,
                                                   .reference_id = {},
                                                   .purpose = web::ScanPurpose::kReference,
                                                   .sensor_serial = "A",
                                                   .reason = {}});
       services_->services().patients.WipePatient(
-          tess, patients.a, [&](const web::Change& change) { refused.set_value(change); });
+          tess, patient, [&](const web::Change& change) { refused.set_value(change); });
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
                   ::testing::HasSubstr("data is being removed"));
       EXPECT_THAT(appliance_->CloseSession(tess), ::testing::HasSubstr("data is being removed"));
@@ -189,13 +173,13 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
                 ::testing::HasSubstr("a scan of this patient is running"));
     On([&] {
       ASSERT_TRUE(appliance_->WebStatus().session) << "nothing was removed";
-      EXPECT_EQ(appliance_->open_patient(), patients.a);
+      EXPECT_EQ(appliance_->open_patient(), patient);
       appliance_->store()->scans.Finish(running, {.outcome = web::ScanOutcome::kCancelled,
                                                   .failure = "discarded",
                                                   .result_json = {},
                                                   .swept_area_m2 = 0.0});
       services_->services().patients.WipePatient(
-          tess, patients.a, [&](const web::Change& change) { wiped.set_value(change); });
+          tess, patient, [&](const web::Change& change) { wiped.set_value(change); });
     });
     EXPECT_EQ(wiped.get_future().get().result, web::ChangeResult::kDone);
     On([&] {
@@ -278,9 +262,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
     }));
     On([&] {
       EXPECT_TRUE(appliance_->store()->scans.List("", 10).empty()) << "nothing was scanned";
-      (void)appliance_->store()->checks.Add(
-          tess, appliance_->WebStatus().sensor.serial,
-          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      AddPassedCheck(tess);
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
       EXPECT_EQ(appliance_->WhyNoReference(ScanOf(DailyCheck::kPassed)), "");
       EXPECT_THAT(appliance_->WhyNoReference(ScanOf(DailyCheck::kOverdue)),

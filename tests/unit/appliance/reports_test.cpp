@@ -167,7 +167,7 @@ TEST_F(ReportsTest, WithoutAKnownRoomTheNumbersAreNamedAfterThePatientAndNotTheC
   EXPECT_THAT(names_in(R"({"room_known":false,"head_xy":[-1,0],"left_xy":[0,1]})"),
               ElementsAre("Vertical", "Patient left/right", "Patient head/feet", "Tilt left/right",
                           "Tilt head/feet", "Yaw"));
-  // Neither side within 67.5 degrees alone, not known at all, or damaged.
+  // Both of the sides lie near each axis, are not known, or are damaged.
   for (const char* body :
        {R"({"room_known":false,"head_xy":[0.7,0.7],"left_xy":[0.7,-0.7]})",
         R"({"room_known":false})", R"({"room_known":false,"head_xy":["1","0"],"left_xy":[0]})"}) {

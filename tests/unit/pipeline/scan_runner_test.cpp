@@ -94,7 +94,7 @@ TEST(ScanRunnerTest, LiveItDoesNotWaitThroughAGapInTheStamps) {
   std::int64_t last = 0;
   const Scene scene =
       RunScan(source, live, {}, [&](const ScanProgress& progress) { last = progress.frames; });
-  EXPECT_EQ(last, 8) << "after five seconds";
+  EXPECT_EQ(last, 8) << "the frames after the gap come after five seconds";
   EXPECT_EQ(scene.frames_total, 8);
 }
 

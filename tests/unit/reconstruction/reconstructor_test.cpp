@@ -318,7 +318,7 @@ TEST_F(ReconstructorTest, TheJointRegistrationWeighsByTheNoiseThatTheSensorState
   };
   const double usual = sigma_of_scale({}), noisy = sigma_of_scale({.constant_m = 0.09});
   fmt::print("scale of the depth known to {:.2e}, of a noisy sensor to {:.2e}\n", usual, noisy);
-  EXPECT_GT(noisy, 1.25 * usual);  // Measured: 1.48; the markers tell it too.
+  EXPECT_GT(noisy, 1.25 * usual);  // Measured: 1.48. The markers limit it, too.
 }
 
 TEST_F(ReconstructorTest, SurfacesAreSmoothedByTheNoiseThatTheSensorStates) {

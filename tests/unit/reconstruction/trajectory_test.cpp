@@ -133,13 +133,14 @@ TEST(Trajectory, VelocityIsNotTakenAcrossAGap) {
       << "backward difference";
 }
 
-TEST(Trajectory, VelocityIsNotTakenOverAStampThatCannotBe) {
+TEST(Trajectory, VelocityIsNotTakenAcrossAnImplausibleStamp) {
   Path path = Tracked();
   path.frames[2].color_time_s = path.frames[3].color_time_s - 0.001;  // stamped on arrival
   for (TrackedFrame& frame : path.frames) frame.velocity_per_s.setZero();
   RefreshVelocities(path.frames, path.map);
   for (const TrackedFrame& frame : path.frames)
-    EXPECT_LT(frame.velocity_per_s.tail<3>().norm(), 1.2) << frame.frame_index << ": 1 m/s";
+    EXPECT_LT(frame.velocity_per_s.tail<3>().norm(), 1.2)
+        << frame.frame_index << ": the truth is 1 m/s";
 }
 
 TEST(LongestLost, CountsTheTimeWithoutAPose) {

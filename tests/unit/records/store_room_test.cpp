@@ -118,7 +118,7 @@ TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
   EXPECT_EQ(after(0), "") << "it was put back";
 }
 
-TEST_F(StoreRoomTest, AClockThatIsSetBackAfterTheSignatureHidesNoCheck) {
+TEST_F(StoreRoomTest, ChecksCountEvenIfTheClockWasSetBackAfterTheSignature) {
   Scan(), Scan(), Scan();
   (void)Sign(Candidate().digest);
   store_ = nullptr;
@@ -136,7 +136,7 @@ TEST_F(StoreRoomTest, AClockThatIsSetBackAfterTheSignatureHidesNoCheck) {
   for (Eigen::Vector3d& corner : markers.at(4).corners) corner.x() += 0.02;
   store_->checks.Add(kEve, "S1", CheckOver(0, 0, markers));
   EXPECT_THAT(store_->room.WhyDue(room, {}), HasSubstr("marker 4 moved 20 mm"));
-  EXPECT_THAT(Candidate().scans, IsEmpty()) << "those of the signature are used up";
+  EXPECT_THAT(Candidate().scans, IsEmpty()) << "the signed scans are not used again";
   Scan(), Scan(), Scan();
   const RoomCandidate candidate = Candidate();
   EXPECT_THAT(candidate.why_not, IsEmpty()) << "the room can be calibrated again";

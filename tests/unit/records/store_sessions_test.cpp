@@ -92,7 +92,7 @@ TEST_F(StoreSessionsTest, FractionNumbersCountSessionsNotScans) {
   EXPECT_EQ(store.treatments.Opened()->fraction, 2) << "nothing was scanned in the session before";
 }
 
-TEST_F(StoreSessionsTest, FractionNumbersGoOnWhereScansHaveBeenRemoved) {
+TEST_F(StoreSessionsTest, FractionNumbersContinueAfterScansWereRemoved) {
   Store store(folder_ / "state");
   const std::string patient = store.patients.Add(kAnna, "P-1", "");
   std::vector<std::string> scans;
@@ -110,7 +110,7 @@ TEST_F(StoreSessionsTest, FractionNumbersGoOnWhereScansHaveBeenRemoved) {
   EXPECT_EQ(store.treatments.Opened()->fraction, 1) << "each patient's own";
 }
 
-TEST_F(StoreSessionsTest, AScanThatWasDiscardedHasNoResultAndIsNoFraction) {
+TEST_F(StoreSessionsTest, ADiscardedScanHasNoResultAndIsNotAFraction) {
   Store store(folder_ / "state");
   const std::string patient = store.patients.Add(kAnna, "P-1", "");
   const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);

@@ -353,7 +353,7 @@ TEST_F(StoreTest, OnlyAScanWithAnAnswerIsAccepted) {
   EXPECT_EQ(store->scans.Find(fine)->accepted_by, "anna");
 }
 
-TEST_F(StoreTest, AResultAgainstAReferenceThatIsNoLongerTheApprovedOneIsNotAccepted) {
+TEST_F(StoreTest, AResultIsNotAcceptedAfterItsReferenceWasReplaced) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
   const std::string first = ApprovedReference(*store, patient);
@@ -381,12 +381,12 @@ TEST_F(StoreTest, AnOlderDraftIsNotApprovedAfterANewerOne) {
   EXPECT_EQ(store->references.Approved(patient)->id, newer);
 }
 
-TEST_F(StoreTest, AScanOfNoPatientBecomesNoReference) {
+TEST_F(StoreTest, AScanWithoutAPatientCannotBecomeAReference) {
   const auto store = Open();
   const std::string scan = Scan(*store, "");
   EXPECT_EQ(RefusalOf([&] { (void)store->references.Add(kAnna, scan, "first", {}); }),
             ChangeResult::kConflict);
-  store->removal.RemoveScan(kAnna, scan, "of nobody");
+  store->removal.RemoveScan(kAnna, scan, "scanned without a patient");
   EXPECT_FALSE(store->scans.Find(scan)) << "it can still be removed";
 }
 

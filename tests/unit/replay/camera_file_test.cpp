@@ -147,7 +147,7 @@ TEST(CameraFileTest, WhatIsNoYamlIsRefused) {
   EXPECT_THAT(Refusal(std::string(70000, ' ')), HasSubstr("70000 bytes"));
 }
 
-TEST(CameraFileTest, ARuleOfDashesInACommentIsNoNesting) {
+TEST(CameraFileTest, ALineOfDashesInACommentIsNotNesting) {
   const std::string refusal = Refusal("%YAML:1.0\n---\n# ---------- camera ----------\na: 1\n");
   EXPECT_THAT(refusal, ::testing::Not(HasSubstr("nests")));
 }

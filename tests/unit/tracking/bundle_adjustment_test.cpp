@@ -17,6 +17,7 @@ namespace {
 using synthetic::Compare;
 using synthetic::Disturb;
 using synthetic::MakeTrueMap;
+using synthetic::WithKeypointDepthsOff;
 
 BundleOptions FreeAllButTheFirst(const TrackingMap& map) {
   BundleOptions options;
@@ -270,9 +271,7 @@ TEST(BundleAdjust, QuadraticTermPullsToItsMinimum) {
 TEST(BundleAdjust, DepthCostsByTheNoiseThatIsStatedForIt) {
   const auto truth = MakeTrueMap({.markers = false});
   const auto cost = [&](double constant_m) {
-    TrackingMap map = truth.map;
-    for (MapKeyframe& keyframe : map.keyframes)
-      for (KeypointObservation& o : keyframe.keypoints) o.z_m += 0.02;  // the pixels still fit
+    TrackingMap map = WithKeypointDepthsOff(truth.map, 0.02);
     BundleOptions options = FreeAllButTheFirst(map);
     options.keypoint_depth_sigmas = 1.0;
     options.depth_noise.constant_m = constant_m;

@@ -16,6 +16,7 @@ namespace {
 using synthetic::Compare;
 using synthetic::Disturb;
 using synthetic::MakeTrueMap;
+using synthetic::WithKeypointDepthsOff;
 
 LocalBundleOptions FreeFrom(int first, const TrackingMap& map) {
   LocalBundleOptions options;
@@ -164,9 +165,7 @@ TEST(LocalBundle, LeavesAMapThatShowsNothingAsItIs) {
 TEST(LocalBundle, DepthCostsByTheNoiseThatIsStatedForIt) {
   const auto truth = MakeTrueMap({.markers = false});
   const auto cost = [&](double constant_m) {
-    TrackingMap map = truth.map;
-    for (MapKeyframe& keyframe : map.keyframes)
-      for (KeypointObservation& o : keyframe.keypoints) o.z_m += 0.02;  // the pixels still fit
+    TrackingMap map = WithKeypointDepthsOff(truth.map, 0.02);
     LocalBundleOptions options = FreeFrom(1, map);
     options.depth_noise.constant_m = constant_m;
     options.max_iterations = 1;

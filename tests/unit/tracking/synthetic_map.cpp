@@ -303,6 +303,12 @@ void Disturb(TrackingMap& map, double translation_m, double rotation_rad) {
   for (Landmark& landmark : map.landmarks) landmark.p_world += translation_m * vector();
 }
 
+TrackingMap WithKeypointDepthsOff(TrackingMap map, double by_m) {
+  for (MapKeyframe& keyframe : map.keyframes)
+    for (KeypointObservation& keypoint : keyframe.keypoints) keypoint.z_m += by_m;
+  return map;
+}
+
 MapError Compare(const TrackingMap& map, const TrackingMap& truth) {
   MapError error;
   for (std::size_t k = 0; k < truth.keyframes.size(); ++k) {

@@ -40,6 +40,9 @@ struct TrueMap {
 /// Moves all but the first keyframe, the landmarks and the markers away from where they are.
 void Disturb(TrackingMap& map, double translation_m, double rotation_rad);
 
+/// The map with all keypoint depths too large by that much; the pixels are unchanged.
+[[nodiscard]] TrackingMap WithKeypointDepthsOff(TrackingMap map, double by_m);
+
 /// Largest distance and angle between the keyframes of two maps.
 struct MapError {
   double translation_m = 0.0;

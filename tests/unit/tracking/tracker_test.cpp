@@ -177,7 +177,7 @@ TEST_F(TrackerTest, RefusesADepthNoiseThatIsImpossible) {
   info.depth_noise.quadratic_m_per_m2 = -1;
   try {
     Tracker tracker(info, {});
-    FAIL() << "taken";
+    FAIL() << "it was accepted";
   } catch (const DataError& error) {
     EXPECT_NE(std::string(error.what()).find("quadratic_m_per_m2 is -1"), std::string::npos)
         << error.what();

@@ -49,7 +49,7 @@ TEST(DepthNoiseTest, TheDefaultGivesTheFormerValuesToTheBit) {
   }
 }
 
-TEST(DepthNoiseTest, IsThePolynomialAboutItsOriginAndWhatTheIncidenceAdds) {
+TEST(DepthNoiseTest, IsThePolynomialAboutItsOriginPlusTheShareOfTheIncidence) {
   const DepthNoise noise = {.constant_m = 0.002,
                             .linear_m_per_m = 0.003,
                             .quadratic_m_per_m2 = 0.004,
@@ -62,7 +62,7 @@ TEST(DepthNoiseTest, IsThePolynomialAboutItsOriginAndWhatTheIncidenceAdds) {
   EXPECT_NEAR(DepthSigma(noise, 1.0, std::sqrt(0.5)), noise.SigmaFacing_m(1.0) + 0.0005, 1e-15);
 }
 
-TEST(DepthNoiseTest, EveryValueIsRefusedBeyondItsLimitsAndTakenAtThem) {
+TEST(DepthNoiseTest, EveryValueIsAcceptedAtItsLimitsAndRefusedBeyond) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const auto check = [](const char* name, double DepthNoise::*member, double inside, double outside,
                         const DepthNoise& others) {
@@ -76,10 +76,10 @@ TEST(DepthNoiseTest, EveryValueIsRefusedBeyondItsLimitsAndTakenAtThem) {
     }
   };
   const auto beyond = [](double limit, double towards) { return std::nextafter(limit, towards); };
-  // Beside values that leave the sum within its own limits.
+  // The other values keep the sum within its own limits.
   check("constant_m", &DepthNoise::constant_m, 0.1, beyond(0.1, 1),
         {.quadratic_m_per_m2 = 0.0, .origin_m = 0.0});
-  // Beside the limit at 1 m, a slope never comes near its own limit.
+  // The limit at 1 m keeps a slope far from its own limit.
   check("linear_m_per_m", &DepthNoise::linear_m_per_m, 0.099, beyond(1.0, 2),
         {.constant_m = 0.001, .quadratic_m_per_m2 = 0.0, .origin_m = 0.0});
   check("quadratic_m_per_m2", &DepthNoise::quadratic_m_per_m2, 1.0, beyond(1.0, 2),
@@ -91,18 +91,18 @@ TEST(DepthNoiseTest, EveryValueIsRefusedBeyondItsLimitsAndTakenAtThem) {
   check("grazing_m", &DepthNoise::grazing_m, 0.0, -1e-300, {});
 }
 
-TEST(DepthNoiseTest, WhatIsNowhereAsSmallAsItsLimitIsTaken) {
+TEST(DepthNoiseTest, NothingBelowTheSmallestNoiseIsAccepted) {
   DepthNoise noise = {.quadratic_m_per_m2 = 0.0, .origin_m = 0.0};
   noise.constant_m = kLeastDepthNoise_m;
   EXPECT_EQ(FaultOf(noise), std::nullopt);
   noise.constant_m = std::nextafter(kLeastDepthNoise_m, 0);
   EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("falls to"));
-  // It falls with the distance, and for ever.
+  // It decreases with the distance without end.
   noise = {.constant_m = 0.1, .linear_m_per_m = -1e-6, .quadratic_m_per_m2 = 0.0};
   EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("falls to -inf"));
   noise.quadratic_m_per_m2 = 1e-320;
   EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("falls to"));
-  // Least at 2 m, where it is constant_m - linear^2 / (4 quadratic) = 0.004 - 0.004 + some.
+  // Smallest at 2 m, where it is constant_m - linear^2 / (4 quadratic) = 0.0001, and then 0.
   noise = {
       .constant_m = 0.0041, .linear_m_per_m = -0.004, .quadratic_m_per_m2 = 0.001, .origin_m = 0.0};
   EXPECT_EQ(FaultOf(noise), std::nullopt);
@@ -124,15 +124,15 @@ TEST(DepthNoiseTest, MillimetresAreRefused) {
   EXPECT_THAT(FaultOf({.constant_m = 1.2}).value_or("none"), HasSubstr("constant_m is 1.2"));
 }
 
-// Whatever is taken can be divided by at every distance, in both precisions, and grows with the
-// incidence; whatever is refused for being too small somewhere is too small there.
-TEST(DepthNoiseTest, WhatIsTakenIsPositiveAndFiniteEverywhere) {
+// Whatever is accepted can be divided by at every distance, in both precisions, and grows with the
+// incidence; whatever is refused as too small is too small somewhere.
+TEST(DepthNoiseTest, WhateverIsAcceptedIsPositiveAndFiniteEverywhere) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> exponent(-7, 0.5), unit(0, 1);
   const auto value = [&](double most) {
     return unit(random) < 0.2 ? 0.0 : most * std::pow(10, exponent(random));
   };
-  int num_taken = 0, num_too_small = 0;
+  int num_accepted = 0, num_too_small = 0;
   for (int i = 0; i < 20000; ++i) {
     const DepthNoise noise = {.constant_m = value(0.1) * (unit(random) < 0.2 ? -1 : 1),
                               .linear_m_per_m = value(1.0) * (unit(random) < 0.5 ? -1 : 1),
@@ -140,7 +140,7 @@ TEST(DepthNoiseTest, WhatIsTakenIsPositiveAndFiniteEverywhere) {
                               .origin_m = value(10.0),
                               .grazing_m = value(0.1)};
     const std::optional<std::string> fault = FaultOf(noise);
-    num_taken += fault ? 0 : 1;
+    num_accepted += fault ? 0 : 1;
     double smallest_m = 1e9;
     for (double z_m = 0.0; z_m < 70.0; z_m = 1.05 * z_m + 0.001) {
       const double sigma_m = noise.SigmaFacing_m(z_m);
@@ -164,7 +164,7 @@ TEST(DepthNoiseTest, WhatIsTakenIsPositiveAndFiniteEverywhere) {
     if (vertex_m > 0) smallest_m = std::min(smallest_m, noise.SigmaFacing_m(vertex_m));
     EXPECT_LT(smallest_m, 1.001 * kLeastDepthNoise_m) << *fault;
   }
-  EXPECT_GT(num_taken, 1000) << "nothing is tested";
+  EXPECT_GT(num_accepted, 1000) << "otherwise nothing is tested";
   EXPECT_GT(num_too_small, 1000);
 }
 

@@ -72,7 +72,7 @@ class DisplayViewTest : public WebTest {
     open.patient_id = patient;
   }
 
-  /// What a display is answered, and what a person is.
+  /// The answers to a display and to a person.
   void ExpectHidden(const std::string& path) {
     const HttpAnswer answer = display_->Get("/api/v1/" + path);
     EXPECT_EQ(answer.status, 404) << path;

@@ -97,7 +97,8 @@ TEST_F(ResultPageTest, AfterTwoMinutesItIsOld) {
 
 TEST_F(ResultPageTest, TheWallClockMakesNoResultFresh) {
   Add("s1", seconds(10));
-  loop_->Do([&] { service_.status.last_result->age_s = 600; });  // it was set back meanwhile
+  loop_->Do(
+      [&] { service_.status.last_result->age_s = 600; });  // the wall clock was set back meanwhile
   EXPECT_THAT(Page(), AllOf(HasSubstr(kOld), HasSubstr("10 min ago")));
   loop_->Do([&] {
     service_.status.last_result->age_s.reset();

@@ -96,8 +96,8 @@ function diagnostics() {
     }, {}));
 }
 
-/// Buttons that are built again while what they began still runs: they stay off until it is done.
-/// One that is off keeps the focus.
+/// Buttons that are rebuilt while the action that they started is still running: they stay disabled
+/// until it is done. A disabled button keeps the focus.
 function lastingButtons(redrawn) {
   const running = new Set();
   return (label, what, task, { isOff, ...properties }) => {
