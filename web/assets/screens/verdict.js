@@ -15,7 +15,8 @@ export function ageOf(scan, received) {
 /// Why this result must not be used: "running", "superseded", "closed" (its patient's session is
 /// not the one that is open), "old", "offline" (nobody knows here whether one of these holds by
 /// now); null: it is valid. The appliance measures the age of its last result since its start by a
-/// steady clock; that of any other one is the wall clock's, which may have been changed, so it counts as old.
+/// steady clock. The age of any other one is the wall clock's, which may have been changed, so it
+/// counts as old.
 export function whyNotValid(scan, received) {
   if (!scan.result) return null;
   const { status } = live;
