@@ -56,7 +56,7 @@ struct JointRegistrationResult {
   WitnessErrors witnesses_before;  ///< Of the solution without the dense terms.
   WitnessErrors witnesses_after;
   int num_pairs = 0;
-  BundlePosterior posterior;  ///< Empty unless accepted and calibrated.
+  BundlePosterior posterior;  ///< Of the solution in the map. Empty unless calibrated.
   SweepEvidence evidence;     ///< Evidence about the sensor's calibration.
 };
 

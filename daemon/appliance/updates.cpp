@@ -52,6 +52,7 @@ Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,
                          appliance_.SetRolledBack(text);
                        }}) {
   appliance_.SetBlockingReason([this] { return WhyNotScan(); });
+  restart_limit_ = appliance_.loop().MakeTimer("restart", [this] { OnStillRunning(); });
 }
 
 Updates::~Updates() {
@@ -205,12 +206,29 @@ void Updates::GoDown(const web::Actor& actor, web::Done done) {
   restart_->Restart(
       [this, actor, done = std::move(done), alive = alive_](const std::string& failure) {
         if (!*alive) return;
-        if (failure.empty()) return done({});
+        if (failure.empty()) {
+          restarted_by_ = actor;
+          restart_limit_.ArmAfter(restart_->limit());
+          return done({});
+        }
         restarting_ = false;
         options_.log(actor, "system.restart_failed", "", failure);
         Log(LogLevel::kError, failure);
         done({.result = ChangeResult::kFailed, .message = failure, .id = {}, .file = {}});
       });
+}
+
+void Updates::OnStillRunning() {
+  std::string text =
+      "the system accepted the restart and did not carry it out: switch the unit off and on";
+  try {
+    CancelFactoryReset(options_.state);
+  } catch (const std::exception& error) {
+    text += fmt::format("; a requested factory reset may still take place ({})", error.what());
+  }
+  restarting_ = false;
+  options_.log(restarted_by_, "system.restart_failed", "", text);
+  Log(LogLevel::kError, text);
 }
 
 void Updates::ForgetRollBack(const web::Actor& actor, web::Done done) {

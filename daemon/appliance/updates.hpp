@@ -66,12 +66,17 @@ class Updates : public web::UpdateService {
   [[nodiscard]] std::string WhyNotScan() const;
   /// Requests the restart; `restarting_` is set.
   void GoDown(const web::Actor& actor, web::Done done);
+  /// The machine still runs although its restart was accepted: scans are possible again, and no
+  /// later restart carries out a factory reset that was requested with this one.
+  void OnStillRunning();
 
   Appliance& appliance_;
   std::unique_ptr<SystemRestart> restart_;
   UpdatesOptions options_;
   UsbSticks sticks_;
   bool restarting_ = false, copying_ = false;
+  web::Actor restarted_by_;
+  EventLoop::Source restart_limit_;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   Updater updater_;  // Declared last, so destroyed first: its callbacks use the members above.
 };

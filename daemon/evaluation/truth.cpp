@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "daemon/files/ply_file.hpp"
 
 namespace plumb {
 namespace {
@@ -19,7 +20,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr std::size_t kMaxFileBytes = std::size_t{512} << 20;
-constexpr std::size_t kMaxElements = 20'000'000;
 
 [[noreturn]] void Fail(const fs::path& file, std::string_view what) {
   throw DataError(fmt::format("cannot read the truth file '{}': {}", file.string(), what));
@@ -84,118 +84,18 @@ std::vector<StampedPose> ReadTrajectory(const fs::path& file) {
   return trajectory;
 }
 
-struct PlyProperty {
-  std::string name;
-  char kind = 'f';  // f: floating point, i: signed, u: unsigned
-  std::size_t bytes = 4;
-};
-
-PlyProperty ParseProperty(const fs::path& file, const std::string& type, const std::string& name) {
-  static const std::map<std::string, std::pair<char, std::size_t>> kTypes = {
-      {"char", {'i', 1}},  {"int8", {'i', 1}},    {"uchar", {'u', 1}},  {"uint8", {'u', 1}},
-      {"short", {'i', 2}}, {"int16", {'i', 2}},   {"ushort", {'u', 2}}, {"uint16", {'u', 2}},
-      {"int", {'i', 4}},   {"int32", {'i', 4}},   {"uint", {'u', 4}},   {"uint32", {'u', 4}},
-      {"float", {'f', 4}}, {"float32", {'f', 4}}, {"double", {'f', 8}}, {"float64", {'f', 8}}};
-  const auto found = kTypes.find(type);
-  if (found == kTypes.end()) Fail(file, fmt::format("unknown property type '{}'", type));
-  return {name, found->second.first, found->second.second};
-}
-
-double Value(const PlyProperty& property, const char* at) {
-  const auto load = [&](auto value) {
-    std::memcpy(&value, at, sizeof(value));
-    return static_cast<double>(value);
-  };
-  if (property.kind == 'f') return property.bytes == 4 ? load(float{}) : load(double{});
-  if (property.kind == 'i')
-    return property.bytes == 1   ? load(std::int8_t{})
-           : property.bytes == 2 ? load(std::int16_t{})
-                                 : load(std::int32_t{});
-  return property.bytes == 1   ? load(std::uint8_t{})
-         : property.bytes == 2 ? load(std::uint16_t{})
-                               : load(std::uint32_t{});
-}
-
-struct PlyHeader {
-  std::size_t num_vertices = 0, num_faces = 0, data_offset = 0;
-  std::vector<PlyProperty> vertex;
-  PlyProperty face_count, face_index;  // of the one list property of faces
-};
-
-PlyHeader ParseHeader(const fs::path& file, const std::string& data) {
-  static constexpr std::string_view kEnd = "end_header\n";
-  const std::size_t end = data.substr(0, 65536).find(kEnd);
-  if (data.rfind("ply", 0) != 0 || end == std::string::npos) Fail(file, "not a PLY file");
-  PlyHeader header;
-  header.data_offset = end + kEnd.size();
-  std::istringstream lines(data.substr(0, end));
-  std::string line, element;
-  while (std::getline(lines, line)) {
-    std::istringstream fields(line);
-    std::string word, a, b, c, d;
-    fields >> word >> a >> b >> c >> d;
-    if (word == "format" && a != "binary_little_endian")
-      Fail(file, fmt::format("expected format binary_little_endian, found '{}'", a));
-    if (word == "element") {
-      element = a;
-      const std::size_t count = std::strtoull(b.c_str(), nullptr, 10);
-      if (count > kMaxElements)
-        Fail(file, fmt::format("expected at most {} elements, found {}", kMaxElements, count));
-      if (a == "vertex") header.num_vertices = count;
-      if (a == "face") header.num_faces = count;
-    } else if (word == "property" && element == "vertex") {
-      header.vertex.push_back(ParseProperty(file, a, b));
-    } else if (word == "property" && element == "face") {
-      if (a != "list") Fail(file, "expected faces with one list of vertex indices");
-      header.face_count = ParseProperty(file, b, d);
-      header.face_index = ParseProperty(file, c, d);
-    }
-  }
-  return header;
-}
-
+// Vertices without the number of frames that measured them count as seen often enough.
 TrueSurface ReadSurface(const fs::path& file) {
+  constexpr float kSeenOftenEnough = 1e9F;
   const std::string data = ReadWhole(file);
-  const PlyHeader header = ParseHeader(file, data);
-  std::size_t stride = 0;
-  std::map<std::string, std::pair<std::size_t, PlyProperty>> columns;
-  for (const PlyProperty& property : header.vertex) {
-    columns[property.name] = {stride, property};
-    stride += property.bytes;
-  }
-  for (const char* name : {"x", "y", "z"}) {
-    if (!columns.contains(name)) Fail(file, fmt::format("vertices have no property '{}'", name));
-  }
-  if (header.data_offset + stride * header.num_vertices > data.size())
-    Fail(file, "the file ends within the vertices");
-
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(data.data()), data.size());
+  TriangleMesh mesh = ParseMeshPly(bytes, file.string());
   TrueSurface surface;
-  const char* at = data.data() + header.data_offset;
-  const auto column = [&](const char* name) {
-    return Value(columns.at(name).second, at + columns.at(name).first);
-  };
-  for (std::size_t i = 0; i < header.num_vertices; ++i, at += stride) {
-    surface.vertices_world.emplace_back(column("x"), column("y"), column("z"));
-    surface.frames_seen.push_back(columns.contains("seen") ? static_cast<float>(column("seen"))
-                                                           : 1e9F);
-  }
-  const char* const last = data.data() + data.size();
-  for (std::size_t i = 0; i < header.num_faces; ++i) {
-    if (at + header.face_count.bytes > last) Fail(file, "the file ends within the faces");
-    const auto count = static_cast<std::size_t>(Value(header.face_count, at));
-    at += header.face_count.bytes;
-    if (count != 3 || at + 3 * header.face_index.bytes > last)
-      Fail(file, fmt::format("face {}: expected a whole triangle", i));
-    std::array<std::uint32_t, 3> triangle{};
-    for (std::uint32_t& index : triangle) {
-      const double value = Value(header.face_index, at);
-      if (!(value >= 0 && value < static_cast<double>(header.num_vertices)))
-        Fail(file, fmt::format("face {}: vertex {} does not exist", i, value));
-      index = static_cast<std::uint32_t>(value);
-      at += header.face_index.bytes;
-    }
-    surface.triangles.push_back(triangle);
-  }
+  for (const Eigen::Vector3f& vertex : mesh.vertices)
+    surface.vertices_world.push_back(vertex.cast<double>());
+  surface.triangles = std::move(mesh.triangles);
+  surface.frames_seen = ParseVertexProperty(bytes, file.string(), "seen");
+  surface.frames_seen.resize(surface.vertices_world.size(), kSeenOftenEnough);
   return surface;
 }
 

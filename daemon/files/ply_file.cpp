@@ -183,6 +183,19 @@ class PlyReader {
     return cloud;
   }
 
+  [[nodiscard]] std::vector<float> VertexProperty(std::string_view name) const {
+    const Element& vertex = elements_[0];
+    const Property* const property = Find(vertex, name);
+    std::vector<float> values;
+    if (property == nullptr) return values;
+    values.reserve(vertex.count);
+    for (std::size_t i = 0; i < vertex.count; ++i) {
+      const std::uint8_t* at = body_.data() + i * vertex.row_bytes + property->offset;
+      values.push_back(static_cast<float>(Value(property->type, at)));
+    }
+    return values;
+  }
+
   [[nodiscard]] std::vector<std::array<std::uint32_t, 3>> Triangles() const {
     const Element& vertex = elements_[0];
     if (elements_.size() < 2 || elements_[1].name != "face")
@@ -283,14 +296,19 @@ class PlyReader {
     element.properties.push_back(std::move(property));
   }
 
+  static const Property* Find(const Element& element, std::string_view name) {
+    const auto at = std::find_if(element.properties.begin(), element.properties.end(),
+                                 [&](const Property& p) { return p.name == name; });
+    return at == element.properties.end() ? nullptr : &*at;
+  }
+
   static std::optional<Columns> Three(const Element& element,
                                       const std::array<std::string_view, 3>& names) {
     Columns columns;
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto at = std::find_if(element.properties.begin(), element.properties.end(),
-                                   [&](const Property& p) { return p.name == names[i]; });
-      if (at == element.properties.end()) return std::nullopt;
-      columns[i] = *at;
+      const Property* const property = Find(element, names[i]);
+      if (property == nullptr) return std::nullopt;
+      columns[i] = *property;
     }
     return columns;
   }
@@ -360,6 +378,11 @@ TriangleMesh ParseMeshPly(std::span<const std::uint8_t> bytes, const std::string
   mesh.colors = std::move(vertices.colors);
   mesh.triangles = reader.Triangles();
   return mesh;
+}
+
+std::vector<float> ParseVertexProperty(std::span<const std::uint8_t> bytes, const std::string& name,
+                                       std::string_view property) {
+  return PlyReader(bytes, name).VertexProperty(property);
 }
 
 TriangleMesh ReadMeshPly(const std::filesystem::path& path) {

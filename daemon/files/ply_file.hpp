@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "algo/types/point_cloud.hpp"
 
@@ -31,5 +33,11 @@ void WriteMeshPly(const std::filesystem::path& path, const TriangleMesh& mesh);
 [[nodiscard]] TriangleMesh ReadMeshPly(const std::filesystem::path& path);
 [[nodiscard]] TriangleMesh ParseMeshPly(std::span<const std::uint8_t> bytes,
                                         const std::string& name);
+
+/// One scalar property of the vertices, for example "seen"; empty if they do not have it.
+/// @throws DataError as above.
+[[nodiscard]] std::vector<float> ParseVertexProperty(std::span<const std::uint8_t> bytes,
+                                                     const std::string& name,
+                                                     std::string_view property);
 
 }  // namespace plumb

@@ -1,6 +1,7 @@
 // Restarting the machine.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -16,6 +17,8 @@ class SystemRestart {
   /// Calls `done` once, on the loop: with nothing once the machine goes down, otherwise with a
   /// sentence that states why it does not.
   virtual void Restart(std::function<void(const std::string& failure)> done) = 0;
+  /// After this time, a machine that still runs is not going down any more.
+  [[nodiscard]] virtual std::chrono::milliseconds limit() const { return std::chrono::minutes(5); }
 };
 
 /// Uses systemd's logind (org.freedesktop.login1.Manager.Reboot), if its policy permits this

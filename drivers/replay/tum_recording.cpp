@@ -1,7 +1,6 @@
 #include "drivers/replay/tum_recording.hpp"
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <condition_variable>
@@ -37,12 +36,6 @@ constexpr std::size_t kMinFrames = 2;
 constexpr std::uint16_t kSaturated = 65535;
 constexpr std::size_t kSearchedPairs = 24;  // For a depth camera that the recording does not state.
 
-double ThreadCpuSeconds() {
-  timespec now{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 /// Names and stamps of one pair, as needed for decoding.
 struct FramePlan {
   fs::path color_file;
@@ -54,8 +47,6 @@ struct FramePlan {
 /// A decoded frame, or the error that prevented it.
 struct Decoded {
   Frame frame;
-  bool has_depth = false;
-  double cpu_s = 0.0;
   std::exception_ptr error;
 };
 
@@ -111,21 +102,18 @@ CameraFile AssumedCamera(const fs::path& first_image) {
   return camera;
 }
 
-/// Converts units to metres; true if any pixel holds a measurement.
-bool ToMetres(const cv::Mat& depth_units, double units_per_metre, cv::Mat& depth_m) {
-  depth_m.create(depth_units.size(), CV_32FC1);
+cv::Mat ToMetres(const cv::Mat& depth_units, double units_per_metre) {
+  cv::Mat depth_m(depth_units.size(), CV_32FC1);
   const auto metres_per_unit = static_cast<float>(1.0 / units_per_metre);
-  unsigned any = 0;
   for (int row = 0; row < depth_units.rows; ++row) {
     const auto* in = depth_units.ptr<std::uint16_t>(row);
     auto* out = depth_m.ptr<float>(row);
     for (int column = 0; column < depth_units.cols; ++column) {
       const unsigned units = in[column] == kSaturated ? 0U : in[column];
-      any |= units;
       out[column] = static_cast<float>(units) * metres_per_unit;
     }
   }
-  return any != 0;
+  return depth_m;
 }
 
 void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics& camera,
@@ -141,7 +129,6 @@ void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics
 
 struct TumRecording::Impl {
   StreamInfo info;
-  RecordingStatistics statistics;
   std::vector<FramePlan> plans;
   double depth_scale = 5000.0;
   Intrinsics depth_intrinsics;
@@ -186,14 +173,13 @@ void TumRecording::Impl::FindFrames(const fs::path& folder, double least_max_gap
     plans.push_back({Resolve(canonical_folder, color_index, c),
                      Resolve(canonical_folder, depth_index, d), c.time_s, d.time_s});
   }
-  statistics.num_unmatched_color = std::ssize(color) - std::ssize(pairs);
-  statistics.num_unmatched_depth = std::ssize(depth) - std::ssize(pairs);
-  if (statistics.num_unmatched_color > 0 || statistics.num_unmatched_depth > 0) {
-    info.warnings.push_back(
-        fmt::format("{} of {} colour and {} of {} depth images have no partner within {:.0f} ms "
-                    "and are left out",
-                    statistics.num_unmatched_color, color.size(), statistics.num_unmatched_depth,
-                    depth.size(), max_gap_s * 1e3));
+  const auto num_unmatched_color = std::ssize(color) - std::ssize(pairs);
+  const auto num_unmatched_depth = std::ssize(depth) - std::ssize(pairs);
+  if (num_unmatched_color > 0 || num_unmatched_depth > 0) {
+    info.warnings.push_back(fmt::format(
+        "{} of {} colour and {} of {} depth images have no partner within {:.0f} ms "
+        "and are left out",
+        num_unmatched_color, color.size(), num_unmatched_depth, depth.size(), max_gap_s * 1e3));
   }
   info.num_frames = std::ssize(plans);
 }
@@ -244,7 +230,6 @@ void TumRecording::Impl::SearchDepthCamera() {
 }
 
 Decoded TumRecording::Impl::Decode(std::size_t i) const {
-  const double begin_s = ThreadCpuSeconds();
   const FramePlan& plan = plans[i];
   Decoded decoded;
   decoded.frame.index = static_cast<std::int64_t>(i);
@@ -254,9 +239,8 @@ Decoded TumRecording::Impl::Decode(std::size_t i) const {
   CheckImageSize(plan.color_file, decoded.frame.color_rgb, info.intrinsics, "colour");
   const cv::Mat depth_units = ReadDepthImage(plan.depth_file);
   CheckImageSize(plan.depth_file, depth_units, depth_intrinsics, "depth");
-  decoded.has_depth = ToMetres(depth_units, depth_scale, decoded.frame.depth_m);
+  decoded.frame.depth_m = ToMetres(depth_units, depth_scale);
   if (registration) decoded.frame.depth_m = registration->Register(decoded.frame.depth_m);
-  decoded.cpu_s = ThreadCpuSeconds() - begin_s;
   return decoded;
 }
 
@@ -306,7 +290,6 @@ std::unique_ptr<TumRecording> TumRecording::Open(const fs::path& folder,
 }
 
 const StreamInfo& TumRecording::info() const { return impl_->info; }
-const RecordingStatistics& TumRecording::statistics() const { return impl_->statistics; }
 
 std::optional<Frame> TumRecording::Next() {
   Impl& impl = *impl_;
@@ -320,9 +303,6 @@ std::optional<Frame> TumRecording::Next() {
   lock.unlock();
   impl.changed.notify_all();
   if (decoded.error) std::rethrow_exception(decoded.error);
-  impl.statistics.num_frames += 1;
-  impl.statistics.num_frames_with_depth += decoded.has_depth ? 1 : 0;
-  impl.statistics.decode_cpu_s += decoded.cpu_s;
   return std::move(decoded.frame);
 }
 

@@ -24,20 +24,9 @@ struct RecordingDefaults {
   double max_stamp_gap_s = 0.020;
 };
 
-/// Statistics of reading so far; complete once Next() has returned nothing.
-struct RecordingStatistics {
-  std::int64_t num_frames = 0;  ///< Returned by Next().
-  /// Frames among these with at least one valid depth pixel.
-  std::int64_t num_frames_with_depth = 0;
-  double decode_cpu_s = 0.0;  ///< CPU time for reading, decoding and registering these frames.
-  std::int64_t num_unmatched_color =
-      0;  ///< Colour images without a depth image close in time, which are left out.
-  std::int64_t num_unmatched_depth = 0;
-};
-
 /// Streams a recording. A separate thread decodes up to three frames ahead, in order, so that
-/// decoding overlaps the work on the frames; the result does not depend on timing. Next(), info()
-/// and statistics() must be called from one thread.
+/// decoding overlaps the work on the frames; the result does not depend on timing. Next() and
+/// info() must be called from one thread.
 ///
 /// Depth of 65535 units also means "nothing measured" (saturated). Depth that is not registered is
 /// registered here, see DepthRegistration.
@@ -58,8 +47,6 @@ class TumRecording : public FrameSource {
   /// @throws DataError for an image that is damaged or of another size than the camera; no frames
   ///         follow.
   [[nodiscard]] std::optional<Frame> Next() override;
-
-  [[nodiscard]] const RecordingStatistics& statistics() const;
 
  private:
   struct Impl;

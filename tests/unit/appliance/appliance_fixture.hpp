@@ -41,7 +41,9 @@ class FakeRestart : public SystemRestart {
     ++num_asked;
     done(failure);
   }
+  [[nodiscard]] std::chrono::milliseconds limit() const override { return stays_up_after; }
   int num_asked = 0;
+  std::chrono::milliseconds stays_up_after = std::chrono::minutes(5);
   std::string failure;
 };
 

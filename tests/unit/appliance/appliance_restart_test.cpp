@@ -100,6 +100,19 @@ TEST_F(ApplianceRestartTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
   });
 }
 
+TEST_F(ApplianceRestartTest, AMachineThatDoesNotGoDownIsUsableAgainAndIsNotResetLater) {
+  Play([&] {
+    MakeReady();
+    restart_->stays_up_after = std::chrono::milliseconds(50);
+    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
+              web::ChangeResult::kDone);
+    EXPECT_TRUE(
+        Becomes([&] { return !std::filesystem::exists(folder_ / "state" / kFactoryResetFile); }));
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
+    EXPECT_EQ(appliance_->store()->audit.Find({0, 10, "system.restart_failed"}).size(), 1U);
+  });
+}
+
 TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedInASessionAndAFailedRestartLeavesItUsable) {
   parts_.demo_patient.clear();
   Play([&] {
