@@ -72,15 +72,16 @@ void UnitProfile::LearnFromScan() {
     const std::optional<ProfileAgreement> compared = Compared();
     const int version = shelf_->Add(serial_, *learned_, begun_from_);
     Log(LogLevel::kInfo,
-        fmt::format("the profile of sensor {} has version {} now, from {} sweeps{}", serial_,
-                    version, learned_->num_sweeps,
+        fmt::format("the profile of sensor {} has version {} now, from {} sweep{}{}", serial_,
+                    version, learned_->num_sweeps, learned_->num_sweeps == 1 ? "" : "s",
                     compared ? fmt::format(" (chi-square {:.1f}, at most {:.1f})",
                                            compared->chi_square, compared->limit)
                              : std::string()),
         {{"SERIAL", serial_}});
   } catch (const std::exception& error) {
     Log(LogLevel::kError,
-        fmt::format("what the sweep taught of sensor {} is lost: {}", serial_, error.what()),
+        fmt::format("the update of sensor {}'s profile by this sweep is lost: {}", serial_,
+                    error.what()),
         {{"SERIAL", serial_}});
   }
 }
