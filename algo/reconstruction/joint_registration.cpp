@@ -133,20 +133,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
     refresh_velocities();
     BundleAdjust(stated, bundle, links, map, result.calibration);
   }
-  // Finds what the sweep determines and how uncertain it is: the equations at the solution.
-  const auto find_information = [&](const std::vector<QuadraticTerm>& terms) {
-    if (!options.calibrate) return;
-    bundle.max_iterations = 0;
-    bundle.find_information = true;
-    result.evidence.solution = ToVector(result.calibration);
-    BundleSummary last = BundleAdjust(stated, bundle, terms, map, result.calibration);
-    result.evidence.information = last.information;
-    result.posterior = std::move(last.posterior);
-  };
-  if (!options.use_dense) {
-    find_information(links);
-    return result;
-  }
+  if (!options.use_dense) return result;
 
   const dense::Cells cells = dense::MakeCells(stated, map);
   MapState before(map);
@@ -201,12 +188,17 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
                     !ContradictsWitnesses(result.witnesses_before, result.witnesses_after);
   if (!result.accepted) {
     result.calibration = calibration_before;
-    bundle.fix_centre_and_distortion = false;
-    find_information(links);
     return result;
   }
   before.Exchange(map);
-  find_information(terms);
+  if (options.calibrate) {
+    bundle.max_iterations = 0;  // Only the equations at the solution are wanted.
+    bundle.find_information = true;
+    result.evidence.solution = ToVector(result.calibration);
+    BundleSummary last = BundleAdjust(stated, bundle, terms, map, result.calibration);
+    result.evidence.information = last.information;
+    result.posterior = std::move(last.posterior);
+  }
   return result;
 }
 

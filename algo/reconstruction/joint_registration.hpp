@@ -56,8 +56,10 @@ struct JointRegistrationResult {
   WitnessErrors witnesses_before;  ///< Of the solution without the dense terms.
   WitnessErrors witnesses_after;
   int num_pairs = 0;
-  BundlePosterior posterior;  ///< Of the solution in the map. Empty unless calibrated.
-  SweepEvidence evidence;     ///< Evidence about the sensor's calibration.
+  /// Empty unless accepted and calibrated: without dense terms it is too narrow (see
+  /// algo/README.md).
+  BundlePosterior posterior;
+  SweepEvidence evidence;  ///< Evidence about the sensor's calibration.
 };
 
 /// Refines the map in place: bundle adjustment with free calibration, then rounds of projective

@@ -115,27 +115,6 @@ TEST(RegisterJointly, BeginsFromWhatIsKnownOfTheSensorAndSaysWhatTheSweepShowed)
   EXPECT_GT(information(kDepthAt + kDepthShiftX, kDepthAt + kDepthShiftX), 1.0);
 }
 
-TEST(RegisterJointly, SaysHowUncertainItIsWithoutTheDenseTermsToo) {
-  synthetic::MapOptions sensor = kLandscape;
-  sensor.sensor.depth[kDepthScale] = 0.008;
-  const TrueMap truth = MakeTrueMap(sensor);
-  // Standard deviation of the depth scale.
-  const auto sigma = [&](bool use_dense) {
-    JointRegistrationOptions options = OfTheRoom();
-    options.use_dense = use_dense;
-    TrackingMap map = truth.map;
-    const BundlePosterior posterior = RegisterJointly(truth.stated, options, map).posterior;
-    EXPECT_EQ(posterior.camera_rows.size(), map.keyframes.size());
-    const Eigen::Index first = posterior.with_calibration.rows() - kCalibrationSize;
-    return std::sqrt(
-        posterior.with_calibration(first + kDepthAt + kDepthScale, kDepthAt + kDepthScale));
-  };
-  const double with = sigma(true), without = sigma(false);
-  fmt::print("depth scale +-{:.2e} with dense terms, +-{:.2e} without\n", with, without);
-  EXPECT_GT(with, 0.0);
-  EXPECT_LT(with, without);
-}
-
 TEST(RegisterJointly, AsksForVelocitiesBeforeEachRound) {
   const TrueMap truth = MakeTrueMap({.num_keyframes = 5, .num_landmarks = 60, .dense = true});
   TrackingMap map = truth.map;
