@@ -116,6 +116,21 @@ Matrix6d FitCovariance(std::span<const SharedMarker> shared, const Subset& subse
   return information.ldlt().solve(Matrix6d::Identity());
 }
 
+// By how much the variances of a fit's markers differ from the stated ones, which are rules of
+// thumb. The observed disagreement of the corners replaces them: at once where it is larger, and
+// where it is smaller as far as there are corners enough to show it.
+double VarianceFactor(std::span<const SharedMarker> shared, const Subset& subset, const Pose& T) {
+  double chi2 = 0.0;
+  for (const std::size_t i : subset) {
+    const double residual = MarkerResidual(shared[i], T);
+    chi2 += 4.0 * residual * residual / (shared[i].sigma_m * shared[i].sigma_m);
+  }
+  // The fit has six degrees of freedom; each corner contributes three coordinates.
+  const double degrees_of_freedom = 12.0 * static_cast<double>(subset.size()) - 6.0;
+  return std::max(chi2 / degrees_of_freedom,
+                  (kStatedSigmasCount + chi2) / (kStatedSigmasCount + degrees_of_freedom));
+}
+
 // Standard deviation of MarkerResidual() for a marker that did not move and was not in the fit.
 double ExpectedResidual(const SharedMarker& marker, const Matrix6d& fit_covariance,
                         const Eigen::Vector3d& centre) {
@@ -202,7 +217,10 @@ LeaveOneOut JudgeMarker(std::span<const SharedMarker> shared, const Subset& good
   const RigidFit fit = FitSubset(shared, others, true);
   if (!fit.valid) return judged;
   const Eigen::Vector3d centre = CentreOf(shared, others);
+  // Scaled by the scatter of the other markers: the stated sigmas alone would let a marker move by
+  // a centimetre unnoticed.
   const double sigma =
+      std::sqrt(VarianceFactor(shared, others, fit.T_a_b)) *
       ExpectedResidual(shared[index], FitCovariance(shared, others, centre), centre);
   judged.residual_m = MarkerResidual(shared[index], fit.T_a_b);
   judged.excess = judged.residual_m / std::max(options.moved_m, options.moved_sigmas * sigma);
@@ -243,12 +261,10 @@ Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subs
   alignment.centre_m = CentreOf(shared, subset);
   const auto count = static_cast<double>(subset.size());
   double sum = 0.0;
-  double chi2 = 0.0;
   double spread = 0.0;
   for (const std::size_t i : subset) {
     const double residual = MarkerResidual(shared[i], fit.T_a_b);
     sum += residual * residual;
-    chi2 += 4.0 * residual * residual / (shared[i].sigma_m * shared[i].sigma_m);
     spread += (Centre(shared[i]) - alignment.centre_m).squaredNorm();
     Eigen::Vector3d current = Eigen::Vector3d::Zero();
     for (const Eigen::Vector3d& p : shared[i].current) current += 0.25 * p;
@@ -260,13 +276,8 @@ Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subs
   alignment.spread_m = std::sqrt(spread / count);
   // The fit has six degrees of freedom; each marker contributes three coordinates.
   alignment.distortion *= 3.0 / std::max(3.0 * count - 6.0, 3.0);
-  // The maps' sigmas are rules of thumb. The observed disagreement of the corners replaces them: at
-  // once where it is larger, and where it is smaller as far as there are corners enough to show it.
-  const double degrees_of_freedom = 12.0 * count - 6.0;
-  const double variance_factor =
-      std::max(chi2 / degrees_of_freedom,
-               (kStatedSigmasCount + chi2) / (kStatedSigmasCount + degrees_of_freedom));
-  alignment.covariance = variance_factor * FitCovariance(shared, subset, alignment.centre_m);
+  alignment.covariance =
+      VarianceFactor(shared, subset, fit.T_a_b) * FitCovariance(shared, subset, alignment.centre_m);
   return alignment;
 }
 
@@ -390,6 +401,11 @@ AlignmentOutcome AlignGood(std::span<const SharedMarker> shared, MarkerConsensus
     outcome.alignment->markers_rejected[shared[i].id] = residual;
     outcome.warnings.push_back(fmt::format("marker {} moved {:.0f} mm since the reference; ignored",
                                            shared[i].id, residual / kMillimetre));
+  }
+  if (consensus.good.size() == 3) {
+    outcome.warnings.emplace_back(
+        "only 3 markers place the scans against each other: if one of them had moved by some "
+        "millimetres, the other two could not show it");
   }
   return outcome;
 }

@@ -17,7 +17,8 @@
 namespace plumb {
 
 /// A marker counts as moved if its residual exceeds both `moved_m` and `moved_sigmas` of its own
-/// standard deviation, so that noise alone does not flag a marker.
+/// standard deviation, so that noise alone does not flag a marker. The standard deviation is the
+/// stated one, scaled by how much the other markers scatter.
 struct MarkerConsensusOptions {
   double moved_m = 5 * kMillimetre;
   double moved_sigmas = 3.0;

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "algo/reconstruction/joint_registration.hpp"
 #include "algo/reconstruction/trajectory.hpp"
+#include "algo/tracking/loop_closer.hpp"
 
 namespace plumb {
 namespace {
@@ -19,6 +21,7 @@ constexpr int kMinReferenceFrames = 5;
 // The depth of Kinect and Xtion sensors errs by about 1 %, the size of prints by up to 3 %.
 constexpr double kUsualDepthScale = 0.02;
 constexpr double kGapToReport_s = 0.5;  // The comparison gives no answer above 1 s.
+constexpr double kDroppedToReport = 0.05;
 
 SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
                           const Pose& T_scene_world) {
@@ -31,6 +34,22 @@ SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
   // views average down to the map's own error.
   result.sigma_m = std::hypot(0.001, 0.004 / std::sqrt(std::max(1, marker.num_views)));
   return result;
+}
+
+// Largest number of keyframes between two that show the same landmark or marker.
+int LongestReturn(const TrackingMap& map) {
+  std::map<std::pair<bool, int>, int> first_seen;  // By (is a marker, index or id).
+  int longest = 0;
+  for (int k = 0; k < static_cast<int>(map.keyframes.size()); ++k) {
+    const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(k)];
+    const auto see = [&](bool is_marker, int id) {
+      const auto [first, is_new] = first_seen.try_emplace({is_marker, id}, k);
+      if (!is_new) longest = std::max(longest, k - first->second);
+    };
+    for (const KeypointObservation& o : keyframe.keypoints) see(false, o.landmark);
+    for (const MarkerObservation& o : keyframe.data.markers) see(true, o.id);
+  }
+  return longest;
 }
 
 }  // namespace
@@ -77,6 +96,17 @@ Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
     scene.warnings.push_back(fmt::format(
         "no image came for {:.2f} s in the sweep; what the sensor passed meanwhile is missing",
         scene.longest_lost_s));
+  }
+  if (static_cast<double>(dropped) > kDroppedToReport * static_cast<double>(scene.frames_total)) {
+    scene.warnings.push_back(fmt::format(
+        "{} of {} frames were dropped, because the processor was busy: fewer views support the "
+        "surface",
+        dropped, scene.frames_total));
+  }
+  if (map.keyframes.size() > 2 * kLoopMinGap && LongestReturn(map) < kLoopMinGap) {
+    scene.warnings.push_back(
+        "the sweep never returned to a place: only neighbouring images hold its path together; "
+        "keep a marker in view for longer, or end the sweep where it began");
   }
   return scene;
 }

@@ -86,6 +86,28 @@ TEST(SceneAlignmentTest, NamesTheMarkerThatMovedAndLeavesItOut) {
   }
 }
 
+TEST(SceneAlignmentTest, TheOthersScatterShowsThatAMarkerMovedBySixMillimetres) {
+  const MarkerMap room = Room(12, 0.0021);  // The sigma that a sweep states, four times the error.
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    MarkerMap current = Seen(room, 0.0006, seed);
+    EXPECT_THAT(AlignScenes(room, current).alignment->markers_rejected, IsEmpty());
+    Move(current, 4, {0.0045, 0, 0});  // Below `moved_m`.
+    EXPECT_THAT(AlignScenes(room, current).alignment->markers_rejected, IsEmpty());
+    Move(current, 4, {0.0018, 0, 0});
+    EXPECT_THAT(AlignScenes(room, current).alignment->markers_rejected,
+                ElementsAre(testing::Pair(4, testing::DoubleNear(0.0063, 0.001))));
+  }
+}
+
+TEST(SceneAlignmentTest, ThreeMarkersAreUsedWithACaution) {
+  const MarkerMap room = Room(3);
+  const AlignmentOutcome three = AlignScenes(room, Seen(room, 0.0005, 1));
+  ASSERT_TRUE(three.alignment);
+  EXPECT_THAT(three.warnings, ElementsAre(HasSubstr("only 3 markers")));
+  const MarkerMap more = Room(4);
+  EXPECT_THAT(AlignScenes(more, Seen(more, 0.0005, 1)).warnings, IsEmpty());
+}
+
 TEST(SceneAlignmentTest, NoisyDepthAccusesNobody) {
   const MarkerMap room = Room(6, 0.004);
   for (unsigned seed = 1; seed <= 50; ++seed) {

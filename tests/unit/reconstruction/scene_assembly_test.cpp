@@ -1,7 +1,13 @@
 #include "algo/reconstruction/scene_assembly.hpp"
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "algo/tracking/loop_closer.hpp"
 
 namespace plumb {
 namespace {
@@ -21,6 +27,38 @@ TEST(SceneAssemblyTest, ALengthThatDepthAndMarkersDisagreeAboutIsAWarning) {
   EXPECT_THAT(warnings_at(1.0201), ElementsAre(HasSubstr("disagree by 2.0 %")));
   EXPECT_THAT(warnings_at(0.9799), ElementsAre(HasSubstr("disagree by 2.0 %")));
   EXPECT_THAT(warnings_at(1.05, false), IsEmpty()) << "nothing to disagree with";
+}
+
+// Warnings of a scene from this many keyframes, of which each sees a landmark together with the
+// next only.
+std::vector<std::string> Warnings(int num_keyframes, std::int64_t num_dropped, bool returns) {
+  TrackingMap map;
+  for (int k = 0; k < num_keyframes; ++k) {
+    MapKeyframe& keyframe = map.keyframes.emplace_back();
+    for (const int landmark : {k, k + 1}) keyframe.keypoints.emplace_back().landmark = landmark;
+  }
+  if (returns)
+    for (const std::size_t k : {std::size_t{2}, std::size_t{2 + kLoopMinGap}})
+      map.keyframes.at(k).data.markers.emplace_back().id = 7;
+  std::vector<TrackedFrame> frames(95);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    frames[i].color_time_s = frames[i].depth_time_s = static_cast<double>(i) / 30.0;
+    frames[i].tracked = true;
+    frames[i].reference_keyframe = 0;
+  }
+  return MakeScene({}, Preset::kBest, num_dropped, frames, map, {}, Pose::Identity()).warnings;
+}
+
+TEST(SceneAssemblyTest, ASweepThatNeverReturnsToAPlaceIsAWarning) {
+  EXPECT_THAT(Warnings(2 * kLoopMinGap + 1, 0, false),
+              ElementsAre(HasSubstr("never returned to a place")));
+  EXPECT_THAT(Warnings(2 * kLoopMinGap + 1, 0, true), IsEmpty());
+  EXPECT_THAT(Warnings(2 * kLoopMinGap, 0, false), IsEmpty()) << "too short to return";
+}
+
+TEST(SceneAssemblyTest, MoreThanOneDroppedFrameInTwentyIsAWarning) {
+  EXPECT_THAT(Warnings(2, 5, false), IsEmpty());  // 5 of 100.
+  EXPECT_THAT(Warnings(2, 6, false), ElementsAre(HasSubstr("6 of 101 frames were dropped")));
 }
 
 }  // namespace

@@ -259,6 +259,18 @@ export const kPatterns = [
     + 'and close other programs on it$',
   'el equipo fue demasiado lento: se omitieron $1 de $2 imágenes de forma regular; barra más '
     + 'despacio y cierre lo demás que se ejecute en él'],
+  ['^(\\d+) of (\\d+) frames were dropped, because the processor was busy: fewer views support the '
+    + 'surface$',
+  'se perdieron $1 de $2 imágenes porque el procesador estaba ocupado: menos vistas sustentan la '
+    + 'superficie'],
+  ['^the sweep never returned to a place: only neighbouring images hold its path together; keep a '
+    + 'marker in view for longer, or end the sweep where it began$',
+  'el barrido no volvió a ningún lugar: solo las imágenes vecinas sostienen su trayectoria; mantenga '
+    + 'más tiempo un marcador a la vista o termine donde empezó'],
+  ['^only 3 markers place the scans against each other: if one of them had moved by some '
+    + 'millimetres, the other two could not show it$',
+  'solo 3 marcadores relacionan los escaneos: si uno se hubiera movido unos milímetros, los otros '
+    + 'dos no podrían mostrarlo'],
   ['^no image came for ([\\d.]+) s in the sweep; what the sensor passed meanwhile is missing$',
     'no llegó ninguna imagen durante $1 s del barrido; falta lo que el sensor recorrió entretanto'],
   ['^reference marker (\\d+) was seen from (\\d+) places? only: the scene\'s frame is less certain '
