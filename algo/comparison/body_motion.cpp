@@ -291,7 +291,7 @@ std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud&
   }
   if (scored.empty()) return std::nullopt;
   std::stable_sort(scored.begin(), scored.end(), by_score);
-  // Starts that ran into the same pose need one refinement only.
+  // Starts that converged to the same pose are refined once.
   std::vector<Scored> distinct;
   for (const Scored& s : scored) {
     const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Scored& d) {

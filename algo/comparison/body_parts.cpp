@@ -96,7 +96,7 @@ Axes AxesByRoom(const BodyView& view, const Outline& outline) {
   if (outline.elongation < kElongated) return axes;
   const double cosine = outline.principal.dot(axes.along);
   if (std::abs(cosine) < std::sqrt(0.5))
-    // the body lies across: posture or T_iec_reference does not belong to this patient
+    // The body lies across: the posture or T_iec_reference is wrong for this patient.
     return room;
   axes.along = cosine > 0 ? outline.principal : Eigen::Vector2d(-outline.principal);
   const Eigen::Vector2d across(axes.along.y(), -axes.along.x());

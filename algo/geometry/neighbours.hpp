@@ -31,9 +31,12 @@ class CloudNeighbours {
   struct Memory {
     std::uint32_t neighbour =
         kNone;  ///< Global index of the nearest point of the last search, within the radius or not.
-    float none_within = 0.0F;      ///< Nothing was nearer than this ...
-    float no_other_within = 0.0F;  ///< ... and nothing except `neighbour` was nearer than this ...
-    float travel_then = 0.0F;      ///< ... when the clouds had travelled this far.
+    /// In the last search no point was nearer than this.
+    float none_within = 0.0F;
+    /// In the last search no point except `neighbour` was nearer than this.
+    float no_other_within = 0.0F;
+    /// How far the clouds had travelled at the last search.
+    float travel_then = 0.0F;
   };
 
   /// @param cell_size  Metres, > 0; about the distance between neighbours within a cloud.

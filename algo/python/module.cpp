@@ -171,7 +171,8 @@ void AddRecording(py::module_& module) {
 
 void AddScene(py::module_& module) {
   py::class_<Scene>(module, "Scene", "The result of one sweep. Lengths in metres, scene frame.")
-      .def_static("load", &ReadScene, "folder"_a, "parts"_a = SceneParts{true, true, true})
+      .def_static("load", &ReadScene, "folder"_a, "parts"_a = SceneParts{true, true, true},
+                  py::call_guard<py::gil_scoped_release>())
       .def(
           "save",
           [](const Scene& scene, const std::filesystem::path& folder) {

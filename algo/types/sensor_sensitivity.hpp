@@ -11,9 +11,10 @@
 
 namespace plumb {
 
-/// A scene rests on an estimate of its sensor's calibration that the sweep itself made. Two sweeps
-/// by one unit make two estimates of the same values, and where these differ the scenes differ:
-/// how, is stated here. Terms are those of the calibration model, in its order and units.
+/// How a scene would change if its sensor's calibration were another one. Each sweep estimates the
+/// calibration itself, so two sweeps by one unit give two estimates of the same values, and their
+/// difference also shifts the scenes against each other. Terms are those of the calibration model,
+/// in its order and units.
 struct SensorSensitivity {
   using Derivative = Eigen::Matrix3Xf;  ///< Metres in the scene's frame per unit of each term.
 

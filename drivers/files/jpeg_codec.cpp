@@ -19,7 +19,7 @@
 namespace plumb {
 namespace {
 
-/// A progressive file may repeat scans without end; encoders write about ten.
+/// A progressive file may contain any number of scans; encoders write about ten.
 constexpr int kMaxScans = 64;
 
 struct ErrorManager {

@@ -25,7 +25,7 @@ CameraFile ParseCalibration(const std::string& text, const std::string& name, in
   if (camera.depth_camera) {
     camera.depth_camera.reset();
     camera.warnings.push_back(fmt::format(
-        "{} states depth_registered 0: ignored, the sensor registers depth itself", name));
+        "depth_registered: 0 in {} is ignored, because the sensor registers depth itself", name));
   }
   return camera;
 }

@@ -47,7 +47,7 @@ const SensorDescription& ChooseSensor(const std::vector<SensorDescription>& sens
   if (found != sensors.end()) return *found;
   throw DeviceError(
       serial.empty()
-          ? "no sensor is attached; plug one in; `plumb doctor` lists the sensors that are seen"
+          ? "no sensor is attached; plug one in; `plumb doctor` lists the detected sensors"
           : fmt::format("sensor {} is not attached, found {}; plug it in", serial,
                         sensors.empty() ? "none" : sensors.front().serial));
 }

@@ -45,12 +45,13 @@ std::string WhyNotUsed(const fs::path& file) {
   void* handle = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) {
     const char* why = ::dlerror();
-    return fmt::format("it cannot be loaded: {}; install what it needs, made for this processor",
-                       why == nullptr ? "no reason given" : why);
+    return fmt::format(
+        "it cannot be loaded: {}; install the libraries it depends on, for this architecture",
+        why == nullptr ? "no reason given" : why);
   }
   // It stays loaded, as OpenNI2 would leave it: drivers do not survive being unloaded.
   if (::dlsym(handle, "oniDriverCreate") == nullptr)
-    return "it is no driver of OpenNI2 2 (it has no function oniDriverCreate): take it away";
+    return "not an OpenNI 2 driver (no oniDriverCreate): remove it";
   return {};
 }
 

@@ -217,7 +217,7 @@ void CheckSize(const Keys& keys, const Intrinsics& intrinsics, const char* what)
   if (intrinsics.width >= 1 && intrinsics.height >= 1 && intrinsics.width <= kMaxImageSide &&
       intrinsics.height <= kMaxImageSide)
     return;
-  throw DataError(fmt::format("{}: the {} image is {}x{} pixels, expected 1 to {} a side",
+  throw DataError(fmt::format("{}: the {} image is {}x{} pixels, expected 1 to {} pixels per side",
                               keys.name(), what, intrinsics.width, intrinsics.height,
                               kMaxImageSide));
 }

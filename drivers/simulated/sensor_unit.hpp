@@ -105,8 +105,6 @@ struct SensorUnit {
   bool steps_white_balance = false;  ///< and white balance.
 };
 
-/// The unit of a given seed, for images of the given size (multiples of the 640 x 480 optics).
-/// Every fault has its own random numbers: switching one off changes nothing else of the unit.
 /// The unit of a given seed for images of the given size (multiples of the 640 x 480 optics). Every
 /// fault has its own random numbers: switching one off changes nothing else. Without faults it is
 /// one ideal pinhole camera that gives colour and depth at the same instant.

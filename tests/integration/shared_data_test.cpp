@@ -1,7 +1,10 @@
 // The recordings beside the project, where they are there: another simulator's sweeps with truth,
-// and a real sensor's.
+// and those of two real sensors. Bounds are 20 % above the figures that the README states, but
+// never above what is required: motion 1.5 mm and 0.15 deg on `sim-b` alone, 1.0 mm and 0.1 deg
+// with a profile, 1.2 mm on `sim-a`, a marker map within 2 permille.
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -9,6 +12,7 @@
 
 #include "daemon/evaluation/accuracy.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/files/trajectory_file.hpp"
 #include "tests/integration/command_line.hpp"
 
 namespace plumb {
@@ -21,12 +25,21 @@ class SharedDataTest : public CommandLineTest {
   struct Errors {
     std::vector<double> translation_mm;
     std::vector<double> rotation_deg;
-    int numbers = 0, inside = 0;  // Of the six of each pair: how many lie in their 95 % interval.
-    std::vector<json> figures;    // Of each spacing.
-    /// A bound that intervals of another width fail: of 36 numbers 34 are expected.
+    int inside = 0;                  // How many of the six of each pair lie in their 95 % interval.
+    std::vector<double> normalised;  // Of the six of each pair: error by standard deviation.
+    std::vector<double> ate_mm;      // Of every scene, over all frames.
+    std::vector<double> scale_permille;  // Of every scene's marker map, without its sign.
+    /// Bounds that intervals of half or of double the width fail: of 36 numbers 34 are expected,
+    /// and a root mean square of 1.
     void ExpectThatIntervalsHold() const {
-      EXPECT_EQ(numbers, 6 * static_cast<int>(translation_mm.size()));
-      EXPECT_GE(inside, 0.85 * numbers);
+      ASSERT_EQ(normalised.size(), 6 * translation_mm.size());
+      EXPECT_GE(inside, 0.85 * static_cast<double>(normalised.size()));
+      const double rms = std::sqrt(
+          std::inner_product(normalised.begin(), normalised.end(), normalised.begin(), 0.0) /
+          static_cast<double>(normalised.size()));
+      // Measured: 0.77 on sim-a, 0.62 on sim-b and 0.65 there with a profile.
+      EXPECT_GE(rms, 0.5);
+      EXPECT_LE(rms, 1.0);
     }
   };
   // One spacing of keyframes gives one number, and a part of it is luck: three give the errors of
@@ -42,15 +55,22 @@ class SharedDataTest : public CommandLineTest {
       arguments.insert(arguments.end(), more.begin(), more.end());
       const RunResult result = Plumb(arguments);
       EXPECT_EQ(result.exit_code, 0) << result.err;
-      errors.figures.push_back(json::parse(result.out));
-      for (const auto& pair : errors.figures.back().at("pairs")) {
+      const json figures = json::parse(result.out);
+      for (const auto& [name, scene] : figures.at("scenes").items()) {
+        EXPECT_EQ(scene.at("frames").at("tracked"), scene.at("frames").at("total")) << name;
+        errors.ate_mm.push_back(scene.at("trajectory_all").at("ate_rmse_mm"));
+        errors.scale_permille.push_back(std::abs(scene.at("marker_scale_permille").get<double>()));
+      }
+      for (const auto& pair : figures.at("pairs")) {
         if (!pair.contains("translation_mm") || pair.at("translation_mm").is_null()) continue;
         errors.translation_mm.push_back(pair.at("translation_mm").get<double>());
         errors.rotation_deg.push_back(pair.at("rotation_deg").get<double>());
         for (const auto& [name, number] : pair.at("numbers").items()) {
           if (number.is_null()) continue;
-          ++errors.numbers;
           errors.inside += number.at("inside").get<bool>() ? 1 : 0;
+          errors.normalised.push_back(
+              1.96 * (number.at("value").get<double>() - number.at("truth").get<double>()) /
+              number.at("u95").get<double>());
         }
       }
     }
@@ -70,16 +90,13 @@ TEST_F(SharedDataTest, AnotherSimulatorsSweepsWithTruth) {
   if (suite.empty()) GTEST_SKIP() << "no recordings at ../shared/data/sim-a";
   const Errors errors = ErrorsOf(suite, "out");
   ASSERT_EQ(errors.translation_mm.size(), 6U);
-  EXPECT_LE(Mean(errors.translation_mm), 1.2);      // Measured: 1.11.
-  EXPECT_LE(Largest(errors.translation_mm), 1.58);  // Measured: 1.32.
+  EXPECT_LE(Mean(errors.translation_mm), 1.2);      // Measured: 1.10.
+  EXPECT_LE(Largest(errors.translation_mm), 1.58);  // Measured: 1.39.
+  EXPECT_LE(Mean(errors.rotation_deg), 0.052);      // Measured: 0.043.
   EXPECT_LE(Largest(errors.rotation_deg), 0.064);   // Measured: 0.053.
+  EXPECT_LE(Largest(errors.ate_mm), 2.1);           // Measured: 1.72.
+  EXPECT_LE(Largest(errors.scale_permille), 0.58);  // Measured: 0.49.
   errors.ExpectThatIntervalsHold();
-  for (const json& figures : errors.figures) {
-    for (const auto& [name, scene] : figures.at("scenes").items()) {
-      EXPECT_EQ(scene.at("frames").at("tracked"), scene.at("frames").at("total")) << name;
-      EXPECT_LE(scene.at("trajectory_all").at("ate_rmse_mm").get<double>(), 2.3) << name;
-    }
-  }
 }
 
 TEST_F(SharedDataTest, AUnitWithABentDepthImageAndAToneCurveOfItsOwn) {
@@ -93,11 +110,20 @@ TEST_F(SharedDataTest, AUnitWithABentDepthImageAndAToneCurveOfItsOwn) {
   // The other room shows another body.
   ASSERT_EQ(alone.translation_mm.size(), 6U);
   ASSERT_EQ(with_profile.translation_mm.size(), 6U);
-  EXPECT_LE(Mean(alone.translation_mm), 0.8);      // Measured: 0.66.
-  EXPECT_LE(Largest(alone.translation_mm), 1.14);  // Measured: 0.95.
-  EXPECT_LE(Largest(alone.rotation_deg), 0.155);
-  EXPECT_LE(Mean(with_profile.translation_mm), 1.1);
-  EXPECT_LE(Largest(with_profile.rotation_deg), 0.155);
+  EXPECT_LE(Mean(alone.translation_mm), 0.8);            // Measured: 0.67.
+  EXPECT_LE(Largest(alone.translation_mm), 1.09);        // Measured: 0.91.
+  EXPECT_LE(Mean(alone.rotation_deg), 0.087);            // Measured: 0.072.
+  EXPECT_LE(Largest(alone.rotation_deg), 0.13);          // Measured: 0.108.
+  EXPECT_LE(Mean(with_profile.translation_mm), 0.85);    // Measured: 0.71.
+  EXPECT_LE(Largest(with_profile.translation_mm), 1.0);  // Measured: 0.96.
+  EXPECT_LE(Mean(with_profile.rotation_deg), 0.087);     // Measured: 0.073.
+  EXPECT_LE(Largest(with_profile.rotation_deg), 0.13);   // Measured: 0.110.
+  // All three sweeps at three spacings.
+  EXPECT_LE(Mean(alone.ate_mm), 2.0);                     // Measured: 1.72.
+  EXPECT_LE(Largest(alone.ate_mm), 2.6);                  // Measured: 2.19.
+  EXPECT_LE(Largest(with_profile.ate_mm), 2.5);           // Measured: 2.08.
+  EXPECT_LE(Largest(alone.scale_permille), 0.89);         // Measured: 0.74.
+  EXPECT_LE(Largest(with_profile.scale_permille), 0.80);  // Measured: 0.67.
   alone.ExpectThatIntervalsHold();
   with_profile.ExpectThatIntervalsHold();
 }
@@ -122,7 +148,7 @@ TEST_F(SharedDataTest, ARealSensorTracksWithTagsAndWithout) {
   path.trajectory = a;
   const auto error = ErrorOfTrajectory(b, path);
   ASSERT_TRUE(error);
-  EXPECT_LE(error->rmse_mm, 3.0);  // measured 0.5
+  EXPECT_LE(error->rmse_mm, 0.6);  // Measured: 0.5.
   for (const std::vector<StampedPose>& poses : {a, b}) {
     for (std::size_t i = 1; i + 1 < poses.size(); ++i) {
       const Eigen::Vector3d bend = poses[i - 1].T_world_camera.translation() -
@@ -133,6 +159,23 @@ TEST_F(SharedDataTest, ARealSensorTracksWithTagsAndWithout) {
       EXPECT_LE(bend.norm(), 0.012) << "the camera jumps at frame " << i;
     }
   }
+}
+
+TEST_F(SharedDataTest, ARealSensorsPathAgreesWithMotionCapture) {
+  const fs::path recording = SharedData("real-kinect");
+  if (recording.empty()) GTEST_SKIP() << "no recording at ../shared/data/real-kinect";
+  const RunResult result = Plumb({"reconstruct", recording, "--out", folder_ / "scene", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json frames = json::parse(result.out).at("frames");
+  EXPECT_EQ(frames.at("tracked"), frames.at("total"));
+  const SceneParts none{.cloud = false, .height_map = false, .mesh = false};
+  const fs::path file = recording / "truth" / "groundtruth.txt";
+  SceneTruth truth;
+  truth.trajectory = ParseTrajectory(ReadText(file), file);
+  const auto error = ErrorOfTrajectory(ReadScene(folder_ / "scene", none).trajectory, truth);
+  ASSERT_TRUE(error);
+  EXPECT_GE(error->count, 170U) << "of 177 pairs of images";
+  EXPECT_LE(error->rmse_mm, 8.5);  // Measured: 7.1 to 7.3.
 }
 
 }  // namespace

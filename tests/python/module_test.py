@@ -1,13 +1,21 @@
 #!/usr/bin/env python3
-"""The Python module on a small simulated suite: arrays, errors, the example.
+"""The Python module on a small simulated suite: arrays, errors, the stub, the example.
 
 Usage: module_test.py PLUMB_BINARY EXAMPLE FOLDER, with the module's folder in PYTHONPATH.
 """
+import ast
+import contextlib
+import importlib.util
+import inspect
+import io
 import json
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
+import threading
+import time
 import unittest
 
 import numpy as np
@@ -83,10 +91,38 @@ class SceneTest(unittest.TestCase):
         folder = pathlib.Path(FOLDER) / "scene"
         self.scenes[0].save(folder)
         loaded = plumb.Scene.load(folder)
+        np.testing.assert_array_equal(loaded.triangles, self.scenes[0].triangles)
         np.testing.assert_array_equal(loaded.heights, self.scenes[0].heights)
         # Trajectories are text: rounded in the ninth decimal.
         np.testing.assert_allclose(loaded.keyframe_poses, self.scenes[0].keyframe_poses,
                                    atol=1e-8)
+
+    def test_other_threads_run_while_a_scene_is_loaded(self):
+        folder = pathlib.Path(FOLDER) / "loaded"
+        self.scenes[0].save(folder)
+        turns = 0
+        ended = threading.Event()
+
+        def count():
+            nonlocal turns
+            while not ended.is_set():
+                turns += 1
+                time.sleep(1e-4)
+
+        # Threads then change only where one of them gives up the lock of its own accord.
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(60.0)
+        other = threading.Thread(target=count)
+        other.start()
+        try:
+            before = turns
+            plumb.Scene.load(folder)
+            after = turns
+        finally:
+            ended.set()
+            other.join()
+            sys.setswitchinterval(interval)
+        self.assertGreater(after, before)
 
     def test_the_motion_is_the_one_that_was_simulated(self):
         result = plumb.compare(*self.scenes)
@@ -106,13 +142,96 @@ class SceneTest(unittest.TestCase):
         self.assertEqual(plumb.compare(*self.scenes, region_m=far).verdict, "no_answer")
 
 
+def parameters(function):
+    """The parameters of a parsed function, and the defaults of those that have one."""
+    names = [argument.arg for argument in function.args.args if argument.arg != "self"]
+    defaults = function.args.defaults
+    return names, dict(zip(names[len(names) - len(defaults):], map(ast.literal_eval, defaults)))
+
+
+class StubTest(unittest.TestCase):
+    """Editors and mypy read plumb.pyi only: it must state what the module has."""
+
+    def check_function(self, stub, real):
+        # pybind11 writes the signature as the first line of the docstring. A default without
+        # a literal is shown as <...> there, and as ... in the stub.
+        line = re.sub(r"<[^>]*>", "...", inspect.getdoc(real).splitlines()[0])
+        names, defaults = parameters(ast.parse(f"def {line}: ...").body[0])
+        stub_names, stub_defaults = parameters(stub)
+        self.assertEqual(stub_names, names[-len(stub_names):] if stub_names else [], line)
+        # An empty list is an empty tuple in the stub, whose defaults must not be mutable.
+        plain = {name: () if value == [] else value for name, value in defaults.items()}
+        self.assertEqual(stub_defaults, plain, line)
+
+    def test_the_stub_has_the_names_and_defaults_of_the_module(self):
+        stub = ast.parse(pathlib.Path(plumb.__file__).with_name("plumb.pyi").read_text())
+        found = set()
+        checked = 0
+        for node in stub.body:
+            if isinstance(node, ast.FunctionDef):
+                self.check_function(node, getattr(plumb, node.name))
+                checked += 1
+            if isinstance(node, ast.ClassDef):
+                real = getattr(plumb, node.name)
+                members = {m.name: m for m in node.body if isinstance(m, ast.FunctionDef)}
+                names = set(members) | {m.target.id for m in node.body
+                                        if isinstance(m, ast.AnnAssign)}
+                for name in names:
+                    self.assertTrue(hasattr(real, name), f"{node.name}.{name}")
+                self.assertEqual({name for name in names if not name.startswith("_")},
+                                 {name for name in vars(real) if not name.startswith("_")},
+                                 node.name)
+                for name, member in members.items():
+                    if name in ("__iter__", "__next__") or "property" in map(
+                            ast.unparse, member.decorator_list):
+                        continue
+                    self.check_function(member, getattr(real, name))
+                    checked += 1
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+                found.add(node.name)
+        self.assertEqual(found, {name for name in dir(plumb) if not name.startswith("_")})
+        self.assertGreaterEqual(checked, 8)
+
+
 class ExampleTest(unittest.TestCase):
+    def test_its_summary_and_its_points_are_those_of_the_errors(self):
+        spec = importlib.util.spec_from_file_location("accuracy_table", EXAMPLE)
+        example = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(example)
+        pairs = [("a", "b", 1.0, 0.1), ("b", "a", 4.0, 0.2), ("a", "c", 2.5, 0.6)]
+        figures = {"pairs": [dict(zip(("reference", "current", "translation_mm", "rotation_deg"),
+                                      pair)) for pair in pairs]
+                   + [{"reference": "b", "current": "c", "translation_mm": None}]}
+        errors = example.pair_errors(figures)
+        self.assertEqual(errors, pairs)
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            example.print_table(errors, {"translation_mm": {"mean": 11.458, "median": 10.497},
+                                         "rotation_deg": {"mean": 1.6, "median": 1.196}})
+        rows = [re.split(r"\s{2,}|(?<=[\w]) (?=\d)", line.strip())
+                for line in printed.getvalue().splitlines()[4:]]
+        self.assertEqual(rows, [["mean", "2.50", "0.300"], ["median", "2.50", "0.200"],
+                                ["maximum", "4.00", "0.600"],
+                                ["the paper, mean", "11.46", "1.600"],
+                                ["the paper, median", "10.50", "1.196"]])
+        picture = pathlib.Path(FOLDER) / "points.svg"
+        example.write_svg(errors, picture)
+        # 320 units wide from 40: 1.0 of 4.4 mm, 0.1 of 0.66 deg, which grow to the right and up.
+        self.assertEqual(re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', picture.read_text())[0],
+                         ("112.7", "311.5"))
     def test_the_example_prints_the_table_and_draws_it(self):
         picture = pathlib.Path(FOLDER) / "errors.svg"
         run = subprocess.run([sys.executable, EXAMPLE, str(SUITE), "--svg", str(picture)],
                              check=True, capture_output=True, text=True)
-        self.assertIn("median", run.stdout)
-        self.assertIn("<circle", picture.read_text())
+        table = {line.rsplit(None, 2)[0].strip(): line.split()[-2:]
+                 for line in run.stdout.splitlines()[1:]}
+        # The demo has one pair, which is every summary of itself.
+        (pair,) = (values for name, values in table.items() if name.split() == ["reference", "moved"])
+        for name in ("mean", "median", "maximum"):
+            self.assertEqual(table[name], pair)
+        self.assertTrue(0.0 < float(pair[0]) < 1.5, pair)  # measured: 1.24 mm
+        self.assertEqual(table["the paper, mean"], ["11.46", "1.600"])
+        self.assertEqual(picture.read_text().count("<circle"), 1)
 
 
 if __name__ == "__main__":

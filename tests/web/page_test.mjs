@@ -806,7 +806,7 @@ await h.step('a scan is deleted with a reason and its number; one that a referen
   await bob.goto(`${h.url}#/result/${reference.id}`);
   await bob.locator('.verdict').waitFor();
   await bob.getByText('Delete this scan…').click();
-  await bob.getByText(/Reference version \d+ is made of this scan/).waitFor();
+  await bob.getByText(/This scan is the source of reference version \d+/).waitFor();
   equal(await bob.getByRole('button', { name: 'Delete permanently' }).count(), 0, 'nothing to press');
   equal((await h.api(bob, `scans/${reference.id}`, 'DELETE', { reason: 'a test' })).status, 409, 'nor through the interface');
   const { id } = scans.find((one) => one.outcome === 'failed');

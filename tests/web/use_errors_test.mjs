@@ -775,9 +775,9 @@ await h.step('site and note are corrected; an archived patient is out of the lis
   await bob.goto(`${h.url}#/patients`);
   await bob.getByRole('link', { name: 'PX-0001' }).waitFor();
   equal(await bob.getByRole('link', { name: 'PX-0002' }).count(), 0, 'out of the list');
-  await bob.getByLabel('Show archived patients too').check();
+  await bob.getByLabel('Include archived patients').check();
   await bob.getByRole('link', { name: 'PX-0002' }).click();
-  await bob.getByRole('button', { name: 'Take out of the archive' }).click();
+  await bob.getByRole('button', { name: 'Restore from archive' }).click();
   await bob.getByRole('button', { name: 'Archive', exact: true }).waitFor();
   await bob.goto(`${h.url}#/patients`);
   await bob.getByRole('link', { name: 'PX-0002' }).waitFor();

@@ -29,7 +29,7 @@ std::string Cell(std::string text) {
   return quoted + "\"";
 }
 
-/// Numbers were not typed by anybody, so a minus is kept.
+/// Numbers are not user input: a leading minus is not escaped.
 std::string Number(const std::optional<double>& value) {
   return value ? fmt::format("{:.4f}", *value) : std::string();
 }
@@ -140,7 +140,7 @@ void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files
   std::string left_out;
   for (const Scan& scan : scans) {
     if (!scan.result) continue;
-    if (scan.folder.empty()) {  // compared, but its files are out of sight
+    if (scan.folder.empty()) {  // compared, but its files are unavailable
       left_out += fmt::format("{}: {}\r\n", scan.id, scan.failure);
       continue;
     }

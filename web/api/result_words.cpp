@@ -21,7 +21,7 @@ constexpr ResultWords kEnglish = {
     .first_password =
         "Somebody else chose this password: log in once on the page with script, and change it.",
     .out_of_order = "Out of order",
-    .nobody_can = "Nobody can log in or scan until this is put right: {}",
+    .nobody_can = "No one can log in or scan until this is fixed: {}",
     .none = "No result yet",
     .patient = "Patient {}",
     .no_patient = "No patient: unassigned scan",

@@ -141,8 +141,8 @@ function showFocused() {
   return shown;
 }
 
-/// What `question` answers. As long as the appliance does not answer, nothing else is shown than
-/// that, and it is asked again.
+/// The answer to `question`. Until the appliance answers, the page shows only that it does not, and
+/// asks again.
 async function ask(question, text = S.offline) {
   const mine = ++turn;
   waiting = true;
@@ -215,8 +215,8 @@ async function begin(message) {
   await showFocused();
 }
 
-/// A result that comes while the sweep is watched is shown at once; a scan that failed is said, and
-/// no older result is shown for it.
+/// A result that arrives while the sweep is shown is opened at once. A failed scan is announced, and
+/// no older result is shown in its place.
 async function followScan() {
   const { state, sensor } = await get('status', true);
   if (state === 'result') {
@@ -278,8 +278,8 @@ setInterval(() => {
 
 const report = (error) => clear(main, h('p', { class: 'card' }, error.message));
 let lastPurpose = null;
-/// Where people act on who is open: they scan, or use a result. Who opens another patient is asked
-/// there whether this one is to be closed.
+/// Screens on which users act on the open session: they scan, or use a result. Opening another
+/// patient there asks whether to close this session.
 const kActOnSession = ['scan', 'result'];
 const watchSession = () =>
   followSession(kActOnSession.includes(route().name), () => live.tell('acknowledged'));
@@ -323,7 +323,7 @@ if (location.pathname === '/room') {
     .catch(report);
 } else {
   listen();
-  // What is said before anybody answers is in the language of who is about to log in.
+  // Until the user is known, the page is in the language of the login screen.
   speak('login');
   applyTheme('login');
   begin().catch(report);

@@ -119,7 +119,7 @@ function around({ width, values }, cell) {
     : known.sort((a, b) => a - b)[known.length >> 1];
 }
 
-/// What came so far of all that was begun, into `place`.
+/// Shows in `place` how much of all downloads begun so far has arrived.
 export function progressIn(place, words = S.loading) {
   const bar = h('progress', { max: 1, 'aria-label': words });
   clear(place, h('p', { class: 'hint' }, words), bar);

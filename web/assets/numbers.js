@@ -30,7 +30,7 @@ function shownUncertainty(u95, digits, most) {
 }
 export const mostDigits = (axis) => (axis.shift ? 1 : 2);
 
-/// Whether a value is not known to differ from nothing: it has no direction and commands nothing.
+/// Whether a value is indistinguishable from zero: it then has no direction and asks for no move.
 export const isStill = (value, u95, most = 1) =>
   printsAsZero(value, digitsOf(u95, most)) || Math.abs(value) <= u95;
 

@@ -16,7 +16,7 @@ namespace plumb::simulated {
 /// properties from the application's threads; Emit() is called from the unit's.
 class VirtualStream : public oni::driver::StreamBase {
  public:
-  static constexpr int kMaxDepth = 10000;  ///< Mm; the recorder damages larger values.
+  static constexpr int kMaxDepth = 10000;  ///< Millimetres; the recorder corrupts larger values.
   [[nodiscard]] static OniVideoMode Mode(bool depth, const FrameCacheShape& shape);
 
   VirtualStream(bool depth, const FrameCacheShape& shape)

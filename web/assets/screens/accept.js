@@ -1,4 +1,4 @@
-// What people do with a result: scan again, accept it, make a reference of it, take it away.
+// What users do with a result: scan again, accept it, make it a reference, download it.
 import { fileUrl, live, may, post } from '../api.js';
 import { action, clear, done, field, form, h, signedTime, signingPassword } from '../dom.js';
 import { S } from '../strings.js';

@@ -1,4 +1,4 @@
-// The audit log: what was done, by whom, from where; filtered and taken away as CSV.
+// The audit log: what was done, by whom and from where. It can be filtered and exported as CSV.
 import { get } from '../api.js';
 import { detailWords, subjectWords, userWords } from '../audit_words.js';
 import { action, checkbox, clear, field, h, redraw, table } from '../dom.js';

@@ -1,4 +1,4 @@
-// The certificate by which browsers know the appliance, and another one in its place.
+// Shows and replaces the TLS certificate.
 import { get, post, put } from '../api.js';
 import { clear, done, field, form, h, localTime, signingPassword, select } from '../dom.js';
 import { S } from '../strings.js';
@@ -6,7 +6,7 @@ import { S } from '../strings.js';
 const kMaxChain = 32 * 1024;
 const kMaxKey = 16 * 1024;
 
-/// Line ends as other systems write them are taken too.
+/// Accepts CR-LF line ends.
 async function pemOf(input, max) {
   const [file] = input.files;
   if (file.size > max) throw new Error(S.certificate.tooLarge(file.name));
@@ -17,7 +17,7 @@ function fileInput() {
   return h('input', { type: 'file', accept: '.pem,.crt,.cer,.key', required: true });
 }
 
-/// With the password again: who holds the key is the appliance to every browser.
+/// Asks for the password again: whoever holds the key can impersonate the appliance.
 function change(load) {
   const text = S.certificate;
   const chain = fileInput();

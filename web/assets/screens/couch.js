@@ -1,4 +1,4 @@
-// From the couch's present readings to those to be set: sums not to be left to mental arithmetic.
+// Computes the couch readings to set from the present ones, so that nobody has to add in their head.
 import { live } from '../api.js';
 import { clear, field, h } from '../dom.js';
 import { isStill, kAxes } from '../numbers.js';

@@ -4,8 +4,8 @@ import { S, translated } from '../strings.js';
 
 const kAskAgain_ms = 5000;
 
-/// Safe mode in which no account can be looked up: nobody can log in, and everybody reads why.
-/// Comes back when the appliance is well again.
+/// Safe mode in which no account can be looked up: no one can log in, and the page says why.
+/// Returns when the appliance has recovered.
 export async function showFault(main, fault) {
   const text = S.login;
   document.title = `${text.faultTitle} · ${S.product}`;

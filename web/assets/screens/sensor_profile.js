@@ -1,4 +1,4 @@
-// What good scans have taught of the connected sensor unit, with its earlier versions.
+// The profile learned from good scans by the connected sensor unit, and its earlier versions.
 import { get, may, post } from '../api.js';
 import { clear, done, field, form, h, localTime, signingPassword, select, table } from '../dom.js';
 import { S, translated } from '../strings.js';
@@ -24,7 +24,7 @@ function row(one) {
     }, text.download)));
 }
 
-/// Only for who may, and with the password again: it changes where every scan begins.
+/// Needs the permission and the password again: every later scan starts from this profile.
 function change({ serial, versions }, load) {
   const text = S.profile;
   const earlier = versions.slice(1).filter((one) => one.num_sweeps > 0);

@@ -56,7 +56,7 @@ function restart() {
     h('button', { class: 'danger' }, text.restartSubmit)));
 }
 
-/// Either kind with the password again; wiping also with its word typed: nothing brings it back.
+/// Both kinds ask for the password again; wiping, which cannot be undone, also for a typed word.
 function factoryReset() {
   const text = S.update;
   const password = signingPassword();
@@ -128,7 +128,7 @@ function bundles(update, button) {
     rows.length ? h('ul', { class: 'files' }, rows) : h('p', { class: 'hint' }, text.noBundles)];
 }
 
-/// Offered only: somebody has to want it.
+/// Bundles on a USB stick are only offered: the user decides whether to install one.
 function onStick(update, button) {
   const text = S.update;
   if (!update.stick.length || !may('update')) return null;

@@ -69,7 +69,7 @@ export const en = {
   login: {
     title: 'Log in', name: 'Name', password: 'Password', submit: 'Log in',
     faultTitle: 'Out of order',
-    faultText: 'Nobody can log in or scan until this is put right:',
+    faultText: 'No one can log in or scan until this is fixed:',
     setupTitle: 'First start',
     setupText: 'This appliance has no account yet. Type the setup code that was printed on its '
       + 'console and in its journal, and create the first account: an engineer.',
@@ -98,8 +98,8 @@ export const en = {
       + 'made earlier still contain the scan.',
     type: (id) => `Type ${id} to confirm`, differs: (id) => `Type the number ${id} to confirm.`,
     gone: (id) => `Scan ${id} is deleted.`,
-    isReference: (version) => `Reference version ${version} is made of this scan. It is deleted `
-      + 'only with the data of its patient.',
+    isReference: (version) => `This scan is the source of reference version ${version}. It can be `
+      + 'deleted only together with the patient’s data.',
   },
   session: {
     label: 'Treatment session',
@@ -128,7 +128,7 @@ export const en = {
     lastScans: 'Recent scans', noScans: 'No scans yet.', goScan: 'Go to scan', preview: 'Camera',
     previewAlt: 'Camera image', noPreview: 'There is no camera image at the moment.',
     waiting: 'Draft references', nothingWaits: 'none',
-    waitingHint: 'A physicist plans each draft, another physicist approves it.',
+    waitingHint: 'A physicist plans each draft, and another physicist approves it.',
     waitingPlan: 'Waiting for a plan:', waitingApproval: 'Waiting for approval:',
     waitingVersion: (version) => `version ${version}`,
   },
@@ -136,10 +136,10 @@ export const en = {
     title: 'Patients', code: 'Code', site: 'Site', added: 'Added', scans: 'Scans',
     about: 'Site, note, archive', note: 'Note',
     noteHint: 'At most 500 characters; no name, no date of birth.', archive: 'Archive',
-    unarchive: 'Take out of the archive', archived: 'archived',
+    unarchive: 'Restore from archive', archived: 'archived',
     archiveHint: 'Takes the patient out of the list. Nothing is deleted.',
     isArchived: 'This patient is archived and cannot be opened for a session.',
-    showArchived: 'Show archived patients too', checkOverdue: 'check overdue',
+    showArchived: 'Include archived patients', checkOverdue: 'check overdue',
     checkFailed: 'check failed',
     reference: 'Reference', approved: 'approved', noReference: 'none',
     waits: 'waiting for approval', waitsForPlan: 'waiting for a plan',
@@ -268,7 +268,7 @@ export const en = {
     noReference: 'No comparison: this scan has no reference.',
     failed: 'This scan failed', cancelled: 'This scan was cancelled.',
     draftSaved: (version) => `Saved as draft version ${version}.`,
-    draftNext: 'A physicist plans it, a second physicist approves it.',
+    draftNext: 'A physicist plans it, and a second physicist approves it.',
     draftLink: 'Open the draft',
     numbers: 'Correction to apply', numbersThen: 'Correction found then',
     remaining: 'Remaining difference: no move needed',
@@ -277,9 +277,9 @@ export const en = {
     within: 'in tolerance', unsure: 'not surely within', outside: 'outside tolerance',
     tolerance: (value, unit) => `tolerance ±${withUnit(value, unit)}`,
     couch: 'Couch readings: what to set',
-    couchHint: 'Type what the couch reads now. Shifts only, on scales as in IEC 61217: up, toward '
-      + 'the gantry, and to the right of a person who faces it count up. If your couch counts '
-      + 'differently, do not use this.',
+    couchHint: 'Type what the couch reads now. Shifts only, on scales as in IEC 61217: readings '
+      + 'increase upward, toward the gantry, and to the right of a person who faces it. If your '
+      + 'couch counts differently, do not use this.',
     couchSet: (axis, cm) => `${axis}: set to ${cm} cm`,
     couchBad: 'a number in cm, with at most two digits after the point',
     refused: 'not known with couch markers', still: 'no change',
@@ -537,7 +537,7 @@ export const en = {
     shown: (found, all) => `${found} of ${all} ${plural(all, 'entry', 'entries')}`,
     csv: 'Download as CSV', whole: 'Download the whole log',
     wholeHint: 'The CSV file holds what is shown here. The whole log holds each entry as it was '
-      + 'stored, with its checksum: plumb verify-log tells whether any entry was changed.',
+      + 'stored, with its checksum: plumb verify-log shows whether any entry was changed.',
     users: { button: 'the button', 'control socket': 'the control socket' },
     views: 'Also show who looked at what', yes: 'yes', no: 'no', unassigned: 'Unassigned scan',
     reason: (text) => `reason: ${text}`, role: (role) => `role: ${role}`,
