@@ -15,6 +15,7 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/robust_weights.hpp"
+#include "algo/base/statistics.hpp"
 #include "algo/comparison/motion_start.hpp"
 #include "algo/comparison/surface.hpp"
 
@@ -131,9 +132,7 @@ std::optional<double> ResidualScale(const std::vector<Pair>& pairs, double max_s
     if (pair.valid) magnitudes.push_back(std::abs(pair.residual_m));
   }
   if (magnitudes.size() < static_cast<std::size_t>(kMinPairs)) return std::nullopt;
-  const auto middle = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 2);
-  std::nth_element(magnitudes.begin(), middle, magnitudes.end());
-  return std::clamp(kMadToSigma * *middle, kMinScale_m, max_scale_m);
+  return std::clamp(kMadToSigma * TakeMedian(magnitudes), kMinScale_m, max_scale_m);
 }
 
 double WeightOf(double residual_m, double scale_m) {

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 
+#include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
 
 namespace plumb {
@@ -351,12 +352,10 @@ BodyParts DescribeBody(const BodyView& view) {
     if (cells * grid.step * grid.step < kMinPart_m2 ||
         static_cast<double>(part.after.size()) < kMinMeasured * cells)
       continue;
-    const auto middle = part.after.begin() + static_cast<std::ptrdiff_t>(part.after.size() / 2);
-    std::nth_element(part.after.begin(), middle, part.after.end());
     BodyPart made{.name = naming.NameOf(rank),
                   .centre_m = part.sum / cells,
                   .now_m = std::nullopt,
-                  .after_m = *middle,
+                  .after_m = TakeMedian(part.after),
                   .largest_shift_m = LargestShift(part.shifts_m)};
     if (view.marker_kind == MarkerKind::kRoom)
       made.now_m = (view.T_motion * made.centre_m - made.centre_m).z() + made.after_m;

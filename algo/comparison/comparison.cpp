@@ -1,6 +1,5 @@
 #include "algo/comparison/comparison.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <mutex>
@@ -11,6 +10,7 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/statistics.hpp"
 #include "algo/comparison/body_motion.hpp"
 #include "algo/comparison/deformation.hpp"
 #include "algo/comparison/deviation.hpp"
@@ -347,14 +347,8 @@ class Comparer {
       if (std::isfinite(distance.z[i])) magnitudes.push_back(std::abs(distance.z[i]));
     }
     if (magnitudes.empty()) return;
-    const auto quantile = [&](double q) {
-      const auto nth = magnitudes.begin() +
-                       static_cast<std::ptrdiff_t>(q * static_cast<double>(magnitudes.size() - 1));
-      std::nth_element(magnitudes.begin(), nth, magnitudes.end());
-      return static_cast<double>(*nth);
-    };
-    result_.motion->residual_median_m = quantile(0.5);
-    result_.motion->residual_p95_m = quantile(0.95);
+    result_.motion->residual_median_m = TakeQuantile(magnitudes, 0.5);
+    result_.motion->residual_p95_m = TakeQuantile(magnitudes, 0.95);
     evidence_.residual_p95_m = result_.motion->residual_p95_m;
   }
 

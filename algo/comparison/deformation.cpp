@@ -14,6 +14,7 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/robust_weights.hpp"
+#include "algo/base/statistics.hpp"
 #include "algo/comparison/surface.hpp"
 
 namespace plumb {
@@ -231,17 +232,11 @@ class Registration {
       lengths.push_back(shift.norm());
       residuals.push_back(std::abs(matches_[i].residual_m));
     }
-    const auto quantile = [](std::vector<double>& values, double q) {
-      if (values.empty()) return 0.0;
-      const auto nth =
-          values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-      std::nth_element(values.begin(), nth, values.end());
-      return *nth;
-    };
-    result.shift_median_m = quantile(lengths, 0.5);
-    result.shift_p95_m = quantile(lengths, 0.95);
-    result.residual_median_m = quantile(residuals, 0.5);
-    result.residual_p95_m = quantile(residuals, 0.95);
+    if (lengths.empty()) return result;
+    result.shift_median_m = TakeQuantile(lengths, 0.5);
+    result.shift_p95_m = TakeQuantile(lengths, 0.95);
+    result.residual_median_m = TakeQuantile(residuals, 0.5);
+    result.residual_p95_m = TakeQuantile(residuals, 0.95);
     return result;
   }
 

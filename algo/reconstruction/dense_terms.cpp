@@ -9,6 +9,7 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/robust_weights.hpp"
+#include "algo/base/statistics.hpp"
 #include "algo/sensor_model/depth_correction.hpp"
 
 namespace plumb::dense {
@@ -475,10 +476,7 @@ double Consistency(const Sensor& sensor, const std::vector<View>& views,
   });
   std::vector<float> all;
   for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
-  if (all.empty()) return 0.0;
-  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2),
-                   all.end());
-  return all[all.size() / 2];
+  return all.empty() ? 0.0 : TakeMedian(all);
 }
 
 }  // namespace plumb::dense

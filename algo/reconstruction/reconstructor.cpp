@@ -11,6 +11,7 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/statistics.hpp"
 #include "algo/markers/sweep_tone.hpp"
 #include "algo/reconstruction/corrected_views.hpp"
 #include "algo/reconstruction/height_maps.hpp"
@@ -45,12 +46,6 @@ TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOption
   tracking.keyframe_angle_rad *= options.keyframe_spacing;
   tracking.min_tracked_share = 1.0 - options.keyframe_spacing * (1.0 - tracking.min_tracked_share);
   return tracking;
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // States why the scene contains no points. The depth is the median over the frames' medians.
@@ -136,8 +131,7 @@ struct Reconstructor::Impl {
     }
     report.valid_depth = total > 0 ? static_cast<double>(z.size()) / total : 0.0;
     if (z.empty()) return;
-    std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2), z.end());
-    report.median_depth_m = z[z.size() / 2];
+    report.median_depth_m = TakeMedian(z);
     median_depths_m.push_back(report.median_depth_m);
   }
 
@@ -185,7 +179,7 @@ struct Reconstructor::Impl {
                                    {.decimation = kDecimation});
     scene.timings_s["mesh"] = Now() - stage;
     if (!tracking_times_s.empty())
-      scene.timings_s["tracking_per_frame_median"] = Median(tracking_times_s);
+      scene.timings_s["tracking_per_frame_median"] = TakeMedian(tracking_times_s);
     scene.timings_s["after_last_frame"] = Now() - start;
     report(1.0, "done");
     return scene;
@@ -305,7 +299,7 @@ struct Reconstructor::Impl {
     cloud_options.with_colors = options.keep_color;
     cloud_options.stop = stop;
     scene.cloud = MergeSurface(surfaces, cloud_options);
-    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, Median(median_depths_m)));
+    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, TakeMedian(median_depths_m)));
     scene.timings_s["clouds"] = Now() - stage;
 
     report(0.8, "height map");
@@ -372,7 +366,7 @@ struct Reconstructor::Impl {
     const std::vector<ViewSurface> surfaces =
         PrepareViews(views, {.depth_noise = info.depth_noise, .stop = stop});
     scene.cloud = MergeSurface(surfaces, {.with_colors = options.keep_color, .stop = stop});
-    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, Median(median_depths_m)));
+    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, TakeMedian(median_depths_m)));
     if (paper.height_map) KeepHeightMap(*paper.height_map, scene);
   }
 

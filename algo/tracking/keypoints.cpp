@@ -10,6 +10,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "algo/base/statistics.hpp"
+
 namespace plumb {
 namespace {
 
@@ -121,10 +123,7 @@ double BrightnessRatio(const cv::Mat& from, const cv::Mat& to,
     const int after = sum(to, guesses[i]);
     if (before > 0 && after > 0) ratios.push_back(static_cast<double>(after) / before);
   }
-  if (ratios.size() < kFewest) return 1.0;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  return ratios.size() < kFewest ? 1.0 : TakeMedian(ratios);
 }
 
 KltResult TrackKlt(const Pyramid& from, const Pyramid& to,

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "algo/base/statistics.hpp"
 #include "algo/tracking/image_budget.hpp"
 #include "algo/tracking/local_bundle.hpp"
 #include "algo/tracking/loop_closer.hpp"
@@ -28,9 +29,7 @@ double MedianDepth(const DenseView& view) {
   std::vector<float> z;
   for (const float value : view.z_m)
     if (value > 0) z.push_back(value);
-  if (z.empty()) return 1.0;
-  std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2), z.end());
-  return z[z.size() / 2];
+  return z.empty() ? 1.0 : TakeMedian(z);
 }
 
 cv::Mat MiddlesOfBlocks(const cv::Mat& rgb, int block) {
