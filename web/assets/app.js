@@ -215,8 +215,8 @@ async function begin(message) {
   await showFocused();
 }
 
-/// A result that arrives while the sweep is shown is opened at once. A failed scan is announced, and
-/// no older result is shown in its place.
+/// A result that arrives while the sweep is shown is opened at once. A failed scan is announced,
+/// and no older result is shown in its place.
 async function followScan() {
   const { state, sensor } = await get('status', true);
   if (state === 'result') {

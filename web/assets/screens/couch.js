@@ -1,4 +1,4 @@
-// Computes the couch readings to set from the present ones, so that nobody has to add in their head.
+// Computes the couch readings to set from the present ones: nobody has to add in their head.
 import { live } from '../api.js';
 import { clear, field, h } from '../dom.js';
 import { isStill, kAxes } from '../numbers.js';
