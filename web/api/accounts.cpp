@@ -9,6 +9,7 @@
 #include "web/api/json.hpp"
 #include "web/api/look_back.hpp"
 #include "web/http/checks.hpp"
+#include "web/http/connection_table.hpp"
 #include "web/http/gate.hpp"
 #include "web/security/password_rules.hpp"
 
@@ -16,6 +17,7 @@ namespace plumb::web {
 namespace {
 
 constexpr std::size_t kMaxName = 32;
+constexpr std::size_t kMaxSetupGuesses = 1000;  // a minute, from all addresses
 /// Prefix of the hash of a password chosen by somebody else: the person has to change it at the
 /// next login.
 constexpr std::string_view kFirst = "first ";
@@ -282,13 +284,18 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   if (!needs_setup() || setting_up_)
     return respond(ErrorResponse(409, "this appliance is set up already; log in"));
   const auto now = options_.now();
-  // One counter for everybody: the code is short, so guesses must be slow wherever they come from.
-  const std::string key = "setup";
-  if (const auto wait = limiter_.Wait(key, now); wait.count() > 0)
+  // Counted by address, so that nobody can keep the owner out with wrong codes, and over all
+  // addresses except this machine's own: 2^40 codes are safe from a thousand guesses a minute.
+  const std::string key = "setup " + NetworkOf(request.address), all = "setup";
+  const bool is_local = IsLocalAddress(request.address);
+  auto wait = limiter_.Wait(key, now);
+  if (!is_local) wait = std::max(wait, limiter_.Wait(all, now, kMaxSetupGuesses));
+  if (wait.count() > 0)
     return respond(
         TooMany(fmt::format("too many wrong setup codes; wait {} seconds", wait.count()), wait));
   if (!SameText(code, setup_code_)) {
     limiter_.Failed(key, now);
+    if (!is_local) limiter_.Failed(all, now, kMaxSetupGuesses);
     audit_.Log(request.actor(), "setup.failed", "", "wrong code");
     return respond(ErrorResponse(
         403, "the setup code is wrong; it is printed on the console and in the journal"));

@@ -10,6 +10,9 @@ namespace {
 
 using Group = std::vector<Connection*>;
 
+constexpr std::chrono::seconds kTimeToAsk{1};  // for a browser to send its request, over TLS
+constexpr std::size_t kOfOneBrowser = 8;       // browsers open six connections at once
+
 /// The connections that satisfy a condition, grouped by a name.
 std::map<std::string, Group> Grouped(std::list<Connection>& connections,
                                      const std::function<bool(const Connection&)>& belongs,
@@ -22,20 +25,6 @@ std::map<std::string, Group> Grouped(std::list<Connection>& connections,
   return groups;
 }
 
-/// The connection of the largest group whose end does the least harm.
-Connection* FromTheLargest(const std::map<std::string, Group>& groups) {
-  const auto largest = std::max_element(
-      groups.begin(), groups.end(),
-      [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
-  const auto harm = [](const Connection* connection) {
-    const bool is_waiting = connection->receiving && !connection->has_head;
-    return std::tuple(!is_waiting, connection->since);
-  };
-  return *std::min_element(
-      largest->second.begin(), largest->second.end(),
-      [&](const Connection* a, const Connection* b) { return harm(a) < harm(b); });
-}
-
 std::size_t CountOf(const std::map<std::string, Group>& groups) {
   std::size_t count = 0;
   for (const auto& [name, group] : groups) count += group.size();
@@ -46,6 +35,24 @@ std::size_t LargestOf(const std::map<std::string, Group>& groups) {
   std::size_t largest = 0;
   for (const auto& [name, group] : groups) largest = std::max(largest, group.size());
   return largest;
+}
+
+/// The connection of the largest groups whose end does the least harm. With one connection from
+/// each of many addresses all groups are equally large, and every connection is compared. One that
+/// has just been made counts as busy: its request is on the way.
+Connection* FromTheLargest(const std::map<std::string, Group>& groups, Connection::TimePoint now) {
+  const auto harm = [&](const Connection* connection) {
+    const bool is_idle = connection->receiving && now - connection->since >= kTimeToAsk;
+    return std::tuple(!is_idle, connection->since);
+  };
+  const std::size_t size = LargestOf(groups);
+  Connection* least = nullptr;
+  for (const auto& [name, group] : groups) {
+    if (group.size() < size) continue;
+    for (Connection* connection : group)
+      if (least == nullptr || harm(connection) < harm(least)) least = connection;
+  }
+  return least;
 }
 
 Connection* Leave(Connection* connection) {
@@ -75,22 +82,31 @@ void ConnectionTable::Remove(const Connection* connection) {
   connections_.remove_if([&](const Connection& held) { return &held == connection; });
 }
 
-Connection* ConnectionTable::NextOverLimit() {
+Connection* ConnectionTable::NextOverLimit(Connection::TimePoint now) {
   const auto is_stranger = [](const Connection& c) { return c.user.empty(); };
   const auto anonymous = Grouped(connections_, is_stranger, &Connection::address);
   if (LargestOf(anonymous) > options_.max_strangers_per_address)
-    return Leave(FromTheLargest(anonymous));
+    return Leave(FromTheLargest(anonymous, now));
   const auto from_outside = Grouped(
       connections_,
       [&](const Connection& c) { return is_stranger(c) && !IsLocalAddress(c.address); },
       &Connection::address);
-  if (CountOf(from_outside) > options_.max_strangers) return Leave(FromTheLargest(from_outside));
+  if (CountOf(from_outside) > options_.max_strangers) {
+    // A new connection of a logged-in browser has no user until its request is here.
+    auto others = from_outside;
+    for (const Connection& connection : connections_) {
+      const auto same = others.find(connection.address);
+      if (!is_stranger(connection) && same != others.end() && same->second.size() <= kOfOneBrowser)
+        others.erase(same);
+    }
+    return Leave(FromTheLargest(others.empty() ? from_outside : others, now));
+  }
   // Space is reserved for strangers and for this machine, so that others can still log in.
   const unsigned others = options_.max_strangers + options_.max_strangers_per_address;
   const auto logged_in = Grouped(
       connections_, [&](const Connection& c) { return !is_stranger(c); }, &Connection::user);
   if (options_.max_connections > others && CountOf(logged_in) > options_.max_connections - others)
-    return Leave(FromTheLargest(logged_in));
+    return Leave(FromTheLargest(logged_in, now));
   return nullptr;
 }
 

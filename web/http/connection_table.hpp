@@ -38,9 +38,11 @@ class ConnectionTable {
   [[nodiscard]] bool empty() const { return connections_.empty(); }
 
   /// A connection to close so that the limits hold, or null. It is marked as leaving: repeat until
-  /// there is none. Connections of the address or person with the most are closed first; among
-  /// these one that waits for a request before one that is being answered, and the oldest first.
-  [[nodiscard]] Connection* NextOverLimit();
+  /// there is none. Connections of the addresses or persons with the most are closed first; among
+  /// these one that waits for a request before one that is new or being answered, and the oldest
+  /// first. A stranger's few connections from the address of a logged-in browser stay while there
+  /// are others.
+  [[nodiscard]] Connection* NextOverLimit(Connection::TimePoint now);
   /// Likewise a connection whose request has not arrived in time.
   [[nodiscard]] Connection* NextLate(Connection::TimePoint now);
 

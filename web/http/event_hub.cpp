@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+#include <vector>
+
 namespace plumb::web {
 
 std::string_view EventStream::Peek(std::size_t max) const {
@@ -39,18 +43,30 @@ void EventStream::Close() {
 }
 
 std::shared_ptr<EventStream> EventHub::Open(std::shared_ptr<Session> session) {
-  std::list<std::shared_ptr<EventStream>> own, of_account;
+  std::vector<std::shared_ptr<EventStream>> own, open;  // the oldest first
+  std::map<std::string, std::size_t> counts;
   for (const auto& stream : streams_) {
     if (stream->closed()) continue;
+    open.push_back(stream);
     if (&stream->session() == session.get()) own.push_back(stream);
-    if (stream->session().user == session->user) of_account.push_back(stream);
+    ++counts[stream->session().user];
   }
+  const auto end_oldest_of = [&](const auto& belongs) {
+    const auto oldest = std::find_if(open.begin(), open.end(), belongs);
+    if (oldest != open.end()) (*oldest)->Close();
+  };
+  const std::size_t of_account = counts[session->user];
   if (own.size() >= limits_.of_session) {
     own.front()->Close();
-  } else if (of_account.size() >= limits_.of_account) {
-    of_account.front()->Close();
+  } else if (of_account >= limits_.of_account) {
+    end_oldest_of([&](const auto& stream) { return stream->session().user == session->user; });
+  } else if (open.size() >= limits_.all) {
+    const auto most =
+        std::max_element(counts.begin(), counts.end(),
+                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    end_oldest_of(
+        [&](const auto& stream) { return counts[stream->session().user] == most->second; });
   }
-  if (streams_.size() >= limits_.all) return nullptr;
   streams_.push_back(std::make_shared<EventStream>(std::move(session), limits_.buffer_bytes));
   return streams_.back();
 }

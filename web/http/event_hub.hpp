@@ -56,7 +56,8 @@ class EventHub {
 
   explicit EventHub(Limits limits) : limits_(limits) {}
 
-  /// Null if there are too many. If one session or one account has too many, its oldest ends.
+  /// If one session or one account has too many, its oldest ends; if all together are too many, the
+  /// oldest of the accounts with the most.
   [[nodiscard]] std::shared_ptr<EventStream> Open(std::shared_ptr<Session> session);
   void Remove(const std::shared_ptr<EventStream>& stream) { streams_.remove(stream); }
   /// To every stream. @param data  One line.

@@ -55,7 +55,8 @@ struct HttpServerOptions {
   std::size_t event_buffer_bytes =
       64 << 10;  ///< Per viewer of the event stream; one that falls behind is dropped.
   unsigned max_event_streams = 32;
-  /// Above these numbers the oldest stream of the account or of the session ends.
+  /// Above these numbers the oldest stream of the account or of the session ends; above the number
+  /// of all streams, the oldest of the account with the most.
   unsigned max_streams_per_account = 16, max_streams_per_session = 6;
   std::uint64_t password_memory_bytes = 64 << 20;  ///< For argon2id; one hash runs at a time.
   std::uint64_t password_operations = 3;

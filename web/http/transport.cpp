@@ -74,9 +74,10 @@ struct Transport::Callbacks {
     auto* transport = static_cast<Transport*>(self);
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
       const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-      *context = transport->connections_.Add(info->connect_fd, NetworkOf(AddressOf(connection)),
-                                             transport->options_.now());
-      while (const Connection* leaving = transport->connections_.NextOverLimit())
+      const auto now = transport->options_.now();
+      *context =
+          transport->connections_.Add(info->connect_fd, NetworkOf(AddressOf(connection)), now);
+      while (const Connection* leaving = transport->connections_.NextOverLimit(now))
         shutdown(leaving->fd, SHUT_RDWR);
     } else {
       transport->connections_.Remove(static_cast<Connection*>(*context));
@@ -280,10 +281,6 @@ struct Transport::Callbacks {
 
   static MHD_Response* MakeStream(Exchange& exchange) {
     exchange.stream = exchange.owner->hub_.Open(exchange.request.session);
-    if (!exchange.stream) {
-      exchange.response = ErrorResponse(503, "too many pages are open");
-      return nullptr;
-    }
     exchange.stream->wake = [&exchange] { exchange.Resume(); };
     exchange.stream->cut = [&exchange] {
       CutSocket(exchange.connection);

@@ -6,17 +6,16 @@
 namespace plumb::web {
 namespace {
 
-constexpr std::size_t kMaxFailures = 5;
 constexpr std::chrono::seconds kWindow{60};
 constexpr std::size_t kMaxKeys = 16384;
 
 }  // namespace
 
-std::chrono::seconds LoginLimiter::Wait(const std::string& key, TimePoint now) const {
+std::chrono::seconds LoginLimiter::Wait(const std::string& key, TimePoint now,
+                                        std::size_t most) const {
   const auto found = failures_.find(key);
-  if (found == failures_.end() || found->second.size() < kMaxFailures)
-    return std::chrono::seconds(0);
-  const auto open_at = found->second[found->second.size() - kMaxFailures] + kWindow;
+  if (found == failures_.end() || found->second.size() < most) return std::chrono::seconds(0);
+  const auto open_at = found->second[found->second.size() - most] + kWindow;
   return now >= open_at ? std::chrono::seconds(0)
                         : std::chrono::ceil<std::chrono::seconds>(open_at - now);
 }
@@ -32,11 +31,11 @@ void LoginLimiter::MakeRoom(TimePoint now) {
       }));
 }
 
-void LoginLimiter::Failed(const std::string& key, TimePoint now) {
+void LoginLimiter::Failed(const std::string& key, TimePoint now, std::size_t most) {
   if (!failures_.contains(key)) MakeRoom(now);
   std::deque<TimePoint>& times = failures_[key];
   times.push_back(now);
-  if (times.size() > kMaxFailures) times.pop_front();
+  if (times.size() > most) times.pop_front();
 }
 
 }  // namespace plumb::web

@@ -8,16 +8,19 @@
 
 namespace plumb::web {
 
-/// At most five failures a minute for one key (an address, or an account's name). The memory is
-/// bounded, and no flood of other keys makes it forget one that is slowed down: what it forgets
+/// At most a number of failures a minute for one key (an address, or an account's name). The memory
+/// is bounded, and no flood of other keys makes it forget one that is slowed down: what it forgets
 /// first is over, then what failed least.
 class LoginLimiter {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// Seconds to wait; 0: proceed.
-  [[nodiscard]] std::chrono::seconds Wait(const std::string& key, TimePoint now) const;
-  void Failed(const std::string& key, TimePoint now);
+  static constexpr std::size_t kMaxFailures = 5;
+
+  /// Seconds to wait; 0: proceed. @param most  Failures a minute; the same for all calls of a key.
+  [[nodiscard]] std::chrono::seconds Wait(const std::string& key, TimePoint now,
+                                          std::size_t most = kMaxFailures) const;
+  void Failed(const std::string& key, TimePoint now, std::size_t most = kMaxFailures);
   void Succeeded(const std::string& key) { failures_.erase(key); }
 
  private:

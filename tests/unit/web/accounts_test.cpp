@@ -1,5 +1,6 @@
 #include <unistd.h>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "tests/unit/web/web_fixture.hpp"
@@ -73,26 +74,44 @@ TEST_F(AccountsTest, WhereNoAccountCanBeSeenTheReasonIsShownAndNobodyMakesTheFir
   EXPECT_EQ(client.Get("/api/v1/session").json().value("setup_required", true), false);
 }
 
+/// The answer to a set-up from an address of this machine; "" is its usual one, 127.0.0.1.
+HttpAnswer SetUpFrom(std::uint16_t port, const std::string& address, const std::string& code) {
+  const std::string body =
+      nlohmann::json{{"code", code}, {"name", "eve"}, {"password", kPassword}}.dump();
+  HttpConnection connection(port, address);
+  connection.Send(
+      "POST /api/v1/setup HTTP/1.1\r\nHost: localhost\r\nContent-Type: " +
+      fmt::format("application/json\r\nContent-Length: {}\r\n\r\n{}", body.size(), body));
+  return connection.Read();
+}
+
 TEST_F(AccountsTest, SetupCodeCannotBeGuessedQuickly) {
   Start();
-  HttpClient client(port_);
-  for (int i = 0; i < 5; ++i) {
-    EXPECT_EQ(client
-                  .Post("/api/v1/setup",
-                        {{"code", "AAAA-AAAA"}, {"name", "eve"}, {"password", kPassword}})
-                  .status,
-              403);
-  }
-  const HttpAnswer right = client.Post(
-      "/api/v1/setup", {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}});
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(SetUpFrom(port_, "127.0.0.2", "AAAA-AAAA").status, 403) << i;
+  const HttpAnswer right = SetUpFrom(port_, "127.0.0.2", setup_code_);
   EXPECT_EQ(right.status, 429);
   EXPECT_FALSE(right.Header("retry-after").empty());
   skipped_s_ = 61;
-  EXPECT_EQ(
-      client
-          .Post("/api/v1/setup", {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}})
-          .status,
-      200);
+  EXPECT_EQ(SetUpFrom(port_, "127.0.0.2", setup_code_).status, 200);
+}
+
+TEST_F(AccountsTest, WrongSetupCodesFromOneAddressDoNotKeepTheOwnerOut) {
+  Start();
+  for (int i = 0; i < 8; ++i) (void)SetUpFrom(port_, "127.0.0.2", "AAAA-AAAA");
+  EXPECT_EQ(SetUpFrom(port_, "127.0.0.3", setup_code_).status, 200);
+}
+
+TEST_F(AccountsTest, WrongSetupCodesFromAllAddressesAreAThousandAMinuteButNeverLockThisMachineOut) {
+  Start();
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_EQ(SetUpFrom(port_, fmt::format("127.0.{}.1", 1 + i / 5), "AAAA-AAAA").status, 403) << i;
+  }
+  EXPECT_EQ(SetUpFrom(port_, "127.0.250.1", setup_code_).status, 429);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(SetUpFrom(port_, "", "AAAA-AAAA").status, 403) << i;
+  EXPECT_EQ(SetUpFrom(port_, "", setup_code_).status, 429) << "its own guesses are counted";
+  skipped_s_ = 61;
+  EXPECT_EQ(SetUpFrom(port_, "", setup_code_).status, 200);
 }
 
 TEST_F(AccountsTest, WeakOrStrangeAccountsAreRefused) {

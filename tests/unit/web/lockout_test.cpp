@@ -1,13 +1,17 @@
 // Who may guess how often, and who is not kept out by others who guess; which passwords are taken.
+#include <unistd.h>
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/security/device_cookies.hpp"
 #include "web/security/login_limiter.hpp"
 #include "web/security/password_rules.hpp"
+#include "web/security/password_worker.hpp"
 
 namespace plumb::test {
 namespace {
@@ -64,6 +68,57 @@ TEST_F(LockoutTest, ABrowserThatLoggedInBeforeIsNotLockedOutByOthers) {
   EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword, &browser), 200);
   EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword, &browser), 200)
       << "even beside the one who guesses";
+}
+
+/// Passwords that take a few tenths of a second to check, as on the appliance.
+class SlowPasswordTest : public LockoutTest {
+ protected:
+  void SetUp() override {
+    Start([](web::HttpServerOptions& options) {
+      options.password_operations = 6;
+      options.password_memory_bytes = 32 << 20;
+    });
+    SetUpAccounts();
+  }
+};
+
+TEST_F(SlowPasswordTest, ABrowserThatLoggedInBeforeIsServedWhileGuessesFromManyAddressesWait) {
+  const HttpClient browser = LoggedIn("technician");
+  std::vector<HttpConnection> guesses;
+  for (int i = 0; i < 16; ++i) {
+    const std::string body =
+        nlohmann::json{{"name", fmt::format("name{}", i)}, {"password", kWrong}}.dump();
+    guesses.emplace_back(port_, fmt::format("127.0.2.{}", 1 + i));
+    guesses.back().Send(
+        fmt::format("POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+                    "application/json\r\nContent-Length: {}\r\n\r\n{}",
+                    body.size(), body));
+  }
+  // Eight wait and one is being checked.
+  EXPECT_EQ(LogInFrom("127.0.3.1", "physicist", kPassword), 503) << "a browser that is not known";
+  EXPECT_EQ(LogInFrom("127.0.3.2", "technician", kPassword, &browser), 200);
+  int refused = 0;
+  for (HttpConnection& guess : guesses) refused += guess.Read().status == 503 ? 1 : 0;
+  EXPECT_GE(refused, 16 - 10);
+}
+
+TEST(PasswordWorkerTest, AKnownPersonsPasswordIsCheckedBeforeThoseOfStrangers) {
+  web::PasswordWorker worker(4, 16 << 20);
+  std::vector<std::string> order;
+  const auto verify = [&](const std::string& who, bool trusted) {
+    return worker.Verify("guess", "", trusted, [&order, who](bool) { order.push_back(who); });
+  };
+  for (int i = 0; i < 8; ++i) EXPECT_TRUE(verify("stranger", false)) << i;
+  (void)verify("stranger", false);  // in place of the one that the thread may have taken
+  EXPECT_FALSE(verify("stranger", false)) << "eight wait";
+  EXPECT_TRUE(verify("known", true));
+  for (int i = 0; i < 600 && order.size() < 9; ++i) {
+    ::usleep(50'000);
+    worker.Dispatch();
+  }
+  ASSERT_GE(order.size(), 9U);
+  const auto at = std::find(order.begin(), order.end(), "known") - order.begin();
+  EXPECT_LE(at, 1) << "after at most the one that was being checked";
 }
 
 TEST_F(LockoutTest, AKnownBrowserIsSlowedDownByItsOwnGuessesAlone) {

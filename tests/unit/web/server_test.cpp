@@ -1,4 +1,5 @@
 // What a hostile or clumsy client sends, on the wire.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <malloc.h>
 #include <sys/resource.h>
@@ -345,29 +346,95 @@ TEST(ConnectionTableTest, TheLimitsHoldOnBothSides) {
   const auto now = std::chrono::steady_clock::now();
   int fd = 0;
   const auto add = [&](const std::string& address, const std::string& user = "") {
-    web::Connection* made = table.Add(++fd, address, now + std::chrono::milliseconds(fd));
+    web::Connection* made = table.Add(++fd, address, now + std::chrono::seconds(fd));
     made->user = user;
     return made;
   };
   for (const char* address : {"10.0.0.1", "10.0.0.1", "10.0.0.1", "10.0.0.2"}) add(address);
-  EXPECT_EQ(table.NextOverLimit(), nullptr) << "four strangers, three of one address";
+  EXPECT_EQ(table.NextOverLimit(now + std::chrono::seconds(fd)), nullptr)
+      << "four strangers, three of one address";
   for (int i = 0; i < 3; ++i) add("127.0.0.1");
-  EXPECT_EQ(table.NextOverLimit(), nullptr) << "this machine is no stranger";
+  EXPECT_EQ(table.NextOverLimit(now + std::chrono::seconds(fd)), nullptr)
+      << "this machine is no stranger";
   add("10.0.0.2");
-  const web::Connection* gone = table.NextOverLimit();
+  const web::Connection* gone = table.NextOverLimit(now + std::chrono::seconds(fd));
   ASSERT_NE(gone, nullptr);
   EXPECT_EQ(gone->fd, 1) << "the oldest of the address with the most";
-  EXPECT_EQ(table.NextOverLimit(), nullptr) << "one was enough, though it is not closed yet";
+  EXPECT_EQ(table.NextOverLimit(now + std::chrono::seconds(fd)), nullptr)
+      << "one was enough, though it is not closed yet";
   add("127.0.0.1");
-  EXPECT_EQ(table.NextOverLimit()->address, "127.0.0.1") << "four of one address";
+  EXPECT_EQ(table.NextOverLimit(now + std::chrono::seconds(fd))->address, "127.0.0.1")
+      << "four of one address";
   for (int i = 0; i < 3; ++i) add("10.0.0.3", i < 2 ? "anna" : "bob")->receiving = i != 0;
-  EXPECT_EQ(table.NextOverLimit(), nullptr) << "three logged in: 10 - 4 - 3";
+  EXPECT_EQ(table.NextOverLimit(now + std::chrono::seconds(fd)), nullptr)
+      << "three logged in: 10 - 4 - 3";
   add("10.0.0.4", "bob");
   add("10.0.0.4", "anna");
-  const web::Connection* over = table.NextOverLimit();
+  const web::Connection* over = table.NextOverLimit(now + std::chrono::seconds(fd));
   ASSERT_NE(over, nullptr);
   EXPECT_EQ(over->user, "anna");
   EXPECT_TRUE(over->receiving) << "not the one that is being answered";
+}
+
+/// 128 strangers' places, all taken by one connection from each of 128 addresses, a second apart.
+class ManyAddressesTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (int i = 0; i < 128; ++i) {
+      Add(fmt::format("10.0.1.{}", i));
+      ASSERT_EQ(Closed(), nullptr) << i;
+    }
+  }
+  web::Connection* Add(const std::string& address, const std::string& user = "") {
+    now_ += std::chrono::seconds(1);
+    web::Connection* made = table_.Add(++last_, address, now_);
+    made->user = user;
+    return made;
+  }
+  const web::Connection* Closed() { return table_.NextOverLimit(now_); }
+
+  const web::HttpServerOptions options_;
+  web::ConnectionTable table_{options_};
+  web::Connection::TimePoint now_ = std::chrono::steady_clock::now();
+  int last_ = 0;
+};
+
+TEST_F(ManyAddressesTest, TheOldestGoesWhateverTheAddressOfTheNewcomer) {
+  for (int i = 0; i < 72; ++i) {
+    Add(i % 2 == 0 ? fmt::format("1.0.0.{}", i) : fmt::format("99.0.0.{}", i));
+    const web::Connection* closed = Closed();
+    ASSERT_NE(closed, nullptr) << i;
+    EXPECT_EQ(closed->fd, i + 1) << closed->address;
+    EXPECT_EQ(Closed(), nullptr);
+  }
+}
+
+TEST_F(ManyAddressesTest, OneThatHasJustComeOutlastsThoseThatReadTheirAnswersSlowly) {
+  web::ConnectionTable table(options_);
+  for (int i = 0; i < 128; ++i) table.Add(i, fmt::format("10.0.1.{}", i), now_)->receiving = false;
+  now_ += std::chrono::minutes(1);
+  const web::Connection* fresh = table.Add(200, "1.0.0.1", now_);
+  const web::Connection* closed = table.NextOverLimit(now_);
+  ASSERT_NE(closed, nullptr);
+  EXPECT_NE(closed, fresh);
+  EXPECT_EQ(closed->fd, 0);
+}
+
+TEST_F(ManyAddressesTest, NewConnectionsFromTheAddressOfALoggedInBrowserStay) {
+  Add("1.0.0.1", "anna");
+  EXPECT_EQ(Closed(), nullptr) << "who is logged in is no stranger";
+  // More than anybody else's, and nothing has arrived for long.
+  for (int i = 0; i < 8; ++i) {
+    Add("1.0.0.1");
+    const web::Connection* closed = Closed();
+    ASSERT_NE(closed, nullptr) << i;
+    EXPECT_NE(closed->address, "1.0.0.1") << i;
+  }
+  Add("1.0.0.1");
+  const web::Connection* closed = Closed();
+  ASSERT_NE(closed, nullptr);
+  EXPECT_EQ(closed->address, "1.0.0.1") << "no browser opens so many";
+  EXPECT_TRUE(closed->user.empty());
 }
 
 TEST_F(ServerTest, AnAddressInUseIsSaid) {
@@ -409,6 +476,21 @@ class TlsTest : public ServerTest {
     return {std::istreambuf_iterator<char>(in), {}};
   }
 
+  /// True if this openssl as a server and as a client speak a version with each other.
+  [[nodiscard]] bool CanSpeak(const std::string& version, const std::string& ciphers) const {
+    const std::string script =
+        "cd " + folder_.path().string() +
+        " && openssl req -x509 -newkey rsa:2048 -nodes -keyout key -out cert -subj /CN=x"
+        " && { timeout 60 openssl s_server -accept 127.0.0.1:0 -cert cert -key key -www " +
+        version + ciphers +
+        " > server & } && for i in $(seq 300); do grep -q ^ACCEPT server && break; sleep 0.1; done"
+        " ; echo | timeout 60 openssl s_client " +
+        version + ciphers +
+        " -connect 127.0.0.1:$(sed -n 's/^ACCEPT.*://p' server) > client"
+        " ; kill $! ; grep '^New, TLSv1' client";
+    return std::system(("{ " + script + "; } > /dev/null 2>&1").c_str()) == 0;
+  }
+
   const std::string kHealth =
       "GET /health HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
   plumb::testing::TempFolder folder_;
@@ -420,6 +502,7 @@ TEST_F(TlsTest, VersionsBefore12AreRefusedAnd12And13AreSpoken) {
   // Level 0: the client itself would speak the old ones.
   const std::string old = " -quiet -cipher ALL:@SECLEVEL=0";
   for (const char* version : {"-tls1", "-tls1_1"}) {
+    EXPECT_TRUE(CanSpeak(version, " -cipher ALL:@SECLEVEL=0")) << version << " with itself";
     EXPECT_THAT(Speak(version + old, kHealth), ::testing::Not(HasSubstr("HTTP/1.1"))) << version;
     EXPECT_NE(exit_code_, 0) << version;
   }

@@ -122,14 +122,19 @@ TEST_F(StreamTest, AViewerThatNeverReadsIsDroppedAndCostsNobodyAnything) {
   EXPECT_EQ(HttpClient(port_).Get("/health").status, 200);
 }
 
-TEST_F(StreamTest, StreamsAreFew) {
+TEST_F(StreamTest, StreamsAreFewAndTheOldestMakesRoomForAnother) {
   Start([](web::HttpServerOptions& options) { options.max_event_streams = 2; });
   SetUpAccounts();
   const HttpClient client = LoggedIn("technician");
   HttpConnection first = OpenStream(client), second = OpenStream(client);
   first.ReadUntil("event: status");
   second.ReadUntil("event: status");
-  EXPECT_EQ(OpenStream(client).Read().status, 503);
+  const HttpClient other = LoggedIn("physicist");
+  HttpConnection third = OpenStream(other);
+  EXPECT_FALSE(third.ReadUntil("event: status").empty());
+  EXPECT_FALSE(first.ReadUntil("0\r\n\r\n").empty()) << "the oldest has ended";
+  loop_->Do([&] { service_.Notify(web::EventKind::kData); });
+  EXPECT_FALSE(second.ReadUntil("event: data").empty());
 }
 
 TEST(EventHubTest, AFullBufferClosesTheStreamAndFreesIt) {
@@ -160,8 +165,18 @@ TEST(EventHubTest, NoAccountTakesThePlacesOfAnother) {
   const auto bert = session("bert");
   const auto first = hub.Open(bert), second = hub.Open(bert);
   ASSERT_TRUE(first && second);
-  EXPECT_EQ(hub.Open(bert), nullptr) << "all places are taken until one has gone";
+  EXPECT_NE(hub.Open(bert), nullptr);
   EXPECT_TRUE(first->closed()) << "his browser's third ends its first";
+  for (int i = 1; i < 4; ++i) EXPECT_FALSE(anna[static_cast<std::size_t>(i)]->closed());
+  // Both together have all places.
+  const auto chris = hub.Open(session("chris"));
+  ASSERT_NE(chris, nullptr);
+  EXPECT_TRUE(anna[1]->closed()) << "the oldest of the account with the most";
+  EXPECT_FALSE(second->closed());
+  const auto dora = hub.Open(session("dora"));
+  ASSERT_NE(dora, nullptr);
+  EXPECT_TRUE(anna[2]->closed()) << "hers is the oldest of two accounts with two each";
+  EXPECT_FALSE(anna[3]->closed() || second->closed() || chris->closed() || dora->closed());
 }
 
 TEST(EventHubTest, WhatIsTakenMakesRoom) {
