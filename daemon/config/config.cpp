@@ -6,6 +6,8 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <sstream>
 #include <string_view>
 #include <vector>
 
@@ -317,6 +319,24 @@ toml::table ParseToml(const std::string& text, const std::string& name) try {
                               error.description()));
 }
 
+namespace {
+
+std::map<std::string, std::string> GivenIn(const toml::table& root) {
+  std::map<std::string, std::string> given;
+  for (const auto& [section, node] : root) {
+    const toml::table* const keys = node.as_table();
+    if (keys == nullptr) continue;
+    for (const auto& [key, value] : *keys) {
+      std::ostringstream text;
+      value.visit([&](const auto& one) { text << one; });
+      given[fmt::format("{}.{}", section.str(), key.str())] = text.str();
+    }
+  }
+  return given;
+}
+
+}  // namespace
+
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
   const toml::table root = ParseToml(text, name);
   static constexpr std::array<std::string_view, 12> kSections = {
@@ -328,6 +348,7 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
                                 node.source().begin.line, key.str(), fmt::join(kSections, "], [")));
   }
   Config config;
+  config.given = GivenIn(root);
   ReadMarkers(Section(root, "markers", name), config.markers);
   ReadReconstruct(Section(root, "reconstruct", name), config.reconstruct);
   ReadCompare(Section(root, "compare", name), use, config);

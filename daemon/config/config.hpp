@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -104,6 +105,8 @@ struct Config {
   UpdateConfig update;
   std::optional<std::filesystem::path>
       region_file;  ///< Absolute, or relative to the configuration file's folder.
+  /// Values as the file gives them, by key: "web.listen" to "'127.0.0.1:80'".
+  std::map<std::string, std::string> given;
 };
 
 /// The reader of a file. The keys are the same for both, but plumbd refuses those of [compare] that

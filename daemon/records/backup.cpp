@@ -305,6 +305,12 @@ OutputKind BackupOutput() {
   return {"backup", kAbout, entries};
 }
 
+std::string Described(const fs::path& target, const BackupReport& report, bool is_encrypted) {
+  return fmt::format("{}: {} scans, {} files, {} bytes, {} problems{}", ValidUtf8(target.string()),
+                     report.scans, report.files, report.bytes, report.problems.size(),
+                     is_encrypted ? ", encrypted" : "");
+}
+
 BackupReport WriteBackup(const fs::path& state, Database& database, const fs::path& target,
                          const std::stop_token& stop, const BackupSecret* secret) {
   RequireOutside(state, target);
@@ -320,7 +326,12 @@ BackupReport BackUpStopped(const fs::path& state, const fs::path& target,
   }
   Database database(state / kDatabase, Database::Access::kReadWrite);
   Migrate(database);
-  return WriteBackup(state, database, target, stop, secret);
+  BackupReport report = WriteBackup(state, database, target, stop, secret);
+  Transaction transaction(database);
+  AppendAuditEntry(database, store::kCommand, "backup.make", "",
+                   Described(target, report, secret != nullptr));
+  transaction.Commit();
+  return report;
 }
 
 BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,

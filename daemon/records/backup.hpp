@@ -31,6 +31,10 @@ struct BackupReport {
   std::filesystem::path replaced = {};
 };
 
+/// A backup in the words of the audit log.
+[[nodiscard]] std::string Described(const std::filesystem::path& target, const BackupReport& report,
+                                    bool is_encrypted);
+
 /// Backs up an open store, whose files must not be removed meanwhile. The database is copied as of
 /// one moment, with the scans that it then contains. Files are copied (sharing blocks until one
 /// side is written to, if the file system can); each is read once. An older backup at `target` is
@@ -41,7 +45,7 @@ struct BackupReport {
                                        const std::stop_token& stop = {},
                                        const BackupSecret* secret = nullptr);
 
-/// Backs up a state folder that no plumbd uses.
+/// Backs up a state folder that no plumbd uses, and notes that in its audit log.
 /// @throws as above; IoError if the folder has no store, or a process uses it.
 [[nodiscard]] BackupReport BackUpStopped(const std::filesystem::path& state,
                                          const std::filesystem::path& target,

@@ -1,5 +1,7 @@
 #include "daemon/records/check_store.hpp"
 
+#include <fmt/format.h>
+
 #include "algo/base/errors.hpp"
 #include "daemon/records/store_refusal.hpp"
 #include "daemon/records/stored_values.hpp"
@@ -134,6 +136,7 @@ std::optional<MarkerBaseline> CheckStore::BaselineMarkers() {
 void CheckStore::SetBaseline(const web::Actor& actor, const std::string& check_id) {
   const std::optional<std::int64_t> number = ParseId(check_id);
   StoreChange change(database_);
+  std::string described;
   {
     Statement query = change.Prepare("SELECT json, user FROM checks WHERE id = ?");
     if (!number || !query.Bind(*number).Step())
@@ -148,13 +151,22 @@ void CheckStore::SetBaseline(const web::Actor& actor, const std::string& check_i
       throw StoreRefusal(ChangeResult::kRefused,
                          "another person than the one who took this check sets it as the baseline");
     }
+    described = fmt::format("{} markers", baseline->markers.size());
+  }
+  {
+    Statement query = change.Prepare(
+        "SELECT check_id, json FROM check_baselines JOIN checks ON checks.id = check_id ORDER BY "
+        "check_baselines.id DESC LIMIT 1");
+    if (query.Step())
+      described += fmt::format("; before: check {} with {} markers", query.Text(0),
+                               CheckIn(query.Text(1)).num_markers);
   }
   change.Prepare("INSERT INTO check_baselines (check_id, set_at, set_by) VALUES (?, ?, ?)")
       .Bind(*number)
       .Bind(Now())
       .Bind(actor.user)
       .Run();
-  change.Log(actor, "check.baseline", check_id, "");
+  change.Log(actor, "check.baseline", check_id, described);
   change.Commit();
 }
 

@@ -87,6 +87,7 @@ std::optional<CheckedScan> FileIntegrity::CheckNext(std::chrono::hours at_least,
 UnusableRecords FileIntegrity::CountUnusable() {
   const StoreDatabase::Held lists = database_.ForLists();
   UnusableRecords found;
+  found.set_aside = static_cast<int>(folders_.SetAsideAs("").size());
   {
     Statement query = lists->Prepare(
         "SELECT count(*) FROM scans JOIN patients ON patients.id = patient_id WHERE unavailable <> "

@@ -21,6 +21,7 @@ struct CheckedScan {
 struct UnusableRecords {
   int scans = 0;
   int references = 0;  ///< Patients whose newest approved reference is one of them.
+  int set_aside = 0;   ///< Folders of scans that the database does not know; of any patient.
   bool operator==(const UnusableRecords&) const = default;
 };
 

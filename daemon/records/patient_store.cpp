@@ -98,10 +98,12 @@ void PatientStore::Change(const web::Actor& actor, const std::string& id, const 
                           const std::string& note, const std::optional<web::CourseNotes>& shown) {
   const std::int64_t number = RequireId(id, "patient");
   StoreChange change(database_);
+  web::CourseNotes before;
   {
     Statement query = change.Prepare("SELECT site, note FROM patients WHERE id = ? AND id > 0");
-    if (shown && query.Bind(number).Step() &&
-        *shown != web::CourseNotes{.site = query.Text(0), .note = query.Text(1)})
+    const bool exists = query.Bind(number).Step();
+    if (exists) before = {.site = query.Text(0), .note = query.Text(1)};
+    if (shown && exists && *shown != before)
       throw StoreRefusal(ChangeResult::kConflict,
                          "this patient was changed by somebody else meanwhile: look again, then "
                          "save");
@@ -113,7 +115,13 @@ void PatientStore::Change(const web::Actor& actor, const std::string& id, const 
       .Run();
   if (change.num_changed() == 0)
     throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
-  change.Log(actor, "patient.change", id, "site and note");  // never the text itself
+  // Never the texts themselves: the log keeps its entries when a patient's data is removed.
+  const bool has_site = site != before.site, has_note = note != before.note;
+  change.Log(actor, "patient.change", id,
+             has_site && has_note ? "site and note"
+             : has_site           ? "site"
+             : has_note           ? "note"
+                                  : "");
   change.Commit();
 }
 

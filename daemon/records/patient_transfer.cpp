@@ -15,6 +15,8 @@
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/utf8.hpp"
+#include "daemon/records/audit_store.hpp"
 #include "daemon/records/file_copy.hpp"
 #include "daemon/records/patient_record.hpp"
 #include "daemon/records/schema.hpp"
@@ -37,7 +39,6 @@ constexpr const char* kScans = "scans";
 constexpr const char* kImports = "imports";
 constexpr const char* kImporting = ".import";
 constexpr std::size_t kMaxRecord = std::size_t{256} << 20, kMaxCode = 32;
-const web::Actor kCommand{.user = "command line", .address = ""};
 
 /// Converts "scans/000004/..." to 4.
 std::optional<std::int64_t> ScanOf(const std::string& path) {
@@ -74,9 +75,8 @@ class PrivateFolder {
 };
 
 /// Opens the source of an export; a backup is not changed.
-std::unique_ptr<Database> OpenSource(const fs::path& state) {
+std::unique_ptr<Database> OpenSource(const fs::path& state, bool is_backup) {
   std::error_code error;
-  const bool is_backup = fs::exists(state / "backup.json", error);
   if (!fs::is_regular_file(state / "plumb.db", error))
     throw IoError(
         fmt::format("cannot export from {}: it holds no plumb.db; name a state folder or "
@@ -123,7 +123,9 @@ Json EarlierEvidence(const fs::path& state, std::int64_t patient) {
 
 PatientReport ExportPatient(const fs::path& state, const std::string& code, const fs::path& target,
                             const std::stop_token& stop, const BackupSecret* secret) {
-  const std::unique_ptr<Database> database = OpenSource(state);
+  std::error_code ignored;
+  const bool is_backup = fs::exists(state / "backup.json", ignored);
+  const std::unique_ptr<Database> database = OpenSource(state, is_backup);
   const std::optional<std::int64_t> patient = FindCode(*database, code);
   if (!patient)
     throw DataError(fmt::format("there is no patient with the code '{}' in {}",
@@ -151,12 +153,20 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
       output.Report(path + (copy == found.end() ? " is missing" : " is not what was stored"));
   }
   output.Commit({{"scans", rows["scans"].size()}, {"references", rows["refs"].size()}});
-  return {.code = rows["patients"][0]["code"],
-          .scans = rows["scans"].size(),
-          .references = rows["refs"].size(),
-          .files = output.files(),
-          .bytes = output.bytes(),
-          .problems = output.problems()};
+  PatientReport report{.code = rows["patients"][0]["code"],
+                       .scans = rows["scans"].size(),
+                       .references = rows["refs"].size(),
+                       .files = output.files(),
+                       .bytes = output.bytes(),
+                       .problems = output.problems()};
+  if (is_backup) return report;
+  Transaction transaction(*database);
+  AppendAuditEntry(*database, store::kCommand, "patient.export", std::to_string(*patient),
+                   fmt::format("{} to {}: {} scans, {} references, {} problems{}", report.code,
+                               ValidUtf8(target.string()), report.scans, report.references,
+                               report.problems.size(), secret != nullptr ? ", encrypted" : ""));
+  transaction.Commit();
+  return report;
 }
 
 /// One export that is being imported into a store.
@@ -264,7 +274,7 @@ class PatientImport {
       WriteWholeFile(moved.back(), record_.dump(1, ' ', false, Json::error_handler_t::replace));
       GiveToOwner(moved);
       SyncDisk(store_.folders.state());
-      AppendAuditEntry(*database_, kCommand, "patient.import", std::to_string(patient),
+      AppendAuditEntry(*database_, store::kCommand, "patient.import", std::to_string(patient),
                        fmt::format("{}: {} scans, {} references as drafts, sha256 {}", report_.code,
                                    report_.scans, report_.references, reader_.digest()));
       transaction.Commit();

@@ -24,8 +24,8 @@ struct PatientReport {
   bool was_there = false;  ///< Import: the same data exists already, and nothing was done.
 };
 
-/// @param state  A state folder that no plumbd uses, or the folder of a backup that is not
-/// encrypted.
+/// @param state  A state folder that no plumbd uses, whose audit log notes the export; or the
+///         folder of a backup that is not encrypted, which is not changed.
 /// @throws DataError if there is no such patient; IoError; Interrupted
 [[nodiscard]] PatientReport ExportPatient(const std::filesystem::path& state,
                                           const std::string& code,

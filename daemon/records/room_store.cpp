@@ -116,6 +116,13 @@ std::string RoomStore::Sign(const web::Actor& actor, const std::string& sensor_s
     throw StoreRefusal(ChangeResult::kConflict,
                        "the board has been scanned again since this was read: read it again");
   }
+  std::string before;
+  {
+    Statement query = change.Prepare(
+        "SELECT version, digest FROM room_calibrations ORDER BY version DESC LIMIT 1");
+    if (query.Step())
+      before = fmt::format("; before: version {}, sha256 {}", query.Integer(0), query.Text(1));
+  }
   change
       .Prepare(
           "INSERT INTO room_calibrations (signed_at, signed_by, digest, json) VALUES (?, ?, ?, ?)")
@@ -126,9 +133,9 @@ std::string RoomStore::Sign(const web::Actor& actor, const std::string& sensor_s
       .Run();
   const std::string version = std::to_string(change.last_id());
   change.Log(actor, "room.calibrate", version,
-             fmt::format("scans differ by {:.2f} mm and {:.2f} deg, sha256 {}",
+             fmt::format("scans differ by {:.2f} mm and {:.2f} deg, sha256 {}{}",
                          candidate.fit->shift_m / kMillimetre, candidate.fit->turn_rad / kDegree,
-                         candidate.digest));
+                         candidate.digest, before));
   change.Commit();
   return version;
 }

@@ -11,14 +11,13 @@ namespace plumb {
 
 namespace fs = std::filesystem;
 
-std::vector<fs::path> ScanFolders::Interrupted(const std::string& scan_id) const {
+std::vector<fs::path> ScanFolders::SetAsideAs(const std::string& begin) const {
   std::vector<fs::path> folders;
   for (const fs::path& aside : SetAside()) {
     std::error_code error;
     fs::directory_iterator entry(aside, error);
     for (const fs::directory_iterator end; !error && entry != end; entry.increment(error)) {
-      if (entry->path().filename().string().starts_with(scan_id + kInterruptedSuffix))
-        folders.push_back(entry->path());
+      if (entry->path().filename().string().starts_with(begin)) folders.push_back(entry->path());
     }
   }
   return folders;

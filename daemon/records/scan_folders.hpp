@@ -27,8 +27,8 @@ class ScanFolders {
   [[nodiscard]] std::array<std::filesystem::path, 2> SetAside() const {
     return {state_ / kSetAside, scans() / kSetAside};
   }
-  /// Complete folders of an interrupted scan, as found at the next start.
-  [[nodiscard]] std::vector<std::filesystem::path> Interrupted(const std::string& scan_id) const;
+  /// What was set aside under a name that begins like this.
+  [[nodiscard]] std::vector<std::filesystem::path> SetAsideAs(const std::string& begin) const;
   [[nodiscard]] static bool IsStaging(const std::filesystem::path& folder) {
     return folder.filename().string().starts_with(kStagingPrefix);
   }
@@ -36,6 +36,7 @@ class ScanFolders {
   [[nodiscard]] std::vector<std::filesystem::path> All() const;
 
   static constexpr const char* kSetAside = "set-aside";
+  /// After the number of an interrupted scan whose folder was complete at the next start.
   static constexpr const char* kInterruptedSuffix = "-interrupted";
 
  private:

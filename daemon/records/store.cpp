@@ -80,6 +80,32 @@ std::unique_ptr<Database> OpenForChanges(const ScanFolders& folders, const Store
 
 }  // namespace
 
+int RestrictAccess(const fs::path& state) {
+  constexpr mode_t kAll = 07777, kNotGiven = 0027;
+  int num_changed = 0;
+  struct stat status {};
+  const auto is_open = [&](const fs::path& path) {
+    return ::stat(path.c_str(), &status) == 0 && status.st_uid == ::geteuid() &&
+           (status.st_mode & kNotGiven) != 0;
+  };
+  const auto restrict = [&](const fs::path& path) {
+    if (is_open(path) && ::chmod(path.c_str(), status.st_mode & kAll & ~kNotGiven) == 0)
+      ++num_changed;
+  };
+  const fs::path scans = ScanFolders(state).scans();
+  if (is_open(state) || is_open(scans)) {  // these two last, so that an interrupted start goes on
+    std::error_code error, ignored;
+    fs::recursive_directory_iterator entry(state, fs::directory_options::skip_permission_denied,
+                                           error);
+    for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error))
+      if (!entry->is_symlink(ignored) && entry->path() != scans) restrict(entry->path());
+  }
+  for (const char* name : {kDatabase, "plumb.db-wal", "plumb.db-shm"}) restrict(state / name);
+  restrict(scans);
+  restrict(state);
+  return num_changed;
+}
+
 FolderLock::~FolderLock() {
   if (fd_ >= 0) ::close(fd_);
 }

@@ -43,6 +43,12 @@ class FolderLock {
   int fd_ = -1;
 };
 
+/// Denies other accounts access to a state folder and what it holds, and the group write access: an
+/// older version or another program may have given it. What belongs to another account stays as it
+/// is. Examines all files only if the state folder or scans/ is open. @returns the number of
+/// changed permissions.
+int RestrictAccess(const std::filesystem::path& state);
+
 /// Identifies a folder and its disk.
 struct FolderPlace {
   dev_t disk = 0;

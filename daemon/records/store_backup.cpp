@@ -1,7 +1,5 @@
 #include "daemon/records/store_backup.hpp"
 
-#include <fmt/format.h>
-
 #include "daemon/records/audit_store.hpp"
 #include "daemon/records/backup_place.hpp"
 
@@ -16,11 +14,7 @@ BackupReport StoreBackup::Make(const web::Actor& actor, const std::filesystem::p
     Database source(folders_.state() / "plumb.db", Database::Access::kReadOnly);
     report = WriteBackup(folders_.state(), source, target, stop, secret);
   }
-  AuditStore(database_).Log(
-      actor, "backup.make", "",
-      fmt::format("{}: {} scans, {} files, {} bytes, {} problems{}", target.string(), report.scans,
-                  report.files, report.bytes, report.problems.size(),
-                  secret != nullptr ? ", encrypted" : ""));
+  AuditStore(database_).Log(actor, "backup.make", "", Described(target, report, secret != nullptr));
   return report;
 }
 

@@ -30,7 +30,18 @@ struct LookedAt {
   std::int64_t id = 0;
   std::string before, now;  ///< Why its files cannot be used; empty if they can.
   bool is_approved = false;
+  fs::path aside = {};  ///< Where its files were set aside; empty if they are not to be moved back.
 };
+
+/// True if the folder is missing, too. What cannot be listed may hold anything.
+bool HoldsNothing(const fs::path& folder) {
+  std::error_code error;
+  fs::directory_iterator entry(folder, error);
+  for (const fs::directory_iterator end; !error && entry != end; entry.increment(error)) {
+    if (entry->path().filename() != "lost+found") return false;
+  }
+  return !error || error == std::errc::no_such_file_or_directory;
+}
 
 /// One start of a store. Borrows its arguments.
 class Recovery {
@@ -43,7 +54,9 @@ class Recovery {
 
  private:
   [[nodiscard]] std::vector<LookedAt> ExamineScans();
+  [[nodiscard]] fs::path FindAside(std::int64_t scan, const std::vector<FileDigest>& files);
   void RefuseIfMostAreMissing(const std::vector<LookedAt>& scans);
+  void MoveBack(std::vector<LookedAt>& scans);
   void NoteAvailability(const std::vector<LookedAt>& scans);
   void CollectOrphan(const fs::path& folder);
   void Discard(const fs::path& folder, const std::string& why);
@@ -57,8 +70,9 @@ class Recovery {
 };
 
 void Recovery::Run() {
-  const std::vector<LookedAt> scans = ExamineScans();
+  std::vector<LookedAt> scans = ExamineScans();
   RefuseIfMostAreMissing(scans);
+  MoveBack(scans);
   Transaction transaction(database_);
   FailInterruptedScans(database_);
   report_.interrupted_scans = database_.num_changed();
@@ -67,6 +81,12 @@ void Recovery::Run() {
                      fmt::format("{} scans had not ended", report_.interrupted_scans));
   }
   if (!confirmed_.empty()) AppendAuditEntry(database_, store::kSelf, "scans.lost", "", confirmed_);
+  for (const LookedAt& scan : scans) {
+    if (!scan.aside.empty())
+      AppendAuditEntry(
+          database_, store::kSelf, "folder.return", ScanId(scan.id),
+          fmt::format("from {}, with the files that were stored", scan.aside.string()));
+  }
   NoteAvailability(scans);
   transaction.Commit();
   for (const fs::path& folder : folders_.All()) CollectOrphan(folder);
@@ -95,23 +115,53 @@ std::vector<LookedAt> Recovery::ExamineScans() {
     if (files.empty() && has_scene[i])  // stored by an older Plumb, and not examined since
       files.push_back({.path = kSceneMarker, .sha256 = {}});
     scans[i].now = WhyNotThere(folders_.Scan(ScanId(scans[i].id)), files, look_);
+    if (!scans[i].now.empty()) scans[i].aside = FindAside(scans[i].id, files);
   }
   return scans;
 }
 
-/// A single missing scan is an accident; half of all scans missing at once is a disk that is not
-/// mounted.
+/// A start with an older database sets the folders of newer scans aside. By their digests they are
+/// recognised when the newer database is back.
+fs::path Recovery::FindAside(std::int64_t scan, const std::vector<FileDigest>& files) {
+  std::error_code ignored;
+  if (files.empty() || fs::exists(fs::symlink_status(folders_.Scan(ScanId(scan)), ignored)))
+    return {};
+  for (const fs::path& folder : folders_.SetAsideAs(ScanId(scan))) {
+    if (WhyNotThere(folder, files, look_).empty() && WhyNotIntact(folder, files).empty())
+      return folder;
+  }
+  return {};
+}
+
+/// A folder that cannot be moved stays where it is, and its scan counts as unavailable.
+void Recovery::MoveBack(std::vector<LookedAt>& scans) {
+  for (LookedAt& scan : scans) {
+    if (scan.aside.empty()) continue;
+    std::error_code error;
+    fs::create_directories(folders_.scans(), error);
+    fs::rename(scan.aside, folders_.Scan(ScanId(scan.id)), error);
+    if (error) {
+      scan.aside.clear();
+    } else {
+      scan.now.clear();
+    }
+  }
+}
+
+/// A single missing scan is an accident, unless nothing else is there either; half of all scans
+/// missing at once is a disk that is not mounted.
 void Recovery::RefuseIfMostAreMissing(const std::vector<LookedAt>& scans) {
   std::size_t seen_before = 0, missing = 0;
   const LookedAt* first = nullptr;
   for (const LookedAt& scan : scans) {
     if (!scan.before.empty()) continue;
     ++seen_before;
-    if (scan.now.empty()) continue;
+    if (scan.now.empty() || !scan.aside.empty()) continue;
     ++missing;
     if (first == nullptr) first = &scan;
   }
-  if (missing < 2 || 2 * missing < seen_before) return;
+  const bool is_empty_disk = missing == seen_before && HoldsNothing(folders_.scans());
+  if (missing == 0 || ((missing < 2 || 2 * missing < seen_before) && !is_empty_disk)) return;
   const fs::path file = folders_.state() / kLostFile;
   std::string other;
   if (look_(file).error == 0) {
@@ -138,7 +188,8 @@ void Recovery::NoteAvailability(const std::vector<LookedAt>& scans) {
   for (const LookedAt& scan : scans) {
     SetUnavailable(database_, scan.id, scan.before, scan.now);
     report_.lost_scans += scan.before.empty() && !scan.now.empty() ? 1 : 0;
-    report_.attached_scans += !scan.before.empty() && scan.now.empty() ? 1 : 0;
+    const bool was_away = !scan.before.empty() || !scan.aside.empty();
+    report_.attached_scans += was_away && scan.now.empty() ? 1 : 0;
     report_.broken_references += scan.is_approved && !scan.now.empty() ? 1 : 0;
   }
 }

@@ -9,8 +9,8 @@
 
 namespace plumb {
 
-/// Most of the stored scans cannot be found; probably their disk is not mounted. Nothing was
-/// changed.
+/// Most of the stored scans cannot be found, or the folder of the scans is empty; probably their
+/// disk is not mounted. Nothing was changed.
 class ScansMissing : public DiskRefused {
  public:
   using DiskRefused::DiskRefused;
@@ -23,7 +23,8 @@ struct RecoveryReport {
   int orphaned_folders = 0;
   int foreign_folders = 0;  ///< Folders of scans that no row records as ended; moved to set-aside.
   int lost_scans = 0;       ///< Finished, but their files cannot be found; marked unavailable.
-  int attached_scans = 0;   ///< Were unavailable, and their files are there again.
+  /// Were unavailable or set aside, and their files are there again.
+  int attached_scans = 0;
   /// Approved, but their scene cannot be found; to be shown prominently.
   int broken_references = 0;
   bool checked_database = true;  ///< False: there was not enough time to check all of it.
@@ -40,7 +41,8 @@ void RefuseScansOfAnother(Database& database, const ScanFolders& folders);
 void ConfirmLostScans(const std::filesystem::path& state, int num_lost);
 
 /// Fails scans that were interrupted, records which files exist, removes the remains of a crash or
-/// a removal, and moves folders without a row to set-aside. The caller holds the connection for
+/// a removal, moves folders without a row to set-aside, and moves them back once there is a row
+/// whose digests they match. The caller holds the connection for
 /// changes.
 /// @throws ScansMissing; IoError and its kinds
 void RecoverStore(Database& database, const ScanFolders& folders, const ExaminePath& look,

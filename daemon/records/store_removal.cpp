@@ -68,7 +68,8 @@ void StoreRemoval::RemoveFiles(const std::string& scan_id) {
   std::error_code ignored;  // remaining files are removed at the next start
   fs::remove_all(folders_.Scan(scan_id), ignored);
   fs::remove_all(folders_.Staging(scan_id), ignored);
-  for (const fs::path& folder : folders_.Interrupted(scan_id)) fs::remove_all(folder, ignored);
+  for (const fs::path& folder : folders_.SetAsideAs(scan_id + ScanFolders::kInterruptedSuffix))
+    fs::remove_all(folder, ignored);
 }
 
 void StoreRemoval::WipePatient(const web::Actor& actor, const std::string& id) {

@@ -12,6 +12,8 @@ namespace plumb::store {
 
 /// The appliance itself, as named in the audit log.
 inline const web::Actor kSelf{.user = "plumbd", .address = ""};
+/// The commands of `plumb`, which do not know who calls them.
+inline const web::Actor kCommand{.user = "command line", .address = ""};
 
 /// Microseconds since 1970.
 [[nodiscard]] std::int64_t ToStored(web::WallClock::time_point time);

@@ -24,6 +24,15 @@ std::vector<web::PlanTemplate> TemplateStore::List() {
   return templates;
 }
 
+namespace {
+
+std::string Described(double width_mm, double height_mm, double shift_mm, double rotation_deg) {
+  return fmt::format("region {:g} x {:g} mm, tolerance {:g} mm and {:g} degrees", width_mm,
+                     height_mm, shift_mm, rotation_deg);
+}
+
+}  // namespace
+
 void TemplateStore::Set(const web::Actor& actor, const web::PlanTemplate& wanted) {
   constexpr std::int64_t kMaxTemplates = 100;
   StoreChange change(database_);
@@ -32,6 +41,13 @@ void TemplateStore::Set(const web::Actor& actor, const web::PlanTemplate& wanted
     if (query.Bind(wanted.site).Step() && query.Integer(0) >= kMaxTemplates)
       throw StoreRefusal(ChangeResult::kConflict,
                          "there are templates of 100 sites already: remove one first");
+  }
+  std::string before;
+  {
+    Statement query = change.Prepare(
+        "SELECT width_mm, height_mm, shift_mm, rotation_deg FROM templates WHERE site = ?");
+    if (query.Bind(wanted.site).Step())
+      before = "; before: " + Described(query.Real(0), query.Real(1), query.Real(2), query.Real(3));
   }
   change
       .Prepare(
@@ -46,9 +62,10 @@ void TemplateStore::Set(const web::Actor& actor, const web::PlanTemplate& wanted
       .Bind(actor.user)
       .Run();
   change.Log(actor, "template.set", "",
-             fmt::format("{}: region {:g} x {:g} mm, tolerance {:g} mm and {:g} degrees",
-                         wanted.site, wanted.width_mm, wanted.height_mm, wanted.tolerance.shift_mm,
-                         wanted.tolerance.rotation_deg));
+             fmt::format("{}: {}{}", wanted.site,
+                         Described(wanted.width_mm, wanted.height_mm, wanted.tolerance.shift_mm,
+                                   wanted.tolerance.rotation_deg),
+                         before));
   change.Commit();
 }
 

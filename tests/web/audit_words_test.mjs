@@ -68,6 +68,23 @@ const kDetails = [
     'Delete scans after … days (0: never): 0 → 365; Stop a sweep after … s without new surface: 2.5',
     'Borrar los escaneos tras … días (0: nunca): 0 → 365; '
     + 'Detener un barrido tras … s sin superficie nueva: 2,5'],
+  ['config.reload',
+    '{"appliance.warm_up_min":[null,"20"],"web.listen":["\'a\'","\'b\'","restart"]}',
+    "appliance.warm_up_min: default → 20; web.listen: 'a' → 'b' (from the next start on)",
+    "appliance.warm_up_min: valor por defecto → 20; web.listen: 'a' → 'b' "
+    + '(desde el próximo inicio)'],
+  ['template.set', 'S-3: region 100 x 200 mm, tolerance 2 mm and 1 degrees; before: region 300 x '
+    + '200 mm, tolerance 5 mm and 2.5 degrees',
+  'S-3: region 100 x 200 mm, tolerance 2 mm and 1 degrees; before: region 300 x 200 mm, tolerance '
+    + '5 mm and 2.5 degrees',
+  'S-3: región 100 x 200 mm, tolerancia 2 mm y 1°; antes: región 300 x 200 mm, tolerancia 5 mm y '
+    + '2,5°'],
+  ['check.baseline', '5 markers; before: check 4 with 6 markers',
+    '5 markers; before: check 4 with 6 markers', '5 marcadores; antes: control 4 con 6 marcadores'],
+  ['patient.export', 'P-1 to /mnt/stick/p1: 3 scans, 1 references, 0 problems, encrypted',
+    'P-1 to /mnt/stick/p1: 3 scans, 1 references, 0 problems, encrypted',
+    'P-1 a /mnt/stick/p1: 3 escaneos, 1 referencias, 0 problemas, cifrada'],
+  ['patient.change', 'note', 'note', 'nota'],
   ['patient.change', 'site and note', 'site and note', 'localización y nota'],
 ];
 for (const [action, detail, english, spanish] of kDetails) {
@@ -81,7 +98,7 @@ for (const language of ['en', 'es']) {
   // What this version does not know is shown as it is stored, also what every object has.
   for (const action of ['check.done', 'session.open', 'scan.start', 'scan.end', 'cancel', 'press',
     'scan.accept', 'scan.accept_outside', 'user.add', 'user.change', 'recording.remove',
-    'settings.change', 'reference.plan', 'an.action', 'toString']) {
+    'settings.change', 'config.reload', 'reference.plan', 'an.action', 'toString']) {
     for (const detail of ['later_word', 'toString', 'a, b; c', '{"a']) {
       equal(detailWords({ action, user: 'plumbd', detail }), detail, `${language} ${action}, unknown`);
     }

@@ -33,6 +33,12 @@ const settingsWords = (changes) => Object.entries(changes).map(([name, values]) 
   return `${wordOf(S.settings, name)}: ${[values].flat().map(said).join(' → ')}`;
 }).join('; ');
 
+/// Each key of the configuration that was changed, before and after; "restart" follows where the
+/// new value is in use only after one.
+const configWords = (changes) => Object.entries(changes).map(([key, [before, after, later]]) =>
+  `${key}: ${[before, after].map((value) => value ?? S.audit.byDefault).join(' → ')}`
+    + (later ? ` (${S.audit.fromNextStart})` : '')).join('; ');
+
 /// "move, vertical +1.20 mm, pitch -0.10 deg; reason: swelling"; the reason is a person's text.
 function acceptWords(detail) {
   const [, result, reason] = /^([^;]*)(?:; reason: ([^]*))?$/.exec(detail) ?? [];
@@ -78,6 +84,7 @@ const kDetails = {
   'user.change': accountWords,
   'reference.plan': planChange,
   'settings.change': (detail) => settingsWords(JSON.parse(detail)),
+  'config.reload': (detail) => configWords(JSON.parse(detail)),
 };
 
 /// What an entry says beside its action.

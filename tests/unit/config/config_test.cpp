@@ -218,6 +218,18 @@ sensor_serial = "7"
   EXPECT_THAT(KeepUntilRestart(in_use, next), testing::IsEmpty());
 }
 
+TEST(ConfigTest, WhatTheFileGivesIsKeptAsText) {
+  const Config config = ParseConfig(
+      "[web]\nlisten = \"[::1]:80\"\nhost_names = [\"a\", \"b\"]\n[appliance]\nquota_gb = 50.0\n"
+      "keep_recordings = true\n",
+      "test.toml");
+  EXPECT_THAT(config.given,
+              testing::UnorderedElementsAre(testing::Pair("web.listen", "'[::1]:80'"),
+                                            testing::Pair("web.host_names", "[ 'a', 'b' ]"),
+                                            testing::Pair("appliance.quota_gb", "50.0"),
+                                            testing::Pair("appliance.keep_recordings", "true")));
+}
+
 TEST(ConfigTest, OffLoopbackThePageIsServedByTlsUnlessItIsSaidOtherwise) {
   const auto transport = [](const std::string& keys, bool is_loopback) {
     return TransportOf(ParseConfig("[web]\n" + keys, "t").web, is_loopback);

@@ -134,6 +134,7 @@ class BackupArchiveTest : public ::testing::Test {
 };
 
 TEST_F(BackupArchiveTest, WhatIsRestoredIsByteIdentical) {
+  const auto before = FilesOf(state());
   const BackupReport made = BackUpStopped(state(), backup());
   EXPECT_EQ(made.scans, 2U);
   EXPECT_EQ(made.files, 1U + 2 * 7 + 2);
@@ -144,7 +145,7 @@ TEST_F(BackupArchiveTest, WhatIsRestoredIsByteIdentical) {
   EXPECT_EQ(report.scans, 2U);
   EXPECT_EQ(report.files, made.files);
   EXPECT_EQ(report.bytes, made.bytes);
-  EXPECT_EQ(FilesOf(restored()), FilesOf(state()));
+  EXPECT_EQ(FilesOf(restored()), before);
   Store store(restored());
   for (const web::Scan& scan : store.scans.List(patient_, 100))
     EXPECT_EQ(store.integrity.Check(scan.id, false), "");
@@ -154,8 +155,9 @@ TEST_F(BackupArchiveTest, WhatIsRestoredIsByteIdentical) {
 }
 
 TEST_F(BackupArchiveTest, HoldsWhatAFolderWouldHold) {
+  fs::copy(state(), folder_ / "same", fs::copy_options::recursive);
   (void)BackUpStopped(state(), places() / "folder");
-  (void)BackUpStopped(state(), backup());
+  (void)BackUpStopped(folder_ / "same", backup());
   const auto folder = FilesBelow(places() / "folder");
   const TarReader tar(backup());
   EXPECT_EQ(tar.entries().size(), folder.size());
@@ -174,6 +176,17 @@ TEST_F(BackupArchiveTest, OfARunningStoreReplacesTheOneBefore) {
   EXPECT_THAT(Names(), ElementsAre("plumb.tar"));
   EXPECT_EQ(RestoreBackup(backup(), restored()).scans, 3U);
   EXPECT_EQ(store.audit.Find({0, 10, "backup.make"}).size(), 2U);
+}
+
+TEST_F(BackupArchiveTest, OfAStoppedStoreIsInItsLog) {
+  const BackupReport made = BackUpStopped(state(), backup());
+  Store store(state());
+  const auto entries = store.audit.Find({0, 10, "backup.make"});
+  ASSERT_EQ(entries.size(), 1U);
+  EXPECT_EQ(entries[0].user, "command line");
+  EXPECT_EQ(entries[0].detail, fmt::format("{}: 2 scans, {} files, {} bytes, 0 problems",
+                                           backup().string(), made.files, made.bytes));
+  EXPECT_EQ(store.audit.FirstBroken(), std::nullopt);
 }
 
 TEST_F(BackupArchiveTest, AnotherFileOrFolderOfItsNameIsNotReplaced) {

@@ -118,6 +118,14 @@ TEST_F(PatientTransferTest, ComesWithEverythingAndByteIdenticalFiles) {
   EXPECT_THAT(exported.problems, IsEmpty());
   const PatientReport imported = ImportPatient(out(), there());
   EXPECT_FALSE(imported.was_there);
+  {
+    Store store(here());
+    const web::AuditEntry entry = store.audit.Find({0, 1}).at(0);
+    EXPECT_EQ(entry.user + " " + entry.action + " " + entry.subject,
+              "command line patient.export " + patient_);
+    EXPECT_EQ(entry.detail, "P-7 to " + out().string() + ": 3 scans, 1 references, 0 problems");
+    EXPECT_EQ(store.audit.FirstBroken(), std::nullopt);
+  }
   EXPECT_EQ(imported.files, exported.files);
   Store from(here()), to(there());
   const auto patient = to.patients.FindByCode("P-7");

@@ -341,5 +341,38 @@ TEST_F(StoreCareTest, TheCheckOfTheDatabaseEndsInTime) {
   EXPECT_TRUE(database.CheckIntegrity()) << "the limit was for that check";
 }
 
+TEST(RestrictAccessTest, TakesBackWhatAnOlderVersionGaveAndNothingElse) {
+  const testing::TempFolder folder;
+  const fs::path state = folder / "state";
+  std::string scan;
+  {
+    Store store(state);
+    scan = testing::StoreScan(store, store.patients.Add(testing::kAnna, "P", ""));
+  }
+  WriteWholeFile(folder / "elsewhere", std::string_view("x"));
+  fs::permissions(folder / "elsewhere", fs::perms(0666));
+  fs::create_symlink(folder / "elsewhere", state / "scans" / scan / "link");
+  const fs::path cloud = state / "scans" / scan / "scene" / "cloud.ply";
+  const auto mode = [](const fs::path& path) { return fs::status(path).permissions(); };
+  const auto open_up = [&] {
+    fs::permissions(state, fs::perms(0755));
+    fs::permissions(state / "scans", fs::perms(0777));
+    fs::permissions(state / "plumb.db", fs::perms(0664));
+    fs::permissions(cloud, fs::perms(0644));
+  };
+  (void)RestrictAccess(state);
+  open_up();
+  EXPECT_EQ(RestrictAccess(state), 4);
+  EXPECT_EQ(mode(state), fs::perms(0750));
+  EXPECT_EQ(mode(state / "scans"), fs::perms(0750));
+  EXPECT_EQ(mode(state / "plumb.db"), fs::perms(0640));
+  EXPECT_EQ(mode(cloud), fs::perms(0640));
+  EXPECT_EQ(mode(folder / "elsewhere"), fs::perms(0666)) << "a link is not followed";
+  fs::permissions(state, fs::perms(0700));
+  EXPECT_EQ(RestrictAccess(state), 0);
+  EXPECT_EQ(mode(state), fs::perms(0700)) << "the stricter mode of the service";
+  EXPECT_EQ(RestrictAccess(folder / "missing"), 0);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -173,6 +173,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
         store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
     EXPECT_EQ(store->checks.StateSince(before), DailyCheck::kOverdue) << "there is no baseline";
     store->checks.SetBaseline(kBert, first);
+    EXPECT_EQ(store->audit.Find({0, 1, "check.baseline"}).at(0).detail, "4 markers");
     store->checks.Add(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kPassed));
   }
   const auto store = Open();
@@ -206,7 +207,9 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
     actions.push_back(entry.user + " " + entry.action + " " + entry.detail);
   EXPECT_THAT(actions,
               ::testing::IsSupersetOf({"anna check.done passed", "anna check.done no_baseline",
-                                       "bert check.baseline "}));
+                                       "bert check.baseline 4 markers"}));
+  store->checks.SetBaseline(kBert, checks[0].id);
+  EXPECT_EQ(store->audit.Find({0, 1}).at(0).detail, "5 markers; before: check 1 with 4 markers");
 }
 
 TEST_F(StoreTest, ABaselineNeedsACheckThatSawMarkers) {

@@ -73,6 +73,10 @@ TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_THAT(lines, Contains("eve room.calibrate 1 scans differ by 0.60 mm and 0.00 deg, sha256 " +
                               candidate.digest));
   EXPECT_THAT(Candidate().scans, IsEmpty()) << "scans of before the signature are used up";
+  Scan(), Scan(), Scan();
+  EXPECT_EQ(Sign(Candidate().digest).first, ChangeResult::kDone);
+  EXPECT_THAT(store_->audit.Find({0, 1, "room.calibrate"}).at(0).detail,
+              ::testing::EndsWith("; before: version 1, sha256 " + candidate.digest));
 }
 
 TEST_F(StoreRoomTest, ScansThatDifferAreNotSigned) {

@@ -162,6 +162,11 @@ TEST_F(StoreSessionsTest, SiteAndNoteAreChangedAndTheirTextIsNotInTheLog) {
   EXPECT_EQ(entry.action, "patient.change");
   EXPECT_EQ(entry.user, "bert");
   EXPECT_EQ((entry.subject + entry.detail).find("knee"), std::string::npos);
+  EXPECT_EQ(entry.detail, "site and note");
+  store.patients.Change(kBert, patient, "thorax", "");
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail, "note");
+  store.patients.Change(kBert, patient, "pelvis", "");
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail, "site");
 }
 
 TEST_F(StoreSessionsTest, AnArchivedPatientKeepsEverythingAndIsNotOpened) {

@@ -413,7 +413,9 @@ TEST_F(StoreTest, ATemplateIsOfOneSiteWhateverItsCaseAndIsLogged) {
   EXPECT_EQ(stored.tolerance.shift_mm, 4);
   EXPECT_EQ(stored.tolerance.rotation_deg, 1.5);
   EXPECT_EQ(stored.changed_by, "bert");
-  EXPECT_THAT(store->audit.Find({0, 1}).at(0).detail, HasSubstr("320 x 410 mm"));
+  EXPECT_EQ(store->audit.Find({0, 1}).at(0).detail,
+            "thorax: region 320 x 410 mm, tolerance 4 mm and 1.5 degrees; before: region 300 x 400 "
+            "mm, tolerance 5 mm and 2 degrees");
   EXPECT_EQ(RefusalOf([&] { store->templates.Remove(kAnna, "pelvis"); }), ChangeResult::kNotFound);
   store->templates.Remove(kAnna, "THORAX");
   EXPECT_THAT(store->templates.List(), SizeIs(0));

@@ -588,7 +588,11 @@ export const es = {
     wholeHint: 'El archivo CSV contiene lo que se muestra aquí. El registro entero contiene cada '
       + 'entrada tal como se guardó, con su suma de control: plumb verify-log dice si se cambió '
       + 'alguna.',
-    users: { button: 'el botón', 'control socket': 'el socket de control' },
+    users: {
+      button: 'el botón', 'control socket': 'el socket de control',
+      'command line': 'la línea de órdenes',
+    },
+    byDefault: 'valor por defecto', fromNextStart: 'desde el próximo inicio',
     views: 'Mostrar también quién consultó qué', yes: 'sí', no: 'no',
     unassigned: 'Escaneo sin asignar',
     reason: (text) => `motivo: ${text}`, role: (role) => `función: ${role}`,
@@ -629,6 +633,7 @@ export const es = {
       'patient.archive': 'Paciente archivado',
       'patient.unarchive': 'Paciente sacado del archivo',
       'patient.import': 'Paciente importado',
+      'patient.export': 'Paciente exportado',
       'patient.wipe': 'Datos de paciente borrados',
       'session.open': 'Sesión abierta',
       'session.close': 'Sesión cerrada',
@@ -643,6 +648,7 @@ export const es = {
       'recording.remove': 'Grabación borrada',
       'folder.remove': 'Carpeta de un escaneo fallido o borrado eliminada',
       'folder.set_aside': 'Carpeta apartada a set-aside',
+      'folder.return': 'Carpeta devuelta desde set-aside',
       'scans.lost': 'Escaneos ausentes confirmados como perdidos',
       press: 'Botón pulsado',
       cancel: 'Escaneo descartado',
@@ -659,6 +665,7 @@ export const es = {
       'display.provision': 'Pantalla vinculada por el archivo de aprovisionamiento',
       'display.remove': 'Pantalla quitada',
       'settings.change': 'Ajustes cambiados',
+      'config.reload': 'Configuración cambiada',
       'backup.make': 'Copia hecha',
       'backup.restore': 'Copia restaurada',
       'storage.recovered': 'Almacenamiento utilizable de nuevo',

@@ -176,7 +176,7 @@ export const kFaultWords = {
     'ponga una copia de los archivos del escaneo en su lugar o escanee una referencia nueva',
   cancelled: 'descartado',
   // Details of the log.
-  'site and note': 'localización y nota',
+  'site and note': 'localización y nota', site: 'localización', note: 'nota',
   'wrong code': 'código incorrecto', 'its files are there again': 'sus archivos han vuelto',
   'of a scan that had not ended': 'de un escaneo que no había terminado',
   'of a scan that was removed': 'de un escaneo que se borró',
@@ -219,6 +219,15 @@ export const kFaultPatterns = [
     + 'or remove these scans\\. The log names them\\.?$',
   'Faltan o han cambiado archivos de algunos escaneos guardados ($1): recupérelos de una copia de '
     + 'seguridad o borre esos escaneos. El registro los nombra.'],
+  ['^Some folders of scans \\((\\d+)\\) are unknown to the database and were set aside: restore a '
+    + 'newer backup, or move them from the folder set-aside to another disk\\.?$',
+  'La base de datos no conoce algunas carpetas de escaneos ($1), que se apartaron: restaure una '
+    + 'copia más reciente, o llévelas de la carpeta set-aside a otro disco.'],
+  ['^No backup is set up: if this disk fails, all scans are lost\\. Mount another disk for '
+    + 'backups, and name it as backup_folder in \\[storage\\]\\.?$',
+  'No hay copias de seguridad configuradas: si falla este disco, se pierden todos los escaneos. '
+    + 'Monte otro disco para las copias e indíquelo como backup_folder en [storage].'],
+  ['^from (.+), with the files that were stored$', 'desde $1, con los archivos que se guardaron'],
   ['^the folder of the scans (.+) is not the one that was opened: if its disk is not mounted any '
     + 'more, mount it again; if this is the right one, start plumbd again$',
   'la carpeta de los escaneos $1 no es la que se abrió: si su disco ya no está montado, vuelva a '
@@ -391,6 +400,14 @@ export const kFaultPatterns = [
   ['^(.+): (\\d+) scans, (\\d+) files, (\\d+) bytes, (\\d+) problems(, encrypted)?$',
     '$1: $2 escaneos, $3 archivos, $4 bytes, $5 problemas$6'],
   ['^, encrypted$', ', cifrada'],
+  ['^(.+) to (.+): (\\d+) scans, (\\d+) references, (\\d+) problems(, encrypted)?$',
+    '$1 a $2: $3 escaneos, $4 referencias, $5 problemas$6'],
+  ['^(.+); before: (.+)$', '$1; antes: $2'],
+  ['^(\\d+) markers$', '$1 marcadores'],
+  ['^check (\\d+) with (\\d+) markers$', 'control $1 con $2 marcadores'],
+  ['^version (\\d+), sha256 (\\w+)$', 'versión $1, sha256 $2'],
+  ['^region ([\\d.]+) x ([\\d.]+) mm, tolerance ([\\d.]+) mm and ([\\d.]+) degrees$',
+    'región $1 x $2 mm, tolerancia $3 mm y $4°'],
   ['^(.+): region ([\\d.]+) x ([\\d.]+) mm, tolerance ([\\d.]+) mm and ([\\d.]+) degrees$',
     '$1: región $2 x $3 mm, tolerancia $4 mm y $5°'],
   ['^scans differ by ([\\d.]+) mm and ([\\d.]+) deg, sha256 (\\w+)$',
