@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <exception>
 #include <iterator>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -23,10 +24,27 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
-using std::chrono::seconds;
 
-constexpr seconds kTick{1};
 const web::Actor kButton{.user = "button", .address = ""};
+
+/// {"appliance.quota_gb": [null, "50"], "web.listen": ["'a'", "'b'", "restart"]}: before and after,
+/// null for the default. @param kept  The keys that take effect only after a restart.
+Json ConfigChanges(const Config& before, const Config& after,
+                   const std::vector<std::string>& kept) {
+  std::map<std::string, std::string> keys = before.given;
+  keys.insert(after.given.begin(), after.given.end());
+  Json changes = Json::object();
+  for (const auto& [key, unused] : keys) {
+    const auto value = [&name = key](const Config& config) {
+      const auto given = config.given.find(name);
+      return given == config.given.end() ? Json(nullptr) : Json(given->second);
+    };
+    if (value(before) == value(after)) continue;
+    changes[key] = {value(before), value(after)};
+    if (std::find(kept.begin(), kept.end(), key) != kept.end()) changes[key].push_back("restart");
+  }
+  return changes;
+}
 
 }  // namespace
 
@@ -47,7 +65,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
   });
   session_timer_ = loop_.MakeTimer("session unused", [this] { OnSessionTimer(); });
   tick_timer_ = loop_.MakeTimer("tick", [this] { OnTick(); });
-  tick_timer_.ArmAfter(kTick);
+  tick_timer_.ArmAfter(parts_.tick);
   if (!storage_fault_.empty()) (void)Handle(ScanEvent::kStorageFailed);
   WatchButton();
   Show();
@@ -361,11 +379,13 @@ void Appliance::ClosePatient(const std::string& patient_id) {
 void Appliance::Reload(const Config& config) {
   Config next = config;
   const std::vector<std::string> kept = KeepUntilRestart(parts_.config, next);
+  const Json changes = ConfigChanges(parts_.config, next, kept);
   parts_.config = std::move(next);
   profiles_off_ = ProfilesOff(parts_.config);
   warm_up_min_ = parts_.config.appliance.warm_up_min;
   RefreshRoom();
   Log(LogLevel::kInfo, "the configuration was read again");
+  if (!changes.empty()) Audit(kSelf, "config.reload", "", changes.dump());
   if (!kept.empty())
     Log(LogLevel::kWarning,
         fmt::format("changed, but in use only after a restart: {}", fmt::join(kept, ", ")));
@@ -383,7 +403,7 @@ void Appliance::Stop(std::function<void()> stopped) {
 }
 
 void Appliance::OnTick() {
-  tick_timer_.ArmAfter(kTick);
+  tick_timer_.ArmAfter(parts_.tick);
   const bool is_running = IsRunning();
   WatchSpace();
   if (is_unusable_due_) CountUnusable();

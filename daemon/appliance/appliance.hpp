@@ -60,6 +60,11 @@ struct ApplianceParts {
   /// Measures the room on the disk of a folder. Empty: asks the system.
   std::function<std::filesystem::space_info(const std::filesystem::path&, std::error_code&)> space =
       {};
+  /// Unit of the intervals between checks, removals and backups.
+  std::chrono::milliseconds tick{1000};
+  /// Nothing is removed for its age until the wall clock has run for so long without a step: a time
+  /// server may still correct it.
+  std::chrono::milliseconds clock_trusted_after = std::chrono::hours(1);
 };
 
 /// Not thread-safe: call it on the loop's thread, except for functions marked "from any thread".
@@ -223,8 +228,8 @@ class Appliance {
     bool has_ended = false;
   };
 
-  static constexpr int kDiskCheckTicks = 10;      ///< In seconds, while no scan runs.
-  static constexpr int kMaintenanceTicks = 3600;  ///< In seconds, while no scan runs.
+  static constexpr int kDiskCheckTicks = 10;      ///< While no scan runs.
+  static constexpr int kMaintenanceTicks = 3600;  ///< While no scan runs.
   static constexpr int kFirstFileCheckTicks = 30;
   static constexpr int kBackupTicks = 60;  ///< Interval at which a due backup is checked for.
 

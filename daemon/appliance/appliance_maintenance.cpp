@@ -22,7 +22,7 @@ using store::kSelf;
 
 namespace {
 
-/// Seconds between the checks of two stored scans, and until the next search for one that is due.
+/// Ticks between the checks of two stored scans, and until the next search for one that is due.
 constexpr int kFileCheckTicks = 5, kNoFileCheckTicks = 600;
 constexpr std::chrono::hours kFileCheckEvery{24};
 
@@ -39,9 +39,7 @@ bool AreOnOneDisk(const std::filesystem::path& a, const std::filesystem::path& b
 void Appliance::RunMaintenance() {
   ticks_to_maintenance_ = kMaintenanceTicks;
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
-  // within this time a time server may still correct the clock
-  constexpr std::chrono::hours kTrusted{1};
-  const bool has_clock = clock_.held() >= kTrusted;
+  const bool has_clock = clock_.held() >= parts_.clock_trusted_after;
   const std::optional<double> quota_gb = parts_.config.appliance.quota_gb;
   const bool posted = store_thread_.Post([this, quota_gb, has_clock, stop = care_.get_token()] {
     try {
@@ -206,7 +204,10 @@ void Appliance::BackUp(
                                         report.scans, report.problems.size())
                           : fmt::format("no backup was made in {}: {}", folder.string(), error));
         loop_.Post("backup", [this, done, error, report, is_beside_scans, folder] {
-          if (error.empty() && folder == BackupTarget()) backup_is_beside_scans_ = is_beside_scans;
+          if (error.empty() && folder.parent_path() == BackupTarget().parent_path()) {
+            backup_fault_.clear();
+            backup_is_beside_scans_ = is_beside_scans;
+          }
           done(error, report);
         });
       });

@@ -245,6 +245,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
   if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
   if (scan_.purpose == web::ScanPurpose::kDailyCheck) RefreshRoom();
   check_.reset();
+  ticks_to_file_check_ = std::min(ticks_to_file_check_, kFirstFileCheckTicks);  // of a recording
   NotifyWeb(web::EventKind::kResult);
   NotifyWeb(web::EventKind::kData);
   RunMaintenance();

@@ -251,7 +251,17 @@ std::vector<std::string> Appliance::StorageWarnings() const {
         "Files of some stored scans ({}) are missing or changed: put them back from a backup, or "
         "remove these scans. The log names them.",
         unusable_.scans));
+  if (unusable_.set_aside > 0)
+    warnings.push_back(fmt::format(
+        "Some folders of scans ({}) are unknown to the database and were set aside: restore a "
+        "newer backup, or move them from the folder set-aside to another disk.",
+        unusable_.set_aside));
   if (!record_fault_.empty()) warnings.push_back(record_fault_);
+  // The demo stores nothing of value.
+  if (parts_.config.appliance.backup_folder.empty() && parts_.demo_patient.empty())
+    warnings.emplace_back(
+        "No backup is set up: if this disk fails, all scans are lost. Mount another disk for "
+        "backups, and name it as backup_folder in [storage].");
   if (!backup_fault_.empty()) warnings.push_back("The last backup failed: " + backup_fault_);
   if (backup_is_beside_scans_)
     warnings.push_back(fmt::format(

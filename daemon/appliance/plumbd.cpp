@@ -384,6 +384,12 @@ int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
     if (configured.fault.empty()) configured.fault = page.fault;
   }
   if (configured.fault.empty()) configured.fault = ResetIfAsked(configured.config.appliance.state);
+  if (configured.fault.empty()) {
+    if (const int num_changed = RestrictAccess(configured.config.appliance.state))
+      Log(LogLevel::kNotice,
+          fmt::format("stored data was open to other accounts: {} permissions were taken back",
+                      num_changed));
+  }
   std::optional<EndGuard> guard;  // outlives the threads that it waits for
   Plumbd plumbd(options, configured.config, configured.fault, page, registry);
   const int code = plumbd.Run();

@@ -344,6 +344,19 @@ TEST_F(ApiRules, ASettingThatIsNotSentStaysAsItIsStored) {
   EXPECT_EQ(engineer.Put("/api/v1/settings", {{"nothing", 1}}).status, 400);
 }
 
+TEST_F(ApiRules, ABackupIsMadeByTheEngineerAndIsInTheLog) {
+  for (const char* role : {"technician", "physicist"})
+    EXPECT_EQ(LoggedIn(role).Post("/api/v1/backup").status, 403) << role;
+  HttpClient engineer = LoggedIn("engineer");
+  EXPECT_TRUE(engineer.Get("/api/v1/backup").json()["last"].is_null());
+  const HttpAnswer made = engineer.Post("/api/v1/backup");
+  EXPECT_EQ(made.status, 200) << made.body;
+  const json last = engineer.Get("/api/v1/backup").json()["last"];
+  ASSERT_TRUE(last.is_object());
+  EXPECT_EQ(last["action"], "backup.make");
+  EXPECT_EQ(last["user"], "engineer");
+}
+
 TEST_F(ApiRules, ANoteThatSomebodyElseHasChangedMeanwhileIsNotReplaced) {
   HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
   const std::string path = "/api/v1/patients/" + AddPatient(technician, "PX-17");

@@ -59,6 +59,7 @@ class RealRuledAppliance : public RuledAppliance {
   RealRuledAppliance() {
     parts_.config.appliance.state = folder_ / "state";
     parts_.config.appliance.warm_up_min = 0;
+    parts_.config.appliance.backup_folder = folder_ / "backups";
     parts_.config.update.folder = folder_ / "updates";
     parts_.make_provider = [this] { return std::make_unique<testing::FakeProvider>(bus_); };
     bus_.Plug("A");

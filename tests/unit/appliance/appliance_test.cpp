@@ -19,6 +19,7 @@
 #include "daemon/records/check_json.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
+#include "tests/unit/records/scan_folder.hpp"
 #include "web/api/json.hpp"
 
 namespace plumb {
@@ -185,6 +186,43 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
     On([&] {
       EXPECT_FALSE(appliance_->WebStatus().session);
       EXPECT_EQ(appliance_->open_patient(), "");
+    });
+  });
+}
+
+TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVerdict) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
+  Play([&] {
+    MakeReady();
+    std::string patient;
+    On([&] {
+      Store& store = *appliance_->store();
+      patient = store.patients.Add(kTester, "P-1", "");
+      const std::string scan = testing::StoreScan(store, patient);
+      (void)testing::PlanAndApprove(store, store.references.Add(testing::kAnna, scan, "", {}));
+      const std::filesystem::path cloud = store.folders.Scan(scan) / "scene" / "cloud.ply";
+      std::string bytes = ReadTextFile(cloud, 1000);
+      bytes[3] = static_cast<char>(bytes[3] ^ 1);
+      WriteWholeFile(cloud, bytes);
+      const std::string session =
+          store.treatments.Open(kTester, patient, web::ScanPurpose::kFraction);
+      appliance_->OpenSession(session, patient, web::ScanPurpose::kFraction, "", kTester);
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
+    });
+    EXPECT_TRUE(Becomes([&] {
+      bus_.GiveFrame();
+      return appliance_->state().phase == ScanPhase::kFault;
+    }));
+    On([&] {
+      EXPECT_THAT(
+          appliance_->WebStatus().fault,
+          ::testing::HasSubstr("the patient's reference cannot be used: scene/cloud.ply has "
+                               "been changed since it was stored"));
+      EXPECT_TRUE(appliance_->StatusJson()["last_result"].is_null());
+      const web::Scan failed = appliance_->store()->scans.List(patient, 1)[0];
+      EXPECT_EQ(failed.outcome, web::ScanOutcome::kFailed);
+      EXPECT_FALSE(failed.result);
     });
   });
 }

@@ -42,5 +42,29 @@ TEST(DiagnosticsTest, HoldHowTheApplianceDoesAndNothingOfPatientsOrAccounts) {
               HasSubstr("\"last_result\":{}"));
 }
 
+TEST(DiagnosticsTest, FreeTextsSayWhatIsWrongWithoutNumbersAndPaths) {
+  const std::string missing =
+      "3 of 5 stored scans cannot be seen (of scan 000777, its folder is missing): is the disk "
+      "mounted at /srv/anna-miller/scans? Nothing was changed.";
+  const std::string reference =
+      "the scan failed: the patient's reference cannot be used: scene/cloud.ply is missing in "
+      "/srv/anna-miller/scans/000778; put a backup of the scan's files in their place";
+  const std::string backup = "The last backup failed: cannot write /mnt/p4711/plumb-5/plumb.db";
+  web::Health health;
+  health.ok = false;
+  health.reason = "storage: " + missing;
+  const std::string text = DiagnosticsText({{"state", "fault"},
+                                            {"reason", reference},
+                                            {"rolled_back", "from scan 000779"},
+                                            {"warnings", {backup, missing}}},
+                                           health, "", {});
+  for (const char* held :
+       {"stored scans cannot be seen", "its folder is missing", "the patient's reference cannot",
+        "is missing in <path>; put a backup", "The last backup failed", "health: storage: # of #"})
+    EXPECT_THAT(text, HasSubstr(held));
+  for (const char* not_held : {"777", "778", "779", "4711", "anna", "/srv", "/mnt", "000"})
+    EXPECT_THAT(text, Not(HasSubstr(not_held)));
+}
+
 }  // namespace
 }  // namespace plumb

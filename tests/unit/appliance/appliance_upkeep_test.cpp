@@ -1,0 +1,294 @@
+// Backups, checks and removals by an appliance whose ticks take a millisecond instead of a second.
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <future>
+#include <memory>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drivers/files/file_io.hpp"
+#include "tests/unit/appliance/appliance_fixture.hpp"
+#include "tests/unit/records/scan_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+class ApplianceUpkeepTest : public testing::ApplianceTest {
+ protected:
+  ApplianceUpkeepTest() {
+    parts_.demo_patient.clear();
+    parts_.tick = milliseconds(1);
+  }
+
+  [[nodiscard]] fs::path state() const { return folder_ / "state"; }
+  /// On the loop's thread.
+  [[nodiscard]] bool Warns(const std::string& begin) const {
+    const std::vector<std::string> warnings = appliance_->WebStatus().storage.warnings;
+    return std::any_of(warnings.begin(), warnings.end(),
+                       [&](const std::string& warning) { return warning.starts_with(begin); });
+  }
+  [[nodiscard]] std::vector<web::AuditEntry> Backups() const {
+    return appliance_->store()->audit.Find({0, 100, "backup.make"});
+  }
+  /// Like Becomes(), but leaves the processor to a backup, which gives way to everything else.
+  [[nodiscard]] bool Comes(const std::function<bool()>& holds) {
+    const auto until = EventLoop::Clock::now() + std::chrono::seconds(60);
+    while (EventLoop::Clock::now() < until) {
+      bool does = false;
+      On([&] { does = holds(); });
+      if (does) return true;
+      std::this_thread::sleep_for(milliseconds(10));
+    }
+    return false;
+  }
+  /// Until the store's thread has done everything that was posted to it.
+  void WaitForStore() {
+    const auto done = std::make_shared<std::promise<void>>();
+    On([&] { EXPECT_TRUE(appliance_->store_thread().Post([done] { done->set_value(); })); });
+    done->get_future().wait();
+  }
+  /// A patient's reference and two more scans; their numbers.
+  std::vector<std::string> StoreScans(int retention_days = 0) const {
+    Store store(state());
+    const std::string patient = store.patients.Add(testing::kAnna, "P", "");
+    std::vector<std::string> scans;
+    for (int i = 0; i < 3; ++i) scans.push_back(testing::StoreScan(store, patient));
+    (void)testing::PlanAndApprove(store, store.references.Add(testing::kAnna, scans[0], "", {}));
+    web::Settings settings = store.settings.Get();
+    settings.retention_days = retention_days;
+    store.settings.Change(testing::kAnna, settings);
+    return scans;
+  }
+  /// Numbers of the stored scans, the oldest first. On the loop's thread.
+  [[nodiscard]] std::vector<std::string> Stored() const {
+    std::vector<std::string> ids;
+    for (const web::Scan& scan : appliance_->store()->scans.List("", 100)) ids.push_back(scan.id);
+    std::sort(ids.begin(), ids.end());
+    return ids;
+  }
+  void ChangeDatabase(const std::string& sql) const {
+    Database(state() / "plumb.db", Database::Access::kReadWrite).Execute(sql);
+  }
+};
+
+TEST_F(ApplianceUpkeepTest, ABackupIsMadeWhenItIsDueAndNotBefore) {
+  parts_.config.appliance.backup_folder = folder_ / "backups";
+  (void)StoreScans();
+  Play([&] {
+    ASSERT_TRUE(Comes([&] { return Backups().size() == 1; }));
+    std::this_thread::sleep_for(milliseconds(400));  // several intervals
+    On([&] {
+      ASSERT_EQ(Backups().size(), 1U) << "it is not due again";
+      EXPECT_EQ(Backups()[0].user, "plumbd");
+      EXPECT_THAT(Backups()[0].detail, ::testing::HasSubstr("3 scans"));
+    });
+    const auto make_older = [&](std::chrono::hours age) {
+      for (const auto& entry : fs::recursive_directory_iterator(folder_ / "backups")) {
+        if (entry.path().filename() == "backup.json")
+          fs::last_write_time(entry.path(), fs::file_time_type::clock::now() - age);
+      }
+    };
+    make_older(std::chrono::hours(23));
+    std::this_thread::sleep_for(milliseconds(400));
+    On([&] { EXPECT_EQ(Backups().size(), 1U) << "one a day"; });
+    make_older(std::chrono::hours(25));
+    EXPECT_TRUE(Comes([&] { return Backups().size() == 2; }));
+    make_older(std::chrono::hours(-25));
+    EXPECT_TRUE(Comes([&] { return Backups().size() == 3; })) << "a time in the future is wrong";
+    On([&] { EXPECT_FALSE(Warns("No backup is set up")); });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, AFailedBackupIsAWarningAndIsTriedAgain) {
+  parts_.config.appliance.backup_folder = folder_ / "disk" / "backups";
+  std::ofstream(folder_ / "disk") << "a file where the disk should be";
+  Play([&] {
+    ASSERT_TRUE(Comes([&] { return Warns("The last backup failed: "); }));
+    fs::remove(folder_ / "disk");
+    fs::create_directory(folder_ / "disk");
+    ASSERT_TRUE(Comes([&] { return Backups().size() == 1; }));
+    EXPECT_TRUE(Comes([&] { return !Warns("The last backup failed: "); }));
+    On([&] { EXPECT_EQ(Backups()[0].user, "plumbd"); });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, ABackupFromThePageEndsTheWarningOfAFailedOne) {
+  parts_.tick = milliseconds(5);  // the schedule tries again only after 18 s
+  parts_.config.appliance.backup_folder = folder_ / "disk" / "backups";
+  std::ofstream(folder_ / "disk") << "a file where the disk should be";
+  Play([&] {
+    ASSERT_TRUE(Comes([&] { return Warns("The last backup failed: "); }));
+    const auto press = [&] {
+      const auto made = std::make_shared<std::promise<web::Change>>();
+      On([&] {
+        services_->services().maintenance.MakeBackup(
+            kTester, [made](const web::Change& change) { made->set_value(change); });
+      });
+      return made->get_future().get();
+    };
+    EXPECT_EQ(press().result, web::ChangeResult::kFailed);
+    fs::remove(folder_ / "disk");
+    fs::create_directory(folder_ / "disk");
+    EXPECT_EQ(press().result, web::ChangeResult::kDone);
+    On([&] {
+      ASSERT_EQ(Backups().size(), 1U);
+      EXPECT_EQ(Backups()[0].user, kTester.user);
+      EXPECT_FALSE(Warns("The last backup failed: "));
+    });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, ThatNoBackupIsSetUpIsAWarning) {
+  Play([&] {
+    On([&] {
+      EXPECT_TRUE(Warns("No backup is set up"));
+      parts_.config.appliance.backup_folder = folder_ / "backups";
+      appliance_->Reload(parts_.config);
+      EXPECT_FALSE(Warns("No backup is set up"));
+    });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, TheDemoNeedsNoBackup) {
+  parts_.demo_patient = "demo";
+  Play([&] { On([&] { EXPECT_FALSE(Warns("No backup is set up")); }); });
+}
+
+TEST_F(ApplianceUpkeepTest, AFileThatChangesWhileTheApplianceRunsIsAWarning) {
+  const std::string scan = StoreScans().back();
+  const std::string warning = "Files of some stored scans (1) are missing or changed";
+  Play([&] {
+    const auto are_checked = [&] {
+      Database database(state() / "plumb.db", Database::Access::kReadOnly);
+      Statement query = database.Prepare("SELECT 1 FROM scans WHERE checked_at <= 1");
+      return !query.Step();
+    };
+    ASSERT_TRUE(Comes(are_checked));
+    On([&] { EXPECT_FALSE(Warns(warning)); });
+    std::fstream file(state() / "scans" / scan / "scene" / "cloud.ply",
+                      std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(3);
+    file.put('X');
+    file.close();
+    ChangeDatabase("UPDATE scans SET checked_at = 1");  // as if a day had passed
+    EXPECT_TRUE(Comes([&] { return Warns(warning); }));
+    On([&] {
+      const auto entries = appliance_->store()->audit.Find({0, 10, "scan.unavailable"});
+      ASSERT_EQ(entries.size(), 1U);
+      EXPECT_EQ(entries[0].subject, scan);
+    });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, ARecordingHasADigestSoonAfterItsScan) {
+  parts_.tick = milliseconds(50);  // the next search would come after half a minute
+  Play([&] {
+    MakeReady();
+    std::this_thread::sleep_for(milliseconds(2500));  // the first search has found nothing
+    std::string scan;
+    On([&] {
+      Store& store = *appliance_->store();
+      scan = testing::StoreScan(store, "", [](const fs::path& folder) {
+        testing::FillScan(folder);
+        fs::create_directory(folder / "recording");
+        WriteWholeFile(folder / "recording" / "rgb.txt", std::string_view("images"));
+      });
+      EXPECT_EQ(appliance_->StartSweep(kTester), "");
+      EXPECT_EQ(appliance_->Cancel(kTester), "");
+    });
+    const auto has_digest = [&] {
+      Database database(state() / "plumb.db", Database::Access::kReadOnly);
+      return database.Prepare("SELECT 1 FROM scan_files WHERE path = 'recording'").Step();
+    };
+    bool has = false;
+    for (int i = 0; i < 100 && !has; ++i) {
+      std::this_thread::sleep_for(milliseconds(100));
+      has = has_digest();
+    }
+    EXPECT_TRUE(has);
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, FoldersThatWereSetAsideAreAWarning) {
+  (void)StoreScans();
+  fs::copy(state() / "scans" / "000003", state() / "scans" / "000007", fs::copy_options::recursive);
+  Play([&] { EXPECT_TRUE(Comes([&] { return Warns("Some folders of scans (1) are unknown"); })); });
+}
+
+TEST_F(ApplianceUpkeepTest, AboveTheConfiguredQuotaScansAreRemovedButNotReferences) {
+  parts_.config.appliance.quota_gb = 1e-9;
+  const std::vector<std::string> scans = StoreScans();
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Stored() == std::vector{scans[0]}; }));
+    On([&] {
+      const auto entries = appliance_->store()->audit.Find({0, 10, "scan.remove"});
+      ASSERT_EQ(entries.size(), 2U);
+      EXPECT_EQ(entries[0].detail, "quota");
+      (void)testing::StoreScan(*appliance_->store(), "1");
+    });
+    EXPECT_TRUE(Comes([&] { return Stored() == std::vector{scans[0]}; })) << "and again later";
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, AChangedConfigurationIsInTheLogWithItsKeys) {
+  const auto with = [&](const std::string& text) {
+    Config config = ParseConfig(text, "plumb.toml", ConfigUse::kAppliance);
+    config.appliance.state = state();
+    return config;
+  };
+  parts_.config = with("[appliance]\nwarm_up_min = 15\n[web]\nlisten = \"127.0.0.1:1\"\n");
+  const auto entries = [&] { return appliance_->store()->audit.Find({0, 10, "config.reload"}); };
+  Play([&] {
+    const Config next = with("[appliance]\nwarm_up_min = 20\nquota_gb = 5.0\n");
+    On([&] { appliance_->Reload(next); });
+    ASSERT_TRUE(Comes([&] { return entries().size() == 1; }));
+    On([&] {
+      EXPECT_EQ(entries()[0].user, "plumbd");
+      EXPECT_EQ(entries()[0].detail,
+                R"({"appliance.quota_gb":[null,"5.0"],"appliance.warm_up_min":["15","20"],)"
+                R"("web.listen":["'127.0.0.1:1'",null,"restart"]})");
+      appliance_->Reload(next);
+    });
+    WaitForStore();
+    On([&] { EXPECT_EQ(entries().size(), 1U) << "nothing was changed"; });
+  });
+}
+
+class ApplianceRetentionTest : public ApplianceUpkeepTest {
+ protected:
+  ApplianceRetentionTest() {
+    scans_ = StoreScans(/*retention_days=*/30);
+    constexpr std::int64_t kTwoMonths_us = 60LL * 24 * 3600 * 1'000'000;
+    ChangeDatabase("UPDATE scans SET started_at = started_at - " + std::to_string(kTwoMonths_us));
+  }
+  std::vector<std::string> scans_;
+};
+
+TEST_F(ApplianceRetentionTest, OldScansAreRemovedByATrustedClock) {
+  parts_.clock_trusted_after = milliseconds(200);
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Stored() == std::vector{scans_[0]}; }));
+    On([&] {
+      EXPECT_EQ(appliance_->store()->audit.Find({0, 10, "scan.remove"})[0].detail, "retention");
+    });
+  });
+}
+
+TEST_F(ApplianceRetentionTest, AClockThatIsNotYetTrustedRemovesNothing) {
+  Play([&] {
+    WaitForStore();  // the removal at the start
+    On([&] { EXPECT_EQ(Stored(), scans_); });
+    std::this_thread::sleep_for(std::chrono::seconds(5));  // and the next one
+    WaitForStore();
+    On([&] { EXPECT_EQ(Stored(), scans_); });
+  });
+}
+
+}  // namespace
+}  // namespace plumb
