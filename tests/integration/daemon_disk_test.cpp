@@ -38,7 +38,7 @@ class DaemonDiskTest : public ::testing::Test {
   static void SetUpTestSuite() { testing::RenderOnce(); }
 
   void SetUp() override {
-    if (::geteuid() != 0) GTEST_SKIP() << "mounts need root";
+    if (::geteuid() != 0) PLUMB_SKIP("mounts need root");
     if (::unshare(CLONE_NEWNS) != 0 ||
         ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) {
       // Root without CAP_SYS_ADMIN, as in a container; anything else is a fault of the test.

@@ -16,6 +16,7 @@
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/sanitized.hpp"
+#include "tests/unit/records/scan_folder.hpp"
 
 namespace plumb {
 namespace {
@@ -385,6 +386,11 @@ TEST_F(DaemonFaultTest, DamageInAFolderWhoseNameIsNoUtf8IsToldAndNotTheEnd) {
 
 TEST_F(DaemonFaultTest, WhatItStoresIsForItsAccountAndItsGroupWhateverTheUmask) {
   const mode_t before = ::umask(0);
+  {  // of an older version
+    Store store(folder_ / "state");
+    (void)testing::StoreScan(store, store.patients.Add(testing::kAnna, "P", ""));
+    fs::permissions(folder_ / "state", fs::perms(0755));
+  }
   Plumbd plumbd(folder_.path());
   ::umask(before);
   ASSERT_TRUE(plumbd.WaitUntilUp());
