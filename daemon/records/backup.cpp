@@ -385,15 +385,20 @@ BackupReport RestoreOver(const fs::path& backup, const fs::path& state, const st
   const fs::path made = state / kRestoringOver;
   try {
     BackupReport report;
+    bool is_unpacked = false;
     try {
       fs::remove_all(made);  // left by an interrupted one
       fs::create_directory(made);
       GiveToOwnerOf(state, made);
       report = RestoreBackup(backup, made, stop, secret);
+      is_unpacked = true;
       report.replaced = MoveOldAside(state);
-    } catch (...) {  // what is stored is as it was
+    } catch (...) {
+      // What is stored is as it was. If it could not be moved back, the unpacked backup has to
+      // stay: without both, the next start would begin with an empty store
+      // (IsRestoreInterrupted()).
       std::error_code ignored;
-      fs::remove_all(made, ignored);
+      if (!is_unpacked || fs::exists(state / kDatabase, ignored)) fs::remove_all(made, ignored);
       throw;
     }
     try {
