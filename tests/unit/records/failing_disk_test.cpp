@@ -228,39 +228,42 @@ TEST_F(FailingDiskTest, WhileABackupIsMadeInOneFile) {
 TEST_F(FailingDiskTest, WhileABackupIsRestored) {
   const fs::path kept = folder_ / "kept";
   (void)BackUpStopped(prepared(), kept);
-  ForEachFault("restoring", [&](const CallFault& fault) {
-    // What no backup has: it is replaced, but never lost.
-    fs::create_directory(state() / "calibration");
-    WriteWholeFile(state() / "calibration" / "unit.json", std::string_view("of before"));
-    (void)Arm(fault);
-    bool is_restored = false;
-    try {
-      (void)RestoreOver(kept, state());
-      is_restored = true;
-    } catch (const std::exception&) {  // of the state folder, or that the backup cannot be read
-    }
-    const long failed = Disarm();
-    EXPECT_TRUE(is_restored || failed > 0);
-    const auto holds_before = [&] {
-      for (const auto& [path, content] : testing::FilesBelow(state()))
-        if (path.ends_with("calibration/unit.json") && content == "of before") return true;
-      return false;
-    };
-    EXPECT_TRUE(holds_before());
-    bool opens = true;
-    try {
-      const Store store(state());
-    } catch (const DatabaseCorrupt&) {  // safe mode, which asks to repeat the restore
-      opens = false;
-    }
-    if (!opens) {
-      EXPECT_FALSE(is_restored);
-      EXPECT_NO_THROW((void)RestoreOver(kept, state()));
-    }
-    ExpectNothingLost({"000001", "000002", "000003"});
-    EXPECT_TRUE(holds_before());
-    return failed;
-  });
+  ForEachFault(
+      "restoring",
+      [&](const CallFault& fault) {
+        // What no backup has: it is replaced, but never lost.
+        fs::create_directory(state() / "calibration");
+        WriteWholeFile(state() / "calibration" / "unit.json", std::string_view("of before"));
+        (void)Arm(fault);
+        bool is_restored = false;
+        try {
+          (void)RestoreOver(kept, state());
+          is_restored = true;
+        } catch (const std::exception&) {  // of the state folder, or that the backup cannot be read
+        }
+        const long failed = Disarm();
+        EXPECT_TRUE(is_restored || failed > 0);
+        const auto holds_before = [&] {
+          for (const auto& [path, content] : testing::FilesBelow(state()))
+            if (path.ends_with("calibration/unit.json") && content == "of before") return true;
+          return false;
+        };
+        EXPECT_TRUE(holds_before());
+        bool opens = true;
+        try {
+          const Store store(state());
+        } catch (const DatabaseCorrupt&) {  // safe mode, which asks to repeat the restore
+          opens = false;
+        }
+        if (!opens) {
+          EXPECT_FALSE(is_restored);
+          EXPECT_NO_THROW((void)RestoreOver(kept, state()));
+        }
+        ExpectNothingLost({"000001", "000002", "000003"});
+        EXPECT_TRUE(holds_before());
+        return failed;
+      },
+      2);
 }
 
 // --- databases that are not what was written
