@@ -298,9 +298,10 @@ class Plumbd {
   std::string status_line_;
 };
 
-/// Without a usable configuration no light can be shown.
 int ShowStopped(const PlumbdOptions& options, const SensorRegistry& registry) {
-  PanelConfig config = ReadConfiguration(options, registry).panel;
+  const Configured configured = ReadOrExplain(options, registry);
+  if (!configured.fault.empty()) Log(LogLevel::kError, configured.fault);
+  PanelConfig config = configured.config.panel;
   config.button_line.clear();
   EventLoop loop;
   std::vector<EventLoop::Source> signals;

@@ -53,6 +53,22 @@ bool MayNameBackupKey(const fs::path& file) try {
   return true;
 }
 
+/// @param is_listen_given  On the command line, which overrides the file.
+void KeepPanelAndPage(const Config& salvaged, bool is_listen_given, Config& config) {
+  config.panel = salvaged.panel;
+  WebConfig web = salvaged.web;
+  if (is_listen_given) web.listen = config.web.listen;
+  try {
+    CheckPageIdentity(web);
+  } catch (const std::exception&) {
+    // The certificate may be the error: the page then has its own.
+    web.tls_certificate.clear();
+    web.tls_key.clear();
+    web.plain_http = false;
+  }
+  config.web = web;
+}
+
 }  // namespace
 
 void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
@@ -142,7 +158,9 @@ Configured ReadOrExplain(const PlumbdOptions& options, const SensorRegistry& reg
     without_file.config_file.reset();
     without_file.use_default_config = false;
     const std::optional<fs::path> file = ConfigFile(options);
-    return {.config = ReadConfiguration(without_file, registry),
+    Config config = ReadConfiguration(without_file, registry);
+    if (file) KeepPanelAndPage(SalvageConfig(*file), options.listen.has_value(), config);
+    return {.config = config,
             .fault = fmt::format("the configuration cannot be used: {}. Correct the file, then "
                                  "restart: systemctl restart plumbd",
                                  error.what()),

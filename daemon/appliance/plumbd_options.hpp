@@ -43,7 +43,8 @@ struct Configured {
 };
 
 /// As ReadConfiguration(). If the file cannot be used, the program still starts: page, light and
-/// socket report the error, at the places that the defaults and the command line name.
+/// socket report the error. Page, light and button are where the file says, as far as it can be
+/// read; everything else is where the defaults and the command line say.
 [[nodiscard]] Configured ReadOrExplain(const PlumbdOptions& options,
                                        const SensorRegistry& registry);
 

@@ -370,6 +370,26 @@ Config ReadConfig(const std::filesystem::path& file, ConfigUse use) {
   return config;
 }
 
+Config SalvageConfig(const std::filesystem::path& file) {
+  Config config;
+  const auto attempt = [](const auto& read) {
+    try {
+      read();
+    } catch (const DataError&) {
+      // The caller reports what is wrong with the file.
+    }
+  };
+  attempt([&] {
+    const std::string name = file.string();
+    const toml::table root = ParseToml(ReadText(file, "configuration"), name);
+    const toml::table none;
+    attempt([&] { ReadPanel(Section(root, "button", name), {none, "light", name}, config.panel); });
+    attempt([&] { ReadPanel({none, "button", name}, Section(root, "light", name), config.panel); });
+    attempt([&] { ReadWeb(Section(root, "web", name), config.web); });
+  });
+  return config;
+}
+
 void RefuseResearchPresets(const Config& config) {
   const auto refuse = [](Preset preset, const char* section) {
     if (preset == Preset::kBest) return;

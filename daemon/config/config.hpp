@@ -143,6 +143,11 @@ enum class ConfigUse { kCommandLine, kAppliance };
 [[nodiscard]] Config ReadConfig(const std::filesystem::path& file,
                                 ConfigUse use = ConfigUse::kCommandLine);
 
+/// The [button], [light] and [web] of a file that ReadConfig() refuses, as far as each can be read,
+/// so that light and page can report the error where they are expected. Everything else has its
+/// default.
+[[nodiscard]] Config SalvageConfig(const std::filesystem::path& file);
+
 /// As ReadConfig(), for a text; `name` stands for the file in messages.
 [[nodiscard]] Config ParseConfig(const std::string& text, const std::string& name,
                                  ConfigUse use = ConfigUse::kCommandLine);

@@ -254,6 +254,26 @@ TEST_F(DaemonPanelTest, WhileTheServiceDoesNotRunTheLightSaysSo) {
   EXPECT_FALSE(fs::exists(light.state())) << "nothing stored is touched";
 }
 
+TEST_F(DaemonPanelTest, ABadKeyElsewhereInTheConfigurationIsAFaultThatTheLightShows) {
+  std::ofstream(folder_ / "plumb.toml", std::ios::app) << "quotas = 3\n";
+  {
+    Plumbd plumbd(folder_.path(), Options());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"], HasSubstr("quotas"));
+    WaitForPhases(plumbd, {"red"}, 10);
+    EXPECT_EQ(Seen(), Lamps{"red"});
+    ExpectLength({"red"}, 80);
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  ForgetLamps();
+  Plumbd light(folder_.path(), Options({"--show-stopped"}));
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (NumPhases({"red"}) < 3 && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(milliseconds(50));
+  ExpectLength({"red"}, 1000);
+  EXPECT_EQ(light.Stop(), 0);
+}
+
 TEST_F(DaemonPanelTest, TheLightShowsScanningWorkingAndResults) {
   testing::PlumbdOptions options = Options();
   options.scenes = 2;
