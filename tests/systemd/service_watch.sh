@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What happens around plumbd's lives, with programs of the test's own in place of systemctl and sleep: pauses, counting, restarts of the machine, the light.
+# What happens around plumbd's lives, with programs of the test's own in place of systemctl, systemd-run and sleep: pauses, counting, restarts of the machine, the light.
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"
 watch=$(cd "$(dirname "$0")/../../systemd" && pwd)/service-watch
@@ -7,7 +7,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
 mkdir bin
-for program in systemctl sleep; do printf '#!/bin/sh\necho "%s $*" >>%s/calls\n' $program "$work" >bin/$program; done
+for program in systemctl systemd-run sleep; do printf '#!/bin/sh\necho "%s $*" >>%s/calls\n' $program "$work" >bin/$program; done
 chmod +x bin/*
 echo "100.5 1" >uptime
 export PATH=$work/bin:$PATH PLUMB_WATCH_BOOT=$work/boot PLUMB_WATCH_KEPT=$work/kept PLUMB_UPTIME=$work/uptime
@@ -22,6 +22,7 @@ life() { # RESULT SECONDS: one life of plumbd; the output is in `log`
 life success 5
 check "an end that was asked for: the light, no pause, no restart" '^1 1 0 0$' \
   "$(called 'systemctl stop plumb-light.service') $(called 'start plumb-light.service') $(called sleep) $(called reboot)"
+check "without a restart nothing is to be forgotten" '^0$' "$(called systemd-run)"
 check "the light goes out before plumbd starts and comes after it has ended" '^systemctl stop.*start plumb-light.service $' "$(tr '\n' ' ' <calls)"
 for i in 1 2 3; do life signal 5; check "failure $i comes without a pause" '^0$' "$(called sleep)"; done
 pauses=
@@ -42,10 +43,21 @@ life exit-code 599
 check "just under ten minutes is no success" '^11$' "$(cat boot/failures)"
 life exit-code 600
 check "a life of ten minutes resets the count" '^1 none$' "$(cat boot/failures) $([ -e kept/restarts ] || echo none)"
+restarted; check "and restarts of the machine help again" '\(1 of 3\)' "$(cat log)"
 life success 1
-check "an end that was asked for too" '^0$' "$(cat boot/failures)"
+check "an end that was asked for resets both, too" '^0 none$' "$(cat boot/failures) $([ -e kept/restarts ] || echo none)"
 
-rm -rf kept && touch kept
+restarted; restarted; restarted
+check "three restarts are counted" '^3$' "$(cat kept/restarts)"
+: >calls
+"$watch" before
+check "a life after them is to be noted after ten minutes" '^systemd-run .*--on-active=600 .*service-watch well$' "$(grep systemd-run calls)"
+"$watch" well # and then the power fails
+restarted; check "a long life that a power cut ended resets the count" '\(1 of 3\)' "$(cat log)"
+life exit-code 5
+check "an end takes the note back" '^1$' "$(grep -A99 systemd-run calls | grep -c 'systemctl stop plumb-well.timer')"
+
+rm -rf boot kept && touch kept
 for _ in 1 2 3 4 5 6 7 8 9 10; do life signal 5; done
 check "no restart when it cannot be counted" '^0 .*not restarted, as that could not be counted' "$(called reboot) $(cat log)"
 echo "nonsense" >boot/failures
