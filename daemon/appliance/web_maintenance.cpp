@@ -43,8 +43,8 @@ void WebMaintenance::WriteDiagnostics(const web::Actor& actor, web::Done done) {
     const std::string text =
         DiagnosticsText(status, health, loop, audit.Find({0, 500, "", /*views=*/false}));
     std::string name =
-        (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX").string();
-    const int fd = ::mkstemp(name.data());
+        (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX.txt").string();
+    const int fd = ::mkstemps(name.data(), 4);
     if (fd < 0) throw DiskRefused(DescribeWriteError(name, errno));
     ::close(fd);
     WriteWholeFile(name, text);

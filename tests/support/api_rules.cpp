@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -413,6 +414,90 @@ TEST_F(ApiRules, AccountsAreOfOneNameAndTheLastEngineerStays) {
   EXPECT_EQ(engineer.Put("/api/v1/users/technician", {{"disabled", true}}).status, 200);
   EXPECT_EQ(technician.Get("/api/v1/status").status, 401) << "its sessions have ended";
   EXPECT_EQ(technician.LogIn("technician", kPassword), 403);
+}
+
+TEST_F(ApiRules, TheRoomsCalibrationIsSignedByWhoMayAsItWasRead) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const auto room = [&] { return technician.Get("/api/v1/room-calibration").json(); };
+  const auto sign = [](HttpClient& who, const std::string& digest,
+                       const std::string& password = kPassword) {
+    return who.Post("/api/v1/room-calibration/sign", {{"digest", digest}, {"password", password}})
+        .status;
+  };
+  EXPECT_EQ(technician.Get("/api/v1/room-calibration/board.pdf").body.substr(0, 5), "%PDF-");
+  EXPECT_EQ(room()["versions"].size(), 0U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(room()["scans"].size(), i);
+    EXPECT_EQ(sign(physicist, std::string(64, 'a')), 409) << i << " scans";
+    appliance_->ScanBoard();
+  }
+  EXPECT_EQ(room()["why_not_sign"], "");
+  EXPECT_EQ(room()["scans"][0]["num_markers"], 4);
+  const std::string digest = room()["digest"];
+  EXPECT_EQ(sign(technician, digest), 403);
+  EXPECT_EQ(sign(physicist, digest, "not this one"), 403);
+  EXPECT_EQ(sign(physicist, digest + "0"), 400) << "no digest";
+  EXPECT_EQ(sign(physicist, std::string(64, 'b')), 409) << "another one than was read";
+  EXPECT_EQ(physicist.Post("/api/v1/room-calibration/sign", {{"digest", digest}}).status, 400);
+  EXPECT_EQ(room()["versions"].size(), 0U);
+  EXPECT_EQ(sign(physicist, digest), 201);
+  EXPECT_EQ(room()["versions"][0]["signed_by"], "physicist");
+  EXPECT_EQ(room()["versions"][0]["digest"], digest);
+  EXPECT_EQ(sign(physicist, digest), 409) << "its scans are used up";
+}
+
+TEST_F(ApiRules, ASensorProfileIsResetAndRolledBackByAnEngineer) {
+  HttpClient engineer = LoggedIn("engineer"), physicist = LoggedIn("physicist");
+  const auto profile = [&] { return physicist.Get("/api/v1/sensor-profile").json(); };
+  const auto file = [&](const std::string& version) {
+    return engineer.Get("/api/v1/sensor-profile/" + version + "/file").status;
+  };
+  const auto post = [](HttpClient& who, const std::string& act, const json& body) {
+    return who.Post("/api/v1/sensor-profile/" + act, body).status;
+  };
+  const auto roll_back = [&](int version, const std::string& password = kPassword) {
+    return post(engineer, "roll-back",
+                {{"serial", "A"}, {"version", version}, {"password", password}});
+  };
+  const json reset = {{"serial", "A"}, {"password", kPassword}};
+  EXPECT_EQ(profile()["serial"], "A");
+  EXPECT_EQ(profile()["versions"].size(), 0U);
+  EXPECT_EQ(file("1"), 404);
+  appliance_->LearnProfile();
+  EXPECT_EQ(profile()["versions"][0]["num_sweeps"], 4);
+  EXPECT_EQ(file("1"), 200);
+  for (const char* none : {"2", "x", "-1", "99999999999999"}) EXPECT_EQ(file(none), 404) << none;
+  EXPECT_EQ(post(physicist, "reset", reset), 403);
+  EXPECT_EQ(post(engineer, "reset", {{"serial", "A"}}), 400);
+  EXPECT_EQ(post(engineer, "reset", {{"serial", "A"}, {"password", "not this one"}}), 403);
+  EXPECT_EQ(post(engineer, "reset", {{"serial", "B"}, {"password", kPassword}}), 409);
+  EXPECT_EQ(profile()["versions"].size(), 1U);
+  EXPECT_EQ(post(engineer, "reset", reset), 200);
+  EXPECT_EQ(profile()["versions"][0]["num_sweeps"], 0);
+  EXPECT_EQ(file("2"), 404) << "a reset holds no profile";
+  EXPECT_EQ(roll_back(1, "not this one"), 403);
+  EXPECT_EQ(roll_back(2), 404);
+  EXPECT_EQ(roll_back(0), 400);
+  EXPECT_EQ(roll_back(1), 200);
+  EXPECT_EQ(profile()["versions"][0]["version"], 3);
+  EXPECT_EQ(profile()["versions"][0]["num_sweeps"], 4);
+  EXPECT_EQ(profile()["versions"][0]["cause"], "rolled_back");
+}
+
+TEST_F(ApiRules, DiagnosticsAreSentToAnEngineerAndNameNoPatient) {
+  HttpClient engineer = LoggedIn("engineer"), physicist = LoggedIn("physicist");
+  AddPatient(physicist, "PX-4711");
+  EXPECT_EQ(physicist.Post("/api/v1/diagnostics").status, 403);
+  const HttpAnswer answer = engineer.Post("/api/v1/diagnostics");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_THAT(answer.Header("content-disposition"), HasSubstr("plumb-diagnostics.txt"));
+  EXPECT_THAT(answer.body, HasSubstr("health: "));
+  EXPECT_THAT(answer.body, ::testing::Not(HasSubstr("PX-4711")));
+  const json entries = physicist.Get("/api/v1/audit").json()["entries"];
+  EXPECT_TRUE(std::any_of(entries.begin(), entries.end(), [](const json& entry) {
+    return entry.value("user", "") == "engineer" &&
+           entry.value("action", "") == "diagnostics.write";
+  }));
 }
 
 TEST_F(ApiRules, WhatWasDoneIsInTheLogWithWhoDidIt) {

@@ -20,6 +20,10 @@ class RuledAppliance {
   virtual std::string StoreScan(const std::string& patient_id) = 0;
   /// A daily check of the connected sensor that has passed just now, taken by that person; its id.
   virtual std::string PassDailyCheck(const std::string& user) = 0;
+  /// A daily check that also saw the board of the room's calibration.
+  virtual void ScanBoard() = 0;
+  /// The connected sensor, whose serial number is "A", gets a profile from four sweeps.
+  virtual void LearnProfile() = 0;
 };
 
 [[nodiscard]] std::unique_ptr<RuledAppliance> MakeRuledAppliance();

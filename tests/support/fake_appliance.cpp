@@ -573,7 +573,7 @@ void FakeAppliance::ForgetRollBack(const Actor& actor, Done done) {
 }
 
 void FakeAppliance::WriteDiagnostics(const Actor& actor, Done done) {
-  Log(actor, "diagnostics", "", "");
+  Log(actor, "diagnostics.write", "", "");
   Finish(done, {ChangeResult::kDone, "", "", diagnostics_file});
 }
 

@@ -7,6 +7,7 @@
 
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/web_services.hpp"
+#include "daemon/records/profile_shelf.hpp"
 #include "tests/support/api_rules.hpp"
 #include "tests/support/board_checks.hpp"
 #include "tests/support/fake_sensor.hpp"
@@ -115,6 +116,12 @@ class RealRuledAppliance : public RuledAppliance {
                                                   testing::CheckOver());
     });
     return id;
+  }
+  void ScanBoard() override { (void)PassDailyCheck("technician"); }  // sees it, too
+  void LearnProfile() override {
+    SensorProfile profile = ProfileOfAnyUnit(testing::FakeBus::Info().intrinsics);
+    profile.num_sweeps = 4;
+    On([&] { (void)served_->appliance.profiles()->Add("A", profile); });
   }
 
  private:

@@ -1,9 +1,12 @@
 // The rules on the fake appliance.
 #include <fmt/format.h>
 
+#include <fstream>
+
 #include "tests/support/api_rules.hpp"
 #include "tests/support/fake_appliance.hpp"
 #include "tests/support/http_client.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace plumb::test {
 namespace {
@@ -15,6 +18,10 @@ class FakeRuledAppliance : public RuledAppliance {
     web::HttpServerOptions options;
     options.password_memory_bytes = 1 << 20;
     options.password_operations = 1;
+    service_.status.sensor.present = true;
+    service_.profiles.serial = "A";
+    service_.diagnostics_file = folder_ / "diagnostics.txt";
+    std::ofstream(service_.diagnostics_file) << "health: ok";
     server_ = std::make_unique<web::HttpServer>(service_.services(), options);
     loop_ = std::make_unique<ServingLoop>(*server_);
   }
@@ -45,8 +52,22 @@ class FakeRuledAppliance : public RuledAppliance {
     });
     return check.id;
   }
+  void ScanBoard() override {
+    loop_->Do([&] { service_.SeeBoard({}); });
+  }
+  void LearnProfile() override {
+    loop_->Do([&] {
+      auto& versions = service_.profiles.versions;
+      web::SensorProfileVersion learned;
+      learned.version = static_cast<int>(versions.size()) + 1;
+      learned.cause = "learned";
+      learned.num_sweeps = 4;
+      versions.insert(versions.begin(), learned);
+    });
+  }
 
  private:
+  plumb::testing::TempFolder folder_;
   FakeAppliance service_;
   std::unique_ptr<web::HttpServer> server_;
   std::unique_ptr<ServingLoop> loop_;  // ends first

@@ -480,7 +480,8 @@ class TlsTest : public ServerTest {
   [[nodiscard]] bool CanSpeak(const std::string& version, const std::string& ciphers) const {
     const std::string script =
         "cd " + folder_.path().string() +
-        " && openssl req -x509 -newkey rsa:2048 -nodes -keyout key -out cert -subj /CN=x"
+        " && rm -f server && openssl req -x509 -newkey rsa:2048 -nodes -keyout key -out cert -subj "
+        "/CN=x"
         " && { timeout 60 openssl s_server -accept 127.0.0.1:0 -cert cert -key key -www " +
         version + ciphers +
         " > server & } && for i in $(seq 300); do grep -q ^ACCEPT server && break; sleep 0.1; done"
