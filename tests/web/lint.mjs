@@ -1,6 +1,7 @@
-// The page's and its tests' JavaScript by ESLint: lint.mjs NODE_MODULES SOURCE_FOLDER
+// The page's and its tests' JavaScript by ESLint, its style sheets by stylelint: lint.mjs NODE_MODULES SOURCE_FOLDER
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
 
 const [modules, source] = process.argv.slice(2);
 const load = createRequire(join(modules, 'index.js'));
@@ -69,6 +70,46 @@ const results = await eslint.lintFiles(
 const { format } = await eslint.loadFormatter('stylish');
 const text = await format(results);
 console.log(text || `all well: ${results.length} files`);
+
+const flags = (names) => Object.fromEntries(names.map((name) => [name, true]));
+const { default: stylelint } = await import(
+  pathToFileURL(join(modules, 'stylelint/lib/index.mjs')));
+const styles = await stylelint.lint({
+  files: join(source, 'web/assets/**/*.css'),
+  formatter: 'string',
+  config: {
+    reportInvalidScopeDisables: true, reportNeedlessDisables: true,
+    rules: {
+      ...flags([
+        'annotation-no-unknown', 'at-rule-no-unknown', 'block-no-empty', 'color-no-invalid-hex',
+        'comment-no-empty', 'custom-property-no-missing-var-function',
+        'declaration-block-no-duplicate-custom-properties',
+        'declaration-block-no-shorthand-property-overrides', 'font-family-no-duplicate-names',
+        'font-family-no-missing-generic-family-keyword', 'function-calc-no-unspaced-operator',
+        'function-linear-gradient-no-nonstandard-direction', 'function-no-unknown',
+        'keyframe-block-no-duplicate-selectors', 'keyframe-declaration-no-important',
+        'length-zero-no-unit', 'media-feature-name-no-unknown',
+        'media-feature-name-value-no-unknown', 'media-query-no-invalid',
+        'named-grid-areas-no-invalid', 'no-duplicate-at-import-rules', 'no-duplicate-selectors',
+        'no-empty-source', 'no-invalid-double-slash-comments', 'no-unknown-animations',
+        'no-unknown-custom-properties', 'property-no-unknown', 'selector-anb-no-unmatchable',
+        'selector-pseudo-class-no-unknown', 'selector-pseudo-element-no-unknown',
+        'selector-type-no-unknown', 'shorthand-property-no-redundant-values',
+        'string-no-newline', 'unit-no-unknown',
+      ]),
+      'color-named': 'never',
+      // An older value before a newer one is for browsers that do not know the latter.
+      'declaration-block-no-duplicate-properties':
+        [true, { ignore: ['consecutive-duplicates-with-different-values'] }],
+      // System colours of forced-colors mode are unknown to it.
+      'declaration-property-value-no-unknown':
+        [true, { ignoreProperties: { '/^(border|fill|stroke)$/': /CanvasText/ } }],
+    },
+  },
+});
+console.log(styles.report || `all well: ${styles.results.length} style sheets`);
+
 // A glob that finds nothing is no success.
-process.exit(results.length > 30 && results.every((one) => one.errorCount + one.warningCount === 0)
-  ? 0 : 1);
+const isWell = results.length > 30 && results.every((one) => one.errorCount + one.warningCount === 0)
+  && styles.results.length > 0 && !styles.errored;
+process.exit(isWell ? 0 : 1);

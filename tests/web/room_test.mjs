@@ -540,6 +540,13 @@ await h.step('Spanish and light: complete, and kept for the account and for the 
   await room.goto(`${h.url}room`);
   await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
   equal(await theme(), 'light', 'and as it stays');
+  await room.emulateMedia({ colorScheme: 'light' });
+  await room.goto(`${h.url}room?theme=auto`);
+  await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
+  equal(await theme(), 'light', 'as the system is');
+  await room.emulateMedia({ colorScheme: 'dark' });
+  await room.locator('html[data-theme=dark]').waitFor();
+  await room.emulateMedia({ colorScheme: null });
   await room.goto(`${h.url}room?theme=dark`);
   await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
   // What the appliance says of its backups, too.

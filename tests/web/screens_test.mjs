@@ -110,12 +110,11 @@ async function lookAt(page, one, language) {
   }
 }
 
-/// Dark by what the person chose, light as the system is: both ways that there are. What is made for
-/// paper has one theme only and is looked at in print in place of the other.
+/// What is made for paper has one theme only and is looked at in print in place of the other.
 async function setTheme(page, theme, printed) {
   await page.emulateMedia({ colorScheme: theme, media: printed && theme === 'light' ? 'print' : null });
   if (printed) return;
-  await page.evaluate((name) => { document.documentElement.dataset.theme = name; }, theme === 'light' ? 'auto' : theme);
+  await page.evaluate((name) => { document.documentElement.dataset.theme = name; }, theme);
 }
 
 let who = {};

@@ -24,27 +24,37 @@ export function adoptPreferences({ user, preferences: chosen }) {
   chooseTheme(user, chosen?.theme);
 }
 
+const isSystemLight = matchMedia('(prefers-color-scheme: light)');
+let theme = 'dark';
+
 /// The room is dark: dark is the default; "auto" follows the system.
-export function applyTheme(who) { document.documentElement.dataset.theme = themeOf(who); }
+function showTheme(chosen) {
+  theme = chosen;
+  const isLight = theme === 'light' || (theme === 'auto' && isSystemLight.matches);
+  document.documentElement.dataset.theme = isLight ? 'light' : 'dark';
+}
+isSystemLight.addEventListener('change', () => showTheme(theme));
+
+export function applyTheme(who) { showTheme(themeOf(who)); }
 
 /// Two choices; `changed` is called after each.
 export function preferences(who, changed) {
   const names = Object.fromEntries(Object.entries(kLanguages)
     .map(([name, texts]) => [name, texts.languageName]));
   const language = select(names, languageOf(who));
-  const theme = select(S.themes, themeOf(who));
+  const themes = select(S.themes, themeOf(who));
   // Without a connection the choice holds until the account is asked again.
-  const save = () => put('session/preferences', { language: language.value, theme: theme.value })
+  const save = () => put('session/preferences', { language: language.value, theme: themes.value })
     .catch(() => {});
   language.addEventListener('change', () => {
     chooseLanguage(who, language.value);
     save();
     changed();
   });
-  theme.addEventListener('change', () => {
-    keepTheme(who, theme.value);
-    document.documentElement.dataset.theme = theme.value;
+  themes.addEventListener('change', () => {
+    keepTheme(who, themes.value);
+    showTheme(themes.value);
     save();
   });
-  return [field(S.language, language), field(S.theme, theme)];
+  return [field(S.language, language), field(S.theme, themes)];
 }
