@@ -82,7 +82,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
 }
 
 Appliance::~Appliance() {
-  care_.request_stop();
+  maintenance_stop_.request_stop();
   session_.reset();
   sensors_.reset();
 }
@@ -392,7 +392,7 @@ void Appliance::Reload(const Config& config) {
 }
 
 void Appliance::Stop(std::function<void()> stopped) {
-  care_.request_stop();
+  maintenance_stop_.request_stop();
   if (!IsRunning()) {
     stopped();
     stopped_ = [] {};

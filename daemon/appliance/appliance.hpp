@@ -169,10 +169,10 @@ class Appliance {
 
   /// Sends each event as one JSON object ({"event", "time", ...}) to the control socket's watchers.
   void SetEventListener(std::function<void(const std::string& line)> listener) {
-    tell_watchers_ = std::move(listener);
+    notify_watchers_ = std::move(listener);
   }
   void SetWebListener(std::function<void(web::EventKind)> listener) {
-    tell_web_ = std::move(listener);
+    notify_page_ = std::move(listener);
   }
 
   /// The status of the page.
@@ -248,7 +248,7 @@ class Appliance {
   void RetryStorage();
   void ProbeStore();
   void ReopenStore();
-  void EndRetry(const std::string& fault, StorageFault kind = StorageFault::kMayEnd);
+  void EndRetry(const std::string& what, StorageFault kind = StorageFault::kMayEnd);
   void LeaveSafeMode();
   void WatchSpace();
   void CountUnusable();
@@ -356,7 +356,7 @@ class Appliance {
   int ticks_to_backup_ = kBackupTicks;
   int ticks_to_record_check_ = 0;
   ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};
-  std::stop_source care_;  ///< Stopped when the appliance is destroyed.
+  std::stop_source maintenance_stop_;  ///< Stopped when the appliance is destroyed.
   ScanState state_;
   std::string sensor_fault_, scan_fault_, rolled_back_;
   std::string session_id_, open_patient_, reference_reason_;
@@ -372,8 +372,8 @@ class Appliance {
   std::string last_serial_;  ///< Serial of the last used sensor.
   PageNotes page_;
   IndicatorPattern shown_ = IndicatorPattern::kOff;
-  std::function<void(const std::string&)> tell_watchers_;
-  std::function<void(web::EventKind)> tell_web_;
+  std::function<void(const std::string&)> notify_watchers_;
+  std::function<void(web::EventKind)> notify_page_;
   std::function<void()> stopped_;
   EventLoop::Source result_timer_, limit_timer_, session_timer_, tick_timer_, storage_timer_,
       button_source_, button_timer_;

@@ -41,22 +41,23 @@ void Appliance::RunMaintenance() {
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
   const bool has_clock = clock_.held() >= parts_.clock_trusted_after;
   const std::optional<double> quota_gb = parts_.config.appliance.quota_gb;
-  const bool posted = store_thread_.Post([this, quota_gb, has_clock, stop = care_.get_token()] {
-    try {
-      if (const std::string why = store_->WhyOtherScans(); !why.empty()) throw DiskRefused(why);
-      const int old =
-          has_clock ? store_->removal.RemoveOldScans(store_->settings.Get().retention_days, stop)
-                    : 0;
-      const int over = quota_gb ? store_->removal.KeepWithinQuota(
-                                      static_cast<std::uint64_t>(*quota_gb * 1e9), stop)
-                                : KeepWithinRoom(stop);
-      if (old + over > 0)
-        Log(LogLevel::kNotice,
-            fmt::format("removed {} scans for their age, {} for the quota", old, over));
-    } catch (const std::exception& error) {
-      Log(LogLevel::kError, fmt::format("cannot remove old scans: {}", error.what()));
-    }
-  });
+  const bool posted =
+      store_thread_.Post([this, quota_gb, has_clock, stop = maintenance_stop_.get_token()] {
+        try {
+          if (const std::string why = store_->WhyOtherScans(); !why.empty()) throw DiskRefused(why);
+          const int old = has_clock ? store_->removal.RemoveOldScans(
+                                          store_->settings.Get().retention_days, stop)
+                                    : 0;
+          const int over = quota_gb ? store_->removal.KeepWithinQuota(
+                                          static_cast<std::uint64_t>(*quota_gb * 1e9), stop)
+                                    : KeepWithinRoom(stop);
+          if (old + over > 0)
+            Log(LogLevel::kNotice,
+                fmt::format("removed {} scans for their age, {} for the quota", old, over));
+        } catch (const std::exception& error) {
+          Log(LogLevel::kError, fmt::format("cannot remove old scans: {}", error.what()));
+        }
+      });
   if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
 }
 
@@ -124,7 +125,7 @@ void Appliance::CheckRecords() {
 void Appliance::CheckStoredFiles() {
   ticks_to_file_check_ = kNoFileCheckTicks;  // until this check has ended
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
-  (void)check_thread_.Post([this, stop = care_.get_token()] {
+  (void)check_thread_.Post([this, stop = maintenance_stop_.get_token()] {
     std::optional<CheckedScan> checked;
     try {
       if (const std::string why = store_->WhyOtherScans(); !why.empty()) throw DiskRefused(why);
@@ -186,7 +187,7 @@ void Appliance::BackUp(
   const std::filesystem::path key =
       key_file.empty() ? parts_.config.appliance.backup_key_file : key_file;
   const bool posted =
-      check_thread_.Post([this, actor, folder, done, key, stop = care_.get_token()] {
+      check_thread_.Post([this, actor, folder, done, key, stop = maintenance_stop_.get_token()] {
         GiveWayToScans();
         BackupReport report;
         std::string error;

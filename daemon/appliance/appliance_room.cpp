@@ -80,12 +80,12 @@ std::optional<RoomWays> Appliance::RoomIn(const MarkerMap& scene) const {
 void Appliance::ReportRoom(web::Status& status) const {
   if (!room_.due.empty())
     status.warnings.push_back(fmt::format(
-        "The room has to be calibrated again, until then directions are the patient's: {}",
+        "The room must be calibrated again; until then, directions refer to the patient: {}",
         room_.due));
   if ((room_.calibration || !room_.due.empty()) && room_.configured)
     status.warnings.push_back(
-        "The signed calibration of the room holds: T_iec_reference of the configuration is not "
-        "used");
+        "The signed room calibration is in effect; T_iec_reference of the configuration is "
+        "ignored");
   const std::optional<Pose> T_iec_reference = RoomPose();
   const Eigen::Matrix3d R_iec_reference = T_iec_reference.value_or(Pose::Identity()).linear();
   status.room = {.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)},

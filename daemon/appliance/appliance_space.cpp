@@ -50,7 +50,8 @@ Appliance::Answer Appliance::WhyFull() const {
   const std::uint64_t needed = NeededBytes();
   if (space->available >= needed) return {};
   return fmt::format(
-      "the disk is full: {} MB are free, a scan may need {}; remove scans that are not wanted",
+      "the disk is full: {} MB are free, a scan may need {}; remove scans that are no longer "
+      "needed",
       space->available / 1'000'000, needed / 1'000'000);
 }
 

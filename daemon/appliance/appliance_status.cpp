@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <functional>
 #include <iterator>
 #include <utility>
 
@@ -12,6 +13,8 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/files/result_folder.hpp"
+#include "daemon/loop/explain.hpp"
+#include "daemon/loop/log.hpp"
 #include "daemon/loop/loop_report.hpp"
 #include "daemon/records/store_json.hpp"
 
@@ -20,6 +23,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
+
+/// The loop ends with an exception that leaves its callbacks; a listener that fails must not do
+/// that.
+void Guarded(const char* whom, const std::function<void()>& notify) try {
+  notify();
+} catch (const std::exception& error) {
+  Log(LogLevel::kError, fmt::format("{} could not be notified: {}", whom, Explain(error)));
+}
 
 /// The fields of a scan in the status and in its events.
 Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
@@ -168,10 +179,12 @@ void Appliance::SetRolledBack(const std::string& text) {
 }
 
 void Appliance::PublishEvent(const char* event, const Json& fields) {
-  if (!tell_watchers_) return;
-  Json line = {{"event", event}, {"time", WallSeconds()}};
-  line.update(fields);
-  tell_watchers_(line.dump(-1, ' ', false, Json::error_handler_t::replace));
+  if (!notify_watchers_) return;
+  Guarded("the control socket's watchers", [&] {
+    Json line = {{"event", event}, {"time", WallSeconds()}};
+    line.update(fields);
+    notify_watchers_(line.dump(-1, ' ', false, Json::error_handler_t::replace));
+  });
 }
 
 void Appliance::PublishState() {
@@ -184,7 +197,7 @@ void Appliance::PublishState() {
 
 void Appliance::NotifyWeb(web::EventKind kind) {
   if (kind == web::EventKind::kData) is_unusable_due_ = true;
-  if (tell_web_) tell_web_(kind);
+  if (notify_page_) Guarded("the page", [&] { notify_page_(kind); });
 }
 
 std::string Appliance::FaultReason() const {

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/utf8.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/provisioning.hpp"
 #include "daemon/loop/log.hpp"
@@ -89,7 +90,7 @@ void Appliance::OpenStore() {
 }
 
 void Appliance::EnterSafeMode(const std::string& what, StorageFault kind) {
-  storage_fault_ = what;
+  storage_fault_ = ValidUtf8(what);  // it may quote a path
   storage_fault_kind_ = kind;
   space_fault_.clear();
   Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
@@ -175,8 +176,9 @@ void Appliance::ReopenStore() {
   if (!posted) EndRetry(storage_fault_);
 }
 
-/// @param fault  The present one; empty: there is none any more.
-void Appliance::EndRetry(const std::string& fault, StorageFault kind) {
+/// @param what  The present fault; empty: there is none any more.
+void Appliance::EndRetry(const std::string& what, StorageFault kind) {
+  const std::string fault = ValidUtf8(what);
   if (storage_fault_kind_ == StorageFault::kDamage) return;  // damage was found in the meantime
   if (fault.empty()) return LeaveSafeMode();
   storage_fault_kind_ = kind;

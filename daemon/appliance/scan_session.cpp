@@ -128,10 +128,10 @@ void ScanSession::Scan(const std::stop_token& stop) {
   if (job_.unit_profile) outcome_.drift = job_.unit_profile->Drift();
   if (job_.check) {
     Check(scene);
-    outcome_.why_not_learned = WhyItTeachesNothing(scene, outcome_.verdict, job_.compare.limits);
+    outcome_.why_not_learned = WhyNotLearned(scene, outcome_.verdict, job_.compare.limits);
   } else {
     Evaluate(scene, stop);
-    outcome_.why_not_learned = WhyItTeachesNothing(scene, outcome_.verdict, job_.compare.limits);
+    outcome_.why_not_learned = WhyNotLearned(scene, outcome_.verdict, job_.compare.limits);
     ThrowIfStopped(stop);  // from here on it is stored
   }
   if (const std::optional<double> last_s = feed_->last_frame_s())

@@ -56,8 +56,8 @@ std::string UnitProfile::Drift() const {
   const std::optional<ProfileAgreement> compared = Compared();
   if (!compared || compared->agrees()) return {};
   return fmt::format(
-      "the sensor {} no longer measures as its profile says (chi-square {:.0f}, at most {:.0f} for "
-      "{} terms): let it warm up and repeat the check; if this comes again, reset the unit's "
+      "the sensor {} no longer agrees with its profile (chi-square {:.0f}, at most {:.0f} for "
+      "{} terms): let it warm up and repeat the check; if this recurs, reset the unit's "
       "profile on the settings page",
       serial_, compared->chi_square, compared->limit, compared->num_terms);
 }
@@ -86,8 +86,8 @@ void UnitProfile::LearnFromScan() {
   }
 }
 
-std::string WhyItTeachesNothing(const Scene& scene, const std::optional<Verdict>& verdict,
-                                const AcceptanceLimits& limits) {
+std::string WhyNotLearned(const Scene& scene, const std::optional<Verdict>& verdict,
+                          const AcceptanceLimits& limits) {
   if (verdict == Verdict::kNoAnswer) return "it gave no answer";
   if (static_cast<int>(scene.markers.size()) < limits.min_shared_markers)
     return fmt::format("{} markers were seen, at least {} are needed", scene.markers.size(),

@@ -45,8 +45,7 @@ class UnitProfile {
 /// Why the profile does not learn from a completed scan; empty if it may. Uses the gates of the
 /// comparison that need only one scene.
 /// @param verdict  Of its comparison or check, if there was one.
-[[nodiscard]] std::string WhyItTeachesNothing(const Scene& scene,
-                                              const std::optional<Verdict>& verdict,
-                                              const AcceptanceLimits& limits);
+[[nodiscard]] std::string WhyNotLearned(const Scene& scene, const std::optional<Verdict>& verdict,
+                                        const AcceptanceLimits& limits);
 
 }  // namespace plumb

@@ -56,13 +56,14 @@ std::string Confirm(int num_lost, const fs::path& state, const RecoveryWait& wai
     lock.Take(state);
     ConfirmLostScans(state, num_lost);
   });
-  return fmt::format("{} missing scans are confirmed as lost: the next start uses that", num_lost);
+  return fmt::format("{} missing scans are confirmed as lost; this takes effect at the next start",
+                     num_lost);
 }
 
 std::string Restore(const UnitRecovery& given, const fs::path& state,
                     const fs::path& configured_key, const RecoveryWait& wait) {
   std::optional<BackupSecret> secret;
-  if (!configured_key.empty()) {  // a stick with a key of its own would be a way around it
+  if (!configured_key.empty()) {  // a key on the stick would bypass the unit's own
     if (!given.key_file.empty())
       throw DataError(fmt::format("the unit has a key for backups, {}: leave recovery.key_file out",
                                   configured_key.string()));
@@ -74,9 +75,9 @@ std::string Restore(const UnitRecovery& given, const fs::path& state,
   const BackupReport report = WhenFree(
       wait, [&] { return RestoreOver(given.backup, state, {}, secret ? &*secret : nullptr); });
   return fmt::format(
-      "restored from {}: {} scans, {} files; what was stored before is in {}",
-      given.backup.string(), report.scans, report.files,
-      report.replaced.empty() ? "no folder, there was nothing" : report.replaced.string());
+      "restored from {}: {} scans, {} files; {}", given.backup.string(), report.scans, report.files,
+      report.replaced.empty() ? "there was no previous data"
+                              : "the previous data is in " + report.replaced.string());
 }
 
 }  // namespace
@@ -117,8 +118,7 @@ std::string RecoverUnit(const UnitRecovery& given, const fs::path& state,
                             : Restore(given, state, configured_key, wait);
   } catch (const DatabaseBusy&) {
     throw DataError(
-        fmt::format("a plumbd works with {}: there is nothing to recover, and nothing was changed",
-                    state.string()));
+        fmt::format("plumbd is using {}; nothing was recovered or changed", state.string()));
   }
 }
 

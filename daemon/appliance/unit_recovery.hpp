@@ -28,8 +28,8 @@ struct RecoveryWait {
 };
 
 /// Carries it out for a state folder that no plumbd works with: in safe mode, none does. Nothing
-/// that was stored is deleted or overwritten; the next start notes it in the audit log. Root takes
-/// the rights of the folder's owner, for good, once the key is read.
+/// that was stored is deleted or overwritten; the next start notes it in the audit log. As root,
+/// permanently drops to the rights of the folder's owner, once the key is read.
 /// @param configured_key  Key file of the configuration; empty: none. If there is one, only backups
 ///                        that were encrypted with it are restored.
 /// @returns what was done, as a sentence.

@@ -220,7 +220,7 @@ void Updates::GoDown(const web::Actor& actor, web::Done done) {
 
 void Updates::OnStillRunning() {
   std::string text =
-      "the system accepted the restart and did not carry it out: switch the unit off and on";
+      "the system accepted the restart but did not carry it out: switch the unit off and on";
   try {
     CancelFactoryReset(options_.state);
   } catch (const std::exception& error) {
@@ -233,7 +233,7 @@ void Updates::OnStillRunning() {
 
 void Updates::ForgetRollBack(const web::Actor& actor, web::Done done) {
   if (updater_.status().rolled_back.empty())
-    return done(Conflict("the machine has not gone back to another system"));
+    return done(Conflict("the machine has not been rolled back"));
   updater_.ForgetRollBack();
   appliance_.SetRolledBack({});
   options_.log(actor, "update.seen", "", "");

@@ -153,7 +153,7 @@ class Rounds {
            "replace the disk, or free space on it");
     if (hottest_c_)
       report.Good("temperature", fmt::format("{:.0f} degrees Celsius at most", *hottest_c_));
-    TellSensor(report);
+    ReportSensor(report);
   }
 
  private:
@@ -188,7 +188,7 @@ class Rounds {
     }
   }
 
-  void TellSensor(DoctorReport& report) const {
+  void ReportSensor(DoctorReport& report) const {
     if (!sensor_before_ || !sensor_before_->present)
       return report.Note("sensor", "not part of this burn-in",
                          "start plumbd with its sensor to have it watched");

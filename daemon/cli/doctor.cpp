@@ -196,7 +196,10 @@ Command AddDoctor(CLI::App& app) {
               .control = context.control},
              context.stop, report);
     }
-    PrintOut(options->json ? report.Json().dump(2) + "\n" : report.Text());
+    PrintOut(options->json ? report.Json().dump(2, ' ', false,
+                                                nlohmann::ordered_json::error_handler_t::replace) +
+                                 "\n"
+                           : report.Text());
     return report.exit_code();
   };
 }

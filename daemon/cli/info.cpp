@@ -113,7 +113,8 @@ int Run(const Options& options) {
                     "(scene.json) nor a result (result.json){}",
                     options.path.string(), fs::exists(options.path) ? "" : "; it does not exist"));
   }
-  PrintOut(options.json ? facts.dump(2) + "\n" : Lines(facts));
+  PrintOut(options.json ? facts.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"
+                        : Lines(facts));
   return kDone;
 }
 

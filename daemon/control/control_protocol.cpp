@@ -18,6 +18,11 @@ namespace {
 using Json = nlohmann::json;
 using Kind = ControlRequest::Kind;
 
+/// An argument of the command line or a quoted path may not be UTF-8.
+std::string Dump(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 constexpr std::array<std::string_view, 8> kActions = {"plug",  "unplug",     "stall",  "resume",
                                                       "error", "next-scene", "glitch", "speed"};
 constexpr std::size_t kMaxArgument = 80;
@@ -112,28 +117,28 @@ ControlRequest ParseControlRequest(std::string_view line) {
 std::string ControlRequestText(const ControlRequest& request) {
   switch (request.kind) {
     case Kind::kStatus:
-      return Json{{"command", "status"}}.dump();
+      return Dump({{"command", "status"}});
     case Kind::kWatch:
-      return Json{{"command", "watch"}}.dump();
+      return Dump({{"command", "watch"}});
     case Kind::kPress:
-      return Json{{"command", "press"}, {"long", request.is_long}}.dump();
+      return Dump({{"command", "press"}, {"long", request.is_long}});
     case Kind::kBackup: {
       Json backup{{"command", "backup"}, {"folder", request.folder}};
       if (!request.key_file.empty()) backup["key_file"] = request.key_file;
-      return backup.dump();
+      return Dump(backup);
     }
     case Kind::kUpdate:
-      return Json{{"command", "update"}, {"name", request.name}}.dump();
+      return Dump({{"command", "update"}, {"name", request.name}});
     case Kind::kUpdateStatus:
-      return Json{{"command", "update-status"}}.dump();
+      return Dump({{"command", "update-status"}});
     case Kind::kRestart:
-      return Json{{"command", "restart"}}.dump();
+      return Dump({{"command", "restart"}});
     case Kind::kSim:
       break;
   }
   Json sim = {{"command", "sim"}, {"action", request.action}};
   if (!request.argument.empty()) sim["argument"] = request.argument;
-  return sim.dump();
+  return Dump(sim);
 }
 
 std::string ControlDone() { return R"({"ok":true})"; }
@@ -141,7 +146,7 @@ std::string ControlDone() { return R"({"ok":true})"; }
 std::string ControlRefusal(std::string_view error, bool is_input) {
   Json refusal = {{"ok", false}, {"error", error}};
   if (is_input) refusal["input"] = true;
-  return refusal.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return Dump(refusal);
 }
 
 }  // namespace plumb

@@ -1,5 +1,5 @@
-// Folders that leave the appliance: files, SHA256SUMS of each in the format of `sha256sum -c`, and
-// a JSON file about the whole. Encrypted if a key is given; the sums are then those of the
+// Exported folders: the files, their checksums (SHA256SUMS, in the format of `sha256sum -c`), and a
+// JSON description. Encrypted if a key is given; the sums are then those of the
 // encrypted files, and signed with the key. A folder whose name ends in ".tar" is one file, an
 // archive of the same.
 #pragma once

@@ -51,6 +51,12 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
   }
 }
 
+TEST(UsageTest, AReportThatQuotesAPathInAnyEncodingIsJson) {
+  const RunResult result = Plumb({"doctor", "--json", "--config", "/nonexistent/\xff.toml"});
+  EXPECT_THAT(result.out, HasSubstr("/nonexistent/\xEF\xBF\xBD.toml"));
+  EXPECT_EQ(result.out.back(), '\n');
+}
+
 TEST(UsageTest, AClosedOrFullStandardOutputIsAnError) {
   const RunResult result =
       Plumb({"info", SmallRecording(SmallNames()[0])}, {.stdout_path = "/dev/full"});

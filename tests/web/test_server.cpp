@@ -347,7 +347,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.status.fault_kind = is_full ? web::FaultKind::kStorage : web::FaultKind::kNone;
     service.status.fault = is_full
                                ? "the disk is full: 90 MB are free, a scan may need 700; remove "
-                                 "scans that are not wanted"
+                                 "scans that are no longer needed"
                                : "";
     service.Notify(web::EventKind::kStatus);
   }

@@ -463,7 +463,7 @@ await h.step('a full disk is a fault that says what to do; the approved referenc
   h.tell('full');
   await anna.goto(`${h.url}#/scan`);
   await anna.locator('.headline', { hasText: 'Fault' }).waitFor();
-  equal(await anna.locator('.guidance').innerText(), 'The disk is full: 90 MB are free, a scan may need 700; remove scans that are not wanted. '
+  equal(await anna.locator('.guidance').innerText(), 'The disk is full: 90 MB are free, a scan may need 700; remove scans that are no longer needed. '
     + 'Nothing can be scanned until this is fixed.', 'what is wrong and what to do');
   equal(await anna.locator('.giant').getAttribute('aria-disabled'), 'true', 'nothing to start');
   const { body: { session } } = await h.api(anna, 'status');

@@ -288,7 +288,7 @@ export const live = {
     else if (message.kind === 'logged_off') {
       this.close();
       endSession();
-    } else this.tell(message.kind);
+    } else this.notify(message.kind);
   },
   /// What another tab says.
   hear(message) {
@@ -317,17 +317,17 @@ export const live = {
   take(status) {
     this.status = status;
     this.received = now();
-    this.tell('status');
+    this.notify('status');
   },
-  tell(kind) {
+  notify(kind) {
     for (const listener of [...this.listeners]) listener(kind);
   },
   connection(connected) {
     if (connected === this.connected) return;
     this.connected = connected;
     if (this.leads) this.sayPulse();
-    this.tell('connection');
-    if (connected) this.tell('data');  // messages sent while disconnected are not repeated
+    this.notify('connection');
+    if (connected) this.notify('data');  // messages sent while disconnected are not repeated
   },
   /// Calls listener(kind) until the returned function is called.
   listen(listener) {
@@ -344,7 +344,7 @@ document.addEventListener('visibilitychange', () => {
   else {
     live.refresh();
     live.watch();
-    live.tell('data');
+    live.notify('data');
   }
 });
 window.addEventListener('pagehide', () => live.stopLeading());

@@ -282,7 +282,7 @@ let lastPurpose = null;
 /// patient there asks whether to close this session.
 const kActOnSession = ['scan', 'result'];
 const watchSession = () =>
-  followSession(kActOnSession.includes(route().name), () => live.tell('acknowledged'));
+  followSession(kActOnSession.includes(route().name), () => live.notify('acknowledged'));
 
 function listen() {
   live.listen((kind) => {

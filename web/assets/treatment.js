@@ -49,7 +49,7 @@ async function asOwn(change, isOurs) {
     if (isDone && !isKnown) forget();
     if (isDone && isKnown && isOurs(live.status.session)) remember(live.status.session);
     // Otherwise somebody else changed the session first, or again.
-    if (isKnown) live.tell('status');
+    if (isKnown) live.notify('status');
   }
 }
 

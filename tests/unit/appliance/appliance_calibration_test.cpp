@@ -166,8 +166,7 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
     EXPECT_EQ(Sign(), web::ChangeResult::kDone);
     ASSERT_TRUE(Gantry());
     EXPECT_LT((*Gantry() - calibrated).norm(), 1e-6);
-    EXPECT_THAT(warnings_,
-                ::testing::HasSubstr("T_iec_reference of the configuration is not used"));
+    EXPECT_THAT(warnings_, ::testing::HasSubstr("T_iec_reference of the configuration is ignored"));
 
     MarkerMap moved = testing::MarkersOfRoom();
     for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;

@@ -97,6 +97,34 @@ ApplianceParts PartsOf(const Config& config, testing::FakeBus& bus) {
           .demo_patient = {}};
 }
 
+TEST(ApplianceStorage, AFaultThatQuotesAPathInAnyEncodingIsUtf8) {
+  Surroundings around;
+  ApplianceParts parts = PartsOf(around.config, around.bus);
+  parts.configuration_fault = "cannot read /media/\xff.toml";
+  Appliance appliance(around.loop, parts);
+  EXPECT_EQ(appliance.storage_fault(), "cannot read /media/\xEF\xBF\xBD.toml");
+}
+
+TEST(ApplianceStorage, AListenerThatFailsIsReportedAndDoesNotEndTheLoop) {
+  Surroundings around;
+  Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+  int lines = 0, notices = 0;
+  appliance.SetEventListener([&](const std::string&) {
+    ++lines;
+    throw std::runtime_error("the socket is gone");
+  });
+  appliance.SetWebListener([&](web::EventKind) {
+    ++notices;
+    throw std::bad_alloc();
+  });
+  around.loop.Post("test", [&] {
+    appliance.SetRolledBack("the update was rolled back");
+    (void)appliance.Press(ButtonPress::kShort,
+                          {.user = "tester", .address = ""});  // ignored without a sensor
+  });
+  EXPECT_TRUE(RunUntil(around.loop, [&] { return lines > 0 && notices > 0; }));
+}
+
 /// The appliance itself verifies the chain of digests, and reports what it finds.
 TEST(ApplianceStorage, AnAuditLogThatWasChangedFromOutsideIsReported) {
   for (const char* change : {"", "UPDATE audit SET user = 'bert' WHERE number = 2",

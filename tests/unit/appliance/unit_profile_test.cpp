@@ -91,7 +91,7 @@ TEST_F(UnitProfileTest, ASweepBeyondTheGateIsNotJoinedAndReported) {
   UnitProfile beyond = Of("A");
   beyond.Begin(options_);
   Sweep(options_, 0.001 + 0.00043);
-  EXPECT_THAT(beyond.Drift(), HasSubstr("sensor A no longer measures as its profile says"));
+  EXPECT_THAT(beyond.Drift(), HasSubstr("sensor A no longer agrees with its profile"));
   EXPECT_THAT(beyond.Drift(), HasSubstr("on the settings page"));
   beyond.LearnFromScan();
   EXPECT_EQ(shelf_->Versions("A").size(), 3U) << "nothing was added";
@@ -147,20 +147,20 @@ TEST_F(UnitProfileTest, ADiskThatCannotBeWrittenDoesNotFailTheScan) {
   EXPECT_NO_THROW(unit.LearnFromScan());
 }
 
-TEST(WhyItTeachesNothing, NamesEachCheckThatAScanHasToPass) {
+TEST(WhyNotLearned, NamesEachCheckThatAScanHasToPass) {
   AcceptanceLimits limits;
   Scene scene;
   for (int id = 0; id < limits.min_shared_markers; ++id) scene.markers[id] = {};
   scene.longest_lost_s = limits.max_lost_s;
-  EXPECT_EQ(WhyItTeachesNothing(scene, {}, limits), "");
-  EXPECT_EQ(WhyItTeachesNothing(scene, Verdict::kMove, limits), "");
-  EXPECT_THAT(WhyItTeachesNothing(scene, Verdict::kNoAnswer, limits), HasSubstr("no answer"));
+  EXPECT_EQ(WhyNotLearned(scene, {}, limits), "");
+  EXPECT_EQ(WhyNotLearned(scene, Verdict::kMove, limits), "");
+  EXPECT_THAT(WhyNotLearned(scene, Verdict::kNoAnswer, limits), HasSubstr("no answer"));
   Scene lost = scene;
   lost.longest_lost_s = limits.max_lost_s + 0.01;
-  EXPECT_THAT(WhyItTeachesNothing(lost, {}, limits), HasSubstr("lost"));
+  EXPECT_THAT(WhyNotLearned(lost, {}, limits), HasSubstr("lost"));
   Scene few = scene;
   few.markers.erase(0);
-  EXPECT_THAT(WhyItTeachesNothing(few, {}, limits), HasSubstr("markers"));
+  EXPECT_THAT(WhyNotLearned(few, {}, limits), HasSubstr("markers"));
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ TEST_F(UnitRecoveryTest, ABackupIsRestoredAndTheReplacedIsKept) {
   (void)BackUpStopped(state(), stick() / "backup.tar");
   WriteWholeFile(state() / "plumb.db", std::string_view("no database"));
   EXPECT_THAT(RecoverUnit(Read("[recovery]\nrestore = \"backup.tar\"\n"), state(), {}),
-              HasSubstr("2 scans, 15 files; what was stored before is in " +
+              HasSubstr("2 scans, 15 files; the previous data is in " +
                         (state() / "before-restore-1").string()));
   EXPECT_EQ(testing::FilesBelow(state() / "before-restore-1").at("plumb.db"), "no database");
   Store store(state());
@@ -99,7 +99,7 @@ TEST_F(UnitRecoveryTest, AUnitThatWorksIsLeftAlone) {
                   (void)RecoverUnit(Read(text), state(), {},
                                     {.longest = std::chrono::milliseconds(0), .sleep = {}});
                 }),
-                HasSubstr("nothing was changed"));
+                HasSubstr("nothing was recovered or changed"));
   }
   EXPECT_FALSE(fs::exists(state() / "before-restore-1"));
   EXPECT_FALSE(fs::exists(state() / "scans-are-lost"));

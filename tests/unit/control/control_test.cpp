@@ -48,6 +48,12 @@ TEST(ControlProtocolTest, EveryRequestReadsBack) {
   }
 }
 
+TEST(ControlProtocolTest, AFolderInAnyEncodingIsSentAsUtf8) {
+  const ControlRequest request{
+      .kind = Kind::kBackup, .action = {}, .argument = {}, .folder = "/mnt/\xff"};
+  EXPECT_EQ(ParseControlRequest(ControlRequestText(request)).folder, "/mnt/\xEF\xBF\xBD");
+}
+
 TEST(ControlProtocolTest, RefusesEverythingElse) {
   for (const char* line : {"",
                            "status",

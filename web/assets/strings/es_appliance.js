@@ -49,7 +49,7 @@ export const kWords = {
     'la lámina se ha escaneado de nuevo desde que se leyó esto: léalo otra vez',
   'the room has other markers than when it was calibrated':
     'la sala tiene otros marcadores que cuando se calibró',
-  ['The signed calibration of the room holds: T_iec_reference of the configuration is not used']:
+  ['The signed room calibration is in effect; T_iec_reference of the configuration is ignored']:
     'Vale la calibración firmada de la sala: T_iec_reference de la configuración no se usa',
   ['fewer than 3 of the room\'s markers lie in the reference as they lay when the room was '
     + 'calibrated']:
@@ -305,7 +305,7 @@ export const kPatterns = [
     'el marcador $1 se movió $2 mm desde que se calibró la sala'],
   ['^the markers lie ([\\d.]+) mm \\(RMS\\) from where they were when the room was calibrated$',
     'los marcadores están a $1 mm (RMS) de donde estaban cuando se calibró la sala'],
-  ['^The room has to be calibrated again, until then directions are the patient\'s: (.+)$',
+  ['^The room must be calibrated again; until then, directions refer to the patient: (.+)$',
     'Hay que calibrar la sala de nuevo; hasta entonces las direcciones son las del paciente: $1'],
   ['^the calibration of the room, version (\\d+), is not used: (.+)$',
     'la calibración de la sala, versión $1, no se usa: $2'],

@@ -162,7 +162,7 @@ export const kFaultWords = {
     'se cortó la conexión con el instalador: mire su diario y pruebe de nuevo',
   'the installer ended before it was done: look at its log, then try again':
     'el instalador acabó antes de tiempo: mire su diario y pruebe de nuevo',
-  'the machine has not gone back to another system': 'el equipo no ha vuelto a otro sistema',
+  'the machine has not been rolled back': 'el equipo no ha vuelto a otro sistema',
   'the bundle became shorter while it was read; send it again':
     'el archivo se acortó mientras se leía; envíelo de nuevo',
   'a bundle\'s name must end with .raucb':
@@ -205,8 +205,8 @@ export const kFaultPatterns = [
   'el escaneo de esta referencia no está como se guardó: $1; ponga una copia de sus archivos en '
     + 'su lugar o escanee de nuevo'],
   // Storage.
-  ['^the disk is full: (\\d+) MB are free, a scan may need (\\d+); remove scans that are not '
-    + 'wanted$',
+  ['^the disk is full: (\\d+) MB are free, a scan may need (\\d+); remove scans that are no '
+    + 'longer needed$',
   'el disco está lleno: quedan $1 MB y un escaneo puede necesitar $2; borre escaneos que no hagan '
     + 'falta'],
   ['^The approved references of some patients \\((\\d+)\\) cannot be used, because their files are '
