@@ -49,7 +49,9 @@ TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOption
 }
 
 // States why the scene contains no points. The depth is the median over the frames' medians.
-std::string WhyNoSurface(std::span<const ViewSurface> surfaces, double median_depth_m) {
+std::string WhyNoSurface(std::span<const ViewSurface> surfaces,
+                         std::vector<double> median_depths_m) {
+  const double median_depth_m = TakeMedian(median_depths_m);
   const ViewSurfaceOptions range;
   const bool measured =
       std::any_of(surfaces.begin(), surfaces.end(), [](const ViewSurface& surface) {
@@ -299,7 +301,7 @@ struct Reconstructor::Impl {
     cloud_options.with_colors = options.keep_color;
     cloud_options.stop = stop;
     scene.cloud = MergeSurface(surfaces, cloud_options);
-    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, TakeMedian(median_depths_m)));
+    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, median_depths_m));
     scene.timings_s["clouds"] = Now() - stage;
 
     report(0.8, "height map");
@@ -366,7 +368,7 @@ struct Reconstructor::Impl {
     const std::vector<ViewSurface> surfaces =
         PrepareViews(views, {.depth_noise = info.depth_noise, .stop = stop});
     scene.cloud = MergeSurface(surfaces, {.with_colors = options.keep_color, .stop = stop});
-    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, TakeMedian(median_depths_m)));
+    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, median_depths_m));
     if (paper.height_map) KeepHeightMap(*paper.height_map, scene);
   }
 

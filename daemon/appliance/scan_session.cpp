@@ -15,6 +15,7 @@
 #include "daemon/loop/explain.hpp"
 #include "daemon/loop/freed_memory.hpp"
 #include "daemon/pipeline/frame_thinning.hpp"
+#include "daemon/pipeline/learning_gate.hpp"
 #include "daemon/pipeline/recording_feed.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 

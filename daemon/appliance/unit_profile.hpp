@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 
-#include "algo/acceptance/acceptance.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/sensor_model/profile_gate.hpp"
 #include "algo/types/scene.hpp"
@@ -41,11 +40,5 @@ class UnitProfile {
   std::optional<SensorProfile> before_, learned_;
   int begun_from_ = 0;
 };
-
-/// Why the profile does not learn from a completed scan; empty if it may. Uses the gates of the
-/// comparison that need only one scene.
-/// @param verdict  Of its comparison or check, if there was one.
-[[nodiscard]] std::string WhyNotLearned(const Scene& scene, const std::optional<Verdict>& verdict,
-                                        const AcceptanceLimits& limits);
 
 }  // namespace plumb

@@ -5,10 +5,12 @@
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
+#include "algo/sensor_model/profile_gate.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
+#include "daemon/pipeline/learning_gate.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 
 namespace plumb {
@@ -20,6 +22,22 @@ struct Options {
   MethodOptions method;
   bool json = false;
 };
+
+// Why a sweep is left out; empty if the profile learns from it.
+std::string WhyLeftOut(const Scene& scene, const std::optional<SensorProfile>& before,
+                       const std::optional<SensorProfile>& learned,
+                       const AcceptanceLimits& limits) {
+  if (!learned) return "its views did not agree better under any calibration";
+  if (std::string why = WhyNotLearned(scene, std::nullopt, limits); !why.empty()) return why;
+  if (!before) return {};
+  const ProfileAgreement agreement = Agreement(*before, *learned);
+  if (agreement.agrees()) return {};
+  return fmt::format(
+      "it contradicts the profile so far (chi-square {:.0f}, at most {:.0f} for {} terms): is it "
+      "of "
+      "the same unit, and was the sensor warm?",
+      agreement.chi_square, agreement.limit, agreement.num_terms);
+}
 
 int Run(const Options& options, const CommandContext& context) {
   Config config = options.method.Read();
@@ -35,14 +53,12 @@ int Run(const Options& options, const CommandContext& context) {
     const Scene scene = RunScan(
         *recording, {.reconstructor = config.reconstruct}, context.stop,
         [&](const ScanProgress& scan) { Show(progress, path.filename().string() + ": ", scan); });
-    if (learned && !scene.markers.empty()) {
+    const std::string why =
+        WhyLeftOut(scene, config.reconstruct.profile, learned, config.compare.limits);
+    if (why.empty()) {
       config.reconstruct.profile = std::move(learned);
     } else {
-      left_out.push_back(fmt::format(
-          "{}: {}", path.string(),
-          scene.markers.empty() ? "no marker was seen, so nothing shows the true size of what was "
-                                  "seen"
-                                : "its views did not agree better under any calibration"));
+      left_out.push_back(fmt::format("{}: {}", path.string(), why));
     }
   }
   progress.Clear();

@@ -79,6 +79,20 @@ TEST_F(ScenesTest, AProfileLearnedFromASweepServesTheNext) {
   }
 }
 
+TEST_F(ScenesTest, AProfileLearnsNothingFromASweepThatContradictsIt) {
+  const fs::path profile = folder_ / "unit.json";
+  ASSERT_EQ(Plumb({"calibrate", SmallRecording(Reference()), "--out", profile}).exit_code, 0);
+  json wrong = json::parse(ReadText(profile));
+  wrong["calibration"]["depth_scale"] = wrong["calibration"]["depth_scale"].get<double>() + 0.03;
+  for (json& entry : wrong.at("covariance")) entry = 1e-4 * entry.get<double>();
+  WriteText(folder_ / "wrong.json", wrong.dump());
+  const RunResult result = Plumb({"calibrate", SmallRecording(Current()), "--sensor-profile",
+                                  folder_ / "wrong.json", "--out", folder_ / "two.json"});
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("contradicts the profile so far"));
+  EXPECT_THAT(LeftBehind({"unit.json", "wrong.json"}), IsEmpty());
+}
+
 TEST_F(ScenesTest, AProfileOfAnotherUnitIsRefusedAndNothingIsWritten) {
   const fs::path profile = folder_ / "unit.json";
   ASSERT_EQ(Plumb({"calibrate", SmallRecording(Reference()), "--out", profile}).exit_code, 0);

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/pipeline/learning_gate.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace plumb {

@@ -1,0 +1,18 @@
+// Whether a sensor unit's profile learns from a sweep.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "algo/acceptance/acceptance.hpp"
+#include "algo/types/scene.hpp"
+
+namespace plumb {
+
+/// Why the profile does not learn from a completed scan; empty if it may. Uses the gates of the
+/// comparison that need only one scene.
+/// @param verdict  Of its comparison or check, if there was one.
+[[nodiscard]] std::string WhyNotLearned(const Scene& scene, const std::optional<Verdict>& verdict,
+                                        const AcceptanceLimits& limits);
+
+}  // namespace plumb
