@@ -16,10 +16,10 @@ namespace plumb::testing {
 
 }  // namespace plumb::testing
 
-/// For a tool that toolchain/install brings, in a function that returns nothing: fails where
-/// PLUMB_REQUIRE_ALL=1. What no installation can bring uses GTEST_SKIP(): mounts and loop devices
-/// that the machine does not permit, and recordings that are not part of the repository.
-/// toolchain/test lists these at its end.
+/// For a tool that toolchain/install brings and for the rights of root, in a function that returns
+/// nothing: fails where PLUMB_REQUIRE_ALL=1. What no installation can bring uses GTEST_SKIP():
+/// mounts and loop devices that the machine does not permit, and recordings that are not part of
+/// the repository. toolchain/test lists these at its end.
 #define PLUMB_SKIP(reason)                                                 \
   do {                                                                     \
     if (::plumb::testing::RequiresAllTests())                              \

@@ -17,6 +17,7 @@
 #include "daemon/records/backup.hpp"
 #include "daemon/records/file_cipher.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/skip.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/records/scan_folder.hpp"
 
@@ -126,7 +127,7 @@ TEST_F(UnitRecoveryTest, AFolderThatIsHeldForAMomentIsWaitedFor) {
 
 // Plumbd's account may have put links anywhere in its folder, and the stick is a stranger's.
 TEST_F(UnitRecoveryTest, RootTakesTheRightsOfTheFoldersOwner) {
-  if (::geteuid() != 0) GTEST_SKIP() << "needs root, which takes the rights of another account";
+  if (::geteuid() != 0) PLUMB_SKIP("needs root, which takes the rights of another account");
   constexpr uid_t kOwner = 12345;
   (void)BackUpStopped(state(), stick() / "backup.tar");
   const UnitRecovery given = Read("[recovery]\nrestore = \"backup.tar\"\n");
