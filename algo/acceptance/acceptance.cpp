@@ -67,6 +67,18 @@ void JudgeTracking(const Evidence& evidence, const AcceptanceLimits& limits, Rea
   judge(evidence.current_lost_s, "current");
 }
 
+void JudgeBreathing(const Evidence& evidence, const AcceptanceLimits& limits, Reasons& reasons) {
+  const auto judge = [&](double rise_m, const char* scan) {
+    if (rise_m <= limits.max_breathing_m) return;
+    reasons.push_back(
+        fmt::format("chest and belly rose by {:.1f} mm in the {} scan, at most {:g} mm are "
+                    "allowed; sweep again while the breath is held",
+                    rise_m / kMillimetre, scan, limits.max_breathing_m / kMillimetre));
+  };
+  judge(evidence.reference_breathing_m, "reference");
+  judge(evidence.current_breathing_m, "current");
+}
+
 // Decimals of an uncertainty: those of the other texts, and none from 100 on, where they would mean
 // nothing.
 int Decimals(double u95, std::size_t i) {
@@ -171,6 +183,7 @@ void CheckLimits(const AcceptanceLimits& limits) {
   positive(limits.max_hole_m, "the largest hole");
   positive(limits.max_residual_p95_m, "the residual limit");
   positive(limits.max_lost_s, "the limit of lost tracking");
+  positive(limits.max_breathing_m, "the limit of breathing");
   if (!(limits.min_coverage >= 0 && limits.min_coverage <= 1)) {
     throw std::invalid_argument(
         fmt::format("acceptance: coverage must lie in 0..1, got {}", limits.min_coverage));
@@ -182,6 +195,7 @@ Decision Decide(const Evidence& evidence, const AcceptanceLimits& limits) {
   Reasons reasons = RefusalsOfMarkers(evidence.markers, limits.min_shared_markers);
   JudgeRegion(evidence, limits, reasons);
   JudgeTracking(evidence, limits, reasons);
+  JudgeBreathing(evidence, limits, reasons);
   JudgeUncertainty(evidence, limits, reasons);
   if (!reasons.empty()) return {Verdict::kNoAnswer, std::move(reasons)};
   return JudgeValues(evidence, limits);

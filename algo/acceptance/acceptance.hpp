@@ -27,6 +27,8 @@ struct AcceptanceLimits {
   double max_hole_m = 5 * kCentimetre;           ///< Largest hole in the region, as a diameter.
   double max_residual_p95_m = 25 * kMillimetre;  ///< 95th percentile after the best motion.
   double max_lost_s = 1.0;                       ///< Longest time without tracking in each scan.
+  /// Largest rise of chest and belly in each scan. Up to it the uncertainty was measured.
+  double max_breathing_m = 8 * kMillimetre;
 };
 
 /// @throws std::invalid_argument naming a limit that is not positive and finite, or a coverage
@@ -76,6 +78,9 @@ struct Evidence {
   double residual_p95_m = kNotMeasured;
   double reference_lost_s = kNotMeasured;
   double current_lost_s = kNotMeasured;
+  /// Rise of chest and belly; 0 also for a scan that cannot tell, such as one of an older version.
+  double reference_breathing_m = 0.0;
+  double current_breathing_m = 0.0;
 
   /// Absent where not reported, as shifts with couch-fixed markers.
   std::array<std::optional<MeasuredNumber>, 6> numbers;
@@ -93,8 +98,8 @@ struct Decision {
                                                          int min_shared_markers);
 
 /// The verdict: no_answer if any gate refuses, in the order markers, support, coverage, hole,
-/// residual, tracking, uncertainty; move if a value lies outside its tolerance; unsure if a value
-/// plus its uncertainty does; otherwise in_tolerance. A value at a limit is within it.
+/// residual, tracking, breathing, uncertainty; move if a value lies outside its tolerance; unsure
+/// if a value plus its uncertainty does; otherwise in_tolerance. A value at a limit is within it.
 ///
 /// A pure function of its input. Rotations are always needed, shifts only where they are present.
 [[nodiscard]] Decision Decide(const Evidence& evidence, const AcceptanceLimits& limits);

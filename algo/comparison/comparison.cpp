@@ -82,6 +82,8 @@ class Comparer {
     result_.current_profile = current.sensor_profile;
     evidence_.reference_lost_s = reference.longest_lost_s;
     evidence_.current_lost_s = current.longest_lost_s;
+    if (reference.breathing) evidence_.reference_breathing_m = reference.breathing->amplitude_m;
+    if (current.breathing) evidence_.current_breathing_m = current.breathing->amplitude_m;
     evidence_.region_is_drawn = !options.region_polygon_m.empty();
   }
 
@@ -242,7 +244,9 @@ class Comparer {
                      .surface = surface->covariance,
                      .T_motion = motion.T,
                      .centroid_m = *centroid,
-                     .sensor = sensor ? std::optional(sensor->covariance) : std::nullopt});
+                     .sensor = sensor ? std::optional(sensor->covariance) : std::nullopt,
+                     .breathing_m = std::hypot(evidence_.reference_breathing_m,
+                                               evidence_.current_breathing_m)});
     motion.covariance = motion.uncertainty.Total();
     result_.motion = motion;
     Lap("motion", since_s);

@@ -25,12 +25,13 @@ struct MotionUncertainty {
   Matrix6d frame = Matrix6d::Zero();  ///< Pose of the reference marker in its own map.
   /// Calibrations of the two sensors: see SharedSensor.
   Matrix6d sensor = Matrix6d::Zero();
+  Matrix6d breathing = Matrix6d::Zero();  ///< Breathing during the two sweeps.
 
   [[nodiscard]] Matrix6d Total() const {
-    return surface + markers + distortion + scale + frame + sensor;
+    return surface + markers + distortion + scale + frame + sensor + breathing;
   }
   /// The causes with their names, in a fixed order.
-  [[nodiscard]] std::array<std::pair<const char*, const Matrix6d*>, 6> Parts() const;
+  [[nodiscard]] std::array<std::pair<const char*, const Matrix6d*>, 7> Parts() const;
 };
 
 /// Input of Uncertainty(). Borrowed for the call.
@@ -42,6 +43,7 @@ struct UncertaintyInput {
   Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();
   /// SharedSensor::covariance; absent where a scene has no sensitivity.
   std::optional<Matrix6d> sensor;
+  double breathing_m = 0.0;  ///< Rise of chest and belly, root of the squares of both sweeps.
 };
 
 [[nodiscard]] MotionUncertainty Uncertainty(const UncertaintyInput& input);

@@ -87,6 +87,7 @@ std::vector<ViewSurface> PrepareCorrectedViews(TrackingMap& map, const Intrinsic
     view.T_world_camera = T_scene_world * DepthPose(keyframe, calibration);
     keyframe.data.view.depth_m.release();
     surfaces[k] = PrepareView(view, working_rays, options);
+    surfaces[k].time_s = keyframe.data.depth_time_s;
   });
   return surfaces;
 }

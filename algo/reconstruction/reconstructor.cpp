@@ -13,6 +13,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/statistics.hpp"
 #include "algo/markers/sweep_tone.hpp"
+#include "algo/reconstruction/breathing.hpp"
 #include "algo/reconstruction/corrected_views.hpp"
 #include "algo/reconstruction/height_maps.hpp"
 #include "algo/reconstruction/joint_registration.hpp"
@@ -303,6 +304,13 @@ struct Reconstructor::Impl {
     scene.cloud = MergeSurface(surfaces, cloud_options);
     if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, median_depths_m));
     scene.timings_s["clouds"] = Now() - stage;
+
+    stage = Now();
+    std::vector<double> times_s;
+    for (const ViewSurface& surface : surfaces) times_s.push_back(surface.time_s);
+    scene.breathing = FindBreathing(MeasurePatches(surfaces, scene.cloud, stop), times_s);
+    WarnOfBreathing(scene);
+    scene.timings_s["breathing"] = Now() - stage;
 
     report(0.8, "height map");
     stage = Now();

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/units.hpp"
 #include "algo/reconstruction/joint_registration.hpp"
 #include "algo/reconstruction/trajectory.hpp"
 #include "algo/tracking/loop_closer.hpp"
@@ -20,6 +21,7 @@ constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
 // The depth of Kinect and Xtion sensors errs by about 1 %, the size of prints by up to 3 %.
 constexpr double kUsualDepthScale = 0.02;
+constexpr double kBreathingToReport_m = 2 * kMillimetre;
 constexpr double kGapToReport_s = 0.5;  // The comparison gives no answer above 1 s.
 constexpr double kDroppedToReport = 0.05;
 
@@ -150,6 +152,14 @@ void WarnOfScale(double depth_scale, Scene& scene) {
       fmt::format("the sensor's depth and the stated size of the markers disagree by {:.1f} %: "
                   "measure the side of a marker",
                   100 * std::abs(depth_scale - 1.0)));
+}
+
+void WarnOfBreathing(Scene& scene) {
+  if (!scene.breathing || !(scene.breathing->amplitude_m > kBreathingToReport_m)) return;
+  scene.warnings.push_back(fmt::format(
+      "a part of the surface, such as chest and belly, rose and fell by {:.1f} mm during the "
+      "sweep, every {:.1f} s: sweep while the breath is held",
+      scene.breathing->amplitude_m / kMillimetre, scene.breathing->period_s));
 }
 
 void KeepHeightMap(HeightMap map, Scene& scene) {

@@ -32,6 +32,9 @@ void WarnOfFrame(const StreamInfo& info, const TrackingMap& map, Scene& scene);
 /// @param depth_scale  `depth_scale` of the estimated calibration.
 void WarnOfScale(double depth_scale, Scene& scene);
 
+/// Adds a warning if a part of the surface rose and fell by more than 2 mm.
+void WarnOfBreathing(Scene& scene);
+
 /// Keeps a map that contains cells and warns about any other: a map without cells cannot be stored,
 /// and an empty one compares with nothing.
 void KeepHeightMap(HeightMap map, Scene& scene);

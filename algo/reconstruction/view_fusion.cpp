@@ -140,6 +140,39 @@ bool ViewFusion::Project(std::uint16_t index, const Eigen::Vector3f& p_world, Se
   return true;
 }
 
+bool ViewFusion::Measure(const Seen& seen, const Eigen::Vector3f& n_world,
+                         Measured& measured) const {
+  const Camera& camera = cameras_[seen.index];
+  const ViewSurface::Pixel* top = camera.view->pixels.data() + seen.top_left;
+  const ViewSurface::Pixel* bottom = top + static_cast<std::size_t>(camera.view->width());
+  if (top[0].weight <= 0.0F || top[1].weight <= 0.0F || bottom[0].weight <= 0.0F ||
+      bottom[1].weight <= 0.0F)
+    return false;
+  const Eigen::Vector3f n = camera.R_camera_world * n_world;
+  const float along = -n.dot(seen.p);  // |p| times the cosine of the angle of incidence
+  if (along * along < kMinCosIncidence * kMinCosIncidence * seen.p.squaredNorm() || along < 0.0F)
+    return false;
+  const float above =
+      top[0].inverse_depth + seen.fu * (top[1].inverse_depth - top[0].inverse_depth);
+  const float below =
+      bottom[0].inverse_depth + seen.fu * (bottom[1].inverse_depth - bottom[0].inverse_depth);
+  const float depth = 1.0F / (above + seen.fv * (below - above));
+  // The measured point lies on the seed's own ray, beyond it by this fraction of its length.
+  measured.beyond = depth * seen.inverse_z - 1.0F;
+  measured.distance_m = -measured.beyond * along;
+  return true;
+}
+
+std::optional<float> ViewFusion::Distance(std::size_t view, const Eigen::Vector3f& p_world,
+                                          const Eigen::Vector3f& n_world) const {
+  Seen seen;
+  Measured measured;
+  if (!Project(static_cast<std::uint16_t>(view), p_world, seen) ||
+      !Measure(seen, n_world, measured))
+    return std::nullopt;
+  return measured.distance_m;
+}
+
 FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3f& n_world,
                             std::span<const std::uint16_t> candidates) const {
   FusedPoint fused;
@@ -161,26 +194,12 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
       __builtin_prefetch(view.pixels.data() + i + static_cast<std::size_t>(view.width()));
     }
     for (std::size_t k = 0; k < num_seen; ++k) {
-      const auto& [p, inverse_z, fu, fv, i, index] = group[k];
-      const Camera& camera = cameras_[index];
-      const ViewSurface& view = *camera.view;
-      const std::size_t width = static_cast<std::size_t>(view.width());
-      const ViewSurface::Pixel* top = view.pixels.data() + i;
-      const ViewSurface::Pixel* bottom = top + width;
-      if (top[0].weight <= 0.0F || top[1].weight <= 0.0F || bottom[0].weight <= 0.0F ||
-          bottom[1].weight <= 0.0F)
-        continue;
-      const Eigen::Vector3f n = camera.R_camera_world * n_world;
-      const float along = -n.dot(p);  // |p| times the cosine of the angle of incidence
-      if (along * along < kMinCosIncidence * kMinCosIncidence * p.squaredNorm() || along < 0.0F)
-        continue;
-      const float above = top[0].inverse_depth + fu * (top[1].inverse_depth - top[0].inverse_depth);
-      const float below =
-          bottom[0].inverse_depth + fu * (bottom[1].inverse_depth - bottom[0].inverse_depth);
-      const float measured = 1.0F / (above + fv * (below - above));
-      // The measured point lies on the seed's own ray, beyond it by this fraction of its length.
-      const float beyond = measured * inverse_z - 1.0F;
-      const float distance = -beyond * along;
+      const std::uint16_t index = group[k].index;
+      const ViewSurface& view = *cameras_[index].view;
+      Measured measured;
+      if (!Measure(group[k], n_world, measured)) continue;
+      const auto& [distance, beyond] = measured;
+      const Eigen::Vector3f& p = group[k].p;
       const float band =
           std::max(options_.min_band_m, kBandSigmas * view.depth_noise.SigmaFacing_m(p.z()));
       if (std::abs(distance) > band) {
@@ -188,12 +207,14 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
         continue;
       }
       if (num_samples == kMaxSamples) continue;
-      const std::size_t nearest = i + (fu > 0.5F ? 1U : 0U) + (fv > 0.5F ? width : 0U);
+      const std::size_t nearest =
+          group[k].top_left + (group[k].fu > 0.5F ? 1U : 0U) +
+          (group[k].fv > 0.5F ? static_cast<std::size_t>(view.width()) : 0U);
       const float w = view.pixels[nearest].weight;
       samples[num_samples++] = {distance, w};
       widest_band = std::max(widest_band, band);
       if (options_.with_normals)
-        fused.normal += w * (camera.R_camera_world.transpose() * view.normals[nearest]);
+        fused.normal += w * (cameras_[index].R_camera_world.transpose() * view.normals[nearest]);
       if (w > best_weight) {
         best_weight = w;
         fused.best_view = index;

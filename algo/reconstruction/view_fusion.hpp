@@ -53,6 +53,11 @@ class ViewFusion {
   void ViewsNear(const Eigen::Vector3f& centre_world, float radius_m,
                  const Eigen::Vector3f& n_world, std::vector<std::uint16_t>& found) const;
 
+  /// Signed distance (metres, along the normal) from a point to the surface that one view measured
+  /// there; nothing where that view does not show it well. May be far: another surface, or none.
+  [[nodiscard]] std::optional<float> Distance(std::size_t view, const Eigen::Vector3f& p_world,
+                                              const Eigen::Vector3f& n_world) const;
+
   [[nodiscard]] std::size_t num_views() const { return cameras_.size(); }
 
  private:
@@ -63,6 +68,10 @@ class ViewFusion {
     float fu, fv;  ///< Shares of the way to the next column and row.
     std::uint32_t top_left;
     std::uint16_t index;
+  };
+  struct Measured {
+    float distance_m;  ///< Along the normal.
+    float beyond;      ///< Beyond the seed, as a fraction of the seed's distance from the camera.
   };
   struct Camera {
     const ViewSurface* view = nullptr;
@@ -77,6 +86,9 @@ class ViewFusion {
   };
 
   [[nodiscard]] bool Project(std::uint16_t index, const Eigen::Vector3f& p_world, Seen& seen) const;
+
+  [[nodiscard]] bool Measure(const Seen& seen, const Eigen::Vector3f& n_world,
+                             Measured& measured) const;
 
   FusionOptions options_;
   std::vector<Camera> cameras_;

@@ -48,6 +48,7 @@ struct ViewSurface {
   DepthNoise depth_noise;  ///< Of the depth image's pixels, not of their means.
   int block = 1;           ///< Image pixels per working pixel in each direction.
   cv::Mat color_rgb;       ///< As in the view: at image or working resolution, or empty.
+  double time_s = 0.0;     ///< When the depth image was taken.
   Pose T_world_camera = Pose::Identity();
   std::shared_ptr<const RayTable>
       rays;  ///< Of the working pixels; shared by the views of one camera.

@@ -31,6 +31,15 @@ struct StampedPose {
   Pose T_world_camera = Pose::Identity();  ///< world = the scene's own frame
 };
 
+/// How far a part of the surface rose and fell during the sweep, as a chest does.
+struct Breathing {
+  double amplitude_m =
+      0.0;                ///< From exhaled to inhaled, of the part that moved most; 0: none found.
+  double sigma_m = 0.0;   ///< Standard deviation of the amplitude.
+  double period_s = 0.0;  ///< 0: none found.
+  double limit_m = 0.0;   ///< A smaller amplitude would not have been found in this sweep.
+};
+
 /// Content of one scan. Lengths in metres, everything in the scene's own frame.
 struct Scene {
   Preset preset = Preset::kBest;
@@ -46,6 +55,8 @@ struct Scene {
   std::int64_t frames_tracked = 0;
   std::int64_t frames_dropped = 0;
   double longest_lost_s = 0.0;  ///< Longest time without a pose between two tracked frames.
+
+  std::optional<Breathing> breathing;  ///< Absent where the sweep cannot tell.
 
   PointCloud cloud;  ///< Merged surface; always with normals, with colours unless disabled.
   std::optional<HeightMap> height_map;  ///< Only in the reference marker's frame.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "algo/base/units.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
@@ -20,6 +21,15 @@ struct Options {
   bool realtime = false;
   bool json = false;
 };
+
+std::string BreathingText(const Breathing& breathing) {
+  if (breathing.amplitude_m > 0.0)
+    return fmt::format("rose by {:.1f} mm (standard deviation {:.1f} mm) every {:.1f} s",
+                       breathing.amplitude_m / kMillimetre, breathing.sigma_m / kMillimetre,
+                       breathing.period_s);
+  return fmt::format("none found; a rise of {:.1f} mm would have been",
+                     breathing.limit_m / kMillimetre);
+}
 
 std::string Summary(const Scene& scene, const std::filesystem::path& out) {
   std::string text = fmt::format("{}\n", out.string());
@@ -39,6 +49,7 @@ std::string Summary(const Scene& scene, const std::filesystem::path& out) {
                 ? "  height map none: no surface around the reference marker\n"
                 : "  height map none: not in the reference marker's frame\n";
   }
+  if (scene.breathing) text += fmt::format("  breathing  {}\n", BreathingText(*scene.breathing));
   text += fmt::format("  surface    {} points, {} triangles\n", scene.cloud.size(),
                       scene.mesh.triangles.size());
   if (const auto after = scene.timings_s.find("after_last_frame"); after != scene.timings_s.end()) {

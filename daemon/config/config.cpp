@@ -140,6 +140,8 @@ void ReadCompare(Section section, ConfigUse use, Config& config) {
   section.TakeScaled("max_residual_p95_mm", options.limits.max_residual_p95_m, kMillimetre,
                      "millimetres above 0");
   section.TakeScaled("max_lost_s", options.limits.max_lost_s, 1.0, "seconds above 0");
+  section.TakeScaled("max_breathing_mm", options.limits.max_breathing_m, kMillimetre,
+                     "millimetres above 0");
   section.RejectUnknownKeys();
 }
 

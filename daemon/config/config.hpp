@@ -124,7 +124,7 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///                    posture = "HFS"|"HFP"|"FFS"|"FFP",
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers,
 ///                    moved_marker_mm, moved_marker_sigmas, min_coverage, max_hole_mm,
-///                    max_residual_p95_mm, max_lost_s
+///                    max_residual_p95_mm, max_lost_s, max_breathing_mm
 ///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to the IEC fixed
 ///     frame

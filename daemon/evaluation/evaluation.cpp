@@ -97,6 +97,8 @@ SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const 
   result.num_markers = scene.markers.size();
   result.keyframes = ErrorOfTrajectory(scene.keyframes, truth);
   result.trajectory = ErrorOfTrajectory(scene.trajectory, truth);
+  if (scene.breathing) result.breathing_mm = scene.breathing->amplitude_m / kMillimetre;
+  result.true_breathing_mm = truth.breathing_m / kMillimetre;
   result.calibration = scene.calibration;
   result.timings_s = scene.timings_s;
   MeasureMarkers(scene, truth, result);

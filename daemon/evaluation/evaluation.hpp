@@ -43,6 +43,8 @@ struct SceneEvaluation {
   std::optional<HeightError>
       heights;  ///< Against the true surface in the true reference marker's frame.
   std::optional<ShapeError> shape;
+  std::optional<double> breathing_mm;  ///< Estimated rise; not set where the sweep cannot tell.
+  double true_breathing_mm = 0.0;
   std::map<std::string, double> calibration, timings_s;
 };
 

@@ -159,6 +159,19 @@ std::string SceneTable(const Evaluation& evaluation) {
   return text;
 }
 
+std::string BreathingTable(const Evaluation& evaluation) {
+  std::string text;
+  for (const SceneEvaluation& s : evaluation.scenes) {
+    if (s.true_breathing_mm == 0.0 && s.breathing_mm.value_or(0.0) == 0.0) continue;
+    text +=
+        fmt::format("  {:<10} rise {:5.2f} mm, estimated {}\n", s.name, s.true_breathing_mm,
+                    s.breathing_mm ? fmt::format("{:5.2f} mm, error {:+5.2f} mm", *s.breathing_mm,
+                                                 *s.breathing_mm - s.true_breathing_mm)
+                                   : "not at all");
+  }
+  return text.empty() ? text : "\nBreathing during the sweeps\n\n" + text;
+}
+
 std::string AlignmentTable(const Evaluation& evaluation) {
   std::vector<double> corners, body, own_corners, own_body, deviation_median, deviation_p95, rigid,
       deformed;
@@ -290,6 +303,8 @@ ordered_json ToJson(const SceneEvaluation& s) {
           {"marker_scale_permille", OrNull(s.marker_scale_permille)},
           {"heights", ToJson(s.heights)},
           {"shape", ToJson(s.shape)},
+          {"breathing_mm", OrNull(s.breathing_mm)},
+          {"true_breathing_mm", s.true_breathing_mm},
           {"calibration", s.calibration},
           {"timings_s", s.timings_s}};
 }
@@ -337,8 +352,8 @@ ordered_json ToJson(const PaperRow& row) {
 std::string EvaluationTable(const Evaluation& evaluation) {
   const MotionStatistics total = evaluation.Total();
   return MotionTable(evaluation) + IntervalTable(total) + VerdictTable(total, evaluation.limits) +
-         SceneTable(evaluation) + AlignmentTable(evaluation) + "\n" + std::string(kResearchNotice) +
-         "\n";
+         SceneTable(evaluation) + BreathingTable(evaluation) + AlignmentTable(evaluation) + "\n" +
+         std::string(kResearchNotice) + "\n";
 }
 
 std::string EvaluationJson(const Evaluation& evaluation) {

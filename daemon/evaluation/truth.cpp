@@ -122,6 +122,9 @@ SceneTruth ReadSceneTruth(const fs::path& folder) {
     for (int i = 0; i < 3; ++i)
       truth.centroid_body[i] =
           motion.at("centroid_body").at(static_cast<std::size_t>(i)).get<double>();
+    if (const auto breathing = motion.find("breathing");
+        breathing != motion.end() && !breathing->is_null())
+      truth.breathing_m = breathing->at("amplitude_m").get<double>();
   } catch (const std::exception& error) {
     Fail(folder / "motion.json", error.what());
   }

@@ -34,6 +34,7 @@ struct SceneTruth {
   Eigen::Vector3d centroid_body =
       Eigen::Vector3d::Zero();  ///< Area centroid of the body, in its own frame.
   TrueSurface body;
+  double breathing_m = 0.0;  ///< Rise of chest and belly during the sweep; 0 where not stated.
 
   [[nodiscard]] Eigen::Vector3d centroid_world() const { return T_world_body * centroid_body; }
 };

@@ -202,6 +202,13 @@ std::string SceneJson(const Scene& scene) {
                     {"tracked", scene.frames_tracked},
                     {"dropped", scene.frames_dropped}};
   json["longest_lost_s"] = scene.longest_lost_s;
+  json["breathing"] = nullptr;
+  if (scene.breathing) {
+    json["breathing"] = {{"amplitude_m", scene.breathing->amplitude_m},
+                         {"sigma_m", scene.breathing->sigma_m},
+                         {"period_s", scene.breathing->period_s},
+                         {"limit_m", scene.breathing->limit_m}};
+  }
   json["sensor_profile"] = scene.sensor_profile ? Json(*scene.sensor_profile) : Json();
   json["calibration"] = MapJson(scene.calibration);
   json["timings_s"] = MapJson(scene.timings_s);
@@ -244,6 +251,13 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   scene.frames_tracked = frames["tracked"].Integer(0, kMaxCount);
   scene.frames_dropped = frames["dropped"].Integer(0, kMaxCount);
   if (root.has("longest_lost_s")) scene.longest_lost_s = root["longest_lost_s"].Number(0, 1e9);
+  if (root.has("breathing") && !root["breathing"].is_null()) {
+    const Value breathing = root["breathing"];
+    scene.breathing = Breathing{.amplitude_m = breathing["amplitude_m"].Number(0, 1),
+                                .sigma_m = breathing["sigma_m"].Number(0, 1),
+                                .period_s = breathing["period_s"].Number(0, 1e3),
+                                .limit_m = breathing["limit_m"].Number(0, 1)};
+  }
   if (root.has("sensor_profile") && !root["sensor_profile"].is_null())
     scene.sensor_profile = root["sensor_profile"].Text();
   if (root.has("calibration")) {

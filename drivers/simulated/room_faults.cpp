@@ -105,7 +105,7 @@ class Breaths {
       shape.belly_rise_m += depth * belly_m_;
       levels.push_back(MakeGrid(shape));
     }
-    return {levels, random_.Uniform(3.0, 5.0), random_.Uniform(0.0, kTwoPi)};
+    return {levels, chest_m_, belly_m_, random_.Uniform(3.0, 5.0), random_.Uniform(0.0, kTwoPi)};
   }
 
  private:

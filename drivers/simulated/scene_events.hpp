@@ -30,6 +30,8 @@ struct HandVisit {
 /// Chest and belly, from exhaled to inhaled.
 struct Breath {
   std::vector<std::shared_ptr<const DistanceGrid>> levels;
+  double chest_m = 0.0;  ///< Rise of the chest from exhaled to inhaled.
+  double belly_m = 0.0;  ///< The same of the belly.
   double period_s = 4.0;
   double phase = 0.0;
   /// 0: exhaled, 1: inhaled.

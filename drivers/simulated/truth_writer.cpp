@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/statistics.hpp"
 #include "algo/types/marker.hpp"
 #include "drivers/files/file_io.hpp"
 
@@ -73,23 +74,44 @@ json Markers(const ScenePlan& scene) {
       {"markers", markers}};
 }
 
+// The 90th percentile of the rise, along the normal, over the surface that rises by over 1 mm.
+double RiseOf(const Breath& breath, const BodyModel& body) {
+  std::vector<float> rises_m;
+  for (const Eigen::Vector3f& vertex : body.surface.vertices) {
+    const float rise_m =
+        breath.levels.front()->Distance(vertex) - breath.levels.back()->Distance(vertex);
+    if (rise_m > 0.001F) rises_m.push_back(rise_m);
+  }
+  return rises_m.empty() ? 0.0 : static_cast<double>(TakeQuantile(rises_m, 0.9));
+}
+
 json Motion(const SuitePlan& plan, const ScenePlan& scene) {
   const Pose T_world_body0 = plan.scenes.front().T_world_body;
   const Pose T_world_reference_marker = plan.room.boards.front().T_world_marker;
   const Pose motion = scene.T_world_body * T_world_body0.inverse();
   const Eigen::Vector3d centroid = plan.scenes.front().body->centroid;
-  return {{"about",
-           "motion_*: rigid transform from the placement of the suite's first scene (body0) to "
-           "this scene's; centroid = area centroid of the "
-           "undeformed body's surface"},
-          {"T_world_body", ToJson(scene.T_world_body)},
-          {"T_world_body0", ToJson(T_world_body0)},
-          {"T_world_reference_marker", ToJson(T_world_reference_marker)},
-          {"centroid_body", ToJson(centroid)},
-          {"centroid_world", ToJson(scene.T_world_body * centroid)},
-          {"motion_reference_marker",
-           ToJson(T_world_reference_marker.inverse() * motion * T_world_reference_marker)},
-          {"motion_world", ToJson(motion)}};
+  json breathing = nullptr;
+  if (const std::optional<Breath>& breath = scene.sweep.events.breath) {
+    breathing = {{"amplitude_m", RiseOf(*breath, *scene.body)},
+                 {"chest_m", breath->chest_m},
+                 {"belly_m", breath->belly_m},
+                 {"period_s", breath->period_s}};
+  }
+  return {
+      {"about",
+       "motion_*: rigid transform from the placement of the suite's first scene (body0) to "
+       "this scene's; centroid = area centroid of the "
+       "undeformed body's surface; breathing: rise from exhaled to inhaled, amplitude_m along the "
+       "surface's normal at the 90th percentile of what rises by over 1 mm"},
+      {"breathing", breathing},
+      {"T_world_body", ToJson(scene.T_world_body)},
+      {"T_world_body0", ToJson(T_world_body0)},
+      {"T_world_reference_marker", ToJson(T_world_reference_marker)},
+      {"centroid_body", ToJson(centroid)},
+      {"centroid_world", ToJson(scene.T_world_body * centroid)},
+      {"motion_reference_marker",
+       ToJson(T_world_reference_marker.inverse() * motion * T_world_reference_marker)},
+      {"motion_world", ToJson(motion)}};
 }
 
 json ToJson(const Intrinsics& camera) {

@@ -95,6 +95,12 @@ TEST(AcceptanceTest, LostTrackingOfEitherScanAtItsBoundary) {
   ExpectGate(&Evidence::current_lost_s, 0.99, 1.01, "in the current scan");
 }
 
+TEST(AcceptanceTest, BreathingDuringEitherScanAtItsBoundary) {
+  ExpectGate(&Evidence::reference_breathing_m, 0.0079, 0.0081,
+             "chest and belly rose by 8.1 mm in the reference scan, at most 8 mm are allowed");
+  ExpectGate(&Evidence::current_breathing_m, 0.008, 0.00801, "in the current scan");
+}
+
 TEST(AcceptanceTest, TooFewSharedMarkers) {
   Evidence two = GoodEvidence();
   two.markers.shared_ids = {4, 7};
@@ -221,15 +227,17 @@ TEST(AcceptanceTest, LimitsActWhereTheyAreSet) {
                           .min_coverage = 0.8,
                           .max_hole_m = 0.02,
                           .max_residual_p95_m = 0.01,
-                          .max_lost_s = 0.5};
+                          .max_lost_s = 0.5,
+                          .max_breathing_m = 0.002};
   Evidence evidence = GoodEvidence();
   evidence.coverage = 0.85;
   evidence.largest_hole_m = 0.03;
   evidence.residual_p95_m = 0.015;
   evidence.reference_lost_s = 0.7;
+  evidence.current_breathing_m = 0.003;
   evidence.numbers[2]->u95 = 2.5;
   evidence.numbers[3]->u95 = 0.7;
-  EXPECT_THAT(Decide(evidence, limits).reasons, SizeIs(6));  // all but the coverage
+  EXPECT_THAT(Decide(evidence, limits).reasons, SizeIs(7));  // all but the coverage
   limits = {};
   limits.min_coverage = 0.8;
   EXPECT_EQ(VerdictOf(evidence, limits), Verdict::kInTolerance);
@@ -243,6 +251,7 @@ TEST(AcceptanceTest, ImpossibleLimitsAreTheCallersMistake) {
     EXPECT_THROW(CheckLimits({.max_hole_m = bad}), std::invalid_argument);
     EXPECT_THROW(CheckLimits({.max_residual_p95_m = bad}), std::invalid_argument);
     EXPECT_THROW(CheckLimits({.max_lost_s = bad}), std::invalid_argument);
+    EXPECT_THROW(CheckLimits({.max_breathing_m = bad}), std::invalid_argument);
   }
   EXPECT_THROW(CheckLimits({.min_coverage = 1.1}), std::invalid_argument);
   EXPECT_THROW(CheckLimits({.min_coverage = kNan}), std::invalid_argument);

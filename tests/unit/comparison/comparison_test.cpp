@@ -291,6 +291,13 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   EXPECT_THAT(Compare(lost_reference, PerfectRepeat()).reasons.at(0),
               HasSubstr("in the reference scan"));
 
+  Scene breathing = PerfectRepeat();
+  breathing.breathing = Breathing{.amplitude_m = 0.009, .period_s = 4.0};
+  EXPECT_THAT(Compare(PerfectReference(), breathing).reasons.at(0),
+              HasSubstr("chest and belly rose by 9.0 mm in the current scan"));
+  EXPECT_THAT(Compare(breathing, PerfectRepeat()).reasons.at(0),
+              HasSubstr("in the reference scan"));
+
   lost.markers.clear();
   const Comparison none = Compare(PerfectReference(), lost);
   EXPECT_EQ(none.verdict, Verdict::kNoAnswer);

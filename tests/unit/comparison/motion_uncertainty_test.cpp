@@ -29,7 +29,8 @@ MotionUncertainty Of(const Pose& T_motion, const Alignment& alignment = SomeAlig
                       .surface = kSurface,
                       .T_motion = T_motion,
                       .centroid_m = kCentroid,
-                      .sensor = std::nullopt});
+                      .sensor = std::nullopt,
+                      .breathing_m = 0.005});
 }
 
 TEST(MotionUncertaintyTest, TheTotalIsTheSumOfItsNamedParts) {
@@ -41,6 +42,12 @@ TEST(MotionUncertaintyTest, TheTotalIsTheSumOfItsNamedParts) {
     sum += *part;
   }
   EXPECT_TRUE(sum.isApprox(uncertainty.Total()));
+}
+
+TEST(MotionUncertaintyTest, BreathingCountsByTheRiseOfTheChest) {
+  const Matrix6d breathing = Of(Pose::Identity()).breathing;
+  EXPECT_NEAR(std::sqrt(breathing(3, 3)), 0.1 * 0.005, 1e-9);
+  EXPECT_NEAR(std::sqrt(breathing(0, 0)), 0.1 * 0.005, 1e-9);
 }
 
 TEST(MotionUncertaintyTest, WhatTheMapsDisagreeByAtAPlaceIsNotAveragedAway) {

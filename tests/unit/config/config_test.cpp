@@ -64,6 +64,7 @@ min_coverage = 0.8
 max_hole_mm = 40
 max_residual_p95_mm = 20
 max_lost_s = 2
+max_breathing_mm = 5
 [iec]
 T_iec_reference = [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]]
 )",
@@ -92,6 +93,7 @@ T_iec_reference = [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]
   EXPECT_DOUBLE_EQ(config.compare.limits.max_hole_m, 0.04);
   EXPECT_DOUBLE_EQ(config.compare.limits.max_residual_p95_m, 0.02);
   EXPECT_DOUBLE_EQ(config.compare.limits.max_lost_s, 2);
+  EXPECT_DOUBLE_EQ(config.compare.limits.max_breathing_m, 0.005);
   EXPECT_NEAR(
       (*config.compare.T_iec_reference * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0.1, 1.2, 0.3))
           .norm(),

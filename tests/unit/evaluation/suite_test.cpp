@@ -98,6 +98,12 @@ TEST(EvaluationReportTest, WhatWasNotMeasuredIsNoZero) {
   evaluation.scenes[0].marker_scale_permille = 2.0;
   EXPECT_THAT(EvaluationTable(evaluation), testing::AllOf(testing::HasSubstr("none   1.25"),
                                                           testing::HasSubstr("|   0.75  +2.0 |")));
+  evaluation.scenes[0].true_breathing_mm = 5.0;
+  EXPECT_THAT(EvaluationTable(evaluation),
+              testing::HasSubstr("blind      rise  5.00 mm, estimated not at all"));
+  evaluation.scenes[0].breathing_mm = 4.25;
+  EXPECT_THAT(EvaluationTable(evaluation),
+              testing::HasSubstr("estimated  4.25 mm, error -0.75 mm"));
 }
 
 }  // namespace

@@ -61,6 +61,19 @@ TEST_F(TruthTest, ReadsAllFour) {
   EXPECT_EQ(truth.body.triangles[0], (std::array<std::uint32_t, 3>{0, 2, 1}));
 }
 
+TEST_F(TruthTest, BreathingIsReadWhereItIsStated) {
+  EXPECT_EQ(ReadSceneTruth(folder_).breathing_m, 0.0);
+  const std::string poses = R"({"T_world_body": [[1,0,0,1],[0,1,0,0],[0,0,1,0],[0,0,0,1]],
+        "T_world_reference_marker": [[1,0,0,0],[0,1,0,5],[0,0,1,0],[0,0,0,1]],
+        "centroid_body": [0.1, 0.2, 0.3], "breathing": )";
+  Write("motion.json", poses + "null}");
+  EXPECT_EQ(ReadSceneTruth(folder_).breathing_m, 0.0);
+  Write("motion.json", poses + R"({"amplitude_m": 0.005}})");
+  EXPECT_EQ(ReadSceneTruth(folder_).breathing_m, 0.005);
+  Write("motion.json", poses + "7}");
+  EXPECT_THROW((void)ReadSceneTruth(folder_), DataError);
+}
+
 TEST_F(TruthTest, RefusesDamage) {
   const std::string whole = Ply(1);
   for (const std::size_t size :

@@ -90,6 +90,11 @@ TEST_F(SceneFolderTest, GivesBackWhatWasWritten) {
   EXPECT_EQ(read.frames_tracked, 3);
   EXPECT_EQ(read.frames_dropped, 1);
   EXPECT_EQ(read.longest_lost_s, 0.25);
+  ASSERT_TRUE(read.breathing);
+  EXPECT_EQ(read.breathing->amplitude_m, 0.004);
+  EXPECT_EQ(read.breathing->sigma_m, 0.0005);
+  EXPECT_EQ(read.breathing->period_s, 3.5);
+  EXPECT_EQ(read.breathing->limit_m, 0.0015);
   EXPECT_EQ(read.cloud.points, scene.cloud.points);
   EXPECT_EQ(read.cloud.normals, scene.cloud.normals);
   EXPECT_EQ(read.cloud.colors, scene.cloud.colors);
@@ -165,10 +170,22 @@ TEST_F(SceneFolderTest, TrajectoryIsTumFormatWithSixDecimalsOfTime) {
 TEST_F(SceneFolderTest, AnotherProgramsSceneWithOnlyTheContractsKeysIsRead) {
   auto json = nlohmann::json::parse(SceneJson(SmallScene()));
   for (const char* key : {"marker_dictionary", "marker_length_m", "reference_marker",
-                          "marker_sigma_m", "longest_lost_s"})
+                          "marker_sigma_m", "longest_lost_s", "breathing"})
     json.erase(key);
   WriteWholeFile(scene_ / "scene.json", json.dump());
   EXPECT_EQ(ReadScene(scene_).markers.size(), 2U);
+  EXPECT_FALSE(ReadScene(scene_).breathing);
+}
+
+TEST_F(SceneFolderTest, BreathingThatNobodyCanHaveIsRefused) {
+  auto json = nlohmann::json::parse(SceneJson(SmallScene()));
+  for (const char* key : {"amplitude_m", "sigma_m", "period_s", "limit_m"}) {
+    auto bad = json;
+    bad["breathing"][key] = -1e-9;
+    EXPECT_THROW((void)ParseSceneJson(bad.dump(), "scene.json"), DataError) << key;
+    bad["breathing"].erase(key);
+    EXPECT_THROW((void)ParseSceneJson(bad.dump(), "scene.json"), DataError) << key;
+  }
 }
 
 TEST_F(SceneFolderTest, WarningsInAnyEncodingAreWritten) {

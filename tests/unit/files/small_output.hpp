@@ -35,6 +35,7 @@ inline Scene SmallScene() {
   scene.frames_tracked = 3;
   scene.frames_dropped = 1;
   scene.longest_lost_s = 0.25;
+  scene.breathing = Breathing{0.004, 0.0005, 3.5, 0.0015};
   scene.cloud.points = {{0, 0, 0.1F}, {0.5F, 0.25F, 0.125F}};
   scene.cloud.normals = {{0, 0, 1}, {0, 1, 0}};
   scene.cloud.colors = {Color{1, 2, 3}, Color{4, 5, 6}};

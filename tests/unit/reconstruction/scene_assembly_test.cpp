@@ -61,5 +61,20 @@ TEST(SceneAssemblyTest, MoreThanOneDroppedFrameInTwentyIsAWarning) {
   EXPECT_THAT(Warnings(2, 6, false), ElementsAre(HasSubstr("6 of 101 frames were dropped")));
 }
 
+TEST(SceneAssemblyTest, BreathingOfOverTwoMillimetresIsAWarning) {
+  const auto warnings_at = [](double rise_m) {
+    Scene scene;
+    scene.breathing = Breathing{.amplitude_m = rise_m, .period_s = 3.9};
+    WarnOfBreathing(scene);
+    return scene.warnings;
+  };
+  EXPECT_THAT(warnings_at(0.002), IsEmpty());
+  EXPECT_THAT(warnings_at(0.0042),
+              ElementsAre(HasSubstr("rose and fell by 4.2 mm during the sweep, every 3.9 s")));
+  Scene silent;
+  WarnOfBreathing(silent);
+  EXPECT_THAT(silent.warnings, IsEmpty());
+}
+
 }  // namespace
 }  // namespace plumb

@@ -217,6 +217,8 @@ TEST(RoomFaultsTest, TheBodyBreathesAroundItsOwnShape) {
   const float in = belly_height(*breath.levels.back());
   EXPECT_GT(in - out, 0.003F);
   EXPECT_LT(in - out, 0.012F);
+  EXPECT_NEAR(in - out, breath.belly_m, 0.002);
+  EXPECT_LT(breath.chest_m, breath.belly_m + 0.001);
   EXPECT_NEAR(belly_height(*scene.body->grid), 0.5F * (in + out), 5e-4F);
   double least = 1, most = 0;
   for (int i = 0; i < 100; ++i) {

@@ -222,6 +222,10 @@ export const kPatterns = [
     + 'again, more slowly$',
   'el seguimiento se perdió durante $1 s en el escaneo ($2), o no llegó ninguna imagen; barra de '
     + 'nuevo, más despacio'],
+  ['^chest and belly rose by ([\\d.]+) mm in the (reference|current) scan, at most ([\\d.]+) mm '
+    + 'are allowed; sweep again while the breath is held$',
+  'el pecho y el vientre subieron $1 mm en el escaneo ($2); se admiten $3 mm como máximo; barra de '
+    + 'nuevo mientras se contiene la respiración'],
   ['^(\\w+) was not measured$', '$1: no se midió'],
   // Why a result is in tolerance, unsure or a move: its numbers, one after the other.
   ['^every value and its uncertainty lie within ([\\d.]+) mm and ([\\d.]+) deg$',
@@ -271,6 +275,10 @@ export const kPatterns = [
     + 'millimetres, the other two could not show it$',
   'solo 3 marcadores relacionan los escaneos: si uno se hubiera movido unos milímetros, los otros '
     + 'dos no podrían mostrarlo'],
+  ['^a part of the surface, such as chest and belly, rose and fell by ([\\d.]+) mm during the '
+    + 'sweep, every ([\\d.]+) s: sweep while the breath is held$',
+  'una parte de la superficie, como el pecho y el vientre, subió y bajó $1 mm durante el barrido, '
+    + 'cada $2 s: barra mientras se contiene la respiración'],
   ['^no image came for ([\\d.]+) s in the sweep; what the sensor passed meanwhile is missing$',
     'no llegó ninguna imagen durante $1 s del barrido; falta lo que el sensor recorrió entretanto'],
   ['^reference marker (\\d+) was seen from (\\d+) places? only: the scene\'s frame is less certain '
