@@ -20,7 +20,7 @@ constexpr double kSensorShift_m = 0.4 * kMillimetre;
 constexpr double kSensorAngle_rad = 0.03 * kDegree;
 
 // The surface of a breathing body is merged from different moments of the breath. Measured on four
-// simulated pairs whose bodies breathed in both sweeps (estimated rise 3.6 to 5.9 mm each): the
+// simulated pairs whose bodies breathed in both sweeps (estimated rise 3.3 to 6.0 mm each): the
 // shifts were off by 0.07 and the angles by 0.07 per metre of the rise, beyond the errors of the
 // same pairs without breathing.
 constexpr double kBreathingShift = 0.1;        // of the rise of chest and belly

@@ -58,7 +58,7 @@ constexpr double kLowestShare = 0.01;
 // to 2.8 times it, and found at 4.3 and more.
 constexpr double kFoundAbove = 3.0;
 constexpr double kMostAffected = 0.9;  // quantile of the moving patches
-// Poses and smoothing take part of the movement: of simulated rises of 2.3 to 11.2 mm, 69 to 91 %
+// Poses and smoothing take part of the movement: of simulated rises of 2.3 to 11.2 mm, 64 to 91 %
 // were found.
 constexpr double kAmplitudeError = 0.2;
 constexpr std::size_t kMinMoving = 10;
