@@ -269,8 +269,8 @@ export const kPatterns = [
     + 'superficie'],
   ['^the sweep never returned to a place: only neighbouring images hold its path together; keep a '
     + 'marker in view for longer, or end the sweep where it began$',
-  'el barrido no volvió a ningún lugar: solo las imágenes vecinas sostienen su trayectoria; mantenga '
-    + 'más tiempo un marcador a la vista o termine donde empezó'],
+  'el barrido no volvió a ningún lugar: solo las imágenes vecinas sostienen su trayectoria; '
+    + 'mantenga más tiempo un marcador a la vista o termine donde empezó'],
   ['^only 3 markers place the scans against each other: if one of them had moved by some '
     + 'millimetres, the other two could not show it$',
   'solo 3 marcadores relacionan los escaneos: si uno se hubiera movido unos milímetros, los otros '
