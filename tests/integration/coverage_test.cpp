@@ -112,7 +112,7 @@ TEST_F(CoverageTest, ThreePlacementsAreAsAccurateAsStated) {
   const json& total = figures.at("total");
   std::printf("%s\n%s\n", total.at("translation_mm").dump().c_str(),
               total.at("rotation_deg").dump().c_str());
-  // Stated: 0.69 mm median, 1.77 max; 0.06 deg median, 0.22 max. Measured: 0.61 and
+  // Stated: 0.69 mm median, 1.77 max; 0.06 deg median, 0.22 max. Measured: 0.62 and
   // 0.75 mm, 0.051 and 0.065 deg.
   EXPECT_LE(total.at("translation_mm").at("median"), 0.83);
   EXPECT_LE(total.at("translation_mm").at("max"), 2.1);
