@@ -34,8 +34,7 @@ std::string WhyLeftOut(const Scene& scene, const std::optional<SensorProfile>& b
   if (agreement.agrees()) return {};
   return fmt::format(
       "it contradicts the profile so far (chi-square {:.0f}, at most {:.0f} for {} terms): is it "
-      "of "
-      "the same unit, and was the sensor warm?",
+      "of the same unit, and was the sensor warm?",
       agreement.chi_square, agreement.limit, agreement.num_terms);
 }
 

@@ -27,7 +27,7 @@ std::string BreathingText(const Breathing& breathing) {
     return fmt::format("rose by {:.1f} mm (standard deviation {:.1f} mm) every {:.1f} s",
                        breathing.amplitude_m / kMillimetre, breathing.sigma_m / kMillimetre,
                        breathing.period_s);
-  return fmt::format("none found; a rise of {:.1f} mm would have been",
+  return fmt::format("none found; a rise of {:.1f} mm or more would have been",
                      breathing.limit_m / kMillimetre);
 }
 

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/sensor_model/calibration_prior.hpp"
 #include "tests/integration/command_line.hpp"
 
 namespace plumb {
@@ -83,7 +84,8 @@ TEST_F(ScenesTest, AProfileLearnsNothingFromASweepThatContradictsIt) {
   const fs::path profile = folder_ / "unit.json";
   ASSERT_EQ(Plumb({"calibrate", SmallRecording(Reference()), "--out", profile}).exit_code, 0);
   json wrong = json::parse(ReadText(profile));
-  wrong["calibration"]["depth_scale"] = wrong["calibration"]["depth_scale"].get<double>() + 0.03;
+  json& scale = wrong.at("mean").at(kDepthAt + kDepthScale);
+  scale = scale.get<double>() + 0.03;
   for (json& entry : wrong.at("covariance")) entry = 1e-4 * entry.get<double>();
   WriteText(folder_ / "wrong.json", wrong.dump());
   const RunResult result = Plumb({"calibrate", SmallRecording(Current()), "--sensor-profile",

@@ -63,7 +63,7 @@ TEST_F(OpenNiDriverFilesTest, ALibraryThatIsNoDriverSaysSo) {
   Dl_info c_library{};
   ASSERT_NE(::dladdr(reinterpret_cast<void*>(&::getenv), &c_library), 0);
   fs::create_symlink(fs::canonical(c_library.dli_fname), folder_.path() / "libSomething.so.0");
-  EXPECT_THAT(Only().problem, HasSubstr("no driver of OpenNI2"));
+  EXPECT_THAT(Only().problem, HasSubstr("not an OpenNI 2 driver"));
 }
 
 TEST_F(OpenNiDriverFilesTest, OtherFilesAndAMissingFolderAreNoDrivers) {
