@@ -40,8 +40,8 @@ namespace codec {
 
 void CheckImageSide(const std::string& name, long width, long height, int max_side) {
   if (width >= 1 && height >= 1 && width <= max_side && height <= max_side) return;
-  throw DataError(fmt::format("image {} states {}x{} pixels, expected 1 to {} pixels per side", name, width,
-                              height, max_side));
+  throw DataError(fmt::format("image {} states {}x{} pixels, expected 1 to {} pixels per side",
+                              name, width, height, max_side));
 }
 
 }  // namespace codec

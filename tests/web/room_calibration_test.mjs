@@ -56,8 +56,10 @@ await h.step('three scans, their spread, and a signature with the password', asy
   // The other page has no event stream for a while, so it is not notified of this change.
   const events = '**/api/v1/events';
   await anna.route(events, (route) => route.fulfill({ status: 503 }));
+  const refused = anna.waitForResponse(events);
   await anna.reload();
   await card(anna).getByText('The newest 3 scans differ').waitFor();
+  await refused;
   await card(bob).getByLabel('Your password').focus();
   await bob.keyboard.type(h.password);
   await bob.keyboard.press('Enter');
@@ -69,8 +71,20 @@ await h.step('three scans, their spread, and a signature with the password', asy
 });
 
 await h.step('due again, in Spanish, on a phone', async () => {
+  // The other page asked for its data before, and its stream opens after this change.
+  const events = '**/api/v1/events';
+  let open;
+  const later = new Promise((done) => { open = done; });
+  await anna.route(events, async (route) => {
+    await later;
+    await route.continue();
+  });
+  await anna.reload();
+  await card(anna).getByText(/signed by bob/).waitFor();
   h.tell('roomdue');
   await card(bob).getByText('Marker 4 moved 8 mm since the room was calibrated.').waitFor();
+  open();
+  await card(anna).getByText('Marker 4 moved 8 mm since the room was calibrated.').waitFor();
   await bob.evaluate(() => localStorage.setItem('plumb-language-bob', 'es'));
   await bob.setViewportSize({ width: 360, height: 740 });
   await bob.reload();

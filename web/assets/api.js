@@ -169,7 +169,7 @@ export const live = {
     this.wanted = true;
     const first = this.refreshed();
     if (!channel) {
-      this.lead(false);
+      this.lead();
       return first;
     }
     const before = now();
@@ -177,7 +177,7 @@ export const live = {
     channel.postMessage({ kind: 'hello', from: kMe });
     setTimeout(() => {
       const answered = this.pulse !== before;
-      if (this.wanted && !this.leads && !answered && !document.hidden) this.lead(false);
+      if (this.wanted && !this.leads && !answered && !document.hidden) this.lead();
     }, kHello_ms);
     return first;
   },
@@ -194,8 +194,7 @@ export const live = {
     } catch { /* the stream says that there is no connection */ }
   },
 
-  /// @param missed  Messages may have been missed since the last stream: they are not repeated.
-  lead(missed = true) {
+  lead() {
     this.stopLeading();
     this.leads = true;
     this.heard = now();
@@ -213,7 +212,8 @@ export const live = {
       ++this.polls;
       const wasConnected = this.connected;
       this.connection(true);
-      if (missed && wasConnected) this.pass({ kind: 'data' });
+      // Messages since the page asked for its data, or since the last stream, are not repeated.
+      if (wasConnected) this.pass({ kind: 'data' });
     };
     source.onerror = () => {
       if (source.readyState !== EventSource.CLOSED) {

@@ -142,13 +142,14 @@ export function keepFocus(element, change) {
 
 const drawn = new WeakMap();
 /// As clear(), but what is there stays when nothing differs: neither the focus nor what a reader
-/// reads is taken away.
+/// reads is taken away. A child may be there already: copies are compared, so that it stays.
 export function redraw(element, ...children) {
-  const fresh = clear(element.cloneNode(false), ...children);
-  const html = fresh.innerHTML;
+  const all = children.flat(Infinity);
+  const copies = all.map((child) => (child instanceof Node ? child.cloneNode(true) : child));
+  const html = clear(element.cloneNode(false), ...copies).innerHTML;
   if (drawn.get(element) === html && element.hasChildNodes()) return;
   drawn.set(element, html);
-  keepFocus(element, () => clear(element, ...fresh.childNodes));
+  keepFocus(element, () => clear(element, ...all));
 }
 
 export function table(headings, rows, caption) {
