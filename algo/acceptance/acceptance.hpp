@@ -27,7 +27,7 @@ struct AcceptanceLimits {
   double max_hole_m = 5 * kCentimetre;           ///< Largest hole in the region, as a diameter.
   double max_residual_p95_m = 25 * kMillimetre;  ///< 95th percentile after the best motion.
   double max_lost_s = 1.0;                       ///< Longest time without tracking in each scan.
-  /// Largest rise of chest and belly in each scan. Up to it the uncertainty was measured.
+  /// Largest rise of chest and belly in each scan. The uncertainty was measured up to this rise.
   double max_breathing_m = 8 * kMillimetre;
 };
 
@@ -78,7 +78,7 @@ struct Evidence {
   double residual_p95_m = kNotMeasured;
   double reference_lost_s = kNotMeasured;
   double current_lost_s = kNotMeasured;
-  /// Rise of chest and belly; 0 also for a scan that cannot tell, such as one of an older version.
+  /// Rise of chest and belly; 0 also where it is not known, as in scans of older versions.
   double reference_breathing_m = 0.0;
   double current_breathing_m = 0.0;
 

@@ -48,7 +48,7 @@ constexpr int kFirstSweeps = 6;  // of the alternating fit, before the period is
 constexpr int kSweeps = 4;       // and each time after it
 constexpr int kRounds = 2;
 constexpr double kCauchySigmas = 3.0;
-constexpr double kRidge = 0.02;  // where the views hardly tell a rhythm from a level
+constexpr double kRidge = 0.02;  // keeps a patch solvable whose views show too little of a period
 constexpr double kLeastSigma_m = 1e-6;
 // Patches move where their slopes are more than this many times the noise, and more than the most
 // negative ones, which only errors make.
@@ -66,8 +66,8 @@ constexpr double kMinContrast = 2.1;
 // The poses' errors after the joint solve.
 constexpr double kPoseSigma_m = 2e-3;
 constexpr double kPoseSigma_rad = 3e-3;
-// The errors of neighbouring patches are alike: so many samples hold the information of one.
-constexpr double kSamplesPerFact = 20.0;
+// The errors of neighbouring patches are correlated: so many samples carry the information of one.
+constexpr double kCorrelatedSamples = 20.0;
 
 using Key = std::uint64_t;
 
@@ -237,7 +237,7 @@ class SurfaceFit {
   }
 
   void FitPoses() {
-    const double prior = kSamplesPerFact * sigma_m_ * sigma_m_;
+    const double prior = kCorrelatedSamples * sigma_m_ * sigma_m_;
     tbb::parallel_for(std::size_t{0}, times_s_.size(), [&](std::size_t v) {
       Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
       normal.diagonal().head<3>().setConstant(prior / (kPoseSigma_m * kPoseSigma_m));
@@ -392,6 +392,7 @@ std::optional<Breathing> FindBreathing(std::span<const SurfacePatch> patches,
   if (!(duration_s >= kMinDuration_s)) return std::nullopt;
   SurfaceFit fit(patches, times_s);
   fit.Solve(kFirstSweeps);
+  // Each round but the last improves the surface for the next.
   for (int round = 0;; ++round) {
     const Rhythm rhythm = fit.BestRhythm(std::min(kLongestPeriod_s, duration_s));
     const std::vector<double> slopes = fit.Slopes(rhythm);

@@ -38,11 +38,10 @@ struct SurfacePatch {
 
 /// Finds the part of the surface that rises and falls together, with a period of 2 to 8 s, relative
 /// to everything else that the same views show. Errors of the views' poses are estimated along with
-/// it, because a registration takes part of the movement for one of the camera.
+/// it, because the registration mistakes part of the breathing for motion of the camera.
 ///
 /// @param times_s  Of the views.
-/// @return nothing if the views are too few or too short to tell; otherwise a result that may be
-///         `found == false`.
+/// @return nothing with fewer than 8 views or less than 3 s; an amplitude of 0 if none was found.
 [[nodiscard]] std::optional<Breathing> FindBreathing(std::span<const SurfacePatch> patches,
                                                      std::span<const double> times_s);
 

@@ -56,7 +56,7 @@ struct Scene {
   std::int64_t frames_dropped = 0;
   double longest_lost_s = 0.0;  ///< Longest time without a pose between two tracked frames.
 
-  std::optional<Breathing> breathing;  ///< Absent where the sweep cannot tell.
+  std::optional<Breathing> breathing;  ///< Absent if the sweep does not allow an estimate.
 
   PointCloud cloud;  ///< Merged surface; always with normals, with colours unless disabled.
   std::optional<HeightMap> height_map;  ///< Only in the reference marker's frame.

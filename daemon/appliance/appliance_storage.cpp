@@ -255,8 +255,8 @@ std::vector<std::string> Appliance::StorageWarnings() const {
         unusable_.scans));
   if (unusable_.set_aside > 0)
     warnings.push_back(fmt::format(
-        "Some folders of scans ({}) are unknown to the database and were set aside: restore a "
-        "newer backup, or move them from the folder set-aside to another disk.",
+        "The database has no record of some scan folders ({}), so they were set aside. Restore a "
+        "newer backup, or move them from the set-aside folder to another disk.",
         unusable_.set_aside));
   if (!record_fault_.empty()) warnings.push_back(record_fault_);
   // The demo stores nothing of value.

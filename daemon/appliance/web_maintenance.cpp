@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -42,9 +43,11 @@ void WebMaintenance::WriteDiagnostics(const web::Actor& actor, web::Done done) {
   store_.Change(&Store::audit, report, [=](AuditStore& audit) {
     const std::string text =
         DiagnosticsText(status, health, loop, audit.Find({0, 500, "", /*views=*/false}));
+    constexpr std::string_view kExtension = ".txt";
     std::string name =
-        (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX.txt").string();
-    const int fd = ::mkstemps(name.data(), 4);
+        (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX").string();
+    name += kExtension;
+    const int fd = ::mkstemps(name.data(), static_cast<int>(kExtension.size()));
     if (fd < 0) throw DiskRefused(DescribeWriteError(name, errno));
     ::close(fd);
     WriteWholeFile(name, text);

@@ -281,6 +281,21 @@ void ReadWeb(Section section, WebConfig& web) {
   section.RejectUnknownKeys();
 }
 
+/// The values of a file as text, by "section.key".
+std::map<std::string, std::string> GivenIn(const toml::table& root) {
+  std::map<std::string, std::string> given;
+  for (const auto& [section, node] : root) {
+    const toml::table* const keys = node.as_table();
+    if (keys == nullptr) continue;
+    for (const auto& [key, value] : *keys) {
+      std::ostringstream text;
+      value.visit([&](const auto& one) { text << one; });
+      given[fmt::format("{}.{}", section.str(), key.str())] = text.str();
+    }
+  }
+  return given;
+}
+
 }  // namespace
 
 std::optional<ListenAddress> ParseListenAddress(std::string_view text) {
@@ -320,24 +335,6 @@ toml::table ParseToml(const std::string& text, const std::string& name) try {
   throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line,
                               error.description()));
 }
-
-namespace {
-
-std::map<std::string, std::string> GivenIn(const toml::table& root) {
-  std::map<std::string, std::string> given;
-  for (const auto& [section, node] : root) {
-    const toml::table* const keys = node.as_table();
-    if (keys == nullptr) continue;
-    for (const auto& [key, value] : *keys) {
-      std::ostringstream text;
-      value.visit([&](const auto& one) { text << one; });
-      given[fmt::format("{}.{}", section.str(), key.str())] = text.str();
-    }
-  }
-  return given;
-}
-
-}  // namespace
 
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
   const toml::table root = ParseToml(text, name);

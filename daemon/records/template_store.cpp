@@ -5,6 +5,14 @@
 #include "daemon/records/store_refusal.hpp"
 
 namespace plumb {
+namespace {
+
+std::string Described(double width_mm, double height_mm, double shift_mm, double rotation_deg) {
+  return fmt::format("region {:g} x {:g} mm, tolerance {:g} mm and {:g} degrees", width_mm,
+                     height_mm, shift_mm, rotation_deg);
+}
+
+}  // namespace
 
 using web::ChangeResult;
 
@@ -23,15 +31,6 @@ std::vector<web::PlanTemplate> TemplateStore::List() {
   }
   return templates;
 }
-
-namespace {
-
-std::string Described(double width_mm, double height_mm, double shift_mm, double rotation_deg) {
-  return fmt::format("region {:g} x {:g} mm, tolerance {:g} mm and {:g} degrees", width_mm,
-                     height_mm, shift_mm, rotation_deg);
-}
-
-}  // namespace
 
 void TemplateStore::Set(const web::Actor& actor, const web::PlanTemplate& wanted) {
   constexpr std::int64_t kMaxTemplates = 100;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The Python module on a small simulated suite: arrays, errors, the stub, the example.
+"""The Python module on a small simulated suite: arrays, errors, types (plumb.pyi), the example.
 
 Usage: module_test.py PLUMB_BINARY EXAMPLE FOLDER, with the module's folder in PYTHONPATH.
 """
@@ -149,25 +149,25 @@ def parameters(function):
     return names, dict(zip(names[len(names) - len(defaults):], map(ast.literal_eval, defaults)))
 
 
-class StubTest(unittest.TestCase):
+class TypesTest(unittest.TestCase):
     """Editors and mypy read plumb.pyi only: it must state what the module has."""
 
-    def check_function(self, stub, real):
+    def check_function(self, typed, real):
         # pybind11 writes the signature as the first line of the docstring. A default without
-        # a literal is shown as <...> there, and as ... in the stub.
+        # a literal is shown as <...> there, and as ... in the types.
         line = re.sub(r"<[^>]*>", "...", inspect.getdoc(real).splitlines()[0])
         names, defaults = parameters(ast.parse(f"def {line}: ...").body[0])
-        stub_names, stub_defaults = parameters(stub)
-        self.assertEqual(stub_names, names[-len(stub_names):] if stub_names else [], line)
-        # An empty list is an empty tuple in the stub, whose defaults must not be mutable.
+        typed_names, typed_defaults = parameters(typed)
+        self.assertEqual(typed_names, names[-len(typed_names):] if typed_names else [], line)
+        # An empty list is an empty tuple in the types, whose defaults must not be mutable.
         plain = {name: () if value == [] else value for name, value in defaults.items()}
-        self.assertEqual(stub_defaults, plain, line)
+        self.assertEqual(typed_defaults, plain, line)
 
-    def test_the_stub_has_the_names_and_defaults_of_the_module(self):
-        stub = ast.parse(pathlib.Path(plumb.__file__).with_name("plumb.pyi").read_text())
+    def test_the_types_have_the_names_and_defaults_of_the_module(self):
+        types = ast.parse(pathlib.Path(plumb.__file__).with_name("plumb.pyi").read_text())
         found = set()
         checked = 0
-        for node in stub.body:
+        for node in types.body:
             if isinstance(node, ast.FunctionDef):
                 self.check_function(node, getattr(plumb, node.name))
                 checked += 1

@@ -89,14 +89,21 @@ class ApplianceTest : public ::testing::Test {
     });
     done->get_future().wait();
   }
-  /// False if it does not come to that within half a minute. Asked on the loop's thread.
-  [[nodiscard]] bool Becomes(const std::function<bool()>& holds) {
-    const auto until = EventLoop::Clock::now() + std::chrono::seconds(30);
+  /// False if it does not come to that in time. Asked on the loop's thread.
+  /// @param pause  Between two questions, where background work needs the processor.
+  [[nodiscard]] bool Becomes(const std::function<bool()>& holds,
+                             std::chrono::seconds limit = std::chrono::seconds(30),
+                             std::chrono::milliseconds pause = {}) {
+    const auto until = EventLoop::Clock::now() + limit;
     while (EventLoop::Clock::now() < until) {
       bool does = false;
       On([&] { does = holds(); });
       if (does) return true;
-      std::this_thread::yield();
+      if (pause.count() > 0) {
+        std::this_thread::sleep_for(pause);
+      } else {
+        std::this_thread::yield();
+      }
     }
     return false;
   }

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
-#include <mutex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -485,112 +484,6 @@ TEST_F(StorageRetryTest, SafeModeNeverEndsWithANewDatabase) {
     LetItTryInVain();
     EXPECT_NE(Fault(), "");
     EXPECT_TRUE(fs::is_empty(state()));
-  });
-}
-
-/// An appliance whose disk has the room that a test says.
-class ApplianceSpaceTest : public testing::ApplianceTest {
- protected:
-  ApplianceSpaceTest() {
-    parts_.demo_patient.clear();
-    parts_.space = [this](const fs::path&, std::error_code&) {
-      const std::lock_guard lock(mutex_);
-      return space_;
-    };
-    SetAvailable(90'000'000'000);
-  }
-  /// Of a disk of 100 GB, of which 5 are kept for root.
-  void SetUsed(std::uintmax_t used_mb) {
-    Set({.capacity = 100'000'000'000,
-         .free = 100'000'000'000 - used_mb * 1'000'000,
-         .available = 95'000'000'000 - used_mb * 1'000'000});
-  }
-  void SetAvailable(std::uintmax_t bytes) {
-    Set({.capacity = 100'000'000'000, .free = bytes, .available = bytes});
-  }
-  [[nodiscard]] bool IsLit(const std::string& light) {
-    return Becomes([&] { return appliance_->WebStatus().light == light; });
-  }
-
- private:
-  void Set(const fs::space_info& space) {
-    const std::lock_guard lock(mutex_);
-    space_ = space;
-  }
-
-  std::mutex mutex_;  ///< The loop and the store's thread ask for it.
-  fs::space_info space_ = {};
-};
-
-TEST_F(ApplianceSpaceTest, FourFifthsOfTheDiskAreToldByPageStatusAndLight) {
-  const auto warns = [&] {
-    const std::vector<std::string> warnings = appliance_->WebStatus().storage.warnings;
-    return std::find(warnings.begin(), warnings.end(),
-                     "The disk is 80 % full: back up and remove scans.") != warnings.end();
-  };
-  Play([&] {
-    SetUsed(75'999);
-    MakeReady();
-    EXPECT_TRUE(IsLit("ready"));
-    On([&] { EXPECT_FALSE(warns()); });
-    SetUsed(76'000);  // of the 95 that are not kept
-    EXPECT_TRUE(IsLit("ready_disk_nearly_full"));
-    On([&] {
-      EXPECT_TRUE(warns());
-      EXPECT_EQ(appliance_->StatusJson()["light"], "ready_disk_nearly_full");
-      EXPECT_THAT(appliance_->StatusJson()["warnings"].dump(), HasSubstr("80 % full"));
-      EXPECT_EQ(appliance_->state().phase, ScanPhase::kReady);
-      EXPECT_TRUE(appliance_->Health().ok);
-    });
-    SetUsed(75'999);
-    EXPECT_TRUE(IsLit("ready")) << "and that it is over";
-  });
-}
-
-/// Of the fake sensor, whose images are smaller than the smallest that are reckoned with.
-constexpr std::uintmax_t kScanBytes = 16'000'000 + 110 * 320 * 240;
-constexpr std::uintmax_t kRecordingBytes = std::uintmax_t{60 * 30 * 320 * 240} / 10 * 26;
-
-TEST_F(ApplianceSpaceTest, OneByteTooLittleIsAFaultAndNoReadiness) {
-  Play([&] {
-    MakeReady();
-    SetAvailable(kScanBytes);
-    EXPECT_TRUE(IsLit("ready_disk_nearly_full"));
-    SetAvailable(kScanBytes - 1);
-    EXPECT_TRUE(IsLit("fault"));
-    On([&] {
-      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kFault);
-      EXPECT_EQ(appliance_->WebStatus().fault_kind, web::FaultKind::kStorage);
-      EXPECT_THAT(appliance_->WebStatus().fault, HasSubstr("the disk is full: 24 MB are free"));
-      EXPECT_THAT(appliance_->StatusLine(), HasSubstr("the disk is full"));
-      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester), HasSubstr("the disk is full"));
-      EXPECT_EQ(appliance_->storage_fault(), "") << "scans can be removed";
-      EXPECT_NE(appliance_->store()->patients.Add(kTester, "A", ""), "");
-    });
-    SetAvailable(kScanBytes);
-    EXPECT_TRUE(IsLit("ready_disk_nearly_full"));
-    On([&] { EXPECT_EQ(appliance_->WebStatus().fault, ""); });
-  });
-}
-
-TEST_F(ApplianceSpaceTest, ARecordingNeedsItsOwnRoomAndADailyCheckHasNone) {
-  parts_.config.appliance.keep_recordings = true;
-  parts_.config.appliance.scan_limit_s = 60;
-  Play([&] {
-    MakeReady();
-    const auto reason = [&] { return appliance_->Health().reason; };
-    SetAvailable(kScanBytes + kRecordingBytes);
-    On([&] { EXPECT_EQ(reason(), ""); });
-    SetAvailable(kScanBytes + kRecordingBytes - 1);
-    On([&] {
-      EXPECT_THAT(reason(), HasSubstr("the disk is full"));
-      EXPECT_EQ(appliance_->OpenCheck(kTester), "");
-      EXPECT_EQ(reason(), "");
-    });
-    SetAvailable(kScanBytes);
-    On([&] { EXPECT_EQ(reason(), ""); });
-    SetAvailable(kScanBytes - 1);
-    On([&] { EXPECT_THAT(reason(), HasSubstr("the disk is full")); });
   });
 }
 

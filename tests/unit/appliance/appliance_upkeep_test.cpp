@@ -1,10 +1,10 @@
 // Backups, checks and removals by an appliance whose ticks take a millisecond instead of a second.
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <fstream>
 #include <future>
 #include <memory>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,6 +24,10 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   ApplianceUpkeepTest() {
     parts_.demo_patient.clear();
     parts_.tick = milliseconds(1);
+    parts_.space = [this, space = parts_.space](const fs::path& folder, std::error_code& error) {
+      if (folder == state()) ++num_ticks_;
+      return space(folder, error);
+    };
   }
 
   [[nodiscard]] fs::path state() const { return folder_ / "state"; }
@@ -38,14 +42,12 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   }
   /// Like Becomes(), but leaves the processor to a backup, which gives way to everything else.
   [[nodiscard]] bool Comes(const std::function<bool()>& holds) {
-    const auto until = EventLoop::Clock::now() + std::chrono::seconds(60);
-    while (EventLoop::Clock::now() < until) {
-      bool does = false;
-      On([&] { does = holds(); });
-      if (does) return true;
-      std::this_thread::sleep_for(milliseconds(10));
-    }
-    return false;
+    return Becomes(holds, std::chrono::seconds(60), milliseconds(10));
+  }
+  /// The disk is examined once in each tick.
+  void WaitForTicks(int count) {
+    const int end = num_ticks_ + count;
+    EXPECT_TRUE(Comes([&] { return num_ticks_ >= end; }));
   }
   /// Until the store's thread has done everything that was posted to it.
   void WaitForStore() {
@@ -75,6 +77,9 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   void ChangeDatabase(const std::string& sql) const {
     Database(state() / "plumb.db", Database::Access::kReadWrite).Execute(sql);
   }
+
+ private:
+  std::atomic<int> num_ticks_ = 0;
 };
 
 TEST_F(ApplianceUpkeepTest, ABackupIsMadeWhenItIsDueAndNotBefore) {
@@ -82,7 +87,7 @@ TEST_F(ApplianceUpkeepTest, ABackupIsMadeWhenItIsDueAndNotBefore) {
   (void)StoreScans();
   Play([&] {
     ASSERT_TRUE(Comes([&] { return Backups().size() == 1; }));
-    std::this_thread::sleep_for(milliseconds(400));  // several intervals
+    WaitForTicks(400);  // several intervals
     On([&] {
       ASSERT_EQ(Backups().size(), 1U) << "it is not due again";
       EXPECT_EQ(Backups()[0].user, "plumbd");
@@ -95,7 +100,7 @@ TEST_F(ApplianceUpkeepTest, ABackupIsMadeWhenItIsDueAndNotBefore) {
       }
     };
     make_older(std::chrono::hours(23));
-    std::this_thread::sleep_for(milliseconds(400));
+    WaitForTicks(400);
     On([&] { EXPECT_EQ(Backups().size(), 1U) << "one a day"; });
     make_older(std::chrono::hours(25));
     EXPECT_TRUE(Comes([&] { return Backups().size() == 2; }));
@@ -190,7 +195,7 @@ TEST_F(ApplianceUpkeepTest, ARecordingHasADigestSoonAfterItsScan) {
   parts_.tick = milliseconds(50);  // the next search would come after half a minute
   Play([&] {
     MakeReady();
-    std::this_thread::sleep_for(milliseconds(2500));  // the first search has found nothing
+    WaitForTicks(50);  // the first search has found nothing
     std::string scan;
     On([&] {
       Store& store = *appliance_->store();
@@ -206,19 +211,17 @@ TEST_F(ApplianceUpkeepTest, ARecordingHasADigestSoonAfterItsScan) {
       Database database(state() / "plumb.db", Database::Access::kReadOnly);
       return database.Prepare("SELECT 1 FROM scan_files WHERE path = 'recording'").Step();
     };
-    bool has = false;
-    for (int i = 0; i < 100 && !has; ++i) {
-      std::this_thread::sleep_for(milliseconds(100));
-      has = has_digest();
-    }
-    EXPECT_TRUE(has);
+    EXPECT_TRUE(Becomes(has_digest, std::chrono::seconds(10), milliseconds(100)));
   });
 }
 
 TEST_F(ApplianceUpkeepTest, FoldersThatWereSetAsideAreAWarning) {
   (void)StoreScans();
   fs::copy(state() / "scans" / "000003", state() / "scans" / "000007", fs::copy_options::recursive);
-  Play([&] { EXPECT_TRUE(Comes([&] { return Warns("Some folders of scans (1) are unknown"); })); });
+  Play([&] {
+    EXPECT_TRUE(
+        Comes([&] { return Warns("The database has no record of some scan folders (1)"); }));
+  });
 }
 
 TEST_F(ApplianceUpkeepTest, AboveTheConfiguredQuotaScansAreRemovedButNotReferences) {
@@ -284,7 +287,7 @@ TEST_F(ApplianceRetentionTest, AClockThatIsNotYetTrustedRemovesNothing) {
   Play([&] {
     WaitForStore();  // the removal at the start
     On([&] { EXPECT_EQ(Stored(), scans_); });
-    std::this_thread::sleep_for(std::chrono::seconds(5));  // and the next one
+    WaitForTicks(4000);  // and the next one
     WaitForStore();
     On([&] { EXPECT_EQ(Stored(), scans_); });
   });

@@ -39,6 +39,11 @@ class StoreRecoveryTest : public ::testing::Test {
   [[nodiscard]] std::unique_ptr<Store> Open(StoreOptions options = {}) const {
     return std::make_unique<Store>(state(), std::move(options));
   }
+  /// The number of the only scan of the only patient.
+  [[nodiscard]] std::string StoreOneScan() const {
+    const auto store = Open();
+    return StoreScan(*store, store->patients.Add(kAnna, "P", ""));
+  }
   static std::vector<std::string> Actions(Store& store) {
     std::vector<std::string> actions;
     for (const web::AuditEntry& entry : store.audit.Find({0, 1000}))
@@ -379,11 +384,7 @@ TEST_F(StoreRecoveryTest, AConfirmationOfNothingLostCountsForNoLaterStart) {
 }
 
 TEST_F(StoreRecoveryTest, TheOnlyScanMayBeMissingBesideOtherFilesAndComesBack) {
-  std::string scan;
-  {
-    const auto store = Open();
-    scan = StoreScan(*store, store->patients.Add(kAnna, "P", ""));
-  }
+  const std::string scan = StoreOneScan();
   fs::rename(state() / "scans" / scan, folder_ / "away");
   WriteWholeFile(state() / "scans" / "note", std::string_view("this is the disk"));
   EXPECT_EQ(Open()->recovery().lost_scans, 1);
@@ -393,11 +394,7 @@ TEST_F(StoreRecoveryTest, TheOnlyScanMayBeMissingBesideOtherFilesAndComesBack) {
 }
 
 TEST_F(StoreRecoveryTest, AnEmptyOrMissingFolderOfScansIsSafeModeEvenForTheOnlyScan) {
-  std::string scan;
-  {
-    const auto store = Open();
-    scan = StoreScan(*store, store->patients.Add(kAnna, "P", ""));
-  }
+  const std::string scan = StoreOneScan();
   const fs::path scans = state() / "scans";
   fs::rename(scans, folder_ / "disk");
   const auto refuses = [&] { return MessageOf<ScansMissing>([&] { (void)Open(); }); };
@@ -419,11 +416,7 @@ TEST_F(StoreRecoveryTest, AnEmptyOrMissingFolderOfScansIsSafeModeEvenForTheOnlyS
 }
 
 TEST_F(StoreRecoveryTest, TheFolderOfScansMayBeALinkAndAFileInItsPlaceIsSafeMode) {
-  std::string scan;
-  {
-    const auto store = Open();
-    scan = StoreScan(*store, store->patients.Add(kAnna, "P", ""));
-  }
+  const std::string scan = StoreOneScan();
   const fs::path scans = state() / "scans";
   fs::rename(scans, folder_ / "disk");
   const auto before = testing::FilesBelow(folder_ / "disk");

@@ -219,8 +219,8 @@ export const kFaultPatterns = [
     + 'or remove these scans\\. The log names them\\.?$',
   'Faltan o han cambiado archivos de algunos escaneos guardados ($1): recupérelos de una copia de '
     + 'seguridad o borre esos escaneos. El registro los nombra.'],
-  ['^Some folders of scans \\((\\d+)\\) are unknown to the database and were set aside: restore a '
-    + 'newer backup, or move them from the folder set-aside to another disk\\.?$',
+  ['^The database has no record of some scan folders \\((\\d+)\\), so they were set aside\\. '
+    + 'Restore a newer backup, or move them from the set-aside folder to another disk\\.?$',
   'La base de datos no conoce algunas carpetas de escaneos ($1), que se apartaron: restaure una '
     + 'copia más reciente, o llévelas de la carpeta set-aside a otro disco.'],
   ['^No backup is set up: if this disk fails, all scans are lost\\. Mount another disk for '
