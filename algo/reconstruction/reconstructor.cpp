@@ -96,7 +96,7 @@ struct Reconstructor::Impl {
 
   [[nodiscard]] double Now() const { return options.now_s ? options.now_s() : 0.0; }
 
-  TrackingReport AddFrame(const Frame& frame) {
+  TrackingReport AddFrame(const Frame& frame, bool fewer_keypoints) {
     if (frame.color_rgb.cols != info.intrinsics.width ||
         frame.color_rgb.rows != info.intrinsics.height ||
         frame.depth_m.size() != frame.color_rgb.size())
@@ -107,7 +107,7 @@ struct Reconstructor::Impl {
     TrackingReport report;
     DepthStatistics(frame.depth_m, report);
     const double start = Now();
-    const TrackedFrame tracked = tracker.Track(frame);
+    const TrackedFrame tracked = tracker.Track(frame, fewer_keypoints);
     tracking_times_s.push_back(Now() - start);
     report.tracked = tracked.tracked;
     report.is_keyframe = tracked.keyframe.has_value();
@@ -405,7 +405,9 @@ struct Reconstructor::Impl {
 Reconstructor::Reconstructor(const StreamInfo& info, const ReconstructorOptions& options)
     : impl_(std::make_unique<Impl>(info, options)) {}
 Reconstructor::~Reconstructor() = default;
-TrackingReport Reconstructor::AddFrame(const Frame& frame) { return impl_->AddFrame(frame); }
+TrackingReport Reconstructor::AddFrame(const Frame& frame, bool fewer_keypoints) {
+  return impl_->AddFrame(frame, fewer_keypoints);
+}
 void Reconstructor::CountDropped(int num_frames) { impl_->dropped += num_frames; }
 Scene Reconstructor::Finish(const std::stop_token& stop,
                             const std::function<void(double, std::string_view)>& progress) {

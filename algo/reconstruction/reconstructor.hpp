@@ -68,8 +68,9 @@ class Reconstructor {
   Reconstructor(const StreamInfo& info, const ReconstructorOptions& options);
   ~Reconstructor();
 
+  /// @param fewer_keypoints  See Tracker::Track().
   /// @throws DataError if the images do not have the size stated by the intrinsics.
-  TrackingReport AddFrame(const Frame& frame);
+  TrackingReport AddFrame(const Frame& frame, bool fewer_keypoints = false);
 
   /// Counts a frame that was dropped before it arrived here (live, too slow).
   void CountDropped(int num_frames);

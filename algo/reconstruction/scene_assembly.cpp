@@ -87,6 +87,8 @@ Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
   scene.frames_total = static_cast<std::int64_t>(frames.size()) + dropped;
   scene.frames_tracked = static_cast<std::int64_t>(scene.trajectory.size());
   scene.frames_dropped = dropped;
+  scene.frames_fewer_keypoints = std::count_if(
+      frames.begin(), frames.end(), [](const TrackedFrame& f) { return f.fewer_keypoints; });
   scene.longest_lost_s = LongestLost(frames);
   for (const auto& [id, marker] : map.markers)
     scene.markers[id] = ToSceneMarker(info, marker, T_scene_world);
@@ -104,6 +106,12 @@ Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
         "{} of {} frames were dropped, because the processor was busy: fewer views support the "
         "surface",
         dropped, scene.frames_total));
+  }
+  if (scene.frames_fewer_keypoints > 0) {
+    scene.warnings.push_back(fmt::format(
+        "{} of {} frames were tracked with fewer keypoints, because the processor was busy: close "
+        "other programs on it",
+        scene.frames_fewer_keypoints, scene.frames_total));
   }
   if (map.keyframes.size() > 2 * kLoopMinGap && LongestReturn(map) < kLoopMinGap) {
     scene.warnings.push_back(

@@ -145,13 +145,24 @@ void FollowedPoints::Observe(const std::vector<PosePoint>& found, std::size_t fi
   active_ = std::move(kept);
 }
 
+void FollowedPoints::KeepOnePerCell() {
+  std::vector<Eigen::Vector2f> pixels;
+  for (const ActivePoint& a : active_) pixels.push_back(a.pixel);
+  std::vector<ActivePoint> kept;
+  for (const std::size_t i :
+       FirstOfCells(pixels, intrinsics_.width, intrinsics_.height, fewer_options_))
+    kept.push_back(active_[i]);
+  active_ = std::move(kept);
+}
+
 void FollowedPoints::AddCorners(const GrayImage& image, const cv::Mat& depth_m, int index,
-                                MapKeyframe& keyframe) {
+                                bool fewer, MapKeyframe& keyframe) {
   std::vector<Eigen::Vector2f> occupied;
   for (const ActivePoint& a : active_) occupied.push_back(a.pixel);
   const Pose T_color_depth = PoseFromTwist(
       keyframe.velocity_per_s * (keyframe.data.depth_time_s - keyframe.data.color_time_s));
-  for (const Eigen::Vector2f& corner : DetectCorners(image.gray, occupied, options_)) {
+  for (const Eigen::Vector2f& corner :
+       DetectCorners(image.gray, occupied, fewer ? fewer_options_ : options_)) {
     const Eigen::Vector2d pixel = corner.cast<double>();
     const double z = DepthAt(depth_m, pixel);
     if (z <= 0) continue;

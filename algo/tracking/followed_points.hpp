@@ -62,9 +62,15 @@ class FollowedPoints {
   /// are recorded as observed in it, the others are dropped.
   void Observe(const std::vector<PosePoint>& found, std::size_t first, MapKeyframe& keyframe);
 
+  /// Stops following all but the oldest point in each of the larger cells for fewer keypoints.
+  /// Their landmarks stay in the map, and Reassociate() may find them again.
+  void KeepOnePerCell();
+
   /// Creates new landmarks at corners of a keyframe's image where no landmark is tracked.
   /// @param index  Index of the keyframe.
-  void AddCorners(const GrayImage& image, const cv::Mat& depth_m, int index, MapKeyframe& keyframe);
+  /// @param fewer  In the larger cells for fewer keypoints.
+  void AddCorners(const GrayImage& image, const cv::Mat& depth_m, int index, bool fewer,
+                  MapKeyframe& keyframe);
 
  private:
   [[nodiscard]] double SigmaPx() const { return intrinsics_.width / 640.0; }
@@ -78,6 +84,7 @@ class FollowedPoints {
   const Intrinsics intrinsics_;
   const DepthNoise depth_noise_;
   const KeypointOptions options_;
+  const KeypointOptions fewer_options_{.cell_px = kFewerCell_px};
   TrackingMap& map_;
   std::vector<ActivePoint> active_;
   // Pyramids of keyframes, the last used first.

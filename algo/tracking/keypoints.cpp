@@ -62,6 +62,34 @@ void AddBestOfCells(const cv::Mat& gray, const cv::Rect& run, int cell,
   }
 }
 
+// Division of an image into cells; remembers which of them contain a point.
+class Cells {
+ public:
+  Cells(int width, int height, const KeypointOptions& options)
+      : size(std::max(8, options.cell_px * width / 640)),
+        columns((width + size - 1) / size),
+        rows((height + size - 1) / size),
+        taken_(static_cast<std::size_t>(columns * rows), false) {}
+
+  const int size, columns, rows;
+
+  [[nodiscard]] bool IsTaken(int row, int column) const { return taken_[Index(row, column)]; }
+  /// True if the point is in the image, and its cell contained none before.
+  bool Take(const Eigen::Vector2f& p) {
+    const int c = static_cast<int>(p.x()) / size;
+    const int r = static_cast<int>(p.y()) / size;
+    if (c < 0 || r < 0 || c >= columns || r >= rows || taken_[Index(r, c)]) return false;
+    taken_[Index(r, c)] = true;
+    return true;
+  }
+
+ private:
+  [[nodiscard]] std::size_t Index(int row, int column) const {
+    return static_cast<std::size_t>(row * columns + column);
+  }
+  std::vector<bool> taken_;
+};
+
 }  // namespace
 
 Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options) {
@@ -74,31 +102,32 @@ Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options) {
 std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray,
                                            const std::vector<Eigen::Vector2f>& occupied,
                                            const KeypointOptions& options) {
-  const int cell = std::max(8, options.cell_px * gray.cols / 640);
-  const int columns = (gray.cols + cell - 1) / cell;
-  const int rows = (gray.rows + cell - 1) / cell;
-  std::vector<bool> taken(static_cast<std::size_t>(columns * rows), false);
-  for (const Eigen::Vector2f& p : occupied) {
-    const int c = static_cast<int>(p.x()) / cell;
-    const int r = static_cast<int>(p.y()) / cell;
-    if (c >= 0 && r >= 0 && c < columns && r < rows)
-      taken[static_cast<std::size_t>(r * columns + c)] = true;
-  }
+  Cells cells(gray.cols, gray.rows, options);
+  for (const Eigen::Vector2f& p : occupied) cells.Take(p);
+  const int cell = cells.size;
   constexpr int kMargin = 8;
   const cv::Rect inner(kMargin, kMargin, gray.cols - 2 * kMargin, gray.rows - 2 * kMargin);
   std::vector<Eigen::Vector2f> corners;
-  for (int r = 0; r < rows; ++r) {
-    const auto is_free = [&](int c) { return !taken[static_cast<std::size_t>(r * columns + c)]; };
-    for (int c = 0; c < columns; ++c) {
-      if (!is_free(c)) continue;
+  for (int r = 0; r < cells.rows; ++r) {
+    for (int c = 0; c < cells.columns; ++c) {
+      if (cells.IsTaken(r, c)) continue;
       int end = c + 1;
-      while (end < columns && is_free(end)) ++end;
+      while (end < cells.columns && !cells.IsTaken(r, end)) ++end;
       const cv::Rect run = cv::Rect(c * cell, r * cell, (end - c) * cell, cell) & inner;
       if (!run.empty()) AddBestOfCells(gray, run, cell, options, corners);
       c = end;
     }
   }
   return corners;
+}
+
+std::vector<std::size_t> FirstOfCells(const std::vector<Eigen::Vector2f>& points, int width,
+                                      int height, const KeypointOptions& options) {
+  Cells cells(width, height, options);
+  std::vector<std::size_t> first;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (cells.Take(points[i])) first.push_back(i);
+  return first;
 }
 
 double BrightnessRatio(const cv::Mat& from, const cv::Mat& to,

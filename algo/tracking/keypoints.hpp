@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,6 +24,9 @@ struct KeypointOptions {
   double min_quality = 4.0;
 };
 
+/// Cell for fewer keypoints: of twice the area.
+inline constexpr int kFewerCell_px = 45;
+
 [[nodiscard]] Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options);
 
 /// New corners (Shi-Tomasi, sub-pixel by the peak of the score) in cells that contain none of
@@ -30,6 +34,12 @@ struct KeypointOptions {
 [[nodiscard]] std::vector<Eigen::Vector2f> DetectCorners(
     const cv::Mat& gray, const std::vector<Eigen::Vector2f>& occupied,
     const KeypointOptions& options);
+
+/// Indices of the points that are the first in their cell of an image of this size, in their order.
+/// Points outside the image are left out.
+[[nodiscard]] std::vector<std::size_t> FirstOfCells(const std::vector<Eigen::Vector2f>& points,
+                                                    int width, int height,
+                                                    const KeypointOptions& options);
 
 /// Brightness of an image relative to another at the same places: the median over the points of the
 /// ratio of the mean grey levels around them, or 1 with too few points. Automatic exposure changes

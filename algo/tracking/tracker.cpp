@@ -106,12 +106,13 @@ Pose Tracker::Impl::PredictedPose(const Frame& frame) const {
   return PoseAfter(T_world_last, velocity, std::min(frame.color_time_s - last_time_s, 0.3));
 }
 
-TrackedFrame Tracker::Impl::Track(const Frame& frame) {
+TrackedFrame Tracker::Impl::Track(const Frame& frame, bool fewer_keypoints) {
   FrameData prepared = Prepare(frame);
   TrackedFrame result;
   result.frame_index = frame.index;
   result.color_time_s = frame.color_time_s;
   result.depth_time_s = frame.depth_time_s;
+  result.fewer_keypoints = fewer_keypoints;
   if (map.keyframes.empty()) {
     // A map that starts with an empty image could never be found again.
     if (ShowsSomething(prepared)) {
@@ -344,7 +345,9 @@ void Tracker::Impl::RefreshKeyframeVelocity(const Frame& frame, const Pose& T_wo
 Tracker::Tracker(const StreamInfo& info, const TrackerOptions& options)
     : impl_(std::make_unique<Impl>(info, options)) {}
 Tracker::~Tracker() = default;
-TrackedFrame Tracker::Track(const Frame& frame) { return impl_->Track(frame); }
+TrackedFrame Tracker::Track(const Frame& frame, bool fewer_keypoints) {
+  return impl_->Track(frame, fewer_keypoints);
+}
 const TrackingMap& Tracker::map() const { return impl_->map; }
 TrackingMap Tracker::TakeMap() { return std::move(impl_->map); }
 const std::vector<TrackedFrame>& Tracker::frames() const { return impl_->frames; }

@@ -50,6 +50,7 @@ struct TrackedFrame {
       Pose::Identity();  ///< If it became a keyframe: its camera in that one's, as tracked.
   Vector6d velocity_per_s = Vector6d::Zero();  ///< In the camera frame.
   int num_keypoints = 0;
+  bool fewer_keypoints = false;  ///< As passed to Track().
   int num_markers = 0;
 };
 
@@ -70,7 +71,9 @@ class Tracker {
   ~Tracker();
 
   /// The frame's images are shared by reference count and kept for keyframes.
-  TrackedFrame Track(const Frame& frame);
+  /// @param fewer_keypoints  A keyframe follows on only one keypoint in each larger cell, for a
+  ///         computer that is too slow; it still observes all that were followed until then.
+  TrackedFrame Track(const Frame& frame, bool fewer_keypoints = false);
 
   [[nodiscard]] const TrackingMap& map() const;
   /// The map, for refinement after the last frame.

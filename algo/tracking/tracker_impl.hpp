@@ -58,7 +58,7 @@ struct Tracker::Impl {
     return map.keyframes[static_cast<std::size_t>(reference.value())];
   }
   [[nodiscard]] Pose PredictedPose(const Frame& frame) const;
-  TrackedFrame Track(const Frame& frame);
+  TrackedFrame Track(const Frame& frame, bool fewer_keypoints);
   static bool ShowsSomething(const FrameData& prepared);
   [[nodiscard]] double SigmaPx() const;
   void AddMarkerPoints(const std::vector<MarkerObservation>& markers,

@@ -99,7 +99,9 @@ void Tracker::Impl::MakeKeyframe(const Frame& frame, FrameData& prepared, const 
   const int index = static_cast<int>(map.keyframes.size());
   if (options.use_keypoints) {
     AssociateKeyframe(prepared, frame.depth_m, T_world_color, keyframe);
-    followed_points.AddCorners(prepared.image, frame.depth_m, index, keyframe);
+    if (result.fewer_keypoints) followed_points.KeepOnePerCell();
+    followed_points.AddCorners(prepared.image, frame.depth_m, index, result.fewer_keypoints,
+                               keyframe);
     followed_points.KeepPyramid(static_cast<std::size_t>(index), prepared.image.pyramid);
   }
   AddNewMarkers(frame.depth_m, keyframe);

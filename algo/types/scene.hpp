@@ -54,6 +54,7 @@ struct Scene {
   std::int64_t frames_total = 0;
   std::int64_t frames_tracked = 0;
   std::int64_t frames_dropped = 0;
+  std::int64_t frames_fewer_keypoints = 0;  ///< Live, while the computer was too slow.
   double longest_lost_s = 0.0;  ///< Longest time without a pose between two tracked frames.
 
   std::optional<Breathing> breathing;  ///< Absent if the sweep does not allow an estimate.

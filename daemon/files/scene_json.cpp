@@ -200,7 +200,8 @@ std::string SceneJson(const Scene& scene) {
   json["keyframes"] = scene.keyframes.size();
   json["frames"] = {{"total", scene.frames_total},
                     {"tracked", scene.frames_tracked},
-                    {"dropped", scene.frames_dropped}};
+                    {"dropped", scene.frames_dropped},
+                    {"fewer_keypoints", scene.frames_fewer_keypoints}};
   json["longest_lost_s"] = scene.longest_lost_s;
   json["breathing"] = nullptr;
   if (scene.breathing) {
@@ -250,6 +251,8 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   scene.frames_total = frames["total"].Integer(0, kMaxCount);
   scene.frames_tracked = frames["tracked"].Integer(0, kMaxCount);
   scene.frames_dropped = frames["dropped"].Integer(0, kMaxCount);
+  if (frames.has("fewer_keypoints"))
+    scene.frames_fewer_keypoints = frames["fewer_keypoints"].Integer(0, kMaxCount);
   if (root.has("longest_lost_s")) scene.longest_lost_s = root["longest_lost_s"].Number(0, 1e9);
   if (root.has("breathing") && !root["breathing"].is_null()) {
     const Value breathing = root["breathing"];

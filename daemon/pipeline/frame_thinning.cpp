@@ -40,8 +40,8 @@ int NextStride(int stride, const TrackingLoad& load, const ThinningOptions& opti
 }
 
 ThinnedFeed::ThinnedFeed(FrameFeed& feed, std::function<double()> now_s,
-                         const ThinningOptions& options)
-    : feed_(feed), now_s_(std::move(now_s)), options_(options) {}
+                         const ThinningOptions& options, const KeypointBudgetOptions& keypoints)
+    : feed_(feed), now_s_(std::move(now_s)), options_(options), keypoint_options_(keypoints) {}
 
 std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
   if (handed_out_s_) {
@@ -74,12 +74,18 @@ bool ThinnedFeed::Takes(double stamp_s, double arrived_s) {
   // wait.
   const double lag_s = arrived_s - stamp_s;
   least_lag_s_ = std::min(lag_s, least_lag_s_.value_or(lag_s));
-  const int next = NextStride(stride_,
-                              {.frame_period_s = frame_period_s_,
-                               .tracking_s = num_taken_ < kFewFrames ? 0.0 : tracking_s_,
-                               .late_s = lag_s - *least_lag_s_,
-                               .since_change_s = stamp_s - changed_s_},
-                              options_);
+  TrackingLoad load{.frame_period_s = frame_period_s_,
+                    .tracking_s = num_taken_ < kFewFrames ? 0.0 : tracking_s_,
+                    .late_s = lag_s - *least_lag_s_,
+                    .since_change_s = stamp_s - changed_s_};
+  const bool fewer = NextFewerKeypoints(fewer_keypoints_, stride_, load, keypoint_options_);
+  if (fewer != fewer_keypoints_) {
+    fewer_keypoints_ = fewer;
+    // The queue may be worked off by this before frames are skipped, too.
+    changed_s_ = stamp_s;
+    load.since_change_s = 0.0;
+  }
+  const int next = NextStride(stride_, load, options_);
   if (next != stride_) {
     stride_ = next;
     changed_s_ = stamp_s;

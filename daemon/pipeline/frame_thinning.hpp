@@ -1,4 +1,4 @@
-// Selects live frames to skip while the computer is too slow to track all of them.
+// Selects live frames to skip, or to track with fewer keypoints, while the computer is too slow.
 #pragma once
 
 #include <functional>
@@ -6,7 +6,9 @@
 #include <stop_token>
 #include <string>
 
+#include "daemon/pipeline/keypoint_budget.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "daemon/pipeline/tracking_load.hpp"
 
 namespace plumb {
 
@@ -25,14 +27,6 @@ struct ThinningOptions {
   double lower_hold_s = 2.0;  ///< Delay after a change before more frames are taken again.
 };
 
-/// State when a frame arrives at tracking.
-struct TrackingLoad {
-  double frame_period_s = 0.0;  ///< Time between the sensor's frames; 0 if unknown.
-  double tracking_s = 0.0;      ///< Recent time to track one frame; 0 if unknown.
-  double late_s = 0.0;          ///< Lateness of tracking behind the sensor.
-  double since_change_s = 0.0;  ///< Since the last change of the stride, or the start of the sweep.
-};
-
 /// The stride from now on, 1 to `max_stride`: one in this many frames is tracked. Frames are
 /// skipped evenly, so that the sweep has no gap, and before the queue overflows, which would lose
 /// consecutive frames.
@@ -42,17 +36,20 @@ struct TrackingLoad {
 [[nodiscard]] int NextStride(int stride, const TrackingLoad& load,
                              const ThinningOptions& options = {});
 
-/// A live feed without the skipped frames. Not thread-safe.
+/// A live feed without the skipped frames. Before any is skipped, frames are tracked with fewer
+/// keypoints. Not thread-safe.
 class ThinnedFeed : public FrameFeed {
  public:
   /// @param feed   Borrowed.
   /// @param now_s  A clock with the rate of the frames' stamps.
   explicit ThinnedFeed(FrameFeed& feed, std::function<double()> now_s = SteadySeconds,
-                       const ThinningOptions& options = {});
+                       const ThinningOptions& options = {},
+                       const KeypointBudgetOptions& keypoints = {});
 
   std::optional<Frame> Next(const std::stop_token& stop) override;
   /// Includes skipped frames.
   int TakeDropped() override;
+  [[nodiscard]] bool fewer_keypoints() const override { return fewer_keypoints_; }
   void Finish() override { feed_.Finish(); }
   [[nodiscard]] std::optional<double> last_frame_s() const override { return feed_.last_frame_s(); }
 
@@ -66,6 +63,8 @@ class ThinnedFeed : public FrameFeed {
   FrameFeed& feed_;
   const std::function<double()> now_s_;
   const ThinningOptions options_;
+  const KeypointBudgetOptions keypoint_options_;
+  bool fewer_keypoints_ = false;
   int stride_ = 1, left_to_skip_ = 0;
   int num_taken_ = 0, num_left_out_ = 0, num_unreported_ = 0;
   std::optional<double> last_stamp_s_, handed_out_s_, least_lag_s_;

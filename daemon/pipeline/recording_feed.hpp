@@ -26,6 +26,7 @@ class RecordingFeed : public FrameFeed {
   /// @throws IoError if the recording cannot be written.
   std::optional<Frame> Next(const std::stop_token& stop) override;
   int TakeDropped() override { return feed_.TakeDropped(); }
+  [[nodiscard]] bool fewer_keypoints() const override { return feed_.fewer_keypoints(); }
   /// No more frames follow; waiting ones are written while the scan is computed.
   void Finish() override;
   /// Waits for the last of them, once, after Finish(). A stop request leaves an incomplete

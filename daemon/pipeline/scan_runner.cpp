@@ -113,7 +113,7 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
       reconstructor.CountDropped(dropped);
       state.frames_dropped += dropped;
     }
-    const TrackingReport report = reconstructor.AddFrame(*frame);
+    const TrackingReport report = reconstructor.AddFrame(*frame, feed.fewer_keypoints());
     ++state.frames;
     state.frames_tracked += report.tracked ? 1 : 0;
     const double seen = static_cast<double>(state.frames + state.frames_dropped);

@@ -36,6 +36,8 @@ class FrameFeed {
   virtual std::optional<Frame> Next(const std::stop_token& stop) = 0;
   /// Frames that were dropped since the last call, because tracking was late.
   virtual int TakeDropped() = 0;
+  /// Whether the last frame is to be tracked with fewer keypoints, because tracking is late.
+  [[nodiscard]] virtual bool fewer_keypoints() const { return false; }
   /// Called once, after Next() returned nothing without a stop request: throws the error that ended
   /// the reading, if any.
   virtual void Finish() = 0;

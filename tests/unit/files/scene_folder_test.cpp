@@ -89,6 +89,7 @@ TEST_F(SceneFolderTest, GivesBackWhatWasWritten) {
   EXPECT_EQ(read.frames_total, 5);
   EXPECT_EQ(read.frames_tracked, 3);
   EXPECT_EQ(read.frames_dropped, 1);
+  EXPECT_EQ(read.frames_fewer_keypoints, 2);
   EXPECT_EQ(read.longest_lost_s, 0.25);
   ASSERT_TRUE(read.breathing);
   EXPECT_EQ(read.breathing->amplitude_m, 0.004);
@@ -172,9 +173,11 @@ TEST_F(SceneFolderTest, AnotherProgramsSceneWithOnlyTheContractsKeysIsRead) {
   for (const char* key : {"marker_dictionary", "marker_length_m", "reference_marker",
                           "marker_sigma_m", "longest_lost_s", "breathing"})
     json.erase(key);
+  json["frames"].erase("fewer_keypoints");
   WriteWholeFile(scene_ / "scene.json", json.dump());
   EXPECT_EQ(ReadScene(scene_).markers.size(), 2U);
   EXPECT_FALSE(ReadScene(scene_).breathing);
+  EXPECT_EQ(ReadScene(scene_).frames_fewer_keypoints, 0);
 }
 
 TEST_F(SceneFolderTest, BreathingThatNobodyCanHaveIsRefused) {

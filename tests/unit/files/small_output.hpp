@@ -34,6 +34,7 @@ inline Scene SmallScene() {
   scene.frames_total = 5;
   scene.frames_tracked = 3;
   scene.frames_dropped = 1;
+  scene.frames_fewer_keypoints = 2;
   scene.longest_lost_s = 0.25;
   scene.breathing = Breathing{0.004, 0.0005, 3.5, 0.0015};
   scene.cloud.points = {{0, 0, 0.1F}, {0.5F, 0.25F, 0.125F}};

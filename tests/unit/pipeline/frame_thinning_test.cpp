@@ -97,18 +97,22 @@ class Sensor : public FrameFeed {
 
 struct Sweep {
   std::vector<std::int64_t> taken;
+  std::vector<bool> with_fewer;  // Of each frame in `taken`.
   int lost = 0, dropped = 0;
   std::string warning;
 };
 
 /// @param tracking_s  That a frame takes, by its index.
-Sweep Track(int num_frames, const std::function<double(std::int64_t)>& tracking_s) {
+/// @param share_of_fewer  By how much of that with fewer keypoints.
+Sweep Track(int num_frames, const std::function<double(std::int64_t)>& tracking_s,
+            double share_of_fewer = 1.0) {
   Sensor sensor(num_frames);
   ThinnedFeed feed(sensor, [&] { return sensor.now_s; });
   Sweep sweep;
   while (const std::optional<Frame> frame = feed.Next({})) {
     sweep.taken.push_back(frame->index);
-    sensor.now_s += tracking_s(frame->index);
+    sweep.with_fewer.push_back(feed.fewer_keypoints());
+    sensor.now_s += tracking_s(frame->index) * (feed.fewer_keypoints() ? share_of_fewer : 1.0);
     sweep.dropped += feed.TakeDropped();
   }
   sweep.dropped += feed.TakeDropped();
@@ -123,6 +127,34 @@ TEST(ThinnedFeed, TakesEveryFrameOfASweepThatIsTrackedInTime) {
   EXPECT_EQ(sweep.taken.size(), 300U);
   EXPECT_EQ(sweep.dropped, 0);
   EXPECT_EQ(sweep.warning, "");
+  EXPECT_EQ(std::count(sweep.with_fewer.begin(), sweep.with_fewer.end(), true), 0);
+}
+
+TEST(ThinnedFeed, FewerKeypointsSaveFramesWhereTheyAreEnough) {
+  // 35 ms of the 33 ms between two frames, and 25 ms with fewer keypoints.
+  const Sweep sweep = Track(
+      300, [](std::int64_t) { return 0.035; }, 0.7);
+  EXPECT_EQ(sweep.taken.size(), 300U);
+  EXPECT_EQ(sweep.warning, "");
+  const auto fewer = std::count(sweep.with_fewer.begin(), sweep.with_fewer.end(), true);
+  EXPECT_GT(fewer, 200);
+  EXPECT_LT(fewer, 270) << "they are reduced once tracking is late, not before";
+  EXPECT_TRUE(sweep.with_fewer.back()) << "a load of 0.75 is too much for all of them";
+  // Without a saving, frames are skipped as well.
+  EXPECT_LT(Track(300, [](std::int64_t) { return 0.035; }).taken.size(), 300U);
+}
+
+TEST(ThinnedFeed, UsesAllKeypointsAgainWhenTheLoadIsOver) {
+  const Sweep sweep = Track(
+      600, [](std::int64_t i) { return i < 150 ? 0.036 : 0.010; }, 0.7);
+  EXPECT_EQ(sweep.taken.size(), 600U);
+  EXPECT_TRUE(sweep.with_fewer[149]);
+  EXPECT_FALSE(sweep.with_fewer.back());
+  // Once each way.
+  int changes = 0;
+  for (std::size_t i = 1; i < sweep.with_fewer.size(); ++i)
+    changes += sweep.with_fewer[i] != sweep.with_fewer[i - 1] ? 1 : 0;
+  EXPECT_EQ(changes, 2);
 }
 
 TEST(ThinnedFeed, LeavesOutEvenlyAndLosesNoneWhereTrackingTakesTooLong) {

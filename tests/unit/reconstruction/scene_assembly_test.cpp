@@ -31,7 +31,8 @@ TEST(SceneAssemblyTest, ALengthThatDepthAndMarkersDisagreeAboutIsAWarning) {
 
 // Warnings of a scene from this many keyframes, of which each sees a landmark together with the
 // next only.
-std::vector<std::string> Warnings(int num_keyframes, std::int64_t num_dropped, bool returns) {
+std::vector<std::string> Warnings(int num_keyframes, std::int64_t num_dropped, bool returns,
+                                  std::size_t num_fewer_keypoints = 0) {
   TrackingMap map;
   for (int k = 0; k < num_keyframes; ++k) {
     MapKeyframe& keyframe = map.keyframes.emplace_back();
@@ -45,6 +46,7 @@ std::vector<std::string> Warnings(int num_keyframes, std::int64_t num_dropped, b
     frames[i].color_time_s = frames[i].depth_time_s = static_cast<double>(i) / 30.0;
     frames[i].tracked = true;
     frames[i].reference_keyframe = 0;
+    frames[i].fewer_keypoints = i < num_fewer_keypoints;
   }
   return MakeScene({}, Preset::kBest, num_dropped, frames, map, {}, Pose::Identity()).warnings;
 }
@@ -59,6 +61,12 @@ TEST(SceneAssemblyTest, ASweepThatNeverReturnsToAPlaceIsAWarning) {
 TEST(SceneAssemblyTest, MoreThanOneDroppedFrameInTwentyIsAWarning) {
   EXPECT_THAT(Warnings(2, 5, false), IsEmpty());  // 5 of 100.
   EXPECT_THAT(Warnings(2, 6, false), ElementsAre(HasSubstr("6 of 101 frames were dropped")));
+}
+
+TEST(SceneAssemblyTest, EveryFrameWithFewerKeypointsIsCountedAndTold) {
+  EXPECT_THAT(Warnings(2, 0, false, 0), IsEmpty());
+  EXPECT_THAT(Warnings(2, 0, false, 1),
+              ElementsAre(HasSubstr("1 of 95 frames were tracked with fewer keypoints")));
 }
 
 TEST(SceneAssemblyTest, BreathingOfOverTwoMillimetresIsAWarning) {

@@ -57,6 +57,16 @@ TEST(Keypoints, FollowsAShiftToAFractionOfAPixel) {
   EXPECT_LT(errors[errors.size() * 8 / 10], 0.1F);
 }
 
+TEST(Keypoints, TheFirstPointOfEachCellIsChosen) {
+  const KeypointOptions options{.cell_px = 40};
+  // The third lies in the first one's cell, the fifth in the second's; the sixth beside the image.
+  const std::vector<Vector2f> points = {{5, 5}, {40, 5}, {39, 39}, {5, 40}, {79, 0}, {700, 5}};
+  EXPECT_EQ(FirstOfCells(points, 640, 480, options), (std::vector<std::size_t>{0, 1, 3}));
+  // Cells are half as wide at half of the width.
+  EXPECT_EQ(FirstOfCells({{5, 5}, {19, 5}, {20, 5}}, 320, 240, options),
+            (std::vector<std::size_t>{0, 2}));
+}
+
 TEST(Keypoints, FollowsThroughAChangeOfTheExposureOnceItsRatioIsKnown) {
   const KeypointOptions options;
   const cv::Mat from = Pattern(0, 0);

@@ -84,6 +84,27 @@ TEST_F(TrackerTest, FollowsThroughAStepOfTheExposure) {
   EXPECT_LT(worst, 0.002);
 }
 
+TEST_F(TrackerTest, FollowsWithFewerKeypointsToo) {
+  Tracker all(sweep().info, {}), fewer(sweep().info, {}), at_first(sweep().info, {});
+  double num_all = 0, num_fewer = 0;
+  for (std::size_t i = 0; i < kNumFrames; ++i) {
+    num_all += all.Track(sweep().frames[i]).num_keypoints;
+    const TrackedFrame result = fewer.Track(sweep().frames[i], true);
+    EXPECT_TRUE(result.tracked) << "frame " << i;
+    EXPECT_TRUE(result.fewer_keypoints);
+    num_fewer += result.num_keypoints;
+    (void)at_first.Track(sweep().frames[i], i < kNumFrames / 2);
+  }
+  fmt::print("{:.0f} keypoints instead of {:.0f}, worst {:.2e} m\n", num_fewer, num_all,
+             WorstError(fewer));
+  EXPECT_LT(num_fewer, 0.6 * num_all);
+  EXPECT_LT(WorstError(fewer), 0.001);
+  EXPECT_LT(WorstError(at_first), 0.001);
+  // Their number grows again once all may be followed.
+  EXPECT_GT(at_first.frames().back().num_keypoints, 1.3 * fewer.frames().back().num_keypoints);
+  EXPECT_FALSE(at_first.frames().back().fewer_keypoints);
+}
+
 TEST_F(TrackerTest, FollowsThroughAFrameThatWasStampedLate) {
   const double spacing_s = sweep().frames[1].color_time_s - sweep().frames[0].color_time_s;
   for (const double before_next_s : {0.2 * spacing_s, 0.001}) {
