@@ -9,6 +9,7 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/reconstruction/dense_terms.hpp"
+#include "algo/reconstruction/marker_uncertainty.hpp"
 #include "algo/tracking/keyframe_link.hpp"
 #include "algo/tracking/velocity_refinement.hpp"
 #include "algo/tracking/witnesses.hpp"
@@ -96,7 +97,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
                                         const JointRegistrationOptions& options, TrackingMap& map,
                                         const std::stop_token& stop) {
   JointRegistrationResult result;
-  if (map.keyframes.size() < 2) return result;
+  if (map.keyframes.empty()) return result;
   BundleOptions bundle;
   bundle.marker_length_m = options.marker_length_m;
   bundle.calibrate = options.calibrate;
@@ -114,6 +115,18 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   std::iota(bundle.free_keyframes.begin(), bundle.free_keyframes.end(), 1);
   std::vector<QuadraticTerm> links;
   AddTrackedLinks(map, links);
+  // Of the map as it is: only the equations are wanted.
+  const auto find_information = [&](const std::vector<QuadraticTerm>& terms) {
+    bundle.max_iterations = 0;
+    bundle.find_information = true;
+    BundleSummary last = BundleAdjust(stated, bundle, terms, map, result.calibration);
+    result.marker_sigmas_m = MarkerSigmas(last.posterior, map, options.marker_length_m);
+    return last;
+  };
+  if (map.keyframes.size() < 2) {
+    find_information(links);
+    return result;
+  }
   BundleAdjust(stated, bundle, links, map, result.calibration);
   // The start is close to the solution now: only directions in which poses and calibration change
   // together remain.
@@ -133,7 +146,10 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
     refresh_velocities();
     BundleAdjust(stated, bundle, links, map, result.calibration);
   }
-  if (!options.use_dense) return result;
+  if (!options.use_dense) {
+    find_information(links);
+    return result;
+  }
 
   const dense::Cells cells = dense::MakeCells(stated, map);
   MapState before(map);
@@ -188,14 +204,14 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
                     !ContradictsWitnesses(result.witnesses_before, result.witnesses_after);
   if (!result.accepted) {
     result.calibration = calibration_before;
+    bundle.fix_centre_and_distortion = false;
+    find_information(links);
     return result;
   }
   before.Exchange(map);
+  BundleSummary last = find_information(terms);
   if (options.calibrate) {
-    bundle.max_iterations = 0;  // Only the equations at the solution are wanted.
-    bundle.find_information = true;
     result.evidence.solution = ToVector(result.calibration);
-    BundleSummary last = BundleAdjust(stated, bundle, terms, map, result.calibration);
     result.evidence.information = last.information;
     result.posterior = std::move(last.posterior);
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <stop_token>
 
 #include "algo/sensor_model/sensor_profile.hpp"
@@ -59,6 +60,8 @@ struct JointRegistrationResult {
   /// Empty unless accepted and calibrated: without dense terms it is too narrow (see
   /// algo/README.md).
   BundlePosterior posterior;
+  /// MarkerSigmas() of the map as it was left, with or without the dense terms.
+  std::map<int, double> marker_sigmas_m;
   SweepEvidence evidence;  ///< Evidence about the sensor's calibration.
 };
 

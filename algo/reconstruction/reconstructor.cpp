@@ -257,7 +257,7 @@ struct Reconstructor::Impl {
       options.on_learned(Learn(options.profile.value_or(ProfileOfAnyUnit(info.intrinsics)),
                                joint_options.prior, joint.evidence));
     scene = MakeScene(info, options.preset, dropped, frames, map, joint.calibration,
-                      SceneFromWorld(info, map));
+                      joint.marker_sigmas_m, SceneFromWorld(info, map));
     WarnOfFrame(info, map, scene);
     if (scene.frame == SceneFrame::kReferenceMarker && !joint.posterior.empty()) {
       scene.sensitivity = SensitivityOf(info.intrinsics, joint.calibration, joint.posterior, map,
@@ -357,7 +357,7 @@ struct Reconstructor::Impl {
     const Pose T_scene_world =
         paper.T_marker_world.value_or(map.keyframes.front().T_world_color.inverse());
     timings.merge(scene.timings_s);
-    scene = MakeScene(info, options.preset, dropped, frames, map, stated, T_scene_world);
+    scene = MakeScene(info, options.preset, dropped, frames, map, stated, {}, T_scene_world);
     scene.timings_s = timings;
     scene.frame = paper.T_marker_world ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
     scene.markers = paper.markers_in_world;

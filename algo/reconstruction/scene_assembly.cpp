@@ -24,17 +24,19 @@ constexpr double kUsualDepthScale = 0.02;
 constexpr double kBreathingToReport_m = 2 * kMillimetre;
 constexpr double kGapToReport_s = 0.5;  // The comparison gives no answer above 1 s.
 constexpr double kDroppedToReport = 0.05;
+// For a marker without a variance, because the solve's equations do not determine it: as the preset
+// `paper` has it for a marker of one view. An alignment gives it less than a thousandth of a
+// usual marker's weight.
+constexpr double kUnplacedMarkerSigma_m = 0.01;
 
 SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
-                          const Pose& T_scene_world) {
+                          const Pose& T_scene_world, double sigma_m) {
   SceneMarker result;
   const MarkerCorners corners = CornersInMarkerFrame(info.marker_length_m);
   for (std::size_t i = 0; i < 4; ++i)
     result.corners[i] = T_scene_world * (marker.T_world_marker * corners[i]);
   result.num_views = marker.num_views;
-  // Standard deviation with one view: a quarter of a pixel at arm's length, mostly in depth. More
-  // views average down to the map's own error.
-  result.sigma_m = std::hypot(0.001, 0.004 / std::sqrt(std::max(1, marker.num_views)));
+  result.sigma_m = sigma_m;
   return result;
 }
 
@@ -71,7 +73,8 @@ Pose SceneFromWorld(const StreamInfo& info, const TrackingMap& map) {
 
 Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
                 const std::vector<TrackedFrame>& frames, const TrackingMap& map,
-                const CalibrationModel& calibration, const Pose& T_scene_world) {
+                const CalibrationModel& calibration, const std::map<int, double>& marker_sigmas_m,
+                const Pose& T_scene_world) {
   Scene scene;
   scene.preset = preset;
   scene.frame =
@@ -90,8 +93,12 @@ Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
   scene.frames_fewer_keypoints = std::count_if(
       frames.begin(), frames.end(), [](const TrackedFrame& f) { return f.fewer_keypoints; });
   scene.longest_lost_s = LongestLost(frames);
-  for (const auto& [id, marker] : map.markers)
-    scene.markers[id] = ToSceneMarker(info, marker, T_scene_world);
+  for (const auto& [id, marker] : map.markers) {
+    const auto sigma = marker_sigmas_m.find(id);
+    scene.markers[id] =
+        ToSceneMarker(info, marker, T_scene_world,
+                      sigma == marker_sigmas_m.end() ? kUnplacedMarkerSigma_m : sigma->second);
+  }
   if (scene.frames_tracked < scene.frames_total - dropped) {
     scene.warnings.push_back(fmt::format("{} of {} frames were not tracked, {:.2f} s at longest",
                                          scene.frames_total - dropped - scene.frames_tracked,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "algo/sensor_model/calibration_model.hpp"
@@ -19,9 +20,12 @@ namespace plumb {
 
 /// All of a scene except its surfaces.
 /// @param dropped  Frames that never reached the tracker.
+/// @param marker_sigmas_m  SceneMarker::sigma_m by id; a marker that is missing there gets 10 mm.
 [[nodiscard]] Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
                               const std::vector<TrackedFrame>& frames, const TrackingMap& map,
-                              const CalibrationModel& calibration, const Pose& T_scene_world);
+                              const CalibrationModel& calibration,
+                              const std::map<int, double>& marker_sigmas_m,
+                              const Pose& T_scene_world);
 
 /// Adds a warning if the scene does not lie in the reference marker's frame, or not reliably. Call
 /// it once the frame is decided, which each preset does in its own way.

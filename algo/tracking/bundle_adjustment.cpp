@@ -50,6 +50,8 @@ class Solver {
   // Information about the calibration once everything else has been eliminated, and the posterior.
   void FindInformation(const State& state, BundleSummary& summary);
   [[nodiscard]] BundlePosterior Posterior(Eigen::MatrixXd S) const;
+  // Columns of the unit matrix for the calibration, zero for what the options fix.
+  [[nodiscard]] Eigen::MatrixXd FreeCalibration() const;
   // Keeps in place what the options fix.
   void PinFixed(Eigen::MatrixXd& S, Eigen::VectorXd& right) const;
   // S -= W V^-1 W', right -= W V^-1 g over all landmarks. The rows of each free keyframe are one
@@ -128,7 +130,7 @@ BundleSummary Solver::Run() {
     if (settled) break;
   }
   summary.final_cost = cost;
-  if (options_.find_information && options_.calibrate) FindInformation(state, summary);
+  if (options_.find_information) FindInformation(state, summary);
   problem_.Write(state);
   return summary;
 }
@@ -199,6 +201,7 @@ void Solver::FindInformation(const State& state, BundleSummary& summary) {
   Eigen::VectorXd right = equations_.g();
   Eliminate(S, right);
   summary.posterior = Posterior(S);
+  if (!options_.calibrate) return;
   const Eigen::MatrixXd poses =
       S.topLeftCorner(problem_.calibration_at(), problem_.calibration_at());
   const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(poses);
@@ -217,7 +220,27 @@ BundlePosterior Solver::Posterior(Eigen::MatrixXd S) const {
   PinFixed(S, right);
   const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(S);
   if (solver.info() != Eigen::Success) return posterior;
-  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(S.rows(), kCalibrationSize);
+  const auto num_markers = static_cast<Eigen::Index>(problem_.num_markers());
+  if (num_markers > 0) {
+    const Eigen::Index first = problem_.MarkerAt(0);
+    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(S.rows(), 6 * num_markers);
+    unit.middleRows(first, 6 * num_markers).setIdentity();
+    posterior.of_markers = solver.solve(unit).middleRows(first, 6 * num_markers);
+    if (!posterior.of_markers.allFinite()) return {};
+  }
+  if (options_.calibrate) {
+    posterior.with_calibration = solver.solve(FreeCalibration());
+    if (!posterior.with_calibration.allFinite()) return {};
+  }
+  for (std::size_t k = 0; k < problem_.num_keyframes(); ++k)
+    posterior.camera_rows.push_back(problem_.CameraAt(static_cast<int>(k)));
+  for (const auto& [id, slot] : problem_.marker_slots())
+    posterior.marker_rows[id] = problem_.MarkerAt(slot);
+  return posterior;
+}
+
+Eigen::MatrixXd Solver::FreeCalibration() const {
+  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(problem_.size(), kCalibrationSize);
   unit.bottomRows<kCalibrationSize>().setIdentity();
   if (options_.fix_centre_and_distortion)
     unit.block(problem_.calibration_at() + kLensAt + QuadraticTerm::kFocal,
@@ -226,13 +249,7 @@ BundlePosterior Solver::Posterior(Eigen::MatrixXd S) const {
         .setZero();
   if (options_.fix_depth_field)
     unit.bottomRightCorner<kNumDepthTerms - kDepthField, kNumDepthTerms - kDepthField>().setZero();
-  posterior.with_calibration = solver.solve(unit);
-  if (!posterior.with_calibration.allFinite()) return {};
-  for (std::size_t k = 0; k < problem_.num_keyframes(); ++k)
-    posterior.camera_rows.push_back(problem_.CameraAt(static_cast<int>(k)));
-  for (const auto& [id, slot] : problem_.marker_slots())
-    posterior.marker_rows[id] = problem_.MarkerAt(slot);
-  return posterior;
+  return unit;
 }
 
 void Solver::Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {

@@ -39,7 +39,9 @@ struct BundleOptions {
   bool fix_depth_field = false;               ///< Keep the depth terms from kDepthField on fixed.
   CalibrationPrior prior = PriorOfAnyUnit();  ///< Prior of the calibration.
   bool keep_witnesses_out = false;            ///< Leave out what IsWitness() selects.
-  bool find_information = false;              ///< Fill BundleSummary::information and posterior.
+  /// Fill BundleSummary::information and posterior. Markers that only fixed keyframes see are then
+  /// free too.
+  bool find_information = false;
   int max_iterations = 8;
   double function_tolerance = 1e-5;  ///< Iteration ends when the relative decrease is smaller.
   /// Damping of the first step, relative to the diagonal. Along some directions poses and
@@ -60,7 +62,12 @@ struct BundleOptions {
 /// cameras' and the markers' side (rotation vector, translation), then the calibration itself.
 /// Landmarks are eliminated.
 struct BundlePosterior {
+  /// No rows where the calibration was not free.
   Eigen::Matrix<double, Eigen::Dynamic, kCalibrationSize> with_calibration;
+  /// Covariance of the markers' twists with each other, 6 rows and columns for each in the order
+  /// of `marker_rows`: cameras and calibration are eliminated too. In the frame of the keyframes
+  /// that were fixed.
+  Eigen::MatrixXd of_markers;
   /// First row of each keyframe. A keyframe that was fixed has none.
   std::vector<std::optional<Eigen::Index>> camera_rows;
   std::map<int, Eigen::Index> marker_rows;  ///< By id.

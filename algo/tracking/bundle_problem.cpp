@@ -56,9 +56,12 @@ double Problem::PixelWeight() const {
 }
 
 void Problem::CollectMarkers() {
-  for (const int k : free_)
-    for (const MarkerObservation& m : map_.keyframes[static_cast<std::size_t>(k)].data.markers)
+  const auto collect = [&](const MapKeyframe& keyframe) {
+    for (const MarkerObservation& m : keyframe.data.markers)
       if (map_.markers.contains(m.id)) markers_.try_emplace(m.id, 0);
+  };
+  for (const int k : free_) collect(map_.keyframes[static_cast<std::size_t>(k)]);
+  if (options_.find_information) std::ranges::for_each(map_.keyframes, collect);
   for (const QuadraticTerm& term : terms_)
     if (term.marker) markers_.try_emplace(*term.marker, 0);
   int slot = 0;

@@ -87,7 +87,7 @@ TEST(SceneAlignmentTest, NamesTheMarkerThatMovedAndLeavesItOut) {
 }
 
 TEST(SceneAlignmentTest, TheOthersScatterShowsThatAMarkerMovedBySixMillimetres) {
-  const MarkerMap room = Room(12, 0.0021);  // The sigma that a sweep states, four times the error.
+  const MarkerMap room = Room(12, 0.0021);  // Four times the error.
   for (unsigned seed = 1; seed <= 20; ++seed) {
     MarkerMap current = Seen(room, 0.0006, seed);
     EXPECT_THAT(AlignScenes(room, current).alignment->markers_rejected, IsEmpty());

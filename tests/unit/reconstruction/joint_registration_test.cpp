@@ -185,6 +185,35 @@ TEST(RegisterJointly, TheFirstKeyframeIsTheGauge) {
   EXPECT_EQ(map.keyframes[0].T_world_color.matrix(), truth.map.keyframes[0].T_world_color.matrix());
 }
 
+TEST(RegisterJointly, StatesTheUncertaintyOfMarkersWithAndWithoutDepthAndFromOneKeyframe) {
+  const TrueMap truth = MakeTrueMap(kLandscape);
+  const auto sigmas = [&](bool use_dense, bool calibrate, std::size_t num_keyframes) {
+    TrackingMap map = truth.map;
+    map.keyframes.resize(num_keyframes);
+    JointRegistrationOptions options = OfTheRoom();
+    options.use_dense = use_dense;
+    options.calibrate = calibrate;
+    const JointRegistrationResult result = RegisterJointly(truth.stated, options, map);
+    EXPECT_EQ(result.accepted, use_dense && num_keyframes > 1);
+    return result.marker_sigmas_m;
+  };
+  const auto dense = sigmas(true, true, 8);
+  const auto sparse = sigmas(false, true, 8);
+  ASSERT_EQ(dense.size(), truth.map.markers.size());
+  ASSERT_EQ(sparse.size(), truth.map.markers.size());
+  EXPECT_EQ(sigmas(true, false, 8).size(), truth.map.markers.size());
+  for (const auto& [id, sigma] : dense) {
+    EXPECT_GT(sigma, 1e-5) << id;
+    EXPECT_LT(sigma, 0.005) << id;
+  }
+  const auto one = sigmas(true, true, 1);
+  ASSERT_FALSE(one.empty());
+  for (const auto& [id, sigma] : one) {
+    EXPECT_GT(sigma, dense.at(id)) << id;
+    EXPECT_GT(sigma, sparse.at(id)) << id;
+  }
+}
+
 TEST(RegisterJointly, StopsOnRequestAndLeavesTinyMapsAlone) {
   const TrueMap truth = MakeTrueMap({.num_keyframes = 3, .num_landmarks = 40, .dense = true});
   TrackingMap map = truth.map;

@@ -48,7 +48,7 @@ std::vector<std::string> Warnings(int num_keyframes, std::int64_t num_dropped, b
     frames[i].reference_keyframe = 0;
     frames[i].fewer_keypoints = i < num_fewer_keypoints;
   }
-  return MakeScene({}, Preset::kBest, num_dropped, frames, map, {}, Pose::Identity()).warnings;
+  return MakeScene({}, Preset::kBest, num_dropped, frames, map, {}, {}, Pose::Identity()).warnings;
 }
 
 TEST(SceneAssemblyTest, ASweepThatNeverReturnsToAPlaceIsAWarning) {
@@ -56,6 +56,18 @@ TEST(SceneAssemblyTest, ASweepThatNeverReturnsToAPlaceIsAWarning) {
               ElementsAre(HasSubstr("never returned to a place")));
   EXPECT_THAT(Warnings(2 * kLoopMinGap + 1, 0, true), IsEmpty());
   EXPECT_THAT(Warnings(2 * kLoopMinGap, 0, false), IsEmpty()) << "too short to return";
+}
+
+TEST(SceneAssemblyTest, AMarkerWithoutAVarianceIsVague) {
+  TrackingMap map;
+  map.keyframes.resize(1);
+  map.markers[3] = map.markers[4] = {.num_views = 2};
+  StreamInfo info;
+  info.marker_length_m = 0.104;
+  const Scene scene = MakeScene(info, Preset::kBest, 0, std::vector<TrackedFrame>(1), map, {},
+                                {{3, 0.0004}}, Pose::Identity());
+  EXPECT_EQ(scene.markers.at(3).sigma_m, 0.0004);
+  EXPECT_EQ(scene.markers.at(4).sigma_m, 0.01);
 }
 
 TEST(SceneAssemblyTest, MoreThanOneDroppedFrameInTwentyIsAWarning) {
