@@ -128,6 +128,29 @@ AlignmentError ErrorOfAlignment(const Pose& T_reference_current, const SceneTrut
           .in_own_frames = figures(T_world_reference_scene, T_world_current_scene)};
 }
 
+IntervalCount CoverageOfMarkers(const MarkerMap& estimated, const SceneTruth& truth) {
+  constexpr double kCover95 = 1.96;
+  std::vector<Eigen::Vector3d> in_scene, in_truth;
+  std::vector<double> sigmas_m, weights;
+  for (const auto& [id, marker] : estimated) {
+    const auto found = truth.markers.find(id);
+    if (found == truth.markers.end() || !(marker.sigma_m > 0)) continue;
+    in_scene.insert(in_scene.end(), marker.corners.begin(), marker.corners.end());
+    in_truth.insert(in_truth.end(), found->second.begin(), found->second.end());
+    sigmas_m.insert(sigmas_m.end(), marker.corners.size(), marker.sigma_m);
+    weights.insert(weights.end(), marker.corners.size(), 1.0 / (marker.sigma_m * marker.sigma_m));
+  }
+  IntervalCount count;
+  const RigidFit fit = FitRigid(in_scene, in_truth, weights);
+  if (!fit.valid) return count;
+  for (std::size_t i = 0; i < in_scene.size(); ++i) {
+    const Eigen::Vector3d off = in_scene[i] - fit.T_a_b * in_truth[i];
+    count.count += 3;
+    count.inside += static_cast<std::size_t>((off.array().abs() <= kCover95 * sigmas_m[i]).count());
+  }
+  return count;
+}
+
 HeightMap TrueHeights(const SceneTruth& truth, const GridShape& grid, const Pose& T_world_frame,
                       double min_frames_seen) {
   const Pose T_frame_world = T_world_frame.inverse();

@@ -10,7 +10,9 @@
 #include "algo/base/pose.hpp"
 #include "algo/comparison/deformation.hpp"
 #include "algo/types/height_map.hpp"
+#include "algo/types/marker.hpp"
 #include "algo/types/scene.hpp"
+#include "daemon/evaluation/number_errors.hpp"
 #include "daemon/evaluation/truth.hpp"
 
 namespace plumb {
@@ -72,6 +74,11 @@ struct TrajectoryError {
                                               const SceneTruth& current,
                                               const Pose& T_world_reference_scene,
                                               const Pose& T_world_current_scene);
+
+/// How many coordinates of the markers' corners lie within 1.96 sigma_m of the true ones, after the
+/// rigid fit of the scene's markers to the true ones, weighted by their sigmas. Markers without a
+/// truth are left out. Nothing is counted where the rest determines no fit.
+[[nodiscard]] IntervalCount CoverageOfMarkers(const MarkerMap& estimated, const SceneTruth& truth);
 
 /// The true top surface on a grid whose axes are those of `T_world_frame`: heights, NaN off the
 /// body or where fewer than `min_frames_seen` frames measured the surface.

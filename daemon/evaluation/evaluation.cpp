@@ -102,6 +102,7 @@ SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const 
   result.calibration = scene.calibration;
   result.timings_s = scene.timings_s;
   MeasureMarkers(scene, truth, result);
+  result.marker_intervals = CoverageOfMarkers(scene.markers, truth);
   if (scene.height_map) {
     const HeightMap true_heights =
         TrueHeights(truth, scene.height_map->grid, truth.T_world_reference_marker, min_frames_seen);
@@ -233,6 +234,15 @@ MotionStatistics Evaluation::Total() const {
 MotionStatistics Evaluation::OfReference(const std::string& reference) const {
   return StatisticsOf(*this,
                       [&](const PairEvaluation& pair) { return pair.reference == reference; });
+}
+
+IntervalCount Evaluation::MarkerIntervals() const {
+  IntervalCount sum;
+  for (const SceneEvaluation& scene : scenes) {
+    sum.count += scene.marker_intervals.count;
+    sum.inside += scene.marker_intervals.inside;
+  }
+  return sum;
 }
 
 Evaluation EvaluateSuite(

@@ -40,6 +40,7 @@ struct SceneEvaluation {
   /// Marker corners after their own best rigid fit to the true ones; not set if none matched.
   std::optional<double> marker_rms_mm;
   std::optional<double> marker_scale_permille;  ///< Scale error of the marker map.
+  IntervalCount marker_intervals;               ///< See CoverageOfMarkers().
   std::optional<HeightError>
       heights;  ///< Against the true surface in the true reference marker's frame.
   std::optional<ShapeError> shape;
@@ -81,6 +82,8 @@ struct Evaluation {
 
   [[nodiscard]] MotionStatistics Total() const;
   [[nodiscard]] MotionStatistics OfReference(const std::string& reference) const;
+  /// Over all scenes.
+  [[nodiscard]] IntervalCount MarkerIntervals() const;
 };
 
 struct EvaluateOptions {

@@ -156,6 +156,11 @@ std::string SceneTable(const Evaluation& evaluation) {
     }
     text += fmt::format(" {:6.2f}\n", Timing(s.timings_s, "after_last_frame"));
   }
+  if (const IntervalCount corners = evaluation.MarkerIntervals(); corners.count > 0)
+    text += fmt::format(
+        "\n  {:.1f} % of the coordinates of {} marker corners lie in their stated 95 % "
+        "intervals.\n",
+        100 * corners.Fraction(), corners.count / 3);
   return text;
 }
 
@@ -219,18 +224,18 @@ ordered_json ToJson(const ErrorSummary& s) {
           {"p95", s.p95},     {"max", s.max},   {"rms", s.rms}};
 }
 
+ordered_json ToJson(const IntervalCount& c) {
+  return {{"count", c.count},
+          {"inside", c.inside},
+          {"fraction", c.count > 0 ? ordered_json(c.Fraction()) : ordered_json()}};
+}
+
 ordered_json ToJson(const IntervalCoverage& coverage) {
   ordered_json json = ordered_json::object();
-  const auto add = [&](const char* name, const IntervalCount& number) {
-    json[name] = {
-        {"count", number.count},
-        {"inside", number.inside},
-        {"fraction", number.count > 0 ? ordered_json(number.Fraction()) : ordered_json()}};
-  };
   for (std::size_t i = 0; i < coverage.numbers.size(); ++i) {
-    add(kNumberNames[i], coverage.numbers[i]);
+    json[kNumberNames[i]] = ToJson(coverage.numbers[i]);
   }
-  add("all", coverage.all);
+  json["all"] = ToJson(coverage.all);
   return json;
 }
 
@@ -301,6 +306,7 @@ ordered_json ToJson(const SceneEvaluation& s) {
           {"trajectory_all", ToJson(s.trajectory)},
           {"marker_rms_mm", OrNull(s.marker_rms_mm)},
           {"marker_scale_permille", OrNull(s.marker_scale_permille)},
+          {"marker_intervals_95", ToJson(s.marker_intervals)},
           {"heights", ToJson(s.heights)},
           {"shape", ToJson(s.shape)},
           {"breathing_mm", OrNull(s.breathing_mm)},
@@ -367,6 +373,7 @@ std::string EvaluationJson(const Evaluation& evaluation) {
     json["scenes"][scene.name] = ToJson(scene);
   }
   json["total"] = ToJson(evaluation.Total());
+  json["marker_intervals_95"] = ToJson(evaluation.MarkerIntervals());
   json["pairs"] = ordered_json::array();
   for (const PairEvaluation& pair : evaluation.pairs) json["pairs"].push_back(ToJson(pair));
   json["paper"] = {{"by_reference", ordered_json::array()}, {"total", ToJson(kPaperTotal)}};

@@ -346,6 +346,8 @@ TEST_F(ScenesTest, EvaluateMeasuresAgainstTheTruth) {
   const json& intervals = figures.at("total").at("intervals_95").at("all");
   EXPECT_EQ(intervals.at("count"), 6 * figures.at("pairs").size());
   EXPECT_GE(intervals.at("fraction").get<double>(), 0.8) << intervals.dump();
+  const json& corners = figures.at("marker_intervals_95");
+  std::printf("marker corners inside their intervals: %s\n", corners.dump().c_str());
   const RunResult again = Plumb({"evaluate", SmallSuite(), "--out", folder_ / "out", "--reuse"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_THAT(again.err, Not(HasSubstr("tracking")));

@@ -228,5 +228,30 @@ TEST(ShapeErrorTest, FindsScale) {
   EXPECT_NEAR(error->scale_permille, 5.0, 0.4);
 }
 
+// Markers with one corner that is off, by just less and just more than the interval.
+TEST(MarkerCoverageTest, CountsCoordinatesWithinTheirIntervals) {
+  SceneTruth truth;
+  MarkerMap estimated;
+  const Pose T_scene_world = PoseOf(10, 20, 30, 1, 2, 3);
+  for (int id = 0; id < 40; ++id) {
+    MarkerCorners corners = CornersInMarkerFrame(0.1);
+    for (Eigen::Vector3d& p : corners) p += Eigen::Vector3d(0.2 * (id % 8), 0.2 * (id / 8), 0);
+    truth.markers[id] = corners;
+    for (Eigen::Vector3d& p : corners) p = T_scene_world * p;
+    estimated[id] = {corners, 3, 0.001};
+  }
+  const IntervalCount exact = CoverageOfMarkers(estimated, truth);
+  EXPECT_EQ(exact.count, 480U);
+  EXPECT_EQ(exact.inside, 480U);
+  // One corner of 160 hardly turns or shifts the fit.
+  estimated[11].corners[2].y() += 0.0019;
+  EXPECT_EQ(CoverageOfMarkers(estimated, truth).inside, 480U);
+  estimated[11].corners[2].y() += 0.0002;
+  EXPECT_EQ(CoverageOfMarkers(estimated, truth).inside, 479U);
+  estimated[40] = estimated[3];  // Not in the truth.
+  EXPECT_EQ(CoverageOfMarkers(estimated, truth).count, 480U);
+  EXPECT_EQ(CoverageOfMarkers({}, truth).count, 0U);
+}
+
 }  // namespace
 }  // namespace plumb
