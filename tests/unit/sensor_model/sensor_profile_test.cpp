@@ -1,5 +1,7 @@
 #include "algo/sensor_model/sensor_profile.hpp"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 
@@ -74,6 +76,34 @@ TEST(SensorProfile, SweepsThatContradictEachOtherMeetBetween) {
   }
   EXPECT_GT(profile.mean[kFocal], 0.0012);
   EXPECT_LT(profile.mean[kFocal], 0.0018);
+}
+
+// A profile of many sweeps of the cold unit is sure of a depth scale that is 0.6 % off once the
+// unit is warm. A warm sweep must still come within the interval that comparisons state for its
+// solution: three times what the residuals promise.
+TEST(SensorProfile, SurenessAboutTheColdUnitDoesNotFailTheWarmOnesInterval) {
+  constexpr double kWarmUp = 0.006;
+  constexpr double kOwnSigma = 0.00067;  // One sweep's, by its residuals.
+  const auto error_by_stated = [](const CalibrationPrior& prior) {
+    const SweepEvidence warm = Sweep(prior, 0.0, kWarmUp, kOwnSigma);
+    const CalibrationMatrix posterior =
+        (warm.information + prior.information).llt().solve(CalibrationMatrix::Identity());
+    return (kWarmUp - warm.solution[kScale]) / (1.96 * 3.0 * std::sqrt(posterior(kScale, kScale)));
+  };
+  SensorProfile cold = ProfileOfAnyUnit(Stated());
+  for (int sweep = 0; sweep < 200; ++sweep) {
+    const CalibrationPrior prior = PriorOfNextSweep(cold, Stated(), 0.01);
+    cold = Learn(cold, prior, Sweep(prior, 0.0, 0.0, kOwnSigma));
+  }
+  EXPECT_LT(error_by_stated(PriorOfNextSweep(cold, Stated(), 0.01)), 0.5);
+  // Even if it were certain, because a prior has at least the variance between two sweeps.
+  cold.covariance(kScale, kScale) *= 1e-4;
+  const CalibrationPrior held = PriorOfNextSweep(cold, Stated(), 0.01);
+  EXPECT_LT(error_by_stated(held), 0.6);
+  EXPECT_GT(error_by_stated(held), 0.4);
+  CalibrationPrior without = held;
+  without.information(kScale, kScale) = 1.0 / cold.covariance(kScale, kScale);
+  EXPECT_GT(error_by_stated(without), 1.0) << "that variance is needed";
 }
 
 TEST(SensorProfile, TheEdgeShiftIsNeverCarriedOver) {
