@@ -45,9 +45,9 @@ struct SceneMarker {
   MarkerCorners corners;  ///< In the scene frame.
   int num_views = 0;      ///< Keyframes (or frames) that contributed.
   /// Standard deviation of one corner coordinate, metres, root mean square over the marker's
-  /// corners and their coordinates. It is what an alignment of two scenes has to expect: the part
-  /// of all markers' errors that one rigid motion of the whole map makes up is not in it, nor is,
-  /// therefore, the error of the scene's frame. Preset `best`: from the joint solve's covariance,
+  /// corners and their coordinates. It is what an alignment of two scenes has to expect: an error
+  /// that a rigid motion of the whole map would correct does not count, so the error of the scene's
+  /// frame does not count either. Preset `best`: from the joint solve's covariance,
   /// see MarkerSigmas(). Preset `paper`: the observed scatter of the views over the square root of
   /// their number.
   double sigma_m = 0.001;

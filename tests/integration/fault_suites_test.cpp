@@ -135,9 +135,9 @@ TEST_F(FaultSuitesLong, PrintsOfAWrongScale) {
   EXPECT_THAT(Rejected(Compared()), IsEmpty());
 }
 
-// Unit 69 has been on for 27 s and its depth is 0.56 % short by that; without the fault it is warm.
-// Profiles are learned from two sweeps six times, which makes them surer than they have any right
-// to be.
+// Unit 69 has been on for 27 s, which makes its depth 0.56 % too short; without the fault it is
+// warm. Each profile learns from the same two sweeps six times, so that it states too small an
+// uncertainty.
 TEST_F(FaultSuitesLong, AProfileLearnedColdDoesNotFailAWarmScansIntervalsNorTheOtherWayRound) {
   const fs::path cold = folder_ / "cold", warm = folder_ / "warm";
   Simulate(cold, 69, 70, "warm-up=on");

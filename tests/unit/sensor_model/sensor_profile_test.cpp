@@ -78,10 +78,10 @@ TEST(SensorProfile, SweepsThatContradictEachOtherMeetBetween) {
   EXPECT_LT(profile.mean[kFocal], 0.0018);
 }
 
-// A profile of many sweeps of the cold unit is sure of a depth scale that is 0.6 % off once the
-// unit is warm. A warm sweep must still come within the interval that comparisons state for its
-// solution: three times what the residuals promise.
-TEST(SensorProfile, SurenessAboutTheColdUnitDoesNotFailTheWarmOnesInterval) {
+// A profile of many sweeps of the cold unit states a small uncertainty of a depth scale that is
+// 0.6 % off once the unit is warm. A warm sweep must still come within the interval that
+// comparisons state for its solution: three times what the residuals promise.
+TEST(SensorProfile, AProfileOfTheColdUnitDoesNotFailTheWarmOnesInterval) {
   constexpr double kWarmUp = 0.006;
   constexpr double kOwnSigma = 0.00067;  // One sweep's, by its residuals.
   const auto error_by_stated = [](const CalibrationPrior& prior) {
@@ -96,7 +96,7 @@ TEST(SensorProfile, SurenessAboutTheColdUnitDoesNotFailTheWarmOnesInterval) {
     cold = Learn(cold, prior, Sweep(prior, 0.0, 0.0, kOwnSigma));
   }
   EXPECT_LT(error_by_stated(PriorOfNextSweep(cold, Stated(), 0.01)), 0.5);
-  // Even if it were certain, because a prior has at least the variance between two sweeps.
+  // Even if it stated no uncertainty at all, because a prior has at least the variance between two sweeps.
   cold.covariance(kScale, kScale) *= 1e-4;
   const CalibrationPrior held = PriorOfNextSweep(cold, Stated(), 0.01);
   EXPECT_LT(error_by_stated(held), 0.6);
