@@ -116,8 +116,8 @@ Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
   }
   if (scene.frames_fewer_keypoints > 0) {
     scene.warnings.push_back(fmt::format(
-        "{} of {} frames were tracked with fewer keypoints, because the processor was busy: close "
-        "other programs on it",
+        "{} of {} frames were tracked with fewer keypoints, because the processor was busy: the "
+        "camera's path may be less accurate",
         scene.frames_fewer_keypoints, scene.frames_total));
   }
   if (map.keyframes.size() > 2 * kLoopMinGap && LongestReturn(map) < kLoopMinGap) {

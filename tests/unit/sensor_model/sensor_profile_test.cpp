@@ -96,7 +96,7 @@ TEST(SensorProfile, AProfileOfTheColdUnitDoesNotFailTheWarmOnesInterval) {
     cold = Learn(cold, prior, Sweep(prior, 0.0, 0.0, kOwnSigma));
   }
   EXPECT_LT(error_by_stated(PriorOfNextSweep(cold, Stated(), 0.01)), 0.5);
-  // Even if it stated no uncertainty at all, because a prior has at least the variance between two sweeps.
+  // Even if it stated none at all, because a prior has at least the variance between two sweeps.
   cold.covariance(kScale, kScale) *= 1e-4;
   const CalibrationPrior held = PriorOfNextSweep(cold, Stated(), 0.01);
   EXPECT_LT(error_by_stated(held), 0.6);

@@ -267,10 +267,10 @@ export const kPatterns = [
     + 'surface$',
   'se perdieron $1 de $2 imágenes porque el procesador estaba ocupado: menos vistas sustentan la '
     + 'superficie'],
-  ['^(\\d+) of (\\d+) frames were tracked with fewer keypoints, because the processor was busy: close '
-    + 'other programs on it$',
-  '$1 de $2 imágenes se siguieron con menos puntos porque el procesador estaba ocupado: cierre lo '
-    + 'demás que se ejecute en él'],
+  ['^(\\d+) of (\\d+) frames were tracked with fewer keypoints, because the processor was busy: '
+    + 'the camera\'s path may be less accurate$',
+  '$1 de $2 imágenes se siguieron con menos puntos porque el procesador estaba ocupado: la '
+    + 'trayectoria de la cámara puede ser menos exacta'],
   ['^the sweep never returned to a place: only neighbouring images hold its path together; keep a '
     + 'marker in view for longer, or end the sweep where it began$',
   'el barrido no volvió a ningún lugar: solo las imágenes vecinas sostienen su trayectoria; '
