@@ -72,6 +72,9 @@ struct SensorThread::Impl {
       try {
         if (!provider) MakeProvider();
         if (!sensor) Find();
+        // The destructor asks to stop before it looks for a sensor to interrupt: one that has been
+        // opened since then would wait for a frame for good.
+        if (stop.stop_requested()) break;
         if (sensor) {
           Read(stop);
         } else {
