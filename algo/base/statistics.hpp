@@ -10,6 +10,8 @@ namespace plumb {
 
 /// Standard deviations per median absolute deviation of normally distributed values.
 inline constexpr double kMadToSigma = 1.4826;
+/// Standard deviations on either side of the mean that hold 95 % of normally distributed values.
+inline constexpr double kCover95 = 1.96;
 
 /// The value of the given rank, counted from 0. Reorders the values.
 /// @throws std::invalid_argument if there is no value of that rank.

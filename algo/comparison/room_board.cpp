@@ -9,13 +9,13 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include "algo/base/statistics.hpp"
 #include "algo/comparison/scene_alignment.hpp"
 #include "algo/geometry/rigid_fit.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr double kCover95 = 1.96;
 constexpr std::size_t kLeastOfBoard = 2;
 constexpr double kMinSigma_m = 1e-5;  // lower limit for synthetic markers that fit exactly
 

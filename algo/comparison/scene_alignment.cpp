@@ -116,10 +116,11 @@ Matrix6d FitCovariance(std::span<const SharedMarker> shared, const Subset& subse
   return information.ldlt().solve(Matrix6d::Identity());
 }
 
-// By how much the variances of a fit's markers differ from the stated ones, which hold for sweeps
-// on the average: errors that one unit repeats in both scans do not show between them, and unlucky
-// sweeps err more. The observed disagreement of the corners replaces them: at once where it is
-// larger, and where it is smaller as far as there are corners enough to show it.
+// By how much the variances of a fit's markers differ from the stated ones, which are right on
+// average only: errors that one unit repeats in both scans do not show between them, and some
+// sweeps err more than others. The observed disagreement of the corners replaces the stated
+// variances: at once where it is larger, and where it is smaller to the extent that enough corners
+// show it.
 double VarianceFactor(std::span<const SharedMarker> shared, const Subset& subset, const Pose& T) {
   double chi2 = 0.0;
   for (const std::size_t i : subset) {

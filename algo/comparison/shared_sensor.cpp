@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 
 #include "algo/sensor_model/profile_gate.hpp"
+#include "algo/sensor_model/sensor_profile.hpp"
 
 namespace plumb {
 namespace {
@@ -14,8 +15,6 @@ using Effect = Eigen::Matrix<double, 6, Eigen::Dynamic>;  // A twist per unit of
 
 constexpr std::size_t kMinPatches = 4;
 constexpr std::size_t kMinMarkers = 3;
-// Factor by which the scatter of sweeps exceeds what their residuals indicate, as in Learn().
-constexpr double kSharedErrors = 3.0;
 // The shift of marker edges depends on the light of each scan. A sweep's estimate of the colour
 // image's readout time depends on the tremor of the hand: over ten sweeps of one simulated unit it
 // scatters by 1.7 ms, fourteen times what the residuals indicate.

@@ -48,7 +48,7 @@ constexpr int kFirstSweeps = 6;  // of the alternating fit, before the period is
 constexpr int kSweeps = 4;       // and each time after it
 constexpr int kRounds = 2;
 constexpr double kCauchySigmas = 3.0;
-constexpr double kRidge = 0.02;  // keeps a patch solvable whose views show too little of a period
+constexpr double kRidge = 0.02;  // keeps a patch solvable if its views show little of a period
 constexpr double kLeastSigma_m = 1e-6;
 // Patches move where their slopes are more than this many times the noise, and more than the most
 // negative ones, which only errors make.

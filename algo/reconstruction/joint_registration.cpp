@@ -115,7 +115,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   std::iota(bundle.free_keyframes.begin(), bundle.free_keyframes.end(), 1);
   std::vector<QuadraticTerm> links;
   AddTrackedLinks(map, links);
-  // Of the map as it is: only the equations are wanted.
+  // Solves nothing: only the equations at the present state of the map are needed.
   const auto find_information = [&](const std::vector<QuadraticTerm>& terms) {
     bundle.max_iterations = 0;
     bundle.find_information = true;

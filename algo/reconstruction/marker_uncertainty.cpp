@@ -17,11 +17,12 @@ constexpr Eigen::Index kCoordinates = 12;  // Of a marker's four corners.
 // marker's corners in the images had no correlation with its error in space. The factor is the
 // root mean square over seven units (45 and 91 to 94 of this simulator, sim-a and sim-b of another
 // one; 1.02 to 1.88), rounded; see README.md of algo.
-constexpr double kSharedErrors = 1.6;
+constexpr double kErrorByPosterior = 1.6;
 // Standard deviation of a marker's position above which its observations do not determine it.
 constexpr double kUndetermined_m = 0.1;
-// Rounds of the weighted fit, with equal weights in the first. There a vague marker makes all
-// others vague, in the third no longer; still more rounds would gather the weight on a few markers.
+// Rounds of the weighted fit. In the first one all weights are equal, so that a poorly determined
+// marker spoils the others; in the third it no longer does. Further rounds would concentrate the
+// weight on a few markers.
 constexpr int kRounds = 3;
 
 // The markers that the posterior determines, and how their corners in the world move.
@@ -106,8 +107,11 @@ std::map<int, double> MarkerSigmas(const BundlePosterior& posterior, const Track
       weights = variances.cwiseInverse();
     }
   }
-  for (Eigen::Index m = 0; m < markers.size(); ++m)
-    sigmas[markers.ids[static_cast<std::size_t>(m)]] = kSharedErrors * std::sqrt(variances[m]);
+  for (Eigen::Index m = 0; m < markers.size(); ++m) {
+    // Rounding may spoil a variance where one marker has nearly all the weight.
+    if (!(variances[m] > 0) || !std::isfinite(variances[m])) continue;
+    sigmas[markers.ids[static_cast<std::size_t>(m)]] = kErrorByPosterior * std::sqrt(variances[m]);
+  }
   return sigmas;
 }
 

@@ -11,11 +11,11 @@ namespace plumb {
 /// SceneMarker::sigma_m of the markers of a solved map, metres, by id. A marker that the posterior
 /// leaves undetermined has none.
 ///
-/// The posterior is in the frame of the first keyframe, and what all markers share there (its
-/// error and that of the path from it) leaves any two scans' alignment unchanged. So the rigid
-/// motion that fits the errors of all corners best is taken out of their covariance, in a weighted
-/// fit as an alignment makes it. A marker takes part in that fit and hides a part of its own error
-/// from it, which is added again. Of a single marker nothing is taken out.
+/// The posterior is in the frame of the first keyframe. An error that all markers share there does
+/// not affect the alignment of two scans, so the rigid motion that fits the errors of all corners
+/// best is removed from their covariance, by a weighted fit as in an alignment. Each marker takes
+/// part in that fit, which therefore absorbs part of the marker's own error; that part is added
+/// back. With a single marker nothing is removed.
 /// @param posterior  Of the map as it is.
 [[nodiscard]] std::map<int, double> MarkerSigmas(const BundlePosterior& posterior,
                                                  const TrackingMap& map, double marker_length_m);

@@ -8,11 +8,6 @@
 namespace plumb {
 namespace {
 
-// Factor by which the scatter of a sweep's solution exceeds what its residuals indicate, because
-// residuals share errors outside the model. Measured on three sweeps of one simulated unit with
-// known truth: with it all lens terms are within 1.5 standard deviations.
-constexpr double kSharedErrors = 3.0;
-
 CalibrationMatrix Inverse(const CalibrationMatrix& m, const char* of) {
   const Eigen::LLT<CalibrationMatrix> solver(m);
   const CalibrationMatrix inverse = solver.solve(CalibrationMatrix::Identity());

@@ -71,8 +71,9 @@ class Tracker {
   ~Tracker();
 
   /// The frame's images are shared by reference count and kept for keyframes.
-  /// @param fewer_keypoints  A keyframe follows on only one keypoint in each larger cell, for a
-  ///         computer that is too slow; it still observes all that were followed until then.
+  /// @param fewer_keypoints  For a computer that is too slow: from each keyframe on, only one
+  ///         keypoint in each larger cell is followed. The keyframe itself still observes all that
+  ///         were followed until then.
   TrackedFrame Track(const Frame& frame, bool fewer_keypoints = false);
 
   [[nodiscard]] const TrackingMap& map() const;

@@ -2,18 +2,18 @@
 
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstdlib>
 #include <filesystem>
-#include <string_view>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/errors.hpp"
 #include "daemon/appliance/diagnostics.hpp"
 #include "daemon/loop/loop_report.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/files/temporary.hpp"
 
 namespace plumb {
 
@@ -43,14 +43,16 @@ void WebMaintenance::WriteDiagnostics(const web::Actor& actor, web::Done done) {
   store_.Change(&Store::audit, report, [=](AuditStore& audit) {
     const std::string text =
         DiagnosticsText(status, health, loop, audit.Find({0, 500, "", /*views=*/false}));
-    constexpr std::string_view kExtension = ".txt";
-    std::string name =
-        (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX").string();
-    name += kExtension;
-    const int fd = ::mkstemps(name.data(), static_cast<int>(kExtension.size()));
-    if (fd < 0) throw DiskRefused(DescribeWriteError(name, errno));
-    ::close(fd);
-    WriteWholeFile(name, text);
+    std::string name;
+    try {
+      const UniqueFile file =
+          MakeUniqueFile(std::filesystem::temp_directory_path(), "plumb-diagnostics-", ".txt");
+      ::close(file.descriptor);
+      name = file.path.string();
+      WriteWholeFile(name, text);
+    } catch (const IoError& error) {
+      throw DiskRefused(error.what());
+    }
     audit.Log(actor, "diagnostics.write", "", "");
     return name;
   });

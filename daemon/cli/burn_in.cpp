@@ -1,7 +1,6 @@
 #include "daemon/cli/burn_in.hpp"
 
 #include <fcntl.h>
-#include <stdlib.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,6 +20,7 @@
 #include "daemon/config/config.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/files/temporary.hpp"
 #include "drivers/simulated/suite.hpp"
 
 namespace plumb {
@@ -32,27 +32,6 @@ constexpr std::size_t kDiskBytes = 64 << 20;
 constexpr std::size_t kMemoryBytes = 128 << 20;
 constexpr int kLeastRounds = 2;
 constexpr double kSlowedDown = 2.0;  // ratio of the slowest to the fastest round
-
-/// A folder that is removed with its owner.
-class WorkFolder {
- public:
-  /// @throws IoError
-  explicit WorkFolder(const fs::path& parent) {
-    std::string name = (parent / ".burn-in-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw IoError(DescribeWriteError(parent, errno));
-    path_ = name;
-  }
-  ~WorkFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 template <typename Value>
 void Append(std::string& bytes, const std::vector<Value>& values) {
@@ -262,7 +241,7 @@ std::string TestDisk(const fs::path& folder, std::size_t bytes, std::uint64_t se
 }
 
 void BurnIn(const BurnInOptions& options, const std::stop_token& stop, DoctorReport& report) try {
-  const WorkFolder work(options.folder);
+  const TemporaryFolder work(options.folder, ".burn-in-");
   Progress progress;
   SimulateOptions simulate;
   simulate.out = work.path() / "suite";

@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
 #include "algo/geometry/rigid_fit.hpp"
 
@@ -129,7 +130,6 @@ AlignmentError ErrorOfAlignment(const Pose& T_reference_current, const SceneTrut
 }
 
 IntervalCount CoverageOfMarkers(const MarkerMap& estimated, const SceneTruth& truth) {
-  constexpr double kCover95 = 1.96;
   std::vector<Eigen::Vector3d> in_scene, in_truth;
   std::vector<double> sigmas_m, weights;
   for (const auto& [id, marker] : estimated) {

@@ -81,7 +81,7 @@ bool ThinnedFeed::Takes(double stamp_s, double arrived_s) {
   const bool fewer = NextFewerKeypoints(fewer_keypoints_, stride_, load, keypoint_options_);
   if (fewer != fewer_keypoints_) {
     fewer_keypoints_ = fewer;
-    // The queue may be worked off by this before frames are skipped, too.
+    // This alone may clear the queue, so frames are not skipped yet.
     changed_s_ = stamp_s;
     load.since_change_s = 0.0;
   }

@@ -11,16 +11,15 @@ struct KeypointBudgetOptions {
   /// one at which frames are skipped, which costs more.
   double reduce_late_s = 0.1;
   double reduce_load = 0.85;     ///< Below it tracking catches up by itself, as in ThinningOptions.
-  double restore_late_s = 0.07;  ///< Counts as in time; the lateness of a few keyframes.
-  /// A frame takes 1.3 times as long with all keypoints (measured): the load is below 0.7 then,
-  /// too.
+  double restore_late_s = 0.07;  ///< Up to here tracking is in time: a few keyframes cause that.
+  /// A frame takes 1.3 times as long with all keypoints (measured), so the load then stays below
+  /// 0.7.
   double restore_load = 0.5;
   double restore_hold_s = 2.0;  ///< Delay after a change before all keypoints are used again.
 };
 
-/// Whether frames are tracked with fewer keypoints from now on. Once tracking is late and cannot
-/// catch up; no longer when every frame is tracked in time and the load has been low for a while.
-/// Pure.
+/// Whether frames are tracked with fewer keypoints from now on: this starts when tracking is late
+/// and cannot catch up, and ends when every frame is tracked in time and the load is low. Pure.
 /// @param fewer   Whether they are now.
 /// @param stride  One in this many frames is tracked.
 [[nodiscard]] bool NextFewerKeypoints(bool fewer, int stride, const TrackingLoad& load,

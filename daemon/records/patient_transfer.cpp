@@ -1,6 +1,5 @@
 #include "daemon/records/patient_transfer.hpp"
 
-#include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -24,6 +23,7 @@
 #include "daemon/records/stored_values.hpp"
 #include "daemon/records/summed_folder.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/files/temporary.hpp"
 
 namespace plumb {
 
@@ -53,26 +53,6 @@ std::optional<std::int64_t> ScanOf(const std::string& path) {
 bool MayHold(const std::string& path) { return path == kRecord || ScanOf(path).has_value(); }
 
 const SummedKind kKind{.name = "export", .about_file = kAbout, .format = 1, .may_hold = MayHold};
-
-/// A temporary folder that only this process can read; removed at the end.
-class PrivateFolder {
- public:
-  PrivateFolder() {
-    std::string name = fs::temp_directory_path() / "plumb-XXXXXX";
-    if (::mkdtemp(name.data()) == nullptr) throw IoError(DescribeWriteError(name, errno));
-    path_ = name;
-  }
-  ~PrivateFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  PrivateFolder(const PrivateFolder&) = delete;
-  PrivateFolder& operator=(const PrivateFolder&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 /// Opens the source of an export; a backup is not changed.
 std::unique_ptr<Database> OpenSource(const fs::path& state, bool is_backup) {
@@ -131,7 +111,7 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
     throw DataError(fmt::format("there is no patient with the code '{}' in {}",
                                 code.substr(0, kMaxCode), state.string()));
   const Json rows = PatientRows(*database, *patient);
-  const PrivateFolder own;
+  const TemporaryFolder own(fs::temp_directory_path(), "plumb-");
   WriteWholeFile(own.path() / kRecord, Json{{"rows", rows},
                                             {"evidence", PatientEvidence(*database, *patient)},
                                             {"earlier", EarlierEvidence(state, *patient)}}

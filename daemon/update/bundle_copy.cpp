@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <vector>
 
@@ -14,6 +13,7 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/files/temporary.hpp"
 
 namespace plumb {
 namespace {
@@ -62,9 +62,7 @@ std::filesystem::path CopyBundle(int fd, const std::filesystem::path& folder,
   std::error_code ignored;
   std::filesystem::create_directories(folder, ignored);
   CheckRoom(folder, bytes);
-  std::string path = (folder / ".upload-XXXXXX").string();
-  const int copy = ::mkostemp(path.data(), O_CLOEXEC);
-  if (copy < 0) throw IoError(DescribeWriteError(folder, errno));
+  const auto [path, copy] = MakeUniqueFile(folder, ".upload-");
   try {
     CopyAll(fd, copy, bytes, path);
   } catch (...) {

@@ -94,7 +94,7 @@ TEST_F(FaultSuites, AMarkerThatWasMovedBetweenTheScansIsNamedAndNoOther) {
                                                  " moved 13 mm since the reference; ignored"));
 }
 
-// A marker in each sweep, another one in each of these two.
+// One marker is pushed in each sweep, and not the same one in both.
 TEST_F(FaultSuitesLong, AMarkerThatIsPushedDuringASweepDoesNoHarmAndNoOtherIsAccused) {
   const json pair = PairWith("moving-marker");
   EXPECT_LE(pair.at("translation_mm"), 0.40);  // Measured: 0.33.
@@ -122,7 +122,7 @@ TEST_F(FaultSuitesLong, TheSensorsCableInTheView) {
   EXPECT_THAT(Rejected(Compared()), IsEmpty());
 }
 
-// All prints of the room are too large or too small by up to 0.5 %: lengths are, too.
+// All prints of the room are too large or too small by up to 0.5 %, and so are all lengths.
 TEST_F(FaultSuitesLong, PrintsOfAWrongScale) {
   const json pair = PairWith("print-scale");
   EXPECT_LE(pair.at("translation_mm"), 0.49);  // Measured: 0.41.

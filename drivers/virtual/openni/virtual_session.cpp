@@ -51,33 +51,21 @@ class AnswerSocket {
 
 }  // namespace
 
-VirtualSession::VirtualSession(const Contents& contents) {
+VirtualSession::VirtualSession(const Contents& contents)
+    : folder_(fs::temp_directory_path(), "plumb-virtual-"),
+      calibration_folder_(folder_.path() / "calibration"),
+      socket_(folder_.path() / "sensor.sock") {
   const auto is_plain = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
   };
   if (contents.serial.empty() || contents.serial.size() > 64 ||
       !std::all_of(contents.serial.begin(), contents.serial.end(), is_plain))
     throw std::invalid_argument("a virtual sensor's serial is 1 to 64 letters, digits, - and _");
-  std::string folder = (fs::temp_directory_path() / "plumb-virtual-XXXXXX").string();
-  if (::mkdtemp(folder.data()) == nullptr) throw IoError(DescribeWriteError(folder, errno));
-  folder_ = folder;
-  socket_ = folder_ / "sensor.sock";
-  calibration_folder_ = folder_ / "calibration";
-  try {
-    Write(contents);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-    throw;
-  }
-  ::setenv(kEnvironment, folder_.c_str(), 1);
+  Write(contents);
+  ::setenv(kEnvironment, folder_.path().c_str(), 1);
 }
 
-VirtualSession::~VirtualSession() {
-  ::unsetenv(kEnvironment);
-  std::error_code ignored;
-  fs::remove_all(folder_, ignored);
-}
+VirtualSession::~VirtualSession() { ::unsetenv(kEnvironment); }
 
 void VirtualSession::Write(const Contents& contents) const {
   std::error_code error;
@@ -87,7 +75,7 @@ void VirtualSession::Write(const Contents& contents) const {
       fmt::format("serial {}\nplugged {}\n", contents.serial, contents.plugged ? 1 : 0);
   for (const fs::path& scene : contents.scenes)
     text += fmt::format("scene {}\n", fs::absolute(scene).string());
-  WriteWholeFile(folder_ / "session", text);
+  WriteWholeFile(folder_.path() / "session", text);
   WriteWholeFile(calibration_folder_ / (contents.serial + ".yaml"),
                  CameraFileText(contents.camera, 1000.0));
 }

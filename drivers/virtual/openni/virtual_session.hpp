@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "algo/types/frame.hpp"
+#include "drivers/files/temporary.hpp"
 
 namespace plumb {
 
@@ -40,7 +41,7 @@ class VirtualSession {
  private:
   void Write(const Contents& contents) const;
 
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
   std::filesystem::path calibration_folder_;
   std::filesystem::path socket_;
 };

@@ -89,23 +89,25 @@ class ApplianceTest : public ::testing::Test {
     });
     done->get_future().wait();
   }
-  /// False if it does not come to that in time. Asked on the loop's thread.
-  /// @param pause  Between two questions, where background work needs the processor.
+  /// False if it does not come to that in time. A timer of the loop asks again and again.
+  /// @param interval  Longer where background work needs the processor.
   [[nodiscard]] bool Becomes(const std::function<bool()>& holds,
                              std::chrono::seconds limit = std::chrono::seconds(30),
-                             std::chrono::milliseconds pause = {}) {
+                             std::chrono::milliseconds interval = std::chrono::milliseconds(1)) {
     const auto until = EventLoop::Clock::now() + limit;
-    while (EventLoop::Clock::now() < until) {
-      bool does = false;
-      On([&] { does = holds(); });
-      if (does) return true;
-      if (pause.count() > 0) {
-        std::this_thread::sleep_for(pause);
-      } else {
-        std::this_thread::yield();
-      }
-    }
-    return false;
+    const auto answer = std::make_shared<std::promise<bool>>();
+    EventLoop::Source timer;
+    On([&] {
+      timer = loop_.MakeTimer("test", [&, answer] {
+        if (holds()) return answer->set_value(true);
+        if (EventLoop::Clock::now() >= until) return answer->set_value(false);
+        timer.ArmAfter(interval);
+      });
+      timer.ArmAfter({});
+    });
+    const bool does = answer->get_future().get();
+    On([&] { timer = {}; });
+    return does;
   }
   void LetOpen() {
     opens_ = true;

@@ -219,8 +219,9 @@ TEST_F(ApplianceUpkeepTest, FoldersThatWereSetAsideAreAWarning) {
   (void)StoreScans();
   fs::copy(state() / "scans" / "000003", state() / "scans" / "000007", fs::copy_options::recursive);
   Play([&] {
-    EXPECT_TRUE(
-        Comes([&] { return Warns("The database has no record of some scan folders (1)"); }));
+    EXPECT_TRUE(Comes([&] {
+      return Warns("1 scan folder is missing from the database and has been set aside");
+    }));
   });
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kLength_m = 0.104;
 // By how much the stated sigmas exceed those of the covariance.
-constexpr double kSharedErrors = 1.6;
+constexpr double kErrorByPosterior = 1.6;
 
 // Markers around a body.
 TrackingMap MapOf(int count) {
@@ -75,7 +75,8 @@ TEST(MarkerUncertaintyTest, StatesTheErrorOfEachMarkerAlone) {
     const auto sigmas = MarkerSigmas(Uncertain(map, 0.001), map, kLength_m);
     ASSERT_EQ(sigmas.size(), static_cast<std::size_t>(count));
     // Of three markers the fit takes a third of the variance, which must come back.
-    for (const auto& [id, sigma] : sigmas) EXPECT_NEAR(sigma / kSharedErrors, 0.001, 5e-5) << id;
+    for (const auto& [id, sigma] : sigmas)
+      EXPECT_NEAR(sigma / kErrorByPosterior, 0.001, 5e-5) << id;
   }
 }
 
@@ -89,21 +90,21 @@ TEST(MarkerUncertaintyTest, WhatAllMarkersShareIsNotInIt) {
   // One marker has no others to share it with.
   const TrackingMap single = MapOf(1);
   posterior = Uncertain(single, 0.0003);
-  EXPECT_NEAR(MarkerSigmas(posterior, single, kLength_m).at(0), kSharedErrors * 0.0003, 1e-9);
+  EXPECT_NEAR(MarkerSigmas(posterior, single, kLength_m).at(0), kErrorByPosterior * 0.0003, 1e-9);
   AddCommonMotion(single, 0, 0.0004, posterior);
-  EXPECT_NEAR(MarkerSigmas(posterior, single, kLength_m).at(0), kSharedErrors * 0.0005, 1e-9);
+  EXPECT_NEAR(MarkerSigmas(posterior, single, kLength_m).at(0), kErrorByPosterior * 0.0005, 1e-9);
 }
 
-TEST(MarkerUncertaintyTest, AVagueMarkerDoesNotMakeTheOthersVague) {
+TEST(MarkerUncertaintyTest, APoorlyDeterminedMarkerDoesNotSpoilTheOthers) {
   const TrackingMap map = MapOf(8);
   BundlePosterior posterior = Uncertain(map, 0.0003);
   SetOwnError(5, 0.01, posterior);
   for (const auto& [id, sigma] : MarkerSigmas(posterior, map, kLength_m)) {
     if (id == 5) {
-      EXPECT_NEAR(sigma / kSharedErrors, 0.01, 0.001);
+      EXPECT_NEAR(sigma / kErrorByPosterior, 0.01, 0.001);
     } else {
       // An unweighted fit would turn and shift the others by millimetres.
-      EXPECT_NEAR(sigma / kSharedErrors, 0.0003, 3e-5) << id;
+      EXPECT_NEAR(sigma / kErrorByPosterior, 0.0003, 3e-5) << id;
     }
   }
 }
@@ -121,7 +122,8 @@ TEST(MarkerUncertaintyTest, AMarkerThatNothingDeterminesHasNone) {
   EXPECT_EQ(set(0.101).size(), 7U);
   const auto without = set(3e4);  // The solve's own damping is all that holds it.
   EXPECT_FALSE(without.contains(5));
-  for (const auto& [id, sigma] : without) EXPECT_NEAR(sigma / kSharedErrors, 0.0003, 3e-5) << id;
+  for (const auto& [id, sigma] : without)
+    EXPECT_NEAR(sigma / kErrorByPosterior, 0.0003, 3e-5) << id;
   EXPECT_THAT(MarkerSigmas({}, map, kLength_m), testing::IsEmpty());
 }
 

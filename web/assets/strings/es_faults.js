@@ -219,8 +219,9 @@ export const kFaultPatterns = [
     + 'or remove these scans\\. The log names them\\.?$',
   'Faltan o han cambiado archivos de algunos escaneos guardados ($1): recupérelos de una copia de '
     + 'seguridad o borre esos escaneos. El registro los nombra.'],
-  ['^The database has no record of some scan folders \\((\\d+)\\), so they were set aside\\. '
-    + 'Restore a newer backup, or move them from the set-aside folder to another disk\\.?$',
+  ['^(\\d+) scan folders? (?:is|are) missing from the database and (?:has|have) been set aside\\. '
+    + 'Restore a more recent backup, or move the contents of the set-aside folder to another '
+    + 'disk\\.?$',
   'La base de datos no conoce algunas carpetas de escaneos ($1), que se apartaron: restaure una '
     + 'copia más reciente, o llévelas de la carpeta set-aside a otro disco.'],
   ['^No backup is set up: if this disk fails, all scans are lost\\. Mount another disk for '
