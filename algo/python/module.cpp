@@ -224,6 +224,8 @@ void AddScene(py::module_& module) {
           "grid", [](const Scene& s) { return GridDict(s.height_map); },
           "x_min, y_min, step in metres; row 0 is y_min; None without a height map")
       .def_readonly("calibration", &Scene::calibration)
+      .def_readonly("calibration_sigma", &Scene::calibration_sigma)
+      .def_readonly("calibration_prior_sigma", &Scene::calibration_prior_sigma)
       .def_readonly("timings_s", &Scene::timings_s)
       .def_readonly("warnings", &Scene::warnings);
 }

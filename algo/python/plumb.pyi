@@ -55,6 +55,8 @@ class Scene:
     heights: Optional[NDArray[np.float32]]
     grid: Optional[Dict[str, float]]
     calibration: Dict[str, float]
+    calibration_sigma: Dict[str, float]
+    calibration_prior_sigma: Dict[str, float]
     timings_s: Dict[str, float]
     warnings: List[str]
 

@@ -24,6 +24,7 @@
 #include "algo/reconstruction/surface_mesh.hpp"
 #include "algo/reconstruction/trajectory.hpp"
 #include "algo/reconstruction/view_surface.hpp"
+#include "algo/tracking/map_budget.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "algo/types/marker_dictionary.hpp"
 
@@ -45,6 +46,7 @@ TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOption
     tracking.color_block = info.intrinsics.width / WorkingIntrinsics(info.intrinsics).width;
   tracking.keyframe_distance *= options.keyframe_spacing;
   tracking.keyframe_angle_rad *= options.keyframe_spacing;
+  tracking.max_images = options.max_images;
   tracking.min_tracked_share = 1.0 - options.keyframe_spacing * (1.0 - tracking.min_tracked_share);
   return tracking;
 }
@@ -77,6 +79,20 @@ std::string WhyNoSurface(std::span<const ViewSurface> surfaces,
 double EdgeSigma(const std::optional<SweepTone>& tone) {
   if (!tone.has_value()) return CalibrationModel::kEdgeBiasSigma;
   return std::hypot(kMeasuredEdgeSigma_px, tone.value().sigma_edge_shift_px);
+}
+
+// States how well the sweep showed each term of the calibration.
+// @param information  Of the sweep alone; zero if nothing was accepted.
+void StateSigmas(const CalibrationMatrix& information, const CalibrationMatrix& prior,
+                 Scene& scene) {
+  const std::optional<CalibrationVector> before = SigmasOf(prior);
+  const std::optional<CalibrationVector> after = SigmasOf(information + prior);
+  if (!before || !after || information.isZero(0.0)) return;
+  for (int i = 0; i < kCalibrationSize; ++i) {
+    const std::string& name = CalibrationNames()[static_cast<std::size_t>(i)];
+    scene.calibration_prior_sigma[name] = (*before)[i];
+    scene.calibration_sigma[name] = (*after)[i];
+  }
 }
 
 }  // namespace
@@ -165,6 +181,7 @@ struct Reconstructor::Impl {
           fmt::format("none of {} frames shows a marker or a surface: check that the sensor looks "
                       "at the scene from 0.5 to 1.5 m",
                       frames.size()));
+    BoundKeyframes(options.max_keyframes, frames, map);
     RefreshVelocities(frames, map);
 
     Scene scene;
@@ -270,6 +287,7 @@ struct Reconstructor::Impl {
           fmt::format("{}, {} sweep{}", options.profile->name, options.profile->num_sweeps,
                       options.profile->num_sweeps == 1 ? "" : "s");
     for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
+    StateSigmas(joint.evidence.information, joint_options.prior.information, scene);
     WarnOfScale(scene.calibration.at("depth_scale"), scene);
     if (tone) {
       scene.calibration["tone_gamma"] = tone->gamma;

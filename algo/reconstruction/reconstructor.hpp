@@ -28,6 +28,10 @@ struct ReconstructorOptions {
   /// Spacing of the keyframes relative to the default, 0.5 to 2. Accuracy figures should hold for
   /// several spacings.
   double keyframe_spacing = 1.0;
+  /// Largest numbers of keyframes that keep their images and that enter the joint solve. They bound
+  /// the memory of long sweeps; a sweep of 300 frames has about 50.
+  std::size_t max_images = 96;
+  std::size_t max_keyframes = 128;
   /// Serial number of the sensor, for `SensorSensitivity::serial`; empty if unknown.
   std::string sensor_serial;
   /// Profile of the sensor unit. Without one the sweep starts from the stated calibration.

@@ -1,5 +1,7 @@
 #include "algo/sensor_model/calibration_model.hpp"
 
+#include "algo/sensor_model/calibration_prior.hpp"
+
 namespace plumb {
 
 namespace {
@@ -47,31 +49,12 @@ Intrinsics CalibrationModel::Corrected(const Intrinsics& stated) const {
 }
 
 std::map<std::string, double> CalibrationModel::Named() const {
-  std::map<std::string, double> named = {{"focal_x_scale", 1.0 + lens[0]},
-                                         {"focal_y_scale", 1.0 + lens[1]},
-                                         {"centre_x_px", lens[2]},
-                                         {"centre_y_px", lens[3]},
-                                         {"distortion_k1", lens[4]},
-                                         {"distortion_k2", lens[5]},
-                                         {"distortion_p1", lens[6]},
-                                         {"distortion_p2", lens[7]},
-                                         {"color_readout_s", readout_s[0]},
-                                         {"marker_edge_bias_px", edge_bias_px[0]},
-                                         {"depth_scale", 1.0 + depth[kDepthScale]},
-                                         {"depth_offset_m", depth[kDepthOffset]},
-                                         {"depth_bow_m", depth[kDepthBow]},
-                                         {"depth_shift_x_px", depth[kDepthShiftX]},
-                                         {"depth_shift_y_px", depth[kDepthShiftY]},
-                                         {"depth_delay_s", depth[kDepthDelay]},
-                                         {"depth_slope_x", depth[kDepthSlopeX]},
-                                         {"depth_slope_y", depth[kDepthSlopeY]},
-                                         {"depth_readout_s", depth[kDepthReadout]}};
-  for (std::size_t i = 0; i < kFieldOrders.size(); ++i)
-    named["depth_field_" + std::to_string(kFieldOrders[i].x) + "_" +
-          std::to_string(kFieldOrders[i].y)] = depth[kDepthField + i];
-  for (std::size_t i = 0; i < kGrowthOrders.size(); ++i)
-    named["depth_field_growth_per_m_" + std::to_string(kGrowthOrders[i].x) + "_" +
-          std::to_string(kGrowthOrders[i].y)] = depth[kDepthGrowth + i];
+  const CalibrationVector values = ToVector(*this);
+  std::map<std::string, double> named;
+  for (int i = 0; i < kCalibrationSize; ++i) {
+    const std::string& name = CalibrationNames()[static_cast<std::size_t>(i)];
+    named[name] = values[i] + (name.ends_with("_scale") ? 1.0 : 0.0);
+  }
   return named;
 }
 

@@ -1,6 +1,10 @@
 // A calibration as one vector, and its prior distribution before a sweep.
 #pragma once
 
+#include <optional>
+#include <string>
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "algo/sensor_model/calibration_model.hpp"
@@ -19,6 +23,10 @@ using CalibrationMatrix = Eigen::Matrix<double, kCalibrationSize, kCalibrationSi
 [[nodiscard]] CalibrationVector ToVector(const CalibrationModel& calibration);
 void MoveCalibration(const CalibrationVector& by, CalibrationModel& calibration);
 
+/// Names of the vector's elements, with their units, as in CalibrationModel::Named() and
+/// scene.json.
+[[nodiscard]] const std::vector<std::string>& CalibrationNames();
+
 /// Normal distribution of a sensor's calibration; adds 1/2 (x - mean)' information (x - mean) to a
 /// least-squares problem.
 struct CalibrationPrior {
@@ -29,6 +37,9 @@ struct CalibrationPrior {
     return 0.5 * (x - mean).dot(information * (x - mean));
   }
 };
+
+/// Standard deviations of a calibration of which this is the information; none if it is singular.
+[[nodiscard]] std::optional<CalibrationVector> SigmasOf(const CalibrationMatrix& information);
 
 /// Prior of a unit of which only the stated calibration is known.
 [[nodiscard]] CalibrationPrior PriorOfAnyUnit(

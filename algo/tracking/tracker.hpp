@@ -29,8 +29,7 @@ struct TrackerOptions {
   /// Of each block of so many pixels each way, keyframes keep the colour of the middle one.
   int color_block = 1;
   bool keep_color = true;  ///< Keyframes keep their colour images.
-  /// Largest number of keyframes that keep images, see BoundImages(); a sweep of 300 frames has
-  /// about 50.
+  /// Largest number of keyframes that keep images, see BoundImages().
   std::size_t max_images = 96;
 };
 

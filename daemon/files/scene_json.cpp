@@ -212,6 +212,8 @@ std::string SceneJson(const Scene& scene) {
   }
   json["sensor_profile"] = scene.sensor_profile ? Json(*scene.sensor_profile) : Json();
   json["calibration"] = MapJson(scene.calibration);
+  json["calibration_sigma"] = MapJson(scene.calibration_sigma);
+  json["calibration_prior_sigma"] = MapJson(scene.calibration_prior_sigma);
   json["timings_s"] = MapJson(scene.timings_s);
   json["warnings"] = scene.warnings;
   // Warnings can quote file names in any encoding; invalid UTF-8 is replaced.
@@ -263,16 +265,17 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   }
   if (root.has("sensor_profile") && !root["sensor_profile"].is_null())
     scene.sensor_profile = root["sensor_profile"].Text();
-  if (root.has("calibration")) {
-    root["calibration"].ForEach([&](const std::string& key, const Value& value) {
-      scene.calibration[key] = value.Number(-1e12, 1e12);
+  const auto read = [&](const char* map_name, double least, double most,
+                        std::map<std::string, double>& values) {
+    if (!root.has(map_name)) return;
+    root[map_name].ForEach([&](const std::string& key, const Value& value) {
+      values[key] = value.Number(least, most);
     });
-  }
-  if (root.has("timings_s")) {
-    root["timings_s"].ForEach([&](const std::string& key, const Value& value) {
-      scene.timings_s[key] = value.Number(0, 1e9);
-    });
-  }
+  };
+  read("calibration", -1e12, 1e12, scene.calibration);
+  read("calibration_sigma", 0, 1e12, scene.calibration_sigma);
+  read("calibration_prior_sigma", 0, 1e12, scene.calibration_prior_sigma);
+  read("timings_s", 0, 1e9, scene.timings_s);
   if (root.has("warnings")) {
     const Value warnings = root["warnings"];
     if (!warnings.json().is_array()) warnings.Fail("is not a list");

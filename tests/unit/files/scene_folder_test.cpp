@@ -106,6 +106,8 @@ TEST_F(SceneFolderTest, GivesBackWhatWasWritten) {
   EXPECT_TRUE(std::isnan(read.height_map->at(2, 6)));
   EXPECT_EQ(read.mesh.triangles, scene.mesh.triangles);
   EXPECT_EQ(read.calibration, scene.calibration);
+  EXPECT_EQ(read.calibration_sigma, scene.calibration_sigma);
+  EXPECT_EQ(read.calibration_prior_sigma, scene.calibration_prior_sigma);
   EXPECT_EQ(read.timings_s, scene.timings_s);
   EXPECT_EQ(read.warnings, scene.warnings);
 }
@@ -126,6 +128,8 @@ TEST_F(SceneFolderTest, HoldsTheKeysOfTheContract) {
   EXPECT_EQ(json.at("keyframes"), 2);
   EXPECT_EQ(json.at("frames").at("total"), 5);
   EXPECT_EQ(json.at("calibration").at("depth_scale"), 1.00123);
+  EXPECT_EQ(json.at("calibration_sigma").at("depth_scale"), 0.00021);
+  EXPECT_EQ(json.at("calibration_prior_sigma").at("depth_scale"), 0.01);
   EXPECT_EQ(json.at("timings_s").at("clouds"), 0.5);
   EXPECT_EQ(json.at("warnings").at(0), "depth is a little short");
 }

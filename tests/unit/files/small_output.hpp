@@ -46,6 +46,8 @@ inline Scene SmallScene() {
   scene.mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   scene.mesh.triangles = {{0, 1, 2}};
   scene.calibration["depth_scale"] = 1.00123;
+  scene.calibration_sigma["depth_scale"] = 0.00021;
+  scene.calibration_prior_sigma["depth_scale"] = 0.01;
   scene.timings_s["clouds"] = 0.5;
   scene.warnings = {"depth is a little short"};
   return scene;

@@ -120,6 +120,54 @@ TEST_F(ReconstructorTest, KeyframesAreAsFarApartAsAskedFor) {
   EXPECT_GT(num_keyframes[1], num_keyframes[2]);
 }
 
+TEST_F(ReconstructorTest, ALongSweepIsSolvedWithABoundedNumberOfKeyframes) {
+  const BallSweep long_sweep = MakeBallSweep(48);
+  const auto reconstruct = [&](std::size_t max_images, std::size_t max_keyframes) {
+    ReconstructorOptions options;
+    options.keyframe_spacing = 0.5;
+    options.max_images = max_images;
+    options.max_keyframes = max_keyframes;
+    Reconstructor reconstructor(long_sweep.info, options);
+    for (const Frame& frame : long_sweep.frames) reconstructor.AddFrame(frame);
+    return reconstructor.Finish();
+  };
+  const Scene all = reconstruct(96, 128);
+  const Scene bounded = reconstruct(14, 16);
+  ASSERT_GT(all.keyframes.size(), 17U);
+  EXPECT_EQ(bounded.keyframes.size(), 16U);
+  ASSERT_EQ(bounded.trajectory.size(), all.trajectory.size());
+  double farthest_m = 0;
+  for (std::size_t i = 0; i < all.trajectory.size(); ++i) {
+    EXPECT_EQ(bounded.trajectory[i].time_s, all.trajectory[i].time_s);
+    farthest_m = std::max(farthest_m, (bounded.trajectory[i].T_world_camera.translation() -
+                                       all.trajectory[i].T_world_camera.translation())
+                                          .norm());
+  }
+  fmt::print("{} keyframes, paths {:.2e} m apart\n", all.keyframes.size(), farthest_m);
+  EXPECT_LT(farthest_m, 0.001);
+}
+
+TEST_F(ReconstructorTest, SaysHowWellTheSweepShowedEachTermOfTheCalibration) {
+  const Scene scene = Reconstruct({});
+  ASSERT_EQ(scene.calibration_sigma.size(), static_cast<std::size_t>(kCalibrationSize));
+  for (const auto& [name, sigma] : scene.calibration_sigma) {
+    EXPECT_TRUE(scene.calibration.contains(name)) << name;
+    EXPECT_GT(sigma, 0) << name;
+    EXPECT_LE(sigma, scene.calibration_prior_sigma.at(name) * (1 + 1e-9)) << name;
+  }
+  const auto remaining = [&](const char* name) {
+    return scene.calibration_sigma.at(name) / scene.calibration_prior_sigma.at(name);
+  };
+  fmt::print(
+      "remaining share of the prior: scale {:.3f}, shift {:.3f}, highest field term {:.3f}\n",
+      remaining("depth_scale"), remaining("depth_shift_x_px"), remaining("depth_field_5_4"));
+  EXPECT_LT(remaining("depth_scale"), 0.5) << "markers of known size show it";
+
+  ReconstructorOptions paper;
+  paper.preset = Preset::kPaper;
+  EXPECT_TRUE(Reconstruct(paper).calibration_sigma.empty()) << "nothing was calibrated";
+}
+
 TEST_F(ReconstructorTest, PaperPresetMakesItsScene) {
   ReconstructorOptions options;
   options.preset = Preset::kPaper;

@@ -1,6 +1,10 @@
 #include "algo/sensor_model/calibration_model.hpp"
 
+#include <string>
+
 #include <gtest/gtest.h>
+
+#include "algo/sensor_model/calibration_prior.hpp"
 
 namespace plumb {
 namespace {
@@ -53,6 +57,47 @@ TEST(CalibrationModel, CentredCoordinatesStartInTheMiddleAndGoByHalfWidths) {
 TEST(CalibrationModel, NamesEveryParameter) {
   EXPECT_EQ(CalibrationModel{}.Named().size(),
             CalibrationModel::kLensSize + 1U + 1U + CalibrationModel::kDepthSize);
+}
+
+TEST(CalibrationModel, EachNameIsThatOfItsParameter) {
+  CalibrationModel model;
+  model.lens = {0.1, 0.2, 3, 4, 5, 6, 7, 8};
+  model.readout_s[0] = 9;
+  model.edge_bias_px[0] = 10;
+  model.depth[kDepthScale] = 0.11;
+  model.depth[kDepthBow] = 12;
+  model.depth[kDepthShiftY] = 13;
+  model.depth[kDepthDelay] = 14;
+  model.depth[kDepthSlopeX] = 15;
+  model.depth[kDepthReadout] = 16;
+  model.depth[kDepthField + 1] = 17;
+  model.depth[kDepthGrowth] = 18;
+  const auto named = model.Named();
+  EXPECT_DOUBLE_EQ(named.at("focal_y_scale"), 1.2);
+  EXPECT_EQ(named.at("distortion_p2"), 8);
+  EXPECT_EQ(named.at("color_readout_s"), 9);
+  EXPECT_EQ(named.at("marker_edge_bias_px"), 10);
+  EXPECT_DOUBLE_EQ(named.at("depth_scale"), 1.11);
+  EXPECT_EQ(named.at("depth_bow_m"), 12);
+  EXPECT_EQ(named.at("depth_shift_y_px"), 13);
+  EXPECT_EQ(named.at("depth_delay_s"), 14);
+  EXPECT_EQ(named.at("depth_slope_x"), 15);
+  EXPECT_EQ(named.at("depth_readout_s"), 16);
+  const auto order = [](const FieldOrder& term) {
+    return std::to_string(term.x) + "_" + std::to_string(term.y);
+  };
+  EXPECT_EQ(named.at("depth_field_" + order(kFieldOrders[1])), 17);
+  EXPECT_EQ(named.at("depth_field_growth_per_m_" + order(kGrowthOrders[0])), 18);
+}
+
+TEST(CalibrationPrior, SigmasAreThoseOfTheInverseAndASingularOneHasNone) {
+  const CalibrationVector sigma = CalibrationVector::LinSpaced(0.001, 2.0);
+  CalibrationMatrix information = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  const auto found = SigmasOf(information);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_LT((*found - sigma).cwiseAbs().maxCoeff(), 1e-12);
+  information(0, 0) = 0.0;
+  EXPECT_FALSE(SigmasOf(information).has_value());
 }
 
 }  // namespace

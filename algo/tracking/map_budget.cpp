@@ -1,0 +1,137 @@
+#include "algo/tracking/map_budget.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace plumb {
+namespace {
+
+// Dissimilarity of two views: distance as a fraction of the depth, plus radians.
+double Apart(const MapKeyframe& a, const MapKeyframe& b) {
+  const double depth = std::clamp(a.median_depth_m, 0.4, 3.0);
+  const Pose T = a.T_world_color.inverse() * b.T_world_color;
+  return T.translation().norm() / depth + RotationAngle(T);
+}
+
+// The keyframe of `path` that may be given up and whose neighbours before and after are most alike,
+// so that the path stays covered without it. 0: there is none.
+template <class MayGo>
+std::size_t LeastMissed(const TrackingMap& map, const std::vector<std::size_t>& path,
+                        const MayGo& may_go) {
+  std::size_t chosen = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i + 1 < path.size(); ++i) {
+    const std::size_t k = path[i];
+    if (!may_go(k)) continue;
+    const double apart = Apart(map.keyframes[path[i - 1]], map.keyframes[path[i + 1]]);
+    if (apart >= least) continue;
+    least = apart;
+    chosen = k;
+  }
+  return chosen;
+}
+
+void ReleaseImages(MapKeyframe& keyframe) {
+  keyframe.is_bare = true;
+  keyframe.data.view.depth_m.release();
+  keyframe.data.view.color_rgb.release();
+  keyframe.gray.release();
+  keyframe.descriptors.release();
+  keyframe.features_px = {};
+  keyframe.features_camera = {};
+  keyframe.dense = {};
+  // Corners are measured again in the images once the tone curve is known. Corners that cannot be
+  // measured again would contradict the others.
+  keyframe.data.markers = {};
+}
+
+// Replaces keyframe `gone` by the one against which it was tracked, wherever something refers to
+// it.
+void ReferToPrevious(int gone, std::vector<TrackedFrame>& frames, TrackingMap& map) {
+  const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(gone)];
+  const int previous = keyframe.previous.value();
+  const Pose T_previous_gone =
+      map.keyframes[static_cast<std::size_t>(previous)].T_world_color.inverse() *
+      keyframe.T_world_color;
+  const auto refer = [&](std::optional<int>& reference, Pose& T_reference_color) {
+    if (reference != gone) return;
+    reference = previous;
+    T_reference_color = T_previous_gone * T_reference_color;
+  };
+  for (TrackedFrame& frame : frames) {
+    if (frame.keyframe == gone) {
+      frame.keyframe.reset();
+      frame.previous_keyframe.reset();
+    }
+    refer(frame.reference_keyframe, frame.T_reference_color);
+    refer(frame.previous_keyframe, frame.T_previous_color);
+  }
+  for (MapKeyframe& other : map.keyframes) refer(other.previous, other.T_previous_color);
+}
+
+// Removes all keyframes but those in `kept` from the map.
+void RemoveOthers(const std::vector<std::size_t>& kept, std::vector<TrackedFrame>& frames,
+                  TrackingMap& map) {
+  std::vector<std::optional<int>> new_index(map.keyframes.size());
+  for (std::size_t i = 0; i < kept.size(); ++i) new_index[kept[i]] = static_cast<int>(i);
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+    if (new_index[k]) continue;
+    for (const KeypointObservation& o : map.keyframes[k].keypoints)
+      --map.landmarks[static_cast<std::size_t>(o.landmark)].num_observations;
+  }
+  std::vector<MapKeyframe> keyframes;
+  keyframes.reserve(kept.size());
+  for (const std::size_t k : kept) keyframes.push_back(std::move(map.keyframes[k]));
+  map.keyframes = std::move(keyframes);
+  const auto renumber = [&](std::optional<int>& keyframe) {
+    if (keyframe) keyframe = new_index[static_cast<std::size_t>(*keyframe)];
+  };
+  for (MapKeyframe& keyframe : map.keyframes) renumber(keyframe.previous);
+  for (TrackedFrame& frame : frames) {
+    renumber(frame.keyframe);
+    renumber(frame.reference_keyframe);
+    renumber(frame.previous_keyframe);
+  }
+  // The keyframe that first saw a landmark only tells which way it moves when a loop is closed.
+  for (Landmark& landmark : map.landmarks)
+    landmark.first_keyframe =
+        new_index[static_cast<std::size_t>(landmark.first_keyframe)].value_or(0);
+}
+
+}  // namespace
+
+void BoundImages(std::size_t max_images, TrackingMap& map) {
+  std::vector<std::size_t> with_images;
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k)
+    if (!map.keyframes[k].is_bare) with_images.push_back(k);
+  const auto may_go = [&](std::size_t k) { return k + kNewestKept < map.keyframes.size(); };
+  while (with_images.size() > max_images) {
+    const std::size_t k = LeastMissed(map, with_images, may_go);
+    if (k == 0) return;  // All others are needed.
+    ReleaseImages(map.keyframes[k]);
+    std::erase(with_images, k);
+  }
+}
+
+void BoundKeyframes(std::size_t max_keyframes, std::vector<TrackedFrame>& frames,
+                    TrackingMap& map) {
+  if (map.keyframes.size() <= max_keyframes) return;
+  std::vector<std::size_t> kept(map.keyframes.size());
+  std::iota(kept.begin(), kept.end(), std::size_t{0});
+  const auto may_go = [&](std::size_t k) {
+    return map.keyframes[k].is_bare && map.keyframes[k].previous;
+  };
+  while (kept.size() > max_keyframes) {
+    const std::size_t k = LeastMissed(map, kept, may_go);
+    if (k == 0) break;  // All others are needed.
+    ReferToPrevious(static_cast<int>(k), frames, map);
+    std::erase(kept, k);
+  }
+  RemoveOthers(kept, frames, map);
+}
+
+}  // namespace plumb
