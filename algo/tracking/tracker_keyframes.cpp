@@ -4,9 +4,9 @@
 #include <utility>
 
 #include "algo/base/statistics.hpp"
-#include "algo/tracking/map_budget.hpp"
 #include "algo/tracking/local_bundle.hpp"
 #include "algo/tracking/loop_closer.hpp"
+#include "algo/tracking/map_budget.hpp"
 #include "algo/tracking/tracker_impl.hpp"
 
 namespace plumb {
