@@ -197,7 +197,7 @@ class Appliance {
   [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
   /// Surface of the running sweep; null if there is none or nothing has been seen yet.
   [[nodiscard]] std::shared_ptr<const LiveSurfaceView> SurfaceSoFar() const {
-    return state_.phase == ScanPhase::kScanning ? scan_.update.surface : nullptr;
+    return state_.phase == web::ApplianceState::kScanning ? scan_.update.surface : nullptr;
   }
   [[nodiscard]] const ScanState& state() const { return state_; }
   /// Changes of the store, one after the other, off the loop.
@@ -260,7 +260,7 @@ class Appliance {
   /// Adds what a person did with the scan to the audit log.
   void AuditAct(ScanAction action, const web::Actor& actor);
   /// Purpose of the running or last scan by its stored name, or "unassigned".
-  [[nodiscard]] const char* ScanKind() const;
+  [[nodiscard]] std::string ScanKind() const;
   void ArmSessionTimer();
   void OnSessionTimer();
   void ForgetSession();

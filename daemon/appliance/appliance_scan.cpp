@@ -66,10 +66,10 @@ void Appliance::BeginSession() {
       parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s) * 1e6)));
 }
 
-const char* Appliance::ScanKind() const {
+std::string Appliance::ScanKind() const {
   const bool is_unassigned =
       scan_.patient_id.empty() && scan_.purpose != web::ScanPurpose::kDailyCheck;
-  return is_unassigned ? "unassigned" : store::Name(scan_.purpose);
+  return std::string(is_unassigned ? "unassigned" : Name(scan_.purpose));
 }
 
 ScanJob Appliance::MakeJob(const web::Settings& settings) {

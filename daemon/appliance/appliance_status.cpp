@@ -19,6 +19,11 @@
 #include "daemon/records/store_json.hpp"
 
 namespace plumb {
+
+using web::ApplianceState;
+using web::FaultKind;
+using web::SweepAdvice;
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -53,39 +58,12 @@ double SecondsSince(Clock::time_point time) {
   return std::chrono::duration<double>(Clock::now() - time).count();
 }
 
-web::ApplianceState WebState(ScanPhase phase) {
-  return static_cast<web::ApplianceState>(static_cast<int>(phase));
-}
-static_assert(static_cast<int>(web::ApplianceState::kFault) == static_cast<int>(ScanPhase::kFault));
-static_assert(static_cast<int>(web::FaultKind::kSensor) == static_cast<int>(FaultKind::kSensor));
-static_assert(static_cast<int>(web::FaultKind::kScan) == static_cast<int>(FaultKind::kScan));
-static_assert(static_cast<int>(web::FaultKind::kStorage) == static_cast<int>(FaultKind::kStorage));
-
-web::Guidance WebGuidance(SweepAdvice advice) {
-  switch (advice) {
-    case SweepAdvice::kNone:
-      return web::Guidance::kNone;
-    case SweepAdvice::kSlower:
-      return web::Guidance::kSlower;
-    case SweepAdvice::kCloser:
-      return web::Guidance::kCloser;
-    case SweepAdvice::kFarther:
-      return web::Guidance::kFarther;
-    case SweepAdvice::kLost:
-      return web::Guidance::kTrackingLost;
-    case SweepAdvice::kNoMarkers:
-      break;
-  }
-  return web::Guidance::kNoMarkers;
-}
-
 constexpr double kTooManyDropped = 0.2;
 
 /// Advice for the sweep. Lost images override all other advice except lost tracking.
-web::Guidance GuidanceOf(SweepAdvice advice, double dropped_share) {
-  if (advice != SweepAdvice::kLost && dropped_share > kTooManyDropped)
-    return web::Guidance::kComputerTooSlow;
-  return WebGuidance(advice);
+SweepAdvice AdviceOn(SweepAdvice seen, double dropped_share) {
+  const bool is_slow = seen != SweepAdvice::kTrackingLost && dropped_share > kTooManyDropped;
+  return is_slow ? SweepAdvice::kComputerTooSlow : seen;
 }
 
 /// True also where nothing can be said of it.
@@ -129,18 +107,18 @@ const char* Name(IndicatorPattern pattern) {
 
 IndicatorPattern Appliance::Pattern() const {
   switch (state_.phase) {
-    case ScanPhase::kNoSensor:
+    case ApplianceState::kNoSensor:
       return IndicatorPattern::kNoSensor;
-    case ScanPhase::kReady:
+    case ApplianceState::kReady:
       if (!rolled_back_.empty()) return IndicatorPattern::kReadyRolledBack;
       return IsNearlyFull() ? IndicatorPattern::kReadyDiskNearlyFull : IndicatorPattern::kReady;
-    case ScanPhase::kWorking:
+    case ApplianceState::kWorking:
       return IndicatorPattern::kWorking;
-    case ScanPhase::kFault:
+    case ApplianceState::kFault:
       return IndicatorPattern::kFault;
-    case ScanPhase::kScanning:
+    case ApplianceState::kScanning:
       break;
-    case ScanPhase::kResult:
+    case ApplianceState::kResult:
       if (scan_.outcome.kind == ScanOutcome::Kind::kNoScene ||
           scan_.outcome.verdict == Verdict::kNoAnswer)
         return IndicatorPattern::kNoAnswer;
@@ -150,14 +128,14 @@ IndicatorPattern Appliance::Pattern() const {
       return scan_.outcome.verdict == Verdict::kMove ? IndicatorPattern::kResultMove
                                                      : IndicatorPattern::kResultInTolerance;
   }
-  switch (GuidanceOf(scan_.update.guidance.advice, scan_.dropped_share)) {
-    case web::Guidance::kSlower:
-    case web::Guidance::kTrackingLost:
-    case web::Guidance::kComputerTooSlow:  // fewer frames: a slower sweep still overlaps enough
+  switch (AdviceOn(scan_.update.guidance.advice, scan_.dropped_share)) {
+    case SweepAdvice::kSlower:
+    case SweepAdvice::kTrackingLost:
+    case SweepAdvice::kComputerTooSlow:  // fewer frames: a slower sweep still overlaps enough
       return IndicatorPattern::kTooFast;
-    case web::Guidance::kFarther:
+    case SweepAdvice::kFarther:
       return IndicatorPattern::kTooNear;
-    case web::Guidance::kCloser:
+    case SweepAdvice::kCloser:
       return IndicatorPattern::kTooFar;
     default:
       return IndicatorPattern::kScanning;
@@ -201,7 +179,7 @@ void Appliance::NotifyWeb(web::EventKind kind) {
 }
 
 std::string Appliance::FaultReason() const {
-  if (state_.phase != ScanPhase::kFault) return {};
+  if (state_.phase != ApplianceState::kFault) return {};
   switch (state_.fault) {
     case FaultKind::kStorage:
       return storage_fault_.empty() ? space_fault_ : storage_fault_;
@@ -225,9 +203,10 @@ std::optional<double> Appliance::Coverage() const {
 
 std::string Appliance::StatusLine() const {
   std::string line = fmt::format("{}", Name(state_.phase));
-  if (state_.phase == ScanPhase::kScanning) line += fmt::format(", {} frames", scan_.update.frames);
-  if (state_.phase == ScanPhase::kWorking) line += fmt::format(", {}", scan_.update.step);
-  if (state_.phase == ScanPhase::kFault) line += ": " + FaultReason();
+  if (state_.phase == ApplianceState::kScanning)
+    line += fmt::format(", {} frames", scan_.update.frames);
+  if (state_.phase == ApplianceState::kWorking) line += fmt::format(", {}", scan_.update.step);
+  if (state_.phase == ApplianceState::kFault) line += ": " + FaultReason();
   return line;
 }
 
@@ -240,10 +219,8 @@ void Appliance::PublishProgress() {
 Json Appliance::StatusJson() {
   const SensorSnapshot sensor = sensors_->snapshot();
   const ScanUpdate& update = scan_.update;
-  const bool is_running =
-      state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
   Json scan = ProgressFields(update, Coverage());
-  scan["active"] = is_running;
+  scan["active"] = IsRunning();
   scan["id"] = scan_.id;
   scan["valid_depth"] = update.guidance.valid_depth;
   scan["without_new_area_s"] = update.guidance.without_new_area_s;
@@ -307,10 +284,9 @@ Json Appliance::StatusJson() {
 web::Status Appliance::WebStatus() {
   const SensorSnapshot sensor = sensors_->snapshot();
   web::Status status;
-  status.state = WebState(state_.phase);
+  status.state = state_.phase;
   status.fault = FaultReason();
-  if (state_.phase == ScanPhase::kFault)
-    status.fault_kind = static_cast<web::FaultKind>(state_.fault);
+  if (state_.phase == ApplianceState::kFault) status.fault_kind = state_.fault;
   status.sensor = {.present = sensor.present,
                    .serial = sensor.sensor.serial,
                    .name = sensor.sensor.name,
@@ -326,7 +302,7 @@ web::Status Appliance::WebStatus() {
   status.light = Name(shown_);
   status.patient_id = check_ ? std::string() : open_patient_;
   status.next_purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
-  if (state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking) {
+  if (IsRunning()) {
     status.scan =
         web::LiveScan{.id = scan_.id,
                       .patient_id = scan_.patient_id,
@@ -334,7 +310,7 @@ web::Status Appliance::WebStatus() {
                       .elapsed_s = SecondsSince(scan_.started),
                       .coverage = Coverage(),
                       .without_new_surface_s = scan_.update.guidance.without_new_area_s,
-                      .guidance = GuidanceOf(scan_.update.guidance.advice, scan_.dropped_share),
+                      .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_share),
                       .keyframes = scan_.update.keyframes,
                       .frames = scan_.update.frames,
                       .frames_tracked = scan_.update.frames_tracked,
@@ -455,7 +431,7 @@ web::Health Appliance::Health() {
   if (const std::string full = WhyNoSpace(); !full.empty())
     return {.ok = false, .reason = "storage: " + full};
   if (!WorkersAreAlive()) return {.ok = false, .reason = "a worker thread shows no progress"};
-  if (state_.phase == ScanPhase::kFault && state_.fault == FaultKind::kSensor)
+  if (state_.phase == ApplianceState::kFault && state_.fault == FaultKind::kSensor)
     return {.ok = false, .reason = "sensor: " + sensor_fault_};
   return {};
 }

@@ -3,6 +3,10 @@
 #include <iterator>
 
 namespace plumb {
+
+using web::ApplianceState;
+using web::FaultKind;
+
 namespace {
 
 ScanTransition Stay(const ScanState& state) {
@@ -28,15 +32,15 @@ std::string_view WhyNoSensor(const ScanState& state) {
 ScanTransition Settle(ScanState state) {
   state.cancelling = false;
   if (state.fault != FaultKind::kNone) {
-    state.phase = ScanPhase::kFault;
+    state.phase = ApplianceState::kFault;
   } else {
-    state.phase = state.has_sensor ? ScanPhase::kReady : ScanPhase::kNoSensor;
+    state.phase = state.has_sensor ? ApplianceState::kReady : ApplianceState::kNoSensor;
   }
   return Stay(state);
 }
 
 ScanTransition Start(ScanState state) {
-  state.phase = ScanPhase::kScanning;
+  state.phase = ApplianceState::kScanning;
   return {.state = state, .actions = {ScanAction::kStartScan}, .refusal = {}};
 }
 
@@ -106,7 +110,7 @@ ScanTransition InScanning(ScanState state, ScanEvent event) {
     case ScanEvent::kEndSweep:
     case ScanEvent::kSweepComplete:
       if (state.cancelling) return Stay(state);
-      state.phase = ScanPhase::kWorking;
+      state.phase = ApplianceState::kWorking;
       return {.state = state, .actions = {ScanAction::kEndSweep}, .refusal = {}};
     case ScanEvent::kStart:
       return Refuse(state, "a scan is running already: end or cancel it first");
@@ -145,7 +149,7 @@ ScanTransition AfterScan(ScanState state, ScanEvent event) {
   if (event == ScanEvent::kScanCancelled) return Settle(state);
   if (event == ScanEvent::kScanFailed) return Fail(state, FaultKind::kScan);
   if (state.fault == FaultKind::kStorage) return Settle(state);
-  state.phase = ScanPhase::kResult;
+  state.phase = ApplianceState::kResult;
   return {.state = state, .actions = {ScanAction::kArmResultTimer}, .refusal = {}};
 }
 
@@ -191,43 +195,26 @@ ScanTransition InFault(ScanState state, ScanEvent event) {
 ScanTransition Next(const ScanState& before, ScanEvent event) {
   ScanState state = before;
   Note(state, event);
-  const bool is_running = state.phase == ScanPhase::kScanning || state.phase == ScanPhase::kWorking;
+  const bool is_running =
+      state.phase == ApplianceState::kScanning || state.phase == ApplianceState::kWorking;
   const bool ends_scan = event == ScanEvent::kScanDone || event == ScanEvent::kScanFailed ||
                          event == ScanEvent::kScanCancelled;
   if (ends_scan) return is_running ? AfterScan(state, event) : Stay(state);
   switch (state.phase) {
-    case ScanPhase::kNoSensor:
+    case ApplianceState::kNoSensor:
       return InNoSensor(state, event);
-    case ScanPhase::kReady:
+    case ApplianceState::kReady:
       return InReady(state, event);
-    case ScanPhase::kScanning:
+    case ApplianceState::kScanning:
       return InScanning(state, event);
-    case ScanPhase::kWorking:
+    case ApplianceState::kWorking:
       return InWorking(state, event);
-    case ScanPhase::kResult:
+    case ApplianceState::kResult:
       return InResult(state, event);
-    case ScanPhase::kFault:
+    case ApplianceState::kFault:
       return InFault(state, event);
   }
   return Stay(state);
-}
-
-const char* Name(ScanPhase phase) {
-  switch (phase) {
-    case ScanPhase::kNoSensor:
-      return "no_sensor";
-    case ScanPhase::kReady:
-      return "ready";
-    case ScanPhase::kScanning:
-      return "scanning";
-    case ScanPhase::kWorking:
-      return "working";
-    case ScanPhase::kResult:
-      return "result";
-    case ScanPhase::kFault:
-      break;
-  }
-  return "fault";
 }
 
 const char* Name(ScanEvent event) {

@@ -79,8 +79,8 @@ web::Scan ScanStore::ReadScan(const Statement& row) const {
   web::Scan scan{.id = ScanId(row.Integer(0)),
                  .patient_id = row.Integer(1) == 0 ? std::string() : row.Text(1),
                  .reference_id = row.Text(2),
-                 .purpose = store::ParsePurpose(row.Text(3)),
-                 .outcome = store::ParseOutcome(row.Text(4)),
+                 .purpose = store::Parse<web::ScanPurpose>("purpose", row.Text(3)),
+                 .outcome = store::Parse<web::ScanOutcome>("outcome", row.Text(4)),
                  .failure = row.Text(5),
                  .started_at = FromStored(row.Integer(6)),
                  .finished_at = {},
@@ -190,7 +190,7 @@ std::string ScanStore::Begin(const NewScan& scan) {
           " VALUES (?, ?, ?, 'running', ?, ?, ?, ?, ?, ?)")
       .Bind(ParseId(scan.patient_id).value_or(0))  // 0: of no patient
       .Bind(ParseId(scan.reference_id))
-      .Bind(store::Name(scan.purpose))
+      .Bind(Name(scan.purpose))
       .Bind(Now())
       .Bind(scan.sensor_serial)
       .Bind(scan.reason)
@@ -251,7 +251,7 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
       .Prepare(
           "UPDATE scans SET outcome = ?, failure = ?, finished_at = ?, swept_area_m2 = ?, "
           "has_folder = ? WHERE id = ?")
-      .Bind(store::Name(finished.outcome))
+      .Bind(Name(finished.outcome))
       .Bind(finished.failure)
       .Bind(Now())
       .Bind(finished.swept_area_m2)

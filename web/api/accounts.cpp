@@ -60,8 +60,9 @@ std::string ReadName(Fields& fields) {
 }
 
 Role ReadRole(Fields& fields) {
-  const auto role = ParseRole(fields.Text("role", 1, kMaxName));
-  if (!role) throw DataError("role must be technician, physicist or engineer");
+  const auto role = Named<Role>(fields.Text("role", 1, kMaxName));
+  if (!role || role == Role::kDisplay)  // which is paired and has no account
+    throw DataError("role must be technician, physicist or engineer");
   return *role;
 }
 

@@ -10,7 +10,6 @@
 #include "web/api/json.hpp"
 #include "web/http/checks.hpp"
 #include "web/service/limits.hpp"
-#include "web/service/names.hpp"
 
 namespace plumb::web {
 namespace {
@@ -145,10 +144,8 @@ PlanTemplate ParseTemplate(const std::string& body) {
 }
 
 ScanPurpose ParsePurpose(const std::string& name) {
-  for (std::size_t i = 0; i < kPurposeNames.size(); ++i) {
-    if (kPurposeNames[i] == name) return static_cast<ScanPurpose>(i);
-  }
-  throw DataError(fmt::format("purpose must be one of {}", fmt::join(kPurposeNames, ", ")));
+  if (const auto purpose = Named<ScanPurpose>(name)) return *purpose;
+  throw DataError(fmt::format("purpose must be one of {}", fmt::join(kNamesOf<ScanPurpose>, ", ")));
 }
 
 std::pair<ReferencePlan, int> ParsePlan(const std::string& body) {

@@ -6,25 +6,8 @@
 #include <algorithm>
 #include <array>
 
-#include "web/security/permissions.hpp"
-#include "web/service/names.hpp"
-
 namespace plumb::web {
 namespace {
-
-constexpr std::array<std::string_view, 6> kStates = {"no_sensor", "ready",  "scanning",
-                                                     "working",   "result", "fault"};
-constexpr std::array<std::string_view, 7> kGuidance = {
-    "none", "slower", "closer", "farther", "tracking_lost", "no_markers", "computer_too_slow"};
-constexpr std::array<std::string_view, 4> kFaultKinds = {"none", "sensor", "scan", "storage"};
-static_assert(kStates.size() == static_cast<std::size_t>(ApplianceState::kFault) + 1);
-static_assert(kGuidance.size() == static_cast<std::size_t>(Guidance::kComputerTooSlow) + 1);
-static_assert(kFaultKinds.size() == static_cast<std::size_t>(FaultKind::kStorage) + 1);
-
-template <std::size_t n, typename Enum>
-std::string_view NameIn(const std::array<std::string_view, n>& names, Enum value) {
-  return names.at(static_cast<std::size_t>(value));
-}
 
 template <typename T>
 Json OrNull(const std::optional<T>& value) {
@@ -50,11 +33,11 @@ Json ToleranceJson(const Tolerance& tolerance) {
 Json LiveScanJson(const LiveScan& scan) {
   return {{"id", scan.id},
           {"patient_id", TextOrNull(scan.patient_id)},
-          {"purpose", NameIn(kPurposeNames, scan.purpose)},
+          {"purpose", Name(scan.purpose)},
           {"elapsed_s", scan.elapsed_s},
           {"coverage", OrNull(scan.coverage)},
           {"without_new_surface_s", scan.without_new_surface_s},
-          {"guidance", NameIn(kGuidance, scan.guidance)},
+          {"guidance", Name(scan.guidance)},
           {"keyframes", scan.keyframes},
           {"frames", scan.frames},
           {"frames_tracked", scan.frames_tracked},
@@ -76,9 +59,6 @@ std::string TimeText(WallClock::time_point time) {
 std::string TimeText(std::time_t time) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(time));
 }
-
-std::string_view Name(ApplianceState state) { return NameIn(kStates, state); }
-std::string_view Name(ScanPurpose purpose) { return NameIn(kPurposeNames, purpose); }
 
 namespace {
 
@@ -102,8 +82,8 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
   Json json = {{"id", scan.id},
                {"patient_id", TextOrNull(scan.patient_id)},
                {"reference_id", TextOrNull(scan.reference_id)},
-               {"purpose", NameIn(kPurposeNames, scan.purpose)},
-               {"outcome", NameIn(kOutcomeNames, scan.outcome)},
+               {"purpose", Name(scan.purpose)},
+               {"outcome", Name(scan.outcome)},
                {"failure", TextOrNull(scan.failure)},
                {"started_at", TimeText(scan.started_at)},
                {"finished_at", nullptr},
@@ -186,7 +166,7 @@ Json SessionJson(const TreatmentSession& session) {
   return {{"id", session.id},
           {"patient_id", session.patient_id},
           {"patient_code", session.patient_code},
-          {"purpose", NameIn(kPurposeNames, session.purpose)},
+          {"purpose", Name(session.purpose)},
           {"fraction", session.fraction > 0 ? Json(session.fraction) : Json(nullptr)},
           {"num_scans", session.num_scans},
           {"opened_by", session.opened_by},
@@ -209,9 +189,9 @@ Json WaitingJson(const std::vector<WaitingReference>& waiting) {
 
 Json ToJson(const Status& status, WallClock::time_point now) {
   Json json = {
-      {"state", NameIn(kStates, status.state)},
+      {"state", Name(status.state)},
       {"fault", TextOrNull(status.fault)},
-      {"fault_kind", NameIn(kFaultKinds, status.fault_kind)},
+      {"fault_kind", Name(status.fault_kind)},
       {"sensor",
        {{"present", status.sensor.present},
         {"serial", status.sensor.serial},
@@ -226,7 +206,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
         {"warnings", status.storage.warnings}}},
       {"light", status.light},
       {"patient_id", TextOrNull(status.patient_id)},
-      {"next_purpose", NameIn(kPurposeNames, status.next_purpose)},
+      {"next_purpose", Name(status.next_purpose)},
       {"scans_today", status.scans_today},
       {"session", status.session ? SessionJson(*status.session) : Json(nullptr)},
       {"room", ToJson(status.room)},

@@ -15,9 +15,18 @@ namespace plumb::web {
 
 using WallClock = std::chrono::system_clock;
 
+// Names: names.hpp.
 enum class ApplianceState { kNoSensor, kReady, kScanning, kWorking, kResult, kFault };
-enum class FaultKind { kNone, kSensor, kScan, kStorage };
-enum class Guidance {
+/// The reason why the appliance cannot scan, or will not be able to once the running scan has
+/// ended.
+enum class FaultKind {
+  kNone,
+  kSensor,   ///< The sensor is attached and does not work; ends when it works or is unplugged.
+  kScan,     ///< The last scan failed; ends when somebody acknowledges it by a press.
+  kStorage,  ///< Nothing can be stored; ends when the storage works again.
+};
+/// What the person who sweeps should do.
+enum class SweepAdvice {
   kNone,
   kSlower,
   kCloser,
@@ -59,7 +68,7 @@ struct LiveScan {
   /// unknown.
   std::optional<double> coverage;
   double without_new_surface_s = 0.0;  ///< Time since new surface was last seen.
-  Guidance guidance = Guidance::kNone;
+  SweepAdvice guidance = SweepAdvice::kNone;
   std::int64_t keyframes = 0;
   std::int64_t frames = 0;
   std::int64_t frames_tracked = 0;
