@@ -224,7 +224,7 @@ class Appliance {
     SensorStatistics images;         ///< Counters of the sensor for the sweep.
     ScanUpdate update;
     double dropped_share = 0.0;  ///< Fraction of images lost in the last two seconds, smoothed.
-    ScanOutcome outcome;
+    EndedScan outcome;
     bool has_ended = false;
   };
 
@@ -289,7 +289,7 @@ class Appliance {
   void OnSensor(const SensorEvent& event);
   void LogSensor(const SensorEvent& event);
   void OnUpdate(const ScanUpdate& update);
-  void OnEnded(const ScanOutcome& outcome);
+  void OnEnded(const EndedScan& outcome);
   void OnTick();
   void WatchButton();
   void ArmButtonTimer();

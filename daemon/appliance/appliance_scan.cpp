@@ -128,9 +128,9 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
   const web::ReferencePlan plan = DefaultPlan();
   const bool is_reference = record.purpose == web::ScanPurpose::kReference;
   callbacks.save = [this, id, plan, is_demo, is_reference, reason = record.reason,
-                    actor = opened_by_, patient = record.patient_id](const ScanOutcome& outcome) {
+                    actor = opened_by_, patient = record.patient_id](const EndedScan& outcome) {
     if (id->empty()) return;  // it never began
-    using Kind = ScanOutcome::Kind;
+    using Kind = EndedScan::Kind;
     // A scan that is discarded or fails while its result is being written has no result.
     const bool is_done = outcome.kind == Kind::kDone;
     FinishedScan finished{.failure = outcome.reason,
@@ -160,7 +160,7 @@ void Appliance::AddListeners(ScanCallbacks& callbacks) {
   callbacks.sweep_complete = [this] {
     loop_.Post("sweep complete", [this] { (void)Handle(ScanEvent::kSweepComplete); });
   };
-  callbacks.ended = [this](const ScanOutcome& outcome) {
+  callbacks.ended = [this](const EndedScan& outcome) {
     loop_.Post("scan ended", [this, outcome] { OnEnded(outcome); });
   };
 }
@@ -169,7 +169,7 @@ ScanCallbacks Appliance::MakeCheckCallbacks(const NewScan& record) {
   ScanCallbacks callbacks;
   callbacks.begin = [] { return std::filesystem::path(); };
   callbacks.save = [this, actor = *check_,
-                    serial = record.sensor_serial](const ScanOutcome& outcome) {
+                    serial = record.sensor_serial](const EndedScan& outcome) {
     if (outcome.check) (void)store_->checks.Add(actor, serial, *outcome.check);
   };
   AddListeners(callbacks);
@@ -195,8 +195,8 @@ void Appliance::NoteDropped(const ScanUpdate& update) {
   scan_.dropped_share += weight * (lost / (lost + seen) - scan_.dropped_share);
 }
 
-void Appliance::OnEnded(const ScanOutcome& outcome) {
-  using Kind = ScanOutcome::Kind;
+void Appliance::OnEnded(const EndedScan& outcome) {
+  using Kind = EndedScan::Kind;
   limit_timer_.Disarm();
   sensors_->EndScan();
   // Its thread has nothing left to do, but may still wait for a processor to end.

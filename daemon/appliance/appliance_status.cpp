@@ -119,7 +119,7 @@ IndicatorPattern Appliance::Pattern() const {
     case ApplianceState::kScanning:
       break;
     case ApplianceState::kResult:
-      if (scan_.outcome.kind == ScanOutcome::Kind::kNoScene ||
+      if (scan_.outcome.kind == EndedScan::Kind::kNoScene ||
           scan_.outcome.verdict == Verdict::kNoAnswer)
         return IndicatorPattern::kNoAnswer;
       if (!scan_.outcome.verdict)
@@ -228,21 +228,21 @@ Json Appliance::StatusJson() {
   scan["cancel_ms"] = scan_.cancel_ms;
   Json last = nullptr;
   if (last_result_) {
-    const ScanOutcome& outcome = last_result_->outcome;
-    last = {{"scan", last_result_->id},
-            {"is_reference", outcome.kind == ScanOutcome::Kind::kDone && !outcome.verdict},
-            {"verdict",
-             outcome.kind == ScanOutcome::Kind::kNoScene ? Json("no_answer") : Json(nullptr)},
-            {"reasons",
-             outcome.kind == ScanOutcome::Kind::kNoScene ? Json{outcome.reason} : Json::array()},
-            {"correction", nullptr},
-            {"frames", outcome.frames},
-            {"frames_dropped", outcome.frames_dropped},
-            {"images_lost", last_result_->images.num_lost},
-            {"images_unpaired", last_result_->images.num_unpaired},
-            {"images_discarded", last_result_->images.num_discarded},
-            {"after_last_frame_s", outcome.after_last_frame_s}};
-    if (outcome.kind == ScanOutcome::Kind::kDone && outcome.verdict) {
+    const EndedScan& outcome = last_result_->outcome;
+    last = {
+        {"scan", last_result_->id},
+        {"is_reference", outcome.kind == EndedScan::Kind::kDone && !outcome.verdict},
+        {"verdict", outcome.kind == EndedScan::Kind::kNoScene ? Json("no_answer") : Json(nullptr)},
+        {"reasons",
+         outcome.kind == EndedScan::Kind::kNoScene ? Json{outcome.reason} : Json::array()},
+        {"correction", nullptr},
+        {"frames", outcome.frames},
+        {"frames_dropped", outcome.frames_dropped},
+        {"images_lost", last_result_->images.num_lost},
+        {"images_unpaired", last_result_->images.num_unpaired},
+        {"images_discarded", last_result_->images.num_discarded},
+        {"after_last_frame_s", outcome.after_last_frame_s}};
+    if (outcome.kind == EndedScan::Kind::kDone && outcome.verdict) {
       last["verdict"] = Name(*outcome.verdict);
       last["reasons"] = outcome.reasons;
       // A result without an answer shows no numbers, so that nobody acts on them.
