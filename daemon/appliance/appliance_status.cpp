@@ -249,10 +249,8 @@ Json Appliance::StatusJson() {
       const bool is_shown = outcome.correction && *outcome.verdict != Verdict::kNoAnswer;
       const Json correction = is_shown ? Json(CorrectionJson(*outcome.correction)) : Json(nullptr);
       last["correction"] = correction;
-      for (const char* name :
-           {"vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg"}) {
-        last[name] = correction.is_object() ? correction[name] : Json(nullptr);
-      }
+      for (const web::NumberAxis& axis : web::kNumberAxes)
+        last[axis.key] = correction.is_object() ? correction[axis.key] : Json(nullptr);
     }
   }
   return {{"state", Name(state_.phase)},

@@ -58,17 +58,10 @@ void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
 /// Verdict and numbers for the log: "move: vertical +1.2, ..., yaw -0.10".
 std::string Described(const web::ResultSummary& result) {
   std::string text = result.verdict;
-  if (!result.correction) return text;
-  const web::SixNumbers& c = *result.correction;
-  const auto add = [&](const char* name, const std::optional<double>& value, const char* unit) {
-    if (value) text += fmt::format(", {} {:+.2f} {}", name, *value, unit);
-  };
-  add("vertical", c.vertical_mm, "mm");
-  add("longitudinal", c.longitudinal_mm, "mm");
-  add("lateral", c.lateral_mm, "mm");
-  add("pitch", c.pitch_deg, "deg");
-  add("roll", c.roll_deg, "deg");
-  add("yaw", c.yaw_deg, "deg");
+  for (const web::NumberAxis& axis : web::kNumberAxes) {
+    if (const auto value = axis.In(result.correction))
+      text += fmt::format(", {} {:+.2f} {}", axis.name, *value, axis.unit);
+  }
   return text;
 }
 

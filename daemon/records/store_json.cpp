@@ -1,10 +1,13 @@
 #include "daemon/records/store_json.hpp"
 
+#include <algorithm>
+#include <functional>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "algo/acceptance/verdict.hpp"
+#include "algo/acceptance/acceptance.hpp"
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "web/service/limits.hpp"
@@ -21,29 +24,21 @@ using Json = nlohmann::json;
       why));
 }
 
-/// Nothing if couch-fixed markers do not determine shifts.
-std::optional<double> Shift(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  if (found == json.end() || found->is_null()) return std::nullopt;
-  if (!found->is_number()) RefuseResult(fmt::format("{} is not a number", key));
-  return found->get<double>();
-}
+// Results are read by the names with which the method writes them.
+static_assert(std::ranges::equal(web::kNumberAxes, kNumberNames, std::equal_to<std::string_view>(),
+                                 &web::NumberAxis::name));
 
-double Angle(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  if (found == json.end() || !found->is_number())
-    RefuseResult(fmt::format("{} is not a number", key));
-  return found->get<double>();
-}
-
-/// A missing angle is never treated as zero.
-web::SixNumbers NumbersOf(const Json& json) {
-  return {.vertical_mm = Shift(json, "vertical_mm"),
-          .longitudinal_mm = Shift(json, "longitudinal_mm"),
-          .lateral_mm = Shift(json, "lateral_mm"),
-          .pitch_deg = Angle(json, "pitch_deg"),
-          .roll_deg = Angle(json, "roll_deg"),
-          .yaw_deg = Angle(json, "yaw_deg")};
+/// Couch-fixed markers do not determine shifts; a missing angle is never treated as zero.
+web::ReportedNumbers NumbersOf(const Json& json) {
+  web::ReportedNumbers numbers;
+  for (const web::NumberAxis& axis : web::kNumberAxes) {
+    const auto found = json.find(axis.key);
+    if (axis.is_shift() && (found == json.end() || found->is_null())) continue;
+    if (found == json.end() || !found->is_number())
+      RefuseResult(fmt::format("{} is not a number", axis.key));
+    numbers.*axis.member = found->get<double>();
+  }
+  return numbers;
 }
 
 /// An object; nothing if it is missing or null.
@@ -70,8 +65,8 @@ void ReadWords(const Json& result, web::ResultSummary& summary) {
   };
   if (const auto words = result.value(Json::json_pointer("/correction/words"), Json());
       words.is_object()) {
-    summary.words = {text(words, "vertical"), text(words, "longitudinal"), text(words, "lateral"),
-                     text(words, "pitch"),    text(words, "roll"),         text(words, "yaw")};
+    for (std::size_t i = 0; i < summary.words.size(); ++i)
+      summary.words[i] = text(words, web::kNumberAxes[i].name);
   }
   const auto parts = result.value(Json::json_pointer("/body/parts"), Json());
   for (const Json& part : parts.is_array() ? parts : Json::array()) {

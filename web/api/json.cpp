@@ -16,14 +16,11 @@ Json OrNull(const std::optional<T>& value) {
 
 Json TextOrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
-Json NumbersJson(const std::optional<SixNumbers>& numbers) {
+Json NumbersJson(const std::optional<ReportedNumbers>& numbers) {
   if (!numbers) return nullptr;
-  return {{"vertical_mm", OrNull(numbers->vertical_mm)},
-          {"longitudinal_mm", OrNull(numbers->longitudinal_mm)},
-          {"lateral_mm", OrNull(numbers->lateral_mm)},
-          {"pitch_deg", numbers->pitch_deg},
-          {"roll_deg", numbers->roll_deg},
-          {"yaw_deg", numbers->yaw_deg}};
+  Json json;
+  for (const NumberAxis& axis : kNumberAxes) json[axis.key] = OrNull(axis.In(numbers));
+  return json;
 }
 
 Json ToleranceJson(const Tolerance& tolerance) {
@@ -69,10 +66,8 @@ void AddDailyCheck(Json& json, DailyCheck check, const char* overdue, const char
 }
 
 Json WordsJson(const std::array<std::string, 6>& words) {
-  static constexpr std::array<const char*, 6> kNames = {"vertical", "longitudinal", "lateral",
-                                                        "pitch",    "roll",         "yaw"};
-  Json json = Json::object();
-  for (std::size_t i = 0; i < words.size(); ++i) json[kNames[i]] = TextOrNull(words[i]);
+  Json json;
+  for (std::size_t i = 0; i < words.size(); ++i) json[kNumberAxes[i].name] = TextOrNull(words[i]);
   return json;
 }
 

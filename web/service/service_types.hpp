@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "web/service/reported_numbers.hpp"
+
 namespace plumb::web {
 
 using WallClock = std::chrono::system_clock;
@@ -84,15 +86,6 @@ struct StorageStatus {
   std::vector<std::string> warnings = {};  ///< Sentences for people: nearly full, no backup.
 };
 
-struct SixNumbers {
-  std::optional<double> vertical_mm;  ///< Shifts are not set with couch-fixed markers.
-  std::optional<double> longitudinal_mm;
-  std::optional<double> lateral_mm;
-  double pitch_deg = 0.0;
-  double roll_deg = 0.0;
-  double yaw_deg = 0.0;
-};
-
 struct Tolerance {
   double shift_mm = 3.0;
   double rotation_deg = 1.0;
@@ -103,10 +96,9 @@ struct ResultSummary {
   std::string verdict;  ///< "in_tolerance", "unsure", "move" or "no_answer".
   std::vector<std::string> reasons;
   /// The motion to APPLY. With "no_answer" it is for analysis only, never to be shown as advice.
-  std::optional<SixNumbers> correction;
-  std::optional<SixNumbers> u95;
-  /// Directions of the correction: vertical, longitudinal, lateral, pitch, roll, yaw; empty if
-  /// unknown.
+  std::optional<ReportedNumbers> correction;
+  std::optional<ReportedNumbers> u95;
+  /// Directions of the correction, in the order of kNumberAxes; empty if unknown.
   std::array<std::string, 6> words;
   std::vector<std::string> body_now;    ///< "left shoulder 9 mm high", before any correction.
   std::vector<std::string> body_after;  ///< The same after the correction: the posture.
