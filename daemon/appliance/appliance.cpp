@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <exception>
-#include <iterator>
 #include <map>
 #include <string_view>
 #include <utility>
@@ -195,8 +194,7 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const web::Actor* actor) {
   if (!answer.empty()) {
     Log(LogLevel::kNotice,
         fmt::format("{} ignored in state {}: {}", Name(event), Name(before.phase), answer));
-    PublishEvent("ignored",
-                 {{"what", Name(event)}, {"state", Name(before.phase)}, {"reason", answer}});
+    PublishEvent(IgnoredEvent{event, before.phase, answer});
   }
   state_ = transition.state;
   if (state_.phase != ApplianceState::kResult) result_timer_.Disarm();
@@ -273,12 +271,7 @@ Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
 
 void Appliance::OnSensor(const SensorEvent& event) {
   LogSensor(event);
-  static constexpr const char* kNames[] = {"ready", "lost", "failed", "others", "stalled"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(SensorEvent::Kind::kStalled) + 1);
-  PublishEvent("sensor", {{"what", kNames[static_cast<int>(event.kind)]},
-                          {"serial", event.sensor.serial},
-                          {"reason", event.reason},
-                          {"others", event.others}});
+  PublishEvent(event);
   NotifyWeb(web::EventKind::kStatus);
   if (event.kind == SensorEvent::Kind::kOthers || event.kind == SensorEvent::Kind::kStalled) return;
   sensor_fault_ = event.reason;

@@ -18,6 +18,7 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/comparison/body_parts.hpp"
+#include "daemon/appliance/control_lines.hpp"
 #include "daemon/appliance/current_store.hpp"
 #include "daemon/appliance/page_identity.hpp"
 #include "daemon/appliance/scan_session.hpp"
@@ -314,9 +315,8 @@ class Appliance {
   void ReadStoredOrFail(web::Status& status);
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
-  void PublishEvent(const char* event, const nlohmann::json& fields);
+  void PublishEvent(const WatchedEvent& event);
   void PublishState();
-  void PublishProgress();
   void NotifyWeb(web::EventKind kind);
   [[nodiscard]] std::optional<double> Coverage() const;
   [[nodiscard]] std::string FaultReason() const;
@@ -385,8 +385,5 @@ class Appliance {
 
 /// Midnight, local time.
 [[nodiscard]] web::WallClock::time_point StartOfDay();
-
-/// "off", "no_sensor", "ready", ...
-[[nodiscard]] const char* Name(IndicatorPattern pattern);
 
 }  // namespace plumb

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
@@ -16,7 +15,6 @@ namespace plumb {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Json = nlohmann::json;
 
 constexpr double kDroppedSmoothing_s = 1.0;
 const web::Actor kAuto{.user = "auto", .address = ""};
@@ -183,7 +181,7 @@ void Appliance::OnUpdate(const ScanUpdate& update) {
   NoteDropped(update);
   scan_.update = update;
   Show();
-  PublishProgress();
+  PublishEvent(ProgressEvent{scan_.id, scan_.update, Coverage()});
   NotifyWeb(web::EventKind::kProgress);
 }
 
@@ -240,7 +238,7 @@ void Appliance::OnEnded(const EndedScan& outcome) {
           {{"SCAN", scan_.id}});
     }
     (void)Handle(ScanEvent::kScanDone);
-    PublishEvent("result", {{"scan", scan_.id}, {"answer", answer}});
+    PublishEvent(ResultEvent{scan_.id, answer});
   }
   if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
   if (scan_.purpose == web::ScanPurpose::kDailyCheck) RefreshRoom();

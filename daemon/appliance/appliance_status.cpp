@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <exception>
 #include <functional>
-#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -37,23 +36,6 @@ void Guarded(const char* whom, const std::function<void()>& notify) try {
   Log(LogLevel::kError, fmt::format("{} could not be notified: {}", whom, Explain(error)));
 }
 
-/// The fields of a scan in the status and in its events.
-Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
-  return {{"step", update.step},
-          {"fraction", update.fraction},
-          {"frames", update.frames},
-          {"frames_tracked", update.frames_tracked},
-          {"frames_dropped", update.frames_dropped},
-          {"guidance", Name(update.guidance.advice)},
-          {"speed_m_s", update.guidance.speed_m_s},
-          {"median_depth_m", update.guidance.median_depth_m},
-          {"area_m2", update.guidance.area_m2},
-          {"coverage", coverage ? Json(*coverage) : Json(nullptr)}};
-}
-
-double WallSeconds() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 double SecondsSince(Clock::time_point time) {
   return std::chrono::duration<double>(Clock::now() - time).count();
 }
@@ -81,28 +63,6 @@ web::WallClock::time_point StartOfDay() {
   local.tm_hour = local.tm_min = local.tm_sec = 0;
   local.tm_isdst = -1;  // summer time may have begun or ended since midnight
   return web::WallClock::from_time_t(std::mktime(&local));
-}
-
-const char* Name(IndicatorPattern pattern) {
-  static constexpr const char* kNames[] = {"off",
-                                           "no_sensor",
-                                           "ready",
-                                           "scanning",
-                                           "too_fast",
-                                           "too_near",
-                                           "too_far",
-                                           "working",
-                                           "done",
-                                           "result_in_tolerance",
-                                           "result_unsure",
-                                           "result_move",
-                                           "no_answer",
-                                           "fault",
-                                           "ready_rolled_back",
-                                           "ready_disk_nearly_full",
-                                           "stopped"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(IndicatorPattern::kStopped) + 1);
-  return kNames[static_cast<int>(pattern)];
 }
 
 IndicatorPattern Appliance::Pattern() const {
@@ -147,7 +107,7 @@ void Appliance::Show() {
   if (pattern == shown_) return;
   shown_ = pattern;
   if (parts_.indicator != nullptr) parts_.indicator->Show(pattern);
-  PublishEvent("light", {{"pattern", Name(pattern)}});
+  PublishEvent(LightEvent{pattern});
 }
 
 void Appliance::SetRolledBack(const std::string& text) {
@@ -156,20 +116,14 @@ void Appliance::SetRolledBack(const std::string& text) {
   NotifyWeb(web::EventKind::kStatus);
 }
 
-void Appliance::PublishEvent(const char* event, const Json& fields) {
-  if (!notify_watchers_) return;
-  Guarded("the control socket's watchers", [&] {
-    Json line = {{"event", event}, {"time", WallSeconds()}};
-    line.update(fields);
-    notify_watchers_(line.dump(-1, ' ', false, Json::error_handler_t::replace));
-  });
+void Appliance::PublishEvent(const WatchedEvent& event) {
+  if (notify_watchers_)
+    Guarded("the control socket's watchers", [&] { notify_watchers_(EventLine(event)); });
 }
 
 void Appliance::PublishState() {
   Show();
-  PublishEvent("state", {{"state", Name(state_.phase)},
-                         {"reason", FaultReason()},
-                         {"cancelling", state_.cancelling}});
+  PublishEvent(StateEvent{state_.phase, FaultReason(), state_.cancelling});
   NotifyWeb(web::EventKind::kStatus);
 }
 
@@ -210,12 +164,6 @@ std::string Appliance::StatusLine() const {
   return line;
 }
 
-void Appliance::PublishProgress() {
-  Json progress = ProgressFields(scan_.update, Coverage());
-  progress["scan"] = scan_.id;
-  PublishEvent("progress", progress);
-}
-
 Json Appliance::StatusJson() {
   const SensorSnapshot sensor = sensors_->snapshot();
   const ScanUpdate& update = scan_.update;
@@ -228,26 +176,26 @@ Json Appliance::StatusJson() {
   scan["cancel_ms"] = scan_.cancel_ms;
   Json last = nullptr;
   if (last_result_) {
-    const EndedScan& outcome = last_result_->outcome;
-    last = {
-        {"scan", last_result_->id},
-        {"is_reference", outcome.kind == EndedScan::Kind::kDone && !outcome.verdict},
-        {"verdict", outcome.kind == EndedScan::Kind::kNoScene ? Json("no_answer") : Json(nullptr)},
-        {"reasons",
-         outcome.kind == EndedScan::Kind::kNoScene ? Json{outcome.reason} : Json::array()},
-        {"correction", nullptr},
-        {"frames", outcome.frames},
-        {"frames_dropped", outcome.frames_dropped},
-        {"images_lost", last_result_->images.num_lost},
-        {"images_unpaired", last_result_->images.num_unpaired},
-        {"images_discarded", last_result_->images.num_discarded},
-        {"after_last_frame_s", outcome.after_last_frame_s}};
-    if (outcome.kind == EndedScan::Kind::kDone && outcome.verdict) {
-      last["verdict"] = Name(*outcome.verdict);
-      last["reasons"] = outcome.reasons;
+    const EndedScan& ended = last_result_->outcome;
+    const bool is_done = ended.kind == EndedScan::Kind::kDone;
+    const bool has_no_scene = ended.kind == EndedScan::Kind::kNoScene;
+    last = {{"scan", last_result_->id},
+            {"is_reference", is_done && !ended.verdict},
+            {"verdict", has_no_scene ? Json("no_answer") : Json(nullptr)},
+            {"reasons", has_no_scene ? Json{ended.reason} : Json::array()},
+            {"correction", nullptr},
+            {"frames", ended.frames},
+            {"frames_dropped", ended.frames_dropped},
+            {"images_lost", last_result_->images.num_lost},
+            {"images_unpaired", last_result_->images.num_unpaired},
+            {"images_discarded", last_result_->images.num_discarded},
+            {"after_last_frame_s", ended.after_last_frame_s}};
+    if (is_done && ended.verdict) {
+      last["verdict"] = Name(*ended.verdict);
+      last["reasons"] = ended.reasons;
       // A result without an answer shows no numbers, so that nobody acts on them.
-      const bool is_shown = outcome.correction && *outcome.verdict != Verdict::kNoAnswer;
-      const Json correction = is_shown ? Json(CorrectionJson(*outcome.correction)) : Json(nullptr);
+      const bool is_shown = ended.correction && *ended.verdict != Verdict::kNoAnswer;
+      const Json correction = is_shown ? Json(CorrectionJson(*ended.correction)) : Json(nullptr);
       last["correction"] = correction;
       for (const web::NumberAxis& axis : web::kNumberAxes)
         last[axis.key] = correction.is_object() ? correction[axis.key] : Json(nullptr);

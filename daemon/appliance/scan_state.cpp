@@ -1,7 +1,5 @@
 #include "daemon/appliance/scan_state.hpp"
 
-#include <iterator>
-
 namespace plumb {
 
 using web::ApplianceState;
@@ -218,12 +216,11 @@ ScanTransition Next(const ScanState& before, ScanEvent event) {
 }
 
 const char* Name(ScanEvent event) {
-  static constexpr const char* kNames[] = {
-      "sensor_ready", "sensor_lost",    "sensor_failed",  "short_press",    "long_press",
-      "start",        "end_sweep",      "cancel",         "sweep_complete", "scan_done",
-      "scan_failed",  "scan_cancelled", "result_expired", "storage_failed", "storage_works"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(ScanEvent::kStorageWorks) + 1);
-  return kNames[static_cast<int>(event)];
+  static constexpr auto kNames = web::NamesUpTo<ScanEvent::kStorageWorks>(
+      {"sensor_ready", "sensor_lost", "sensor_failed", "short_press", "long_press", "start",
+       "end_sweep", "cancel", "sweep_complete", "scan_done", "scan_failed", "scan_cancelled",
+       "result_expired", "storage_failed", "storage_works"});
+  return kNames.at(static_cast<std::size_t>(event)).data();
 }
 
 }  // namespace plumb
