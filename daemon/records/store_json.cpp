@@ -10,7 +10,7 @@
 #include "algo/acceptance/acceptance.hpp"
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
-#include "web/service/limits.hpp"
+#include "web/service/settings_change.hpp"
 
 namespace plumb {
 namespace {
@@ -98,10 +98,14 @@ class Stored {
     const auto found = json_.find(key);
     return found == json_.end() ? nullptr : &*found;
   }
-  [[nodiscard]] double Number(const char* key, double least, double most) const {
+  [[nodiscard]] double Number(const char* key, web::Range range) const {
     const Json* value = Find(key);
     if (value == nullptr || !value->is_number()) Fail(fmt::format("{} is not a number", key));
-    return InRange(key, value->get<double>(), least, most);
+    return InRange(key, value->get<double>(), range);
+  }
+  [[nodiscard]] web::Tolerance Tolerance() const {
+    return {.shift_mm = Number("shift_tolerance_mm", web::kShiftTolerance_mm.stored),
+            .rotation_deg = Number("rotation_tolerance_deg", web::kRotationTolerance_deg.stored)};
   }
   [[nodiscard]] bool Flag(const char* key) const {
     const Json* value = Find(key);
@@ -123,7 +127,7 @@ class Stored {
       Fail(fmt::format("{} is not a point of {} numbers", key, kSize));
     for (std::size_t i = 0; i < kSize; ++i) {
       if (!json[i].is_number()) Fail(fmt::format("{} contains a value that is not a number", key));
-      point[i] = InRange(key, json[i].get<double>(), -kMaxCoordinate_m, kMaxCoordinate_m);
+      point[i] = InRange(key, json[i].get<double>(), {-kMaxCoordinate_m, kMaxCoordinate_m});
     }
     return point;
   }
@@ -131,17 +135,15 @@ class Stored {
  private:
   static constexpr double kMaxCoordinate_m = 1000.0;
 
-  [[nodiscard]] double InRange(const char* key, double value, double least, double most) const {
-    if (!(value >= least && value <= most))
-      Fail(fmt::format("{} is {}, expected {} to {}", key, value, least, most));
+  [[nodiscard]] double InRange(const char* key, double value, web::Range range) const {
+    if (!range.Holds(value))
+      Fail(fmt::format("{} is {}, expected {} to {}", key, value, range.least, range.most));
     return value;
   }
 
   Json json_;
   const char* what_;
 };
-
-constexpr double kMaxShift_mm = 1000.0, kMaxRotation_deg = 180.0;
 
 }  // namespace
 
@@ -163,9 +165,7 @@ web::ReferencePlan ParsePlan(const std::string& text) {
   for (const Json& point : *region) plan.region_m.push_back(stored.Point<2>("region_m", point));
   if (plan.region_m.size() == 1 || plan.region_m.size() == 2)
     stored.Fail("region_m has fewer than 3 points");
-  plan.tolerance = {
-      .shift_mm = stored.Number("shift_tolerance_mm", 0.001, kMaxShift_mm),
-      .rotation_deg = stored.Number("rotation_tolerance_deg", 0.001, kMaxRotation_deg)};
+  plan.tolerance = stored.Tolerance();
   plan.posture = stored.Posture("posture");
   plan.couch_markers = stored.Flag("couch_markers");
   if (const Json* isocentre = stored.Find("isocentre_m"))
@@ -173,22 +173,13 @@ web::ReferencePlan ParsePlan(const std::string& text) {
   return plan;
 }
 
-std::string SettingsJson(const web::Settings& s) {
-  return Json{{"shift_tolerance_mm", s.tolerance.shift_mm},
-              {"rotation_tolerance_deg", s.tolerance.rotation_deg},
-              {"posture", s.posture},
-              {"couch_markers", s.couch_markers},
-              {"auto_stop_s", s.auto_stop_s},
-              {"scan_limit_s", s.scan_limit_s},
-              {"keep_recordings", s.keep_recordings},
-              {"retention_days", s.retention_days},
-              {"idle_logout_min", s.idle_logout_min}}
-      .dump();
+std::string SettingsJson(const web::Settings& settings) {
+  return web::SettingsAs<Json>(settings).dump();
 }
 
 std::string SettingsChanges(const std::string& stored, const web::Settings& settings) {
   const Json before = ParseBoundedJsonOrNothing(stored);
-  const Json wanted = Json::parse(SettingsJson(settings));
+  const Json wanted = web::SettingsAs<Json>(settings);
   Json changes = Json::object();
   for (const auto& [name, after] : wanted.items()) {
     if (!before.is_object() || !before.contains(name)) {
@@ -203,23 +194,22 @@ std::string SettingsChanges(const std::string& stored, const web::Settings& sett
 web::Settings ParseSettings(const std::string& text) {
   const Stored stored(text, "the stored settings");
   web::Settings s;
-  const auto number = [&](const char* key, double& value, double least, double most) {
-    if (stored.Find(key) != nullptr) value = stored.Number(key, least, most);
+  const auto number = [&](const char* key, double& value, const web::Limits& limits) {
+    if (stored.Find(key) != nullptr) value = stored.Number(key, limits.stored);
   };
-  const auto whole = [&](const char* key, int& value, int least, int most) {
+  const auto whole = [&](const char* key, int& value, const web::Limits& limits) {
     double read = value;
-    number(key, read, least, most);
+    number(key, read, limits);
     value = static_cast<int>(read);
   };
-  s.tolerance = {.shift_mm = stored.Number("shift_tolerance_mm", 0.001, kMaxShift_mm),
-                 .rotation_deg = stored.Number("rotation_tolerance_deg", 0.001, kMaxRotation_deg)};
+  s.tolerance = stored.Tolerance();
   s.posture = stored.Posture("posture");
   s.couch_markers = stored.Flag("couch_markers");
-  number("auto_stop_s", s.auto_stop_s, 0.1, 3600);
-  number("scan_limit_s", s.scan_limit_s, 0.1, 3600);
+  number("auto_stop_s", s.auto_stop_s, web::kAutoStop_s);
+  number("scan_limit_s", s.scan_limit_s, web::kScanLimit_s);
   if (stored.Find("keep_recordings") != nullptr) s.keep_recordings = stored.Flag("keep_recordings");
-  whole("retention_days", s.retention_days, 0, 1'000'000);
-  whole("idle_logout_min", s.idle_logout_min, 1, 100'000);
+  whole("retention_days", s.retention_days, web::kRetention_days);
+  whole("idle_logout_min", s.idle_logout_min, web::kIdleLogout_min);
   return s;
 }
 

@@ -298,18 +298,6 @@ Json ToJson(const AuditEntry& entry) {
   return json;
 }
 
-Json ToJson(const Settings& settings) {
-  return {{"shift_tolerance_mm", settings.tolerance.shift_mm},
-          {"rotation_tolerance_deg", settings.tolerance.rotation_deg},
-          {"posture", settings.posture},
-          {"couch_markers", settings.couch_markers},
-          {"auto_stop_s", settings.auto_stop_s},
-          {"scan_limit_s", settings.scan_limit_s},
-          {"keep_recordings", settings.keep_recordings},
-          {"retention_days", settings.retention_days},
-          {"idle_logout_min", settings.idle_logout_min}};
-}
-
 Json ToJson(const UpdateStatus& update) {
   return {{"supported", update.supported},
           {"message", update.message},

@@ -23,7 +23,6 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] Json ToJson(const CheckStatus& checks, WallClock::time_point now);
 [[nodiscard]] Json ToJson(const User& user);  ///< Without the hash.
 [[nodiscard]] Json ToJson(const AuditEntry& entry);
-[[nodiscard]] Json ToJson(const Settings& settings);
 [[nodiscard]] Json ToJson(const UpdateStatus& update);
 [[nodiscard]] std::string Dump(const Json& json);
 

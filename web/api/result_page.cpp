@@ -15,6 +15,8 @@
 #include "web/assets/spanish.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
+#include "web/security/password_rules.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb::web {
 namespace {
@@ -80,12 +82,12 @@ std::string LoginForm(const ResultWords& words, std::string_view trouble) {
   return fmt::format(
       "<h1>{}</h1>{}<form method=\"post\" action=\"/login\" class=\"card form\">"
       "<label>{} <input name=\"name\" autocomplete=\"username\" required "
-      "maxlength=\"32\"></label>"
+      "maxlength=\"{}\"></label>"
       "<label>{} <input name=\"password\" type=\"password\" "
-      "autocomplete=\"current-password\" required maxlength=\"128\"></label>"
+      "autocomplete=\"current-password\" required maxlength=\"{}\"></label>"
       "<button class=\"primary\">{}</button></form>",
       words.log_in, trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble),
-      words.name, words.password, words.log_in);
+      words.name, kMaxName, words.password, kMaxPassword, words.log_in);
 }
 
 /// A row of the table. Only the verdict MOVE asks for moves.
