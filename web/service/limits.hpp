@@ -31,7 +31,7 @@ inline constexpr Limits kRetention_days{.entered = {0, 36500}, .stored = {0, 1'0
 inline constexpr Limits kIdleLogout_min{.entered = {1, 240}, .stored = {1, 100'000}};
 
 /// Lengths of texts in bytes. A name is that of an account, a display, or a patient (its code).
-inline constexpr std::size_t kMaxName = 32;
+inline constexpr std::size_t kMaxName = 32, kMaxSite = 64, kMaxNote = 500;
 inline constexpr std::size_t kMinReason = 3, kMaxReason = 200;
 
 /// Head or feet first, supine or prone.

@@ -151,8 +151,6 @@ struct Patient {
   bool archived = false;  ///< Not in the list and not to be opened; nothing is deleted.
 };
 
-inline constexpr std::size_t kMaxSite = 64, kMaxNote = 500;  // bytes
-
 /// What people write about a patient's course.
 struct CourseNotes {
   std::string site, note;
@@ -198,7 +196,7 @@ struct ReferencePlan {
   std::optional<std::array<double, 3>>
       isocentre_m;  ///< Reference marker's frame; not set: centroid of the region.
   Tolerance tolerance;
-  std::string posture = "HFS";  ///< HFS, HFP, FFS, FFP.
+  std::string posture = "HFS";  ///< One of kPostures.
   bool couch_markers = false;   ///< Markers are fixed to the couch: no shifts are calculated.
 };
 
@@ -361,15 +359,16 @@ struct AuditEntry {
   std::optional<AuditSubject> about = {};  ///< Of the subject; nothing: its id is what people know.
 };
 
+/// Within the limits of limits.hpp.
 struct Settings {
-  Tolerance tolerance;           ///< For new references.
-  std::string posture = "HFS";   ///< For new references.
-  bool couch_markers = false;    ///< For new references.
-  double auto_stop_s = 10.0;     ///< Time without new coverage; 1..120.
-  double scan_limit_s = 60.0;    ///< 5..600.
+  Tolerance tolerance;          ///< For new references.
+  std::string posture = "HFS";  ///< For new references.
+  bool couch_markers = false;   ///< For new references.
+  double auto_stop_s = 10.0;    ///< Time without new coverage.
+  double scan_limit_s = 60.0;
   bool keep_recordings = false;  ///< Keep the raw frames of scans, with colour.
   int retention_days = 0;        ///< Older scans are removed; 0: never. References are kept.
-  int idle_logout_min = 15;      ///< 1..240.
+  int idle_logout_min = 15;
 };
 
 struct UpdateStatus {
