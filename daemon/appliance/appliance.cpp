@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <exception>
-#include <iterator>
 #include <map>
 #include <string_view>
 #include <utility>
@@ -19,6 +18,7 @@
 namespace plumb {
 
 using store::kSelf;
+using web::ApplianceState;
 
 namespace {
 
@@ -114,7 +114,7 @@ void Appliance::ArmButtonTimer() {
 }
 
 bool Appliance::IsRunning() const {
-  return state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
+  return state_.phase == ApplianceState::kScanning || state_.phase == ApplianceState::kWorking;
 }
 
 /// The demo's patient, which is open from the start and stays open.
@@ -150,8 +150,8 @@ Appliance::Answer Appliance::WhyNotChangeSession() const {
 
 /// Without a running scan and a shown result, a long press ends the treatment session.
 Appliance::Answer Appliance::Press(ButtonPress press, const web::Actor& actor) {
-  if (press == ButtonPress::kLong && state_.phase == ScanPhase::kReady && !session_id_.empty() &&
-      !IsOwnSession())
+  if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady &&
+      !session_id_.empty() && !IsOwnSession())
     return CloseSession(actor);
   return Handle(press == ButtonPress::kShort ? ScanEvent::kShortPress : ScanEvent::kLongPress,
                 &actor);
@@ -184,7 +184,7 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const web::Actor* actor) {
   const bool starts = std::find(transition.actions.begin(), transition.actions.end(),
                                 ScanAction::kStartScan) != transition.actions.end();
   Answer answer(transition.refusal);
-  if (!answer.empty() && before.fault == FaultKind::kStorage && !space_fault_.empty())
+  if (!answer.empty() && before.fault == web::FaultKind::kStorage && !space_fault_.empty())
     answer = space_fault_;
   if (starts) {
     answer = WhyNotScan();
@@ -194,17 +194,16 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const web::Actor* actor) {
   if (!answer.empty()) {
     Log(LogLevel::kNotice,
         fmt::format("{} ignored in state {}: {}", Name(event), Name(before.phase), answer));
-    PublishEvent("ignored",
-                 {{"what", Name(event)}, {"state", Name(before.phase)}, {"reason", answer}});
+    PublishEvent(IgnoredEvent{event, before.phase, answer});
   }
   state_ = transition.state;
-  if (state_.phase != ScanPhase::kResult) result_timer_.Disarm();
+  if (state_.phase != ApplianceState::kResult) result_timer_.Disarm();
   for (const ScanAction action : transition.actions) {
     Act(action);
     if (actor != nullptr) AuditAct(action, *actor);
   }
   if (actor != nullptr && transition.actions.empty())  // a fault or a result was acknowledged
-    Audit(*actor, "press", "", Name(state_.phase));
+    Audit(*actor, "press", "", std::string(Name(state_.phase)));
   if (state_ != before) PublishState();
   return answer;
 }
@@ -272,12 +271,7 @@ Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
 
 void Appliance::OnSensor(const SensorEvent& event) {
   LogSensor(event);
-  static constexpr const char* kNames[] = {"ready", "lost", "failed", "others", "stalled"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(SensorEvent::Kind::kStalled) + 1);
-  PublishEvent("sensor", {{"what", kNames[static_cast<int>(event.kind)]},
-                          {"serial", event.sensor.serial},
-                          {"reason", event.reason},
-                          {"others", event.others}});
+  PublishEvent(event);
   NotifyWeb(web::EventKind::kStatus);
   if (event.kind == SensorEvent::Kind::kOthers || event.kind == SensorEvent::Kind::kStalled) return;
   sensor_fault_ = event.reason;
@@ -421,7 +415,7 @@ bool Appliance::WorkersAreAlive() const {
   if (now_s - sensors_->heartbeat_s() > parts_.sensor_silence_s) return false;
   // During the sweep the scan's thread waits for frames; their arrival is monitored by the sensor
   // thread.
-  const bool is_working = state_.phase == ScanPhase::kWorking && session_ != nullptr;
+  const bool is_working = state_.phase == ApplianceState::kWorking && session_ != nullptr;
   return !is_working || now_s - session_->heartbeat_s() < parts_.worker_silence_s;
 }
 

@@ -18,6 +18,7 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/comparison/body_parts.hpp"
+#include "daemon/appliance/control_lines.hpp"
 #include "daemon/appliance/current_store.hpp"
 #include "daemon/appliance/page_identity.hpp"
 #include "daemon/appliance/scan_session.hpp"
@@ -197,7 +198,7 @@ class Appliance {
   [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
   /// Surface of the running sweep; null if there is none or nothing has been seen yet.
   [[nodiscard]] std::shared_ptr<const LiveSurfaceView> SurfaceSoFar() const {
-    return state_.phase == ScanPhase::kScanning ? scan_.update.surface : nullptr;
+    return state_.phase == web::ApplianceState::kScanning ? scan_.update.surface : nullptr;
   }
   [[nodiscard]] const ScanState& state() const { return state_; }
   /// Changes of the store, one after the other, off the loop.
@@ -224,7 +225,7 @@ class Appliance {
     SensorStatistics images;         ///< Counters of the sensor for the sweep.
     ScanUpdate update;
     double dropped_share = 0.0;  ///< Fraction of images lost in the last two seconds, smoothed.
-    ScanOutcome outcome;
+    EndedScan outcome;
     bool has_ended = false;
   };
 
@@ -260,7 +261,7 @@ class Appliance {
   /// Adds what a person did with the scan to the audit log.
   void AuditAct(ScanAction action, const web::Actor& actor);
   /// Purpose of the running or last scan by its stored name, or "unassigned".
-  [[nodiscard]] const char* ScanKind() const;
+  [[nodiscard]] std::string ScanKind() const;
   void ArmSessionTimer();
   void OnSessionTimer();
   void ForgetSession();
@@ -289,7 +290,7 @@ class Appliance {
   void OnSensor(const SensorEvent& event);
   void LogSensor(const SensorEvent& event);
   void OnUpdate(const ScanUpdate& update);
-  void OnEnded(const ScanOutcome& outcome);
+  void OnEnded(const EndedScan& outcome);
   void OnTick();
   void WatchButton();
   void ArmButtonTimer();
@@ -314,9 +315,8 @@ class Appliance {
   void ReadStoredOrFail(web::Status& status);
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
-  void PublishEvent(const char* event, const nlohmann::json& fields);
+  void PublishEvent(const WatchedEvent& event);
   void PublishState();
-  void PublishProgress();
   void NotifyWeb(web::EventKind kind);
   [[nodiscard]] std::optional<double> Coverage() const;
   [[nodiscard]] std::string FaultReason() const;
@@ -385,8 +385,5 @@ class Appliance {
 
 /// Midnight, local time.
 [[nodiscard]] web::WallClock::time_point StartOfDay();
-
-/// "off", "no_sensor", "ready", ...
-[[nodiscard]] const char* Name(IndicatorPattern pattern);
 
 }  // namespace plumb

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
@@ -16,7 +15,6 @@ namespace plumb {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Json = nlohmann::json;
 
 constexpr double kDroppedSmoothing_s = 1.0;
 const web::Actor kAuto{.user = "auto", .address = ""};
@@ -66,10 +64,10 @@ void Appliance::BeginSession() {
       parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s) * 1e6)));
 }
 
-const char* Appliance::ScanKind() const {
+std::string Appliance::ScanKind() const {
   const bool is_unassigned =
       scan_.patient_id.empty() && scan_.purpose != web::ScanPurpose::kDailyCheck;
-  return is_unassigned ? "unassigned" : store::Name(scan_.purpose);
+  return std::string(is_unassigned ? "unassigned" : Name(scan_.purpose));
 }
 
 ScanJob Appliance::MakeJob(const web::Settings& settings) {
@@ -128,9 +126,9 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
   const web::ReferencePlan plan = DefaultPlan();
   const bool is_reference = record.purpose == web::ScanPurpose::kReference;
   callbacks.save = [this, id, plan, is_demo, is_reference, reason = record.reason,
-                    actor = opened_by_, patient = record.patient_id](const ScanOutcome& outcome) {
+                    actor = opened_by_, patient = record.patient_id](const EndedScan& outcome) {
     if (id->empty()) return;  // it never began
-    using Kind = ScanOutcome::Kind;
+    using Kind = EndedScan::Kind;
     // A scan that is discarded or fails while its result is being written has no result.
     const bool is_done = outcome.kind == Kind::kDone;
     FinishedScan finished{.failure = outcome.reason,
@@ -160,7 +158,7 @@ void Appliance::AddListeners(ScanCallbacks& callbacks) {
   callbacks.sweep_complete = [this] {
     loop_.Post("sweep complete", [this] { (void)Handle(ScanEvent::kSweepComplete); });
   };
-  callbacks.ended = [this](const ScanOutcome& outcome) {
+  callbacks.ended = [this](const EndedScan& outcome) {
     loop_.Post("scan ended", [this, outcome] { OnEnded(outcome); });
   };
 }
@@ -169,7 +167,7 @@ ScanCallbacks Appliance::MakeCheckCallbacks(const NewScan& record) {
   ScanCallbacks callbacks;
   callbacks.begin = [] { return std::filesystem::path(); };
   callbacks.save = [this, actor = *check_,
-                    serial = record.sensor_serial](const ScanOutcome& outcome) {
+                    serial = record.sensor_serial](const EndedScan& outcome) {
     if (outcome.check) (void)store_->checks.Add(actor, serial, *outcome.check);
   };
   AddListeners(callbacks);
@@ -183,7 +181,7 @@ void Appliance::OnUpdate(const ScanUpdate& update) {
   NoteDropped(update);
   scan_.update = update;
   Show();
-  PublishProgress();
+  PublishEvent(ProgressEvent{scan_.id, scan_.update, Coverage()});
   NotifyWeb(web::EventKind::kProgress);
 }
 
@@ -195,8 +193,8 @@ void Appliance::NoteDropped(const ScanUpdate& update) {
   scan_.dropped_share += weight * (lost / (lost + seen) - scan_.dropped_share);
 }
 
-void Appliance::OnEnded(const ScanOutcome& outcome) {
-  using Kind = ScanOutcome::Kind;
+void Appliance::OnEnded(const EndedScan& outcome) {
+  using Kind = EndedScan::Kind;
   limit_timer_.Disarm();
   sensors_->EndScan();
   // Its thread has nothing left to do, but may still wait for a processor to end.
@@ -240,7 +238,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
           {{"SCAN", scan_.id}});
     }
     (void)Handle(ScanEvent::kScanDone);
-    PublishEvent("result", {{"scan", scan_.id}, {"answer", answer}});
+    PublishEvent(ResultEvent{scan_.id, answer});
   }
   if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
   if (scan_.purpose == web::ScanPurpose::kDailyCheck) RefreshRoom();

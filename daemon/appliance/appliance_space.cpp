@@ -67,8 +67,8 @@ Appliance::Answer Appliance::WhyNoSpace() const {
 /// State and light must not say "ready" while each press is refused. A result, or the failure of a
 /// scan, stays until it has been seen.
 void Appliance::WatchSpace() {
-  if (IsRunning() || state_.phase == ScanPhase::kResult || state_.fault == FaultKind::kScan ||
-      !storage_fault_.empty())
+  if (IsRunning() || state_.phase == web::ApplianceState::kResult ||
+      state_.fault == web::FaultKind::kScan || !storage_fault_.empty())
     return;
   Answer why;
   try {

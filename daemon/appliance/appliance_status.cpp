@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <exception>
 #include <functional>
-#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -19,6 +18,11 @@
 #include "daemon/records/store_json.hpp"
 
 namespace plumb {
+
+using web::ApplianceState;
+using web::FaultKind;
+using web::SweepAdvice;
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -32,60 +36,16 @@ void Guarded(const char* whom, const std::function<void()>& notify) try {
   Log(LogLevel::kError, fmt::format("{} could not be notified: {}", whom, Explain(error)));
 }
 
-/// The fields of a scan in the status and in its events.
-Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
-  return {{"step", update.step},
-          {"fraction", update.fraction},
-          {"frames", update.frames},
-          {"frames_tracked", update.frames_tracked},
-          {"frames_dropped", update.frames_dropped},
-          {"guidance", Name(update.guidance.advice)},
-          {"speed_m_s", update.guidance.speed_m_s},
-          {"median_depth_m", update.guidance.median_depth_m},
-          {"area_m2", update.guidance.area_m2},
-          {"coverage", coverage ? Json(*coverage) : Json(nullptr)}};
-}
-
-double WallSeconds() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 double SecondsSince(Clock::time_point time) {
   return std::chrono::duration<double>(Clock::now() - time).count();
-}
-
-web::ApplianceState WebState(ScanPhase phase) {
-  return static_cast<web::ApplianceState>(static_cast<int>(phase));
-}
-static_assert(static_cast<int>(web::ApplianceState::kFault) == static_cast<int>(ScanPhase::kFault));
-static_assert(static_cast<int>(web::FaultKind::kSensor) == static_cast<int>(FaultKind::kSensor));
-static_assert(static_cast<int>(web::FaultKind::kScan) == static_cast<int>(FaultKind::kScan));
-static_assert(static_cast<int>(web::FaultKind::kStorage) == static_cast<int>(FaultKind::kStorage));
-
-web::Guidance WebGuidance(SweepAdvice advice) {
-  switch (advice) {
-    case SweepAdvice::kNone:
-      return web::Guidance::kNone;
-    case SweepAdvice::kSlower:
-      return web::Guidance::kSlower;
-    case SweepAdvice::kCloser:
-      return web::Guidance::kCloser;
-    case SweepAdvice::kFarther:
-      return web::Guidance::kFarther;
-    case SweepAdvice::kLost:
-      return web::Guidance::kTrackingLost;
-    case SweepAdvice::kNoMarkers:
-      break;
-  }
-  return web::Guidance::kNoMarkers;
 }
 
 constexpr double kTooManyDropped = 0.2;
 
 /// Advice for the sweep. Lost images override all other advice except lost tracking.
-web::Guidance GuidanceOf(SweepAdvice advice, double dropped_share) {
-  if (advice != SweepAdvice::kLost && dropped_share > kTooManyDropped)
-    return web::Guidance::kComputerTooSlow;
-  return WebGuidance(advice);
+SweepAdvice AdviceOn(SweepAdvice seen, double dropped_share) {
+  const bool is_slow = seen != SweepAdvice::kTrackingLost && dropped_share > kTooManyDropped;
+  return is_slow ? SweepAdvice::kComputerTooSlow : seen;
 }
 
 /// True also where nothing can be said of it.
@@ -105,43 +65,21 @@ web::WallClock::time_point StartOfDay() {
   return web::WallClock::from_time_t(std::mktime(&local));
 }
 
-const char* Name(IndicatorPattern pattern) {
-  static constexpr const char* kNames[] = {"off",
-                                           "no_sensor",
-                                           "ready",
-                                           "scanning",
-                                           "too_fast",
-                                           "too_near",
-                                           "too_far",
-                                           "working",
-                                           "done",
-                                           "result_in_tolerance",
-                                           "result_unsure",
-                                           "result_move",
-                                           "no_answer",
-                                           "fault",
-                                           "ready_rolled_back",
-                                           "ready_disk_nearly_full",
-                                           "stopped"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(IndicatorPattern::kStopped) + 1);
-  return kNames[static_cast<int>(pattern)];
-}
-
 IndicatorPattern Appliance::Pattern() const {
   switch (state_.phase) {
-    case ScanPhase::kNoSensor:
+    case ApplianceState::kNoSensor:
       return IndicatorPattern::kNoSensor;
-    case ScanPhase::kReady:
+    case ApplianceState::kReady:
       if (!rolled_back_.empty()) return IndicatorPattern::kReadyRolledBack;
       return IsNearlyFull() ? IndicatorPattern::kReadyDiskNearlyFull : IndicatorPattern::kReady;
-    case ScanPhase::kWorking:
+    case ApplianceState::kWorking:
       return IndicatorPattern::kWorking;
-    case ScanPhase::kFault:
+    case ApplianceState::kFault:
       return IndicatorPattern::kFault;
-    case ScanPhase::kScanning:
+    case ApplianceState::kScanning:
       break;
-    case ScanPhase::kResult:
-      if (scan_.outcome.kind == ScanOutcome::Kind::kNoScene ||
+    case ApplianceState::kResult:
+      if (scan_.outcome.kind == EndedScan::Kind::kNoScene ||
           scan_.outcome.verdict == Verdict::kNoAnswer)
         return IndicatorPattern::kNoAnswer;
       if (!scan_.outcome.verdict)
@@ -150,14 +88,14 @@ IndicatorPattern Appliance::Pattern() const {
       return scan_.outcome.verdict == Verdict::kMove ? IndicatorPattern::kResultMove
                                                      : IndicatorPattern::kResultInTolerance;
   }
-  switch (GuidanceOf(scan_.update.guidance.advice, scan_.dropped_share)) {
-    case web::Guidance::kSlower:
-    case web::Guidance::kTrackingLost:
-    case web::Guidance::kComputerTooSlow:  // fewer frames: a slower sweep still overlaps enough
+  switch (AdviceOn(scan_.update.guidance.advice, scan_.dropped_share)) {
+    case SweepAdvice::kSlower:
+    case SweepAdvice::kTrackingLost:
+    case SweepAdvice::kComputerTooSlow:  // fewer frames: a slower sweep still overlaps enough
       return IndicatorPattern::kTooFast;
-    case web::Guidance::kFarther:
+    case SweepAdvice::kFarther:
       return IndicatorPattern::kTooNear;
-    case web::Guidance::kCloser:
+    case SweepAdvice::kCloser:
       return IndicatorPattern::kTooFar;
     default:
       return IndicatorPattern::kScanning;
@@ -169,7 +107,7 @@ void Appliance::Show() {
   if (pattern == shown_) return;
   shown_ = pattern;
   if (parts_.indicator != nullptr) parts_.indicator->Show(pattern);
-  PublishEvent("light", {{"pattern", Name(pattern)}});
+  PublishEvent(LightEvent{pattern});
 }
 
 void Appliance::SetRolledBack(const std::string& text) {
@@ -178,20 +116,14 @@ void Appliance::SetRolledBack(const std::string& text) {
   NotifyWeb(web::EventKind::kStatus);
 }
 
-void Appliance::PublishEvent(const char* event, const Json& fields) {
-  if (!notify_watchers_) return;
-  Guarded("the control socket's watchers", [&] {
-    Json line = {{"event", event}, {"time", WallSeconds()}};
-    line.update(fields);
-    notify_watchers_(line.dump(-1, ' ', false, Json::error_handler_t::replace));
-  });
+void Appliance::PublishEvent(const WatchedEvent& event) {
+  if (notify_watchers_)
+    Guarded("the control socket's watchers", [&] { notify_watchers_(EventLine(event)); });
 }
 
 void Appliance::PublishState() {
   Show();
-  PublishEvent("state", {{"state", Name(state_.phase)},
-                         {"reason", FaultReason()},
-                         {"cancelling", state_.cancelling}});
+  PublishEvent(StateEvent{state_.phase, FaultReason(), state_.cancelling});
   NotifyWeb(web::EventKind::kStatus);
 }
 
@@ -201,7 +133,7 @@ void Appliance::NotifyWeb(web::EventKind kind) {
 }
 
 std::string Appliance::FaultReason() const {
-  if (state_.phase != ScanPhase::kFault) return {};
+  if (state_.phase != ApplianceState::kFault) return {};
   switch (state_.fault) {
     case FaultKind::kStorage:
       return storage_fault_.empty() ? space_fault_ : storage_fault_;
@@ -225,25 +157,18 @@ std::optional<double> Appliance::Coverage() const {
 
 std::string Appliance::StatusLine() const {
   std::string line = fmt::format("{}", Name(state_.phase));
-  if (state_.phase == ScanPhase::kScanning) line += fmt::format(", {} frames", scan_.update.frames);
-  if (state_.phase == ScanPhase::kWorking) line += fmt::format(", {}", scan_.update.step);
-  if (state_.phase == ScanPhase::kFault) line += ": " + FaultReason();
+  if (state_.phase == ApplianceState::kScanning)
+    line += fmt::format(", {} frames", scan_.update.frames);
+  if (state_.phase == ApplianceState::kWorking) line += fmt::format(", {}", scan_.update.step);
+  if (state_.phase == ApplianceState::kFault) line += ": " + FaultReason();
   return line;
-}
-
-void Appliance::PublishProgress() {
-  Json progress = ProgressFields(scan_.update, Coverage());
-  progress["scan"] = scan_.id;
-  PublishEvent("progress", progress);
 }
 
 Json Appliance::StatusJson() {
   const SensorSnapshot sensor = sensors_->snapshot();
   const ScanUpdate& update = scan_.update;
-  const bool is_running =
-      state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
   Json scan = ProgressFields(update, Coverage());
-  scan["active"] = is_running;
+  scan["active"] = IsRunning();
   scan["id"] = scan_.id;
   scan["valid_depth"] = update.guidance.valid_depth;
   scan["without_new_area_s"] = update.guidance.without_new_area_s;
@@ -251,31 +176,29 @@ Json Appliance::StatusJson() {
   scan["cancel_ms"] = scan_.cancel_ms;
   Json last = nullptr;
   if (last_result_) {
-    const ScanOutcome& outcome = last_result_->outcome;
+    const EndedScan& ended = last_result_->outcome;
+    const bool is_done = ended.kind == EndedScan::Kind::kDone;
+    const bool has_no_scene = ended.kind == EndedScan::Kind::kNoScene;
     last = {{"scan", last_result_->id},
-            {"is_reference", outcome.kind == ScanOutcome::Kind::kDone && !outcome.verdict},
-            {"verdict",
-             outcome.kind == ScanOutcome::Kind::kNoScene ? Json("no_answer") : Json(nullptr)},
-            {"reasons",
-             outcome.kind == ScanOutcome::Kind::kNoScene ? Json{outcome.reason} : Json::array()},
+            {"is_reference", is_done && !ended.verdict},
+            {"verdict", has_no_scene ? Json("no_answer") : Json(nullptr)},
+            {"reasons", has_no_scene ? Json{ended.reason} : Json::array()},
             {"correction", nullptr},
-            {"frames", outcome.frames},
-            {"frames_dropped", outcome.frames_dropped},
+            {"frames", ended.frames},
+            {"frames_dropped", ended.frames_dropped},
             {"images_lost", last_result_->images.num_lost},
             {"images_unpaired", last_result_->images.num_unpaired},
             {"images_discarded", last_result_->images.num_discarded},
-            {"after_last_frame_s", outcome.after_last_frame_s}};
-    if (outcome.kind == ScanOutcome::Kind::kDone && outcome.verdict) {
-      last["verdict"] = Name(*outcome.verdict);
-      last["reasons"] = outcome.reasons;
+            {"after_last_frame_s", ended.after_last_frame_s}};
+    if (is_done && ended.verdict) {
+      last["verdict"] = Name(*ended.verdict);
+      last["reasons"] = ended.reasons;
       // A result without an answer shows no numbers, so that nobody acts on them.
-      const bool is_shown = outcome.correction && *outcome.verdict != Verdict::kNoAnswer;
-      const Json correction = is_shown ? Json(CorrectionJson(*outcome.correction)) : Json(nullptr);
+      const bool is_shown = ended.correction && *ended.verdict != Verdict::kNoAnswer;
+      const Json correction = is_shown ? Json(CorrectionJson(*ended.correction)) : Json(nullptr);
       last["correction"] = correction;
-      for (const char* name :
-           {"vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg"}) {
-        last[name] = correction.is_object() ? correction[name] : Json(nullptr);
-      }
+      for (const web::NumberAxis& axis : web::kNumberAxes)
+        last[axis.key] = correction.is_object() ? correction[axis.key] : Json(nullptr);
     }
   }
   return {{"state", Name(state_.phase)},
@@ -307,10 +230,9 @@ Json Appliance::StatusJson() {
 web::Status Appliance::WebStatus() {
   const SensorSnapshot sensor = sensors_->snapshot();
   web::Status status;
-  status.state = WebState(state_.phase);
+  status.state = state_.phase;
   status.fault = FaultReason();
-  if (state_.phase == ScanPhase::kFault)
-    status.fault_kind = static_cast<web::FaultKind>(state_.fault);
+  if (state_.phase == ApplianceState::kFault) status.fault_kind = state_.fault;
   status.sensor = {.present = sensor.present,
                    .serial = sensor.sensor.serial,
                    .name = sensor.sensor.name,
@@ -326,7 +248,7 @@ web::Status Appliance::WebStatus() {
   status.light = Name(shown_);
   status.patient_id = check_ ? std::string() : open_patient_;
   status.next_purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
-  if (state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking) {
+  if (IsRunning()) {
     status.scan =
         web::LiveScan{.id = scan_.id,
                       .patient_id = scan_.patient_id,
@@ -334,7 +256,7 @@ web::Status Appliance::WebStatus() {
                       .elapsed_s = SecondsSince(scan_.started),
                       .coverage = Coverage(),
                       .without_new_surface_s = scan_.update.guidance.without_new_area_s,
-                      .guidance = GuidanceOf(scan_.update.guidance.advice, scan_.dropped_share),
+                      .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_share),
                       .keyframes = scan_.update.keyframes,
                       .frames = scan_.update.frames,
                       .frames_tracked = scan_.update.frames_tracked,
@@ -455,7 +377,7 @@ web::Health Appliance::Health() {
   if (const std::string full = WhyNoSpace(); !full.empty())
     return {.ok = false, .reason = "storage: " + full};
   if (!WorkersAreAlive()) return {.ok = false, .reason = "a worker thread shows no progress"};
-  if (state_.phase == ScanPhase::kFault && state_.fault == FaultKind::kSensor)
+  if (state_.phase == ApplianceState::kFault && state_.fault == FaultKind::kSensor)
     return {.ok = false, .reason = "sensor: " + sensor_fault_};
   return {};
 }

@@ -1,6 +1,5 @@
 #include "daemon/appliance/control_desk.hpp"
 
-#include <chrono>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,29 +10,24 @@
 namespace plumb {
 namespace {
 
-using Json = nlohmann::json;
 const web::Actor kSocket{.user = "control socket", .address = {}};
 
-std::string Line(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 std::string BackupDone(const BackupReport& report) {
-  return Line({{"ok", true},
-               {"scans", report.scans},
-               {"files", report.files},
-               {"bytes", report.bytes},
-               {"problems", report.problems}});
+  return ControlLine({{"ok", true},
+                      {"scans", report.scans},
+                      {"files", report.files},
+                      {"bytes", report.bytes},
+                      {"problems", report.problems}});
 }
 
 std::string UpdateLine(const web::UpdateStatus& status) {
-  return Line({{"ok", true},
-               {"installing", status.installing},
-               {"fraction", status.fraction},
-               {"message", status.message},
-               {"failure", status.failure},
-               {"restart_needed", status.restart_needed},
-               {"rolled_back", status.rolled_back}});
+  return ControlLine({{"ok", true},
+                      {"installing", status.installing},
+                      {"fraction", status.fraction},
+                      {"message", status.message},
+                      {"failure", status.failure},
+                      {"restart_needed", status.restart_needed},
+                      {"rolled_back", status.rolled_back}});
 }
 
 web::Done ReplyWith(const ControlServer::Reply& reply) {
@@ -42,10 +36,6 @@ web::Done ReplyWith(const ControlServer::Reply& reply) {
               ? ControlDone()
               : ControlRefusal(change.message, change.result == web::ChangeResult::kInvalid));
   };
-}
-
-double SystemSeconds() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 }  // namespace
@@ -58,10 +48,9 @@ void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Rep
   using Kind = ControlRequest::Kind;
   switch (request.kind) {
     case Kind::kStatus:
-      return reply(Line(appliance_.StatusJson()));
+      return reply(ControlLine(appliance_.StatusJson()));
     case Kind::kWatch:  // the present state first, then the events
-      return reply(Line(
-          {{"event", "status"}, {"time", SystemSeconds()}, {"status", appliance_.StatusJson()}}));
+      return reply(StatusEventLine(appliance_.StatusJson()));
     case Kind::kPress: {
       const std::string refusal =
           appliance_.Press(request.is_long ? ButtonPress::kLong : ButtonPress::kShort, kSocket);

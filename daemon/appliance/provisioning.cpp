@@ -19,6 +19,7 @@
 #include "daemon/files/atomic_folder.hpp"
 #include "drivers/files/file_io.hpp"
 #include "web/security/sessions.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -50,7 +51,7 @@ bool IsPlainFile(const std::string& name) {
 }
 
 bool IsDisplayName(const std::string& name) {
-  return IsWord(name, " ._-", 32) && name.front() != ' ' && name.back() != ' ';
+  return IsWord(name, " ._-", web::kMaxName) && name.front() != ' ' && name.back() != ' ';
 }
 
 /// 32 or 128 bits, or nothing.

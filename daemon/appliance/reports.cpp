@@ -101,12 +101,6 @@ std::string WhyOf(const web::Scan& scan, Language language) {
   return scan.result->reasons.empty() ? "" : Translated(scan.result->reasons.front(), language);
 }
 
-std::array<std::optional<double>, 6> ValuesOf(const std::optional<web::SixNumbers>& numbers) {
-  if (!numbers) return {};
-  return {numbers->vertical_mm, numbers->longitudinal_mm, numbers->lateral_mm,
-          numbers->pitch_deg,   numbers->roll_deg,        numbers->yaw_deg};
-}
-
 /// A correction without an answer must not be applied, so it is left out.
 bool IsAdvice(const web::Scan& scan) {
   return scan.result && scan.result->correction && scan.result->verdict != "no_answer";
@@ -117,19 +111,19 @@ std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const Json& result,
   std::vector<ReportNumber> numbers;
   if (!IsAdvice(scan)) return numbers;
   const ReportWords& words = WordsOf(language);
-  const auto values = ValuesOf(scan.result->correction), u95 = ValuesOf(scan.result->u95);
   const std::array<std::string, 6> names = AxisNames(result, words.terms);
   const bool moves = scan.result->verdict == "move";
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool is_shift = i < 3;
-    const double half = u95[i].value_or(0.0);
-    const double limit = is_shift ? tolerance.shift_mm : tolerance.rotation_deg;
-    const bool known = values[i] && std::abs(*values[i]) > half;
-    const bool is_within = values[i] && std::abs(*values[i]) + half <= limit;
+    const web::NumberAxis& axis = web::kNumberAxes[i];
+    const std::optional<double> value = axis.In(scan.result->correction);
+    const double half = axis.In(scan.result->u95).value_or(0.0);
+    const double limit = axis.is_shift() ? tolerance.shift_mm : tolerance.rotation_deg;
+    const bool known = value && std::abs(*value) > half;
+    const bool is_within = value && std::abs(*value) + half <= limit;
     numbers.push_back(
         {.name = names[i],
-         .unit = is_shift ? "mm" : "\u00b0",
-         .value = values[i],
+         .unit = axis.symbol(),
+         .value = value,
          .u95 = half,
          .tolerance = limit,
          .words = !moves  ? std::string(is_within ? words.terms.no_move : words.terms.scan_again)
@@ -177,10 +171,9 @@ ReportFacts QualityOf(const web::Scan& scan, const Json& scene, const Json& resu
 
 /// Index of a direction's name in result.json among the six; nothing if it is none of them.
 std::optional<std::size_t> AxisNamed(const std::string& name) {
-  constexpr std::array kNames = {"vertical", "longitudinal", "lateral", "pitch", "roll", "yaw"};
-  const auto* const found = std::ranges::find(kNames, name);
-  if (found == kNames.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - kNames.begin());
+  const auto* const found = std::ranges::find(web::kNumberAxes, name, &web::NumberAxis::name);
+  if (found == web::kNumberAxes.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - web::kNumberAxes.begin());
 }
 
 /// Adds what the comparison could not rely on.
@@ -409,9 +402,10 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
       is_any_failed = true;
     }
     if (IsAdvice(*scan)) {
-      const auto values = ValuesOf(scan->result->correction), u95 = ValuesOf(scan->result->u95);
-      for (std::size_t i = 0; i < values.size(); ++i) {
-        if (values[i]) row.values[i] = CourseValue{*values[i], u95[i].value_or(0.0)};
+      for (std::size_t i = 0; i < row.values.size(); ++i) {
+        const web::NumberAxis& axis = web::kNumberAxes[i];
+        if (const auto value = axis.In(scan->result->correction))
+          row.values[i] = CourseValue{*value, axis.In(scan->result->u95).value_or(0.0)};
       }
     }
     report.rows.push_back(std::move(row));

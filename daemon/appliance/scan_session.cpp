@@ -82,27 +82,27 @@ void ScanSession::Cancel() {
 void ScanSession::Run(const std::stop_token& stop) {
   try {
     Scan(stop);
-    outcome_.kind = ScanOutcome::Kind::kDone;
+    outcome_.kind = EndedScan::Kind::kDone;
   } catch (const Interrupted&) {
-    outcome_.kind = ScanOutcome::Kind::kCancelled;
+    outcome_.kind = EndedScan::Kind::kCancelled;
   } catch (const DataError& error) {
-    outcome_.kind = ScanOutcome::Kind::kNoScene;
+    outcome_.kind = EndedScan::Kind::kNoScene;
     outcome_.reason = error.what();
     if (job_.check)
       outcome_.check = TakenCheck{
           {.status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {error.what()}}};
   } catch (const std::bad_alloc&) {
-    outcome_.kind = ScanOutcome::Kind::kFailed;
+    outcome_.kind = EndedScan::Kind::kFailed;
     outcome_.reason = "out of memory: make a shorter sweep, or close other programs";
   } catch (const std::exception& error) {
-    outcome_.kind = ScanOutcome::Kind::kFailed;
+    outcome_.kind = EndedScan::Kind::kFailed;
     outcome_.reason = Explain(error);
   }
-  if (outcome_.kind != ScanOutcome::Kind::kDone && stop.stop_requested())
-    outcome_.kind = ScanOutcome::Kind::kCancelled;
+  if (outcome_.kind != EndedScan::Kind::kDone && stop.stop_requested())
+    outcome_.kind = EndedScan::Kind::kCancelled;
   Save();
   // The stored reference was good, and only now differs.
-  if (outcome_.kind == ScanOutcome::Kind::kDone && job_.unit_profile &&
+  if (outcome_.kind == EndedScan::Kind::kDone && job_.unit_profile &&
       outcome_.why_not_learned.empty())
     job_.unit_profile->LearnFromScan();
   callbacks_.ended(outcome_);
@@ -144,9 +144,9 @@ void ScanSession::Save() {
     callbacks_.save(outcome_);
     return;
   } catch (const std::exception& error) {
-    if (outcome_.kind == ScanOutcome::Kind::kDone || outcome_.reason.empty())
+    if (outcome_.kind == EndedScan::Kind::kDone || outcome_.reason.empty())
       outcome_.reason = error.what();
-    outcome_.kind = ScanOutcome::Kind::kFailed;
+    outcome_.kind = EndedScan::Kind::kFailed;
   }
   try {
     callbacks_.save(outcome_);

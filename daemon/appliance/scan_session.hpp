@@ -71,8 +71,8 @@ struct ScanUpdate {
   std::shared_ptr<const LiveSurfaceView> surface;  ///< Null: nothing can be shown yet.
 };
 
-/// Outcome of the scan.
-struct ScanOutcome {
+/// How the scan ended, and what it gave. Of the end the store keeps a web::ScanOutcome.
+struct EndedScan {
   enum class Kind { kDone, kNoScene, kCancelled, kFailed };
   Kind kind = Kind::kFailed;
   std::string reason;       ///< kNoScene: why the frames give no scene. kFailed: the error.
@@ -96,11 +96,11 @@ struct ScanCallbacks {
   std::function<std::filesystem::path()> begin;
   /// Stores any outcome, and the contents of the folder. If it fails for a completed scan, it is
   /// called again for the failed one.
-  std::function<void(const ScanOutcome&)> save;
+  std::function<void(const EndedScan&)> save;
   std::function<void(const ScanUpdate&)> update;
   /// Called once, when there was no new coverage for long enough.
   std::function<void()> sweep_complete;
-  std::function<void(const ScanOutcome&)> ended;  ///< Called last, exactly once.
+  std::function<void(const EndedScan&)> ended;  ///< Called last, exactly once.
 };
 
 /// The scan starts with construction. The sensor thread pushes into feed(); closing the feed ends
@@ -145,7 +145,7 @@ class ScanSession {
   SweepGuide guide_;
   LiveSurface surface_;
   ScanUpdate update_;
-  ScanOutcome outcome_;
+  EndedScan outcome_;
   bool complete_reported_ = false;
   double reported_s_ = 0.0, shown_s_ = 0.0;
   std::atomic<double> heartbeat_s_;

@@ -1,8 +1,10 @@
 #include "daemon/appliance/scan_state.hpp"
 
-#include <iterator>
-
 namespace plumb {
+
+using web::ApplianceState;
+using web::FaultKind;
+
 namespace {
 
 ScanTransition Stay(const ScanState& state) {
@@ -28,15 +30,15 @@ std::string_view WhyNoSensor(const ScanState& state) {
 ScanTransition Settle(ScanState state) {
   state.cancelling = false;
   if (state.fault != FaultKind::kNone) {
-    state.phase = ScanPhase::kFault;
+    state.phase = ApplianceState::kFault;
   } else {
-    state.phase = state.has_sensor ? ScanPhase::kReady : ScanPhase::kNoSensor;
+    state.phase = state.has_sensor ? ApplianceState::kReady : ApplianceState::kNoSensor;
   }
   return Stay(state);
 }
 
 ScanTransition Start(ScanState state) {
-  state.phase = ScanPhase::kScanning;
+  state.phase = ApplianceState::kScanning;
   return {.state = state, .actions = {ScanAction::kStartScan}, .refusal = {}};
 }
 
@@ -106,7 +108,7 @@ ScanTransition InScanning(ScanState state, ScanEvent event) {
     case ScanEvent::kEndSweep:
     case ScanEvent::kSweepComplete:
       if (state.cancelling) return Stay(state);
-      state.phase = ScanPhase::kWorking;
+      state.phase = ApplianceState::kWorking;
       return {.state = state, .actions = {ScanAction::kEndSweep}, .refusal = {}};
     case ScanEvent::kStart:
       return Refuse(state, "a scan is running already: end or cancel it first");
@@ -145,7 +147,7 @@ ScanTransition AfterScan(ScanState state, ScanEvent event) {
   if (event == ScanEvent::kScanCancelled) return Settle(state);
   if (event == ScanEvent::kScanFailed) return Fail(state, FaultKind::kScan);
   if (state.fault == FaultKind::kStorage) return Settle(state);
-  state.phase = ScanPhase::kResult;
+  state.phase = ApplianceState::kResult;
   return {.state = state, .actions = {ScanAction::kArmResultTimer}, .refusal = {}};
 }
 
@@ -191,52 +193,34 @@ ScanTransition InFault(ScanState state, ScanEvent event) {
 ScanTransition Next(const ScanState& before, ScanEvent event) {
   ScanState state = before;
   Note(state, event);
-  const bool is_running = state.phase == ScanPhase::kScanning || state.phase == ScanPhase::kWorking;
+  const bool is_running =
+      state.phase == ApplianceState::kScanning || state.phase == ApplianceState::kWorking;
   const bool ends_scan = event == ScanEvent::kScanDone || event == ScanEvent::kScanFailed ||
                          event == ScanEvent::kScanCancelled;
   if (ends_scan) return is_running ? AfterScan(state, event) : Stay(state);
   switch (state.phase) {
-    case ScanPhase::kNoSensor:
+    case ApplianceState::kNoSensor:
       return InNoSensor(state, event);
-    case ScanPhase::kReady:
+    case ApplianceState::kReady:
       return InReady(state, event);
-    case ScanPhase::kScanning:
+    case ApplianceState::kScanning:
       return InScanning(state, event);
-    case ScanPhase::kWorking:
+    case ApplianceState::kWorking:
       return InWorking(state, event);
-    case ScanPhase::kResult:
+    case ApplianceState::kResult:
       return InResult(state, event);
-    case ScanPhase::kFault:
+    case ApplianceState::kFault:
       return InFault(state, event);
   }
   return Stay(state);
 }
 
-const char* Name(ScanPhase phase) {
-  switch (phase) {
-    case ScanPhase::kNoSensor:
-      return "no_sensor";
-    case ScanPhase::kReady:
-      return "ready";
-    case ScanPhase::kScanning:
-      return "scanning";
-    case ScanPhase::kWorking:
-      return "working";
-    case ScanPhase::kResult:
-      return "result";
-    case ScanPhase::kFault:
-      break;
-  }
-  return "fault";
-}
-
 const char* Name(ScanEvent event) {
-  static constexpr const char* kNames[] = {
-      "sensor_ready", "sensor_lost",    "sensor_failed",  "short_press",    "long_press",
-      "start",        "end_sweep",      "cancel",         "sweep_complete", "scan_done",
-      "scan_failed",  "scan_cancelled", "result_expired", "storage_failed", "storage_works"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(ScanEvent::kStorageWorks) + 1);
-  return kNames[static_cast<int>(event)];
+  static constexpr auto kNames = web::NamesUpTo<ScanEvent::kStorageWorks>(
+      {"sensor_ready", "sensor_lost", "sensor_failed", "short_press", "long_press", "start",
+       "end_sweep", "cancel", "sweep_complete", "scan_done", "scan_failed", "scan_cancelled",
+       "result_expired", "storage_failed", "storage_works"});
+  return kNames.at(static_cast<std::size_t>(event)).data();
 }
 
 }  // namespace plumb

@@ -4,27 +4,17 @@
 #include <string_view>
 #include <vector>
 
+#include "web/service/names.hpp"
+
 namespace plumb {
 
-/// Names in the interface; see Name().
-enum class ScanPhase { kNoSensor, kReady, kScanning, kWorking, kResult, kFault };
-
-/// The reason why the appliance cannot scan, or will not be able to once the running scan has
-/// ended.
-enum class FaultKind {
-  kNone,
-  kSensor,   ///< The sensor is attached and does not work; ends when it works or is unplugged.
-  kScan,     ///< The last scan failed; ends when somebody acknowledges it by a press.
-  kStorage,  ///< Nothing can be stored; ends when the storage works again.
-};
-
 struct ScanState {
-  ScanPhase phase = ScanPhase::kNoSensor;
+  web::ApplianceState phase = web::ApplianceState::kNoSensor;
   bool has_sensor = false;  ///< Attached, open and streaming.
   bool sensor_fails =
       false;  ///< Attached but not working, whatever else is wrong; never together with has_sensor.
   /// Not kNone only in phase kFault, or in a scan that is being cancelled because of it.
-  FaultKind fault = FaultKind::kNone;
+  web::FaultKind fault = web::FaultKind::kNone;
   /// The running scan was requested to stop and has not stopped yet; kScanning and kWorking only.
   bool cancelling = false;
   bool operator==(const ScanState&) const = default;
@@ -59,8 +49,6 @@ struct ScanTransition {
 /// Total: every event is defined in every state. Invalid events change nothing.
 [[nodiscard]] ScanTransition Next(const ScanState& state, ScanEvent event);
 
-/// "no_sensor", "ready", "scanning", "working", "result", "fault"
-[[nodiscard]] const char* Name(ScanPhase phase);
 [[nodiscard]] const char* Name(ScanEvent event);
 
 }  // namespace plumb

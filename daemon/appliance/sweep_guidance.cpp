@@ -5,6 +5,9 @@
 #include <stdexcept>
 
 namespace plumb {
+
+using web::SweepAdvice;
+
 namespace {
 
 // surfaces farther away are the room, measured with low accuracy
@@ -21,24 +24,6 @@ std::uint64_t CellKey(const Eigen::Vector3d& p_world, double cell_m) {
 }
 
 }  // namespace
-
-const char* Name(SweepAdvice advice) {
-  switch (advice) {
-    case SweepAdvice::kNone:
-      return "none";
-    case SweepAdvice::kSlower:
-      return "slower";
-    case SweepAdvice::kCloser:
-      return "closer";
-    case SweepAdvice::kFarther:
-      return "farther";
-    case SweepAdvice::kLost:
-      return "tracking_lost";
-    case SweepAdvice::kNoMarkers:
-      break;
-  }
-  return "no_markers";
-}
 
 SweepGuide::SweepGuide(const Intrinsics& intrinsics, const GuidanceOptions& options)
     : intrinsics_(intrinsics), options_(options) {
@@ -93,7 +78,8 @@ void SweepGuide::UpdateArea(const Frame& frame, const TrackingReport& report) {
 }
 
 SweepAdvice SweepGuide::Advice(double time_s) const {
-  if (time_s - tracked_s_.value_or(*first_s_) > options_.lost_after_s) return SweepAdvice::kLost;
+  if (time_s - tracked_s_.value_or(*first_s_) > options_.lost_after_s)
+    return SweepAdvice::kTrackingLost;
   if (time_s - marker_s_.value_or(*first_s_) > options_.no_markers_after_s)
     return SweepAdvice::kNoMarkers;
   if (guidance_.valid_depth < options_.min_valid_depth) return SweepAdvice::kFarther;

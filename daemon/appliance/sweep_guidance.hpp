@@ -7,12 +7,9 @@
 
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/types/frame.hpp"
+#include "web/service/service_types.hpp"
 
 namespace plumb {
-
-enum class SweepAdvice { kNone, kSlower, kCloser, kFarther, kLost, kNoMarkers };
-/// "none", "slower", "closer", "farther", "tracking_lost", "no_markers"
-[[nodiscard]] const char* Name(SweepAdvice advice);
 
 /// Starting values; distances in metres, times in seconds by the frames' stamps.
 struct GuidanceOptions {
@@ -35,7 +32,7 @@ struct GuidanceOptions {
 
 /// State of the sweep up to now.
 struct SweepGuidance {
-  SweepAdvice advice = SweepAdvice::kNone;
+  web::SweepAdvice advice = web::SweepAdvice::kNone;
   double speed_m_s = 0.0;
   double turn_rad_s = 0.0;
   double median_depth_m = 0.0;
@@ -60,7 +57,7 @@ class SweepGuide {
  private:
   void UpdateSpeed(double time_s, const TrackingReport& report);
   void UpdateArea(const Frame& frame, const TrackingReport& report);
-  [[nodiscard]] SweepAdvice Advice(double time_s) const;
+  [[nodiscard]] web::SweepAdvice Advice(double time_s) const;
 
   Intrinsics intrinsics_;
   GuidanceOptions options_;

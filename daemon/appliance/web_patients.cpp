@@ -11,9 +11,8 @@ using web::ChangeResult;
 namespace {
 
 /// Why this patient cannot be opened for that purpose; empty if it can.
-std::string WhyNotOpen(ScanPhase phase, const web::Patient& patient, web::ScanPurpose purpose) {
-  if (phase == ScanPhase::kScanning || phase == ScanPhase::kWorking)
-    return "a scan is running: wait for its result, then open the patient";
+std::string WhyNotOpen(bool is_running, const web::Patient& patient, web::ScanPurpose purpose) {
+  if (is_running) return "a scan is running: wait for its result, then open the patient";
   if (purpose == web::ScanPurpose::kFraction && patient.approved_reference_id.empty())
     return "this patient has no approved reference: scan and approve one first";
   return {};
@@ -79,7 +78,7 @@ void WebPatients::OpenPatient(const web::Actor& actor, const std::string& id,
     return done(
         Refusal(ChangeResult::kInvalid, "a daily check is of no patient: open it as a check"));
   }
-  if (const std::string why = WhyNotOpen(appliance_.state().phase, *patient, purpose); !why.empty())
+  if (const std::string why = WhyNotOpen(appliance_.IsRunning(), *patient, purpose); !why.empty())
     return done(AnswerOf(why));
   if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
     return done(AnswerOf(why));

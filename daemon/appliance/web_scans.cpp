@@ -29,8 +29,7 @@ std::optional<web::Scan> WebScans::FindScan(const std::string& id) {
 
 void WebScans::AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
                           web::Done done) {
-  const ScanPhase phase = appliance_.state().phase;
-  if (phase == ScanPhase::kScanning || phase == ScanPhase::kWorking)
+  if (appliance_.IsRunning())
     return done(AnswerOf("a scan is running: accept its result, not an older one"));
   const std::optional<web::Scan> scan = FindScan(id);
   if (!scan) return done(Refusal(ChangeResult::kNotFound, "there is no such scan"));

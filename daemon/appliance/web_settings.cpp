@@ -5,33 +5,27 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "web/service/limits.hpp"
-
 namespace plumb {
 
 using web::ChangeResult;
 
 namespace {
 
-std::string CheckSettings(const web::Settings& s) {
-  struct Field {
-    const char* name;
-    double value;
-    web::Range range;
+/// Names a setting that nobody may enter; empty if there is none.
+std::string CheckSettings(const web::SettingsChange& change) {
+  const web::Settings settings = change.AppliedTo({});
+  std::string wrong;
+  const auto check = [&](const char* name, double value, const web::Limits& limits) {
+    const auto [least, most] = limits.entered;
+    if (!limits.entered.Holds(value))
+      wrong = fmt::format("{}: expected {} to {}", name, least, most);
   };
-  for (const Field& field :
-       {Field{"tolerance.shift_mm", s.tolerance.shift_mm, web::kShiftTolerance_mm},
-        Field{"tolerance.rotation_deg", s.tolerance.rotation_deg, web::kRotationTolerance_deg},
-        Field{"auto_stop_s", s.auto_stop_s, web::kAutoStop_s},
-        Field{"scan_limit_s", s.scan_limit_s, web::kScanLimit_s},
-        Field{"retention_days", static_cast<double>(s.retention_days), web::kRetention_days},
-        Field{"idle_logout_min", static_cast<double>(s.idle_logout_min), web::kIdleLogout_min}}) {
-    if (!field.range.Holds(field.value))
-      return fmt::format("{}: expected {} to {}", field.name, field.range.least, field.range.most);
-  }
-  if (!web::IsPosture(s.posture))
-    return fmt::format("posture: expected one of {}", fmt::join(web::kPostures, ", "));
-  return {};
+  web::ForEachSetting(change, settings,
+                      [&]([[maybe_unused]] const char* name, const auto&, const auto& value,
+                          const auto&... limits) { (check(name, value, limits), ...); });
+  if (!web::IsPosture(settings.posture))
+    wrong = fmt::format("posture: expected one of {}", fmt::join(web::kPostures, ", "));
+  return wrong;
 }
 
 }  // namespace
@@ -42,9 +36,8 @@ web::Settings WebSettings::GetSettings() {
 
 void WebSettings::ChangeSettings(const web::Actor& actor, const web::SettingsChange& change,
                                  web::Done done) {
-  if (const std::string wrong = CheckSettings(change.AppliedTo({})); !wrong.empty()) {
+  if (const std::string wrong = CheckSettings(change); !wrong.empty())
     return done(Refusal(ChangeResult::kInvalid, wrong));
-  }
   // The store's thread makes one change after the other, so none comes between reading and writing.
   store_.Change(&Store::settings, std::move(done), [=](SettingsStore& stored) {
     stored.Change(actor, change.AppliedTo(change.is_complete() ? web::Settings{} : stored.Get()));

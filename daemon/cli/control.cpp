@@ -17,6 +17,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "algo/acceptance/acceptance.hpp"
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
@@ -157,10 +158,9 @@ std::string StatusText(const Json& status) {
     text += fmt::format("result   scan {}: {}\n", last.value("scan", ""),
                         verdict.is_string() ? verdict.get<std::string>() : "reference taken");
     if (const Json correction = last.value("correction", Json()); correction.is_object()) {
-      for (const auto& [name, unit] : {std::pair("vertical", "mm"), std::pair("longitudinal", "mm"),
-                                       std::pair("lateral", "mm"), std::pair("pitch", "deg"),
-                                       std::pair("roll", "deg"), std::pair("yaw", "deg")}) {
-        text += fmt::format("         {:<13}{}\n", name, NumberText(correction, name, unit));
+      for (std::size_t i = 0; i < kNumberNames.size(); ++i) {
+        text += fmt::format("         {:<13}{}\n", kNumberNames[i],
+                            NumberText(correction, kNumberNames[i], UnitOf(i)));
       }
     }
     for (const Json& reason : last.value("reasons", Json::array()))

@@ -18,11 +18,6 @@ namespace {
 using Json = nlohmann::json;
 using Kind = ControlRequest::Kind;
 
-/// An argument of the command line or a quoted path may not be UTF-8.
-std::string Dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 constexpr std::array<std::string_view, 8> kActions = {"plug",  "unplug",     "stall",  "resume",
                                                       "error", "next-scene", "glitch", "speed"};
 constexpr std::size_t kMaxArgument = 80;
@@ -117,28 +112,32 @@ ControlRequest ParseControlRequest(std::string_view line) {
 std::string ControlRequestText(const ControlRequest& request) {
   switch (request.kind) {
     case Kind::kStatus:
-      return Dump({{"command", "status"}});
+      return ControlLine({{"command", "status"}});
     case Kind::kWatch:
-      return Dump({{"command", "watch"}});
+      return ControlLine({{"command", "watch"}});
     case Kind::kPress:
-      return Dump({{"command", "press"}, {"long", request.is_long}});
+      return ControlLine({{"command", "press"}, {"long", request.is_long}});
     case Kind::kBackup: {
       Json backup{{"command", "backup"}, {"folder", request.folder}};
       if (!request.key_file.empty()) backup["key_file"] = request.key_file;
-      return Dump(backup);
+      return ControlLine(backup);
     }
     case Kind::kUpdate:
-      return Dump({{"command", "update"}, {"name", request.name}});
+      return ControlLine({{"command", "update"}, {"name", request.name}});
     case Kind::kUpdateStatus:
-      return Dump({{"command", "update-status"}});
+      return ControlLine({{"command", "update-status"}});
     case Kind::kRestart:
-      return Dump({{"command", "restart"}});
+      return ControlLine({{"command", "restart"}});
     case Kind::kSim:
       break;
   }
   Json sim = {{"command", "sim"}, {"action", request.action}};
   if (!request.argument.empty()) sim["argument"] = request.argument;
-  return Dump(sim);
+  return ControlLine(sim);
+}
+
+std::string ControlLine(const nlohmann::json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string ControlDone() { return R"({"ok":true})"; }
@@ -146,7 +145,7 @@ std::string ControlDone() { return R"({"ok":true})"; }
 std::string ControlRefusal(std::string_view error, bool is_input) {
   Json refusal = {{"ok", false}, {"error", error}};
   if (is_input) refusal["input"] = true;
-  return Dump(refusal);
+  return ControlLine(refusal);
 }
 
 }  // namespace plumb

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "daemon/control/attached_file.hpp"
 
 namespace plumb {
@@ -38,6 +40,9 @@ struct ControlRequest {
 
 /// The line without its end.
 [[nodiscard]] std::string ControlRequestText(const ControlRequest& request);
+
+/// Text that is not UTF-8, such as a path, does not make a line fail.
+[[nodiscard]] std::string ControlLine(const nlohmann::json& json);
 
 /// {"ok": true} or {"ok": false, "error": text}
 [[nodiscard]] std::string ControlDone();

@@ -164,9 +164,8 @@ Json CorrectionJson(const Correction& correction) {
   Json json = {{"isocentre", VectorJson(correction.isocentre_m)}};
   json.update(NumbersJson(correction.value));
   json["uncertainty"] = NumbersJson(correction.u95);
-  json["words"] = {{"vertical", correction.words[0]}, {"longitudinal", correction.words[1]},
-                   {"lateral", correction.words[2]},  {"pitch", correction.words[3]},
-                   {"roll", correction.words[4]},     {"yaw", correction.words[5]}};
+  for (std::size_t i = 0; i < kNumberNames.size(); ++i)
+    json["words"][kNumberNames[i]] = correction.words[i];
   return json;
 }
 

@@ -58,17 +58,10 @@ void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
 /// Verdict and numbers for the log: "move: vertical +1.2, ..., yaw -0.10".
 std::string Described(const web::ResultSummary& result) {
   std::string text = result.verdict;
-  if (!result.correction) return text;
-  const web::SixNumbers& c = *result.correction;
-  const auto add = [&](const char* name, const std::optional<double>& value, const char* unit) {
-    if (value) text += fmt::format(", {} {:+.2f} {}", name, *value, unit);
-  };
-  add("vertical", c.vertical_mm, "mm");
-  add("longitudinal", c.longitudinal_mm, "mm");
-  add("lateral", c.lateral_mm, "mm");
-  add("pitch", c.pitch_deg, "deg");
-  add("roll", c.roll_deg, "deg");
-  add("yaw", c.yaw_deg, "deg");
+  for (const web::NumberAxis& axis : web::kNumberAxes) {
+    if (const auto value = axis.In(result.correction))
+      text += fmt::format(", {} {:+.2f} {}", axis.name, *value, axis.unit);
+  }
   return text;
 }
 
@@ -79,8 +72,8 @@ web::Scan ScanStore::ReadScan(const Statement& row) const {
   web::Scan scan{.id = ScanId(row.Integer(0)),
                  .patient_id = row.Integer(1) == 0 ? std::string() : row.Text(1),
                  .reference_id = row.Text(2),
-                 .purpose = store::ParsePurpose(row.Text(3)),
-                 .outcome = store::ParseOutcome(row.Text(4)),
+                 .purpose = store::Parse<web::ScanPurpose>("purpose", row.Text(3)),
+                 .outcome = store::Parse<web::ScanOutcome>("outcome", row.Text(4)),
                  .failure = row.Text(5),
                  .started_at = FromStored(row.Integer(6)),
                  .finished_at = {},
@@ -190,7 +183,7 @@ std::string ScanStore::Begin(const NewScan& scan) {
           " VALUES (?, ?, ?, 'running', ?, ?, ?, ?, ?, ?)")
       .Bind(ParseId(scan.patient_id).value_or(0))  // 0: of no patient
       .Bind(ParseId(scan.reference_id))
-      .Bind(store::Name(scan.purpose))
+      .Bind(Name(scan.purpose))
       .Bind(Now())
       .Bind(scan.sensor_serial)
       .Bind(scan.reason)
@@ -251,7 +244,7 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
       .Prepare(
           "UPDATE scans SET outcome = ?, failure = ?, finished_at = ?, swept_area_m2 = ?, "
           "has_folder = ? WHERE id = ?")
-      .Bind(store::Name(finished.outcome))
+      .Bind(Name(finished.outcome))
       .Bind(finished.failure)
       .Bind(Now())
       .Bind(finished.swept_area_m2)

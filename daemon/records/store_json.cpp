@@ -1,13 +1,16 @@
 #include "daemon/records/store_json.hpp"
 
+#include <algorithm>
+#include <functional>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "algo/acceptance/verdict.hpp"
+#include "algo/acceptance/acceptance.hpp"
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
-#include "web/service/limits.hpp"
+#include "web/service/settings_change.hpp"
 
 namespace plumb {
 namespace {
@@ -21,29 +24,21 @@ using Json = nlohmann::json;
       why));
 }
 
-/// Nothing if couch-fixed markers do not determine shifts.
-std::optional<double> Shift(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  if (found == json.end() || found->is_null()) return std::nullopt;
-  if (!found->is_number()) RefuseResult(fmt::format("{} is not a number", key));
-  return found->get<double>();
-}
+// Results are read by the names with which the method writes them.
+static_assert(std::ranges::equal(web::kNumberAxes, kNumberNames, std::equal_to<std::string_view>(),
+                                 &web::NumberAxis::name));
 
-double Angle(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  if (found == json.end() || !found->is_number())
-    RefuseResult(fmt::format("{} is not a number", key));
-  return found->get<double>();
-}
-
-/// A missing angle is never treated as zero.
-web::SixNumbers NumbersOf(const Json& json) {
-  return {.vertical_mm = Shift(json, "vertical_mm"),
-          .longitudinal_mm = Shift(json, "longitudinal_mm"),
-          .lateral_mm = Shift(json, "lateral_mm"),
-          .pitch_deg = Angle(json, "pitch_deg"),
-          .roll_deg = Angle(json, "roll_deg"),
-          .yaw_deg = Angle(json, "yaw_deg")};
+/// Couch-fixed markers do not determine shifts; a missing angle is never treated as zero.
+web::ReportedNumbers NumbersOf(const Json& json) {
+  web::ReportedNumbers numbers;
+  for (const web::NumberAxis& axis : web::kNumberAxes) {
+    const auto found = json.find(axis.key);
+    if (axis.is_shift() && (found == json.end() || found->is_null())) continue;
+    if (found == json.end() || !found->is_number())
+      RefuseResult(fmt::format("{} is not a number", axis.key));
+    numbers.*axis.member = found->get<double>();
+  }
+  return numbers;
 }
 
 /// An object; nothing if it is missing or null.
@@ -70,8 +65,8 @@ void ReadWords(const Json& result, web::ResultSummary& summary) {
   };
   if (const auto words = result.value(Json::json_pointer("/correction/words"), Json());
       words.is_object()) {
-    summary.words = {text(words, "vertical"), text(words, "longitudinal"), text(words, "lateral"),
-                     text(words, "pitch"),    text(words, "roll"),         text(words, "yaw")};
+    for (std::size_t i = 0; i < summary.words.size(); ++i)
+      summary.words[i] = text(words, web::kNumberAxes[i].name);
   }
   const auto parts = result.value(Json::json_pointer("/body/parts"), Json());
   for (const Json& part : parts.is_array() ? parts : Json::array()) {
@@ -103,10 +98,14 @@ class Stored {
     const auto found = json_.find(key);
     return found == json_.end() ? nullptr : &*found;
   }
-  [[nodiscard]] double Number(const char* key, double least, double most) const {
+  [[nodiscard]] double Number(const char* key, web::Range range) const {
     const Json* value = Find(key);
     if (value == nullptr || !value->is_number()) Fail(fmt::format("{} is not a number", key));
-    return InRange(key, value->get<double>(), least, most);
+    return InRange(key, value->get<double>(), range);
+  }
+  [[nodiscard]] web::Tolerance Tolerance() const {
+    return {.shift_mm = Number("shift_tolerance_mm", web::kShiftTolerance_mm.stored),
+            .rotation_deg = Number("rotation_tolerance_deg", web::kRotationTolerance_deg.stored)};
   }
   [[nodiscard]] bool Flag(const char* key) const {
     const Json* value = Find(key);
@@ -128,7 +127,7 @@ class Stored {
       Fail(fmt::format("{} is not a point of {} numbers", key, kSize));
     for (std::size_t i = 0; i < kSize; ++i) {
       if (!json[i].is_number()) Fail(fmt::format("{} contains a value that is not a number", key));
-      point[i] = InRange(key, json[i].get<double>(), -kMaxCoordinate_m, kMaxCoordinate_m);
+      point[i] = InRange(key, json[i].get<double>(), {-kMaxCoordinate_m, kMaxCoordinate_m});
     }
     return point;
   }
@@ -136,17 +135,15 @@ class Stored {
  private:
   static constexpr double kMaxCoordinate_m = 1000.0;
 
-  [[nodiscard]] double InRange(const char* key, double value, double least, double most) const {
-    if (!(value >= least && value <= most))
-      Fail(fmt::format("{} is {}, expected {} to {}", key, value, least, most));
+  [[nodiscard]] double InRange(const char* key, double value, web::Range range) const {
+    if (!range.Holds(value))
+      Fail(fmt::format("{} is {}, expected {} to {}", key, value, range.least, range.most));
     return value;
   }
 
   Json json_;
   const char* what_;
 };
-
-constexpr double kMaxShift_mm = 1000.0, kMaxRotation_deg = 180.0;
 
 }  // namespace
 
@@ -168,9 +165,7 @@ web::ReferencePlan ParsePlan(const std::string& text) {
   for (const Json& point : *region) plan.region_m.push_back(stored.Point<2>("region_m", point));
   if (plan.region_m.size() == 1 || plan.region_m.size() == 2)
     stored.Fail("region_m has fewer than 3 points");
-  plan.tolerance = {
-      .shift_mm = stored.Number("shift_tolerance_mm", 0.001, kMaxShift_mm),
-      .rotation_deg = stored.Number("rotation_tolerance_deg", 0.001, kMaxRotation_deg)};
+  plan.tolerance = stored.Tolerance();
   plan.posture = stored.Posture("posture");
   plan.couch_markers = stored.Flag("couch_markers");
   if (const Json* isocentre = stored.Find("isocentre_m"))
@@ -178,22 +173,13 @@ web::ReferencePlan ParsePlan(const std::string& text) {
   return plan;
 }
 
-std::string SettingsJson(const web::Settings& s) {
-  return Json{{"shift_tolerance_mm", s.tolerance.shift_mm},
-              {"rotation_tolerance_deg", s.tolerance.rotation_deg},
-              {"posture", s.posture},
-              {"couch_markers", s.couch_markers},
-              {"auto_stop_s", s.auto_stop_s},
-              {"scan_limit_s", s.scan_limit_s},
-              {"keep_recordings", s.keep_recordings},
-              {"retention_days", s.retention_days},
-              {"idle_logout_min", s.idle_logout_min}}
-      .dump();
+std::string SettingsJson(const web::Settings& settings) {
+  return web::SettingsAs<Json>(settings).dump();
 }
 
 std::string SettingsChanges(const std::string& stored, const web::Settings& settings) {
   const Json before = ParseBoundedJsonOrNothing(stored);
-  const Json wanted = Json::parse(SettingsJson(settings));
+  const Json wanted = web::SettingsAs<Json>(settings);
   Json changes = Json::object();
   for (const auto& [name, after] : wanted.items()) {
     if (!before.is_object() || !before.contains(name)) {
@@ -208,23 +194,22 @@ std::string SettingsChanges(const std::string& stored, const web::Settings& sett
 web::Settings ParseSettings(const std::string& text) {
   const Stored stored(text, "the stored settings");
   web::Settings s;
-  const auto number = [&](const char* key, double& value, double least, double most) {
-    if (stored.Find(key) != nullptr) value = stored.Number(key, least, most);
+  const auto number = [&](const char* key, double& value, const web::Limits& limits) {
+    if (stored.Find(key) != nullptr) value = stored.Number(key, limits.stored);
   };
-  const auto whole = [&](const char* key, int& value, int least, int most) {
+  const auto whole = [&](const char* key, int& value, const web::Limits& limits) {
     double read = value;
-    number(key, read, least, most);
+    number(key, read, limits);
     value = static_cast<int>(read);
   };
-  s.tolerance = {.shift_mm = stored.Number("shift_tolerance_mm", 0.001, kMaxShift_mm),
-                 .rotation_deg = stored.Number("rotation_tolerance_deg", 0.001, kMaxRotation_deg)};
+  s.tolerance = stored.Tolerance();
   s.posture = stored.Posture("posture");
   s.couch_markers = stored.Flag("couch_markers");
-  number("auto_stop_s", s.auto_stop_s, 0.1, 3600);
-  number("scan_limit_s", s.scan_limit_s, 0.1, 3600);
+  number("auto_stop_s", s.auto_stop_s, web::kAutoStop_s);
+  number("scan_limit_s", s.scan_limit_s, web::kScanLimit_s);
   if (stored.Find("keep_recordings") != nullptr) s.keep_recordings = stored.Flag("keep_recordings");
-  whole("retention_days", s.retention_days, 0, 1'000'000);
-  whole("idle_logout_min", s.idle_logout_min, 1, 100'000);
+  whole("retention_days", s.retention_days, web::kRetention_days);
+  whole("idle_logout_min", s.idle_logout_min, web::kIdleLogout_min);
   return s;
 }
 

@@ -1,7 +1,6 @@
 #include "daemon/records/stored_values.hpp"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <chrono>
 
@@ -9,7 +8,6 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/records/store_refusal.hpp"
-#include "web/service/names.hpp"
 
 namespace plumb::store {
 
@@ -45,41 +43,11 @@ std::int64_t RequireId(const std::string& text, const char* what) {
 
 std::string ScanId(std::int64_t id) { return fmt::format("{:06}", id); }
 
-const char* Name(web::ScanPurpose purpose) {
-  return web::kPurposeNames.at(static_cast<std::size_t>(purpose)).data();
-}
-const char* Name(web::ScanOutcome outcome) {
-  return web::kOutcomeNames.at(static_cast<std::size_t>(outcome)).data();
-}
-const char* Name(web::Role role) {
-  return web::kRoleNames.at(static_cast<std::size_t>(role)).data();
-}
-
-namespace {
-
-/// The value with that name. @throws DataError if there is none.
-template <typename Value, std::size_t kSize>
-Value Parse(const char* what, std::string_view name,
-            const std::array<std::string_view, kSize>& names) {
-  for (std::size_t i = 0; i < kSize; ++i) {
-    if (name == names[i]) return static_cast<Value>(i);
-  }
+void RefuseName(const char* what, std::string_view name) {
   throw DataError(
       fmt::format("this version knows no {} '{}', which is stored: the database was changed from "
                   "outside, or its disk failed. Put a backup of it in its place",
                   what, name.substr(0, 32)));
-}
-
-}  // namespace
-
-web::ScanPurpose ParsePurpose(std::string_view name) {
-  return Parse<web::ScanPurpose>("purpose", name, web::kPurposeNames);
-}
-web::ScanOutcome ParseOutcome(std::string_view name) {
-  return Parse<web::ScanOutcome>("outcome", name, web::kOutcomeNames);
-}
-web::Role ParseRole(std::string_view name) {
-  return Parse<web::Role>("role", name, web::kRoleNames);
 }
 
 }  // namespace plumb::store

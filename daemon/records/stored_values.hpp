@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "web/service/service_types.hpp"
+#include "web/service/names.hpp"
 
 namespace plumb::store {
 
@@ -29,12 +29,12 @@ inline const web::Actor kCommand{.user = "command line", .address = ""};
 /// "000042": the name of a scan's folder, and its id.
 [[nodiscard]] std::string ScanId(std::int64_t id);
 
-[[nodiscard]] const char* Name(web::ScanPurpose purpose);
-[[nodiscard]] const char* Name(web::ScanOutcome outcome);
-[[nodiscard]] const char* Name(web::Role role);
+[[noreturn]] void RefuseName(const char* what, std::string_view name);
 /// @throws DataError for a name that this version does not know.
-[[nodiscard]] web::ScanPurpose ParsePurpose(std::string_view name);
-[[nodiscard]] web::ScanOutcome ParseOutcome(std::string_view name);
-[[nodiscard]] web::Role ParseRole(std::string_view name);
+template <typename Enum>
+[[nodiscard]] Enum Parse(const char* what, std::string_view name) {
+  if (const std::optional<Enum> value = web::Named<Enum>(name)) return *value;
+  RefuseName(what, name);
+}
 
 }  // namespace plumb::store

@@ -60,13 +60,13 @@ std::string TreatmentStore::Open(const web::Actor& actor, const std::string& pat
           "INSERT INTO sessions (patient_id, purpose, fraction, opened_at, opened_by) VALUES (?, "
           "?, ?, ?, ?)")
       .Bind(*patient)
-      .Bind(store::Name(purpose))
+      .Bind(Name(purpose))
       .Bind(fraction)
       .Bind(Now())
       .Bind(actor.user)
       .Run();
   const std::string id = std::to_string(change.last_id());
-  change.Log(actor, "session.open", id, store::Name(purpose));
+  change.Log(actor, "session.open", id, std::string(Name(purpose)));
   change.Commit();
   return id;
 }
@@ -88,7 +88,7 @@ std::optional<web::TreatmentSession> TreatmentStore::Opened() {
   return web::TreatmentSession{.id = query.Text(0),
                                .patient_id = query.Text(1),
                                .patient_code = query.Text(2),
-                               .purpose = store::ParsePurpose(query.Text(3)),
+                               .purpose = store::Parse<web::ScanPurpose>("purpose", query.Text(3)),
                                .fraction = static_cast<int>(query.Integer(4)),
                                .num_scans = static_cast<int>(query.Integer(7)),
                                .opened_by = query.Text(5),

@@ -26,7 +26,7 @@ web::User ReadUser(const Statement& row) {
                  .disabled = row.Integer(3) != 0,
                  .created_at = FromStored(row.Integer(4))};
   try {
-    user.role = store::ParseRole(row.Text(1));
+    user.role = store::Parse<web::Role>("role", row.Text(1));
   } catch (const DataError&) {
     user.disabled = true;
   }
@@ -59,7 +59,7 @@ void UserStore::Add(const web::Actor& actor, const web::User& user) {
             "INSERT INTO users (name, role, password_hash, disabled, created_at) VALUES (?, ?, ?, "
             "?, ?)")
         .Bind(user.name)
-        .Bind(store::Name(user.role))
+        .Bind(Name(user.role))
         .Bind(user.password_hash)
         .Bind(std::int64_t{user.disabled})
         .Bind(Now())
@@ -68,7 +68,7 @@ void UserStore::Add(const web::Actor& actor, const web::User& user) {
     throw StoreRefusal(ChangeResult::kConflict,
                        "there is an account of this name already: choose another name");
   }
-  change.Log(actor, "user.add", user.name, store::Name(user.role));
+  change.Log(actor, "user.add", user.name, std::string(Name(user.role)));
   change.Commit();
 }
 
@@ -87,12 +87,12 @@ void UserStore::Change(const web::Actor& actor, const web::UserChange& wanted) {
                        "the account has been changed by somebody else meanwhile: log in again");
   std::string changes;
   if (wanted.role && *wanted.role != user.role)
-    changes += fmt::format("role {} > {} ", store::Name(user.role), store::Name(*wanted.role));
+    changes += fmt::format("role {} > {} ", Name(user.role), Name(*wanted.role));
   if (wanted.password_hash && *wanted.password_hash != user.password_hash) changes += "password ";
   if (wanted.disabled && *wanted.disabled != user.disabled)
     changes += *wanted.disabled ? "disabled " : "enabled ";
   change.Prepare("UPDATE users SET role = ?, password_hash = ?, disabled = ? WHERE name = ?")
-      .Bind(store::Name(wanted.role.value_or(user.role)))
+      .Bind(Name(wanted.role.value_or(user.role)))
       .Bind(wanted.password_hash.value_or(user.password_hash))
       .Bind(std::int64_t{wanted.disabled.value_or(user.disabled)})
       .Bind(wanted.name)

@@ -154,9 +154,9 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
     swept = fraction;
     if (scan.coverage) scan.coverage = fraction;
     scan.without_new_surface_s = fraction > 0.8 ? 3.4 : 0.2;
-    scan.guidance = fraction > 0.3 && fraction < 0.6 ? Guidance::kSlower : Guidance::kNone;
+    scan.guidance = fraction > 0.3 && fraction < 0.6 ? SweepAdvice::kSlower : SweepAdvice::kNone;
     if (guidance) scan.guidance = *guidance;
-    status.light = scan.guidance == Guidance::kSlower ? "too_fast" : "scanning";
+    status.light = scan.guidance == SweepAdvice::kSlower ? "too_fast" : "scanning";
     scan.frames = static_cast<std::int64_t>(scan.elapsed_s * 30);
     scan.frames_tracked = scan.frames;
     scan.keyframes = scan.frames / 4;
@@ -165,7 +165,7 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
       status.state = ApplianceState::kWorking;
       status.light = "working";
       scan.step = "surface";
-      scan.guidance = Guidance::kNone;
+      scan.guidance = SweepAdvice::kNone;
     }
     Notify(EventKind::kProgress);
   } else {

@@ -79,8 +79,8 @@ class FakeAppliance : public web::BackgroundWork,
   std::optional<Recorded> next_recorded;  ///< Set: what the next finished scan shows, out of turn.
   std::chrono::milliseconds sweep{3000};
   std::chrono::milliseconds work{600};
-  double swept = 0.0;                     ///< Share of the running sweep.
-  std::optional<web::Guidance> guidance;  ///< Set: what every sweep advises.
+  double swept = 0.0;                        ///< Share of the running sweep.
+  std::optional<web::SweepAdvice> guidance;  ///< Set: what every sweep advises.
   /// Set: completions wait here until the test calls them.
   bool hold_completions = false;
   std::vector<std::function<void()>> held;

@@ -258,10 +258,13 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "fail") service.Fail("the recording cannot be written");
   if (name == "press") service.Press({"button", ""}, [](const web::Change&) {});
   if (name == "guide") {  // none: as the sweep goes
-    static const std::map<std::string, web::Guidance> kGuidance = {
-        {"good", web::Guidance::kNone},         {"slower", web::Guidance::kSlower},
-        {"closer", web::Guidance::kCloser},     {"farther", web::Guidance::kFarther},
-        {"lost", web::Guidance::kTrackingLost}, {"too_slow", web::Guidance::kComputerTooSlow}};
+    static const std::map<std::string, web::SweepAdvice> kGuidance = {
+        {"good", web::SweepAdvice::kNone},
+        {"slower", web::SweepAdvice::kSlower},
+        {"closer", web::SweepAdvice::kCloser},
+        {"farther", web::SweepAdvice::kFarther},
+        {"lost", web::SweepAdvice::kTrackingLost},
+        {"too_slow", web::SweepAdvice::kComputerTooSlow}};
     std::string what;
     words >> what;
     service.guidance.reset();

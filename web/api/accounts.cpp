@@ -12,11 +12,11 @@
 #include "web/http/connection_table.hpp"
 #include "web/http/gate.hpp"
 #include "web/security/password_rules.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb::web {
 namespace {
 
-constexpr std::size_t kMaxName = 32;
 constexpr std::size_t kMaxSetupGuesses = 1000;  // a minute, from all addresses
 /// Prefix of the hash of a password chosen by somebody else: the person has to change it at the
 /// next login.
@@ -60,8 +60,9 @@ std::string ReadName(Fields& fields) {
 }
 
 Role ReadRole(Fields& fields) {
-  const auto role = ParseRole(fields.Text("role", 1, kMaxName));
-  if (!role) throw DataError("role must be technician, physicist or engineer");
+  const auto role = Named<Role>(fields.Text("role", 1, kMaxName));
+  if (!role || role == Role::kDisplay)  // which is paired and has no account
+    throw DataError("role must be technician, physicist or engineer");
   return *role;
 }
 

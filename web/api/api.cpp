@@ -15,6 +15,7 @@
 #include "web/api/look_back.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb::web {
 namespace {
@@ -220,7 +221,7 @@ void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& 
       "POST", "/api/v1/patients", Permission::kPatients, BodyKind::kJson,
       [&patients](const Request& request, const Respond& respond) {
         Fields fields(request.body);
-        const std::string code = fields.Text("code", 1, 32),
+        const std::string code = fields.Text("code", 1, kMaxName),
                           site = fields.Text("site", 0, kMaxSite);
         fields.Finish();
         if (!IsName(code))
@@ -256,7 +257,7 @@ void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& 
               [&patients](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const ScanPurpose purpose = ParsePurpose(fields.Text("purpose", 1, 32));
-                const std::string reason = fields.Text("reason", 0, 200);
+                const std::string reason = fields.Text("reason", 0, kMaxReason);
                 const std::string replaces =
                     fields.Has("replaces") ? fields.Text("replaces", 0, 64) : std::string();
                 fields.Finish();
@@ -312,7 +313,7 @@ void AddReferenceRoutes(Table& table, ReferenceService& references) {
               [&references](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const std::string scan_id = fields.Text("scan_id", 1, 64),
-                                  reason = fields.Text("reason", 0, 200);
+                                  reason = fields.Text("reason", 0, kMaxReason);
                 fields.Finish();
                 references.AddReference(request.actor(), scan_id, reason, Answer(respond));
               });
@@ -345,7 +346,7 @@ void AddScanRoutes(Table& table, ScanService& scans) {
   table.Write("DELETE", "/api/v1/scans/{id}", Permission::kWipe, BodyKind::kJson,
               [&scans](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
-                const std::string reason = fields.Text("reason", 3, 200);
+                const std::string reason = fields.Text("reason", kMinReason, kMaxReason);
                 fields.Finish();
                 scans.RemoveScan(request.actor(), request.arguments[0], reason, Answer(respond));
               });
@@ -403,8 +404,9 @@ void AddSettingsRoutes(Table& table, SettingsService& settings, AuditLog& audit)
     NameDownload(response, "plumb_log.jsonl");
     return response;
   });
-  table.Read("/api/v1/settings", Permission::kView,
-             [&settings](const Request&) { return JsonResponse(ToJson(settings.GetSettings())); });
+  table.Read("/api/v1/settings", Permission::kView, [&settings](const Request&) {
+    return JsonResponse(SettingsAs<Json>(settings.GetSettings()));
+  });
   table.Write("PUT", "/api/v1/settings", Permission::kSettings, BodyKind::kJson,
               [&settings](const Request& request, const Respond& respond) {
                 settings.ChangeSettings(request.actor(), ParseSettingsChange(request.body),

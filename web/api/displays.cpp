@@ -9,6 +9,7 @@
 #include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
 #include "web/http/checks.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb::web {
 namespace {
@@ -124,7 +125,7 @@ void Displays::Claim(const Request& request, const Respond& respond) {
 void Displays::Approve(const Request& request, const Respond& respond) {
   Fields fields(request.body);
   std::string code = fields.Text("code", 1, 16);
-  const std::string name = fields.Text("name", 1, 32);
+  const std::string name = fields.Text("name", 1, kMaxName);
   fields.Finish();
   Expire();
   std::transform(code.begin(), code.end(), code.begin(),
@@ -136,7 +137,8 @@ void Displays::Approve(const Request& request, const Respond& respond) {
     return respond(ErrorResponse(404, "no screen shows this code; a code is valid for 10 minutes"));
   }
   if (service_.Displays().size() >= kMaxDisplays)
-    return respond(ErrorResponse(409, "20 screens are paired already: remove one first"));
+    return respond(ErrorResponse(
+        409, fmt::format("{} screens are paired already: remove one first", kMaxDisplays)));
   const Display display{.id = {},
                         .name = name,
                         .token_hash = found->token_hash,

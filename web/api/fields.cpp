@@ -10,7 +10,6 @@
 #include "web/api/json.hpp"
 #include "web/http/checks.hpp"
 #include "web/service/limits.hpp"
-#include "web/service/names.hpp"
 
 namespace plumb::web {
 namespace {
@@ -113,11 +112,8 @@ void Fields::Finish() const {
 
 namespace {
 
-double NumberIn(Fields& fields, const char* name, Range range) {
-  return fields.Number(name, range.least, range.most);
-}
-int IntegerIn(Fields& fields, const char* name, Range range) {
-  return fields.Integer(name, static_cast<int>(range.least), static_cast<int>(range.most));
+double NumberIn(Fields& fields, const char* name, const Limits& limits) {
+  return fields.Number(name, limits.entered.least, limits.entered.most);
 }
 Tolerance ToleranceIn(Fields& fields) {
   return {.shift_mm = NumberIn(fields, "shift_tolerance_mm", kShiftTolerance_mm),
@@ -128,6 +124,20 @@ std::string PostureIn(Fields& fields) {
   if (!IsPosture(posture))
     throw DataError(fmt::format("posture must be one of {}", fmt::join(kPostures, ", ")));
   return posture;
+}
+
+void Take(Fields& fields, const char* name, std::optional<double>& wanted, const Limits& limits) {
+  wanted = NumberIn(fields, name, limits);
+}
+void Take(Fields& fields, const char* name, std::optional<int>& wanted, const Limits& limits) {
+  wanted = fields.Integer(name, static_cast<int>(limits.entered.least),
+                          static_cast<int>(limits.entered.most));
+}
+void Take(Fields& fields, const char* name, std::optional<bool>& wanted) {
+  wanted = fields.Flag(name);
+}
+void Take(Fields& fields, const char* /*posture*/, std::optional<std::string>& wanted) {
+  wanted = PostureIn(fields);
 }
 
 }  // namespace
@@ -145,10 +155,8 @@ PlanTemplate ParseTemplate(const std::string& body) {
 }
 
 ScanPurpose ParsePurpose(const std::string& name) {
-  for (std::size_t i = 0; i < kPurposeNames.size(); ++i) {
-    if (kPurposeNames[i] == name) return static_cast<ScanPurpose>(i);
-  }
-  throw DataError(fmt::format("purpose must be one of {}", fmt::join(kPurposeNames, ", ")));
+  if (const auto purpose = Named<ScanPurpose>(name)) return *purpose;
+  throw DataError(fmt::format("purpose must be one of {}", fmt::join(kNamesOf<ScanPurpose>, ", ")));
 }
 
 std::pair<ReferencePlan, int> ParsePlan(const std::string& body) {
@@ -170,25 +178,12 @@ std::pair<ReferencePlan, int> ParsePlan(const std::string& body) {
 
 SettingsChange ParseSettingsChange(const std::string& body) {
   Fields fields(body);
-  const auto number = [&](const char* name, Range range) {
-    return fields.Has(name) ? std::optional(NumberIn(fields, name, range)) : std::nullopt;
-  };
-  const auto whole = [&](const char* name, Range range) {
-    return fields.Has(name) ? std::optional(IntegerIn(fields, name, range)) : std::nullopt;
-  };
-  const auto flag = [&](const char* name) {
-    return fields.Has(name) ? std::optional(fields.Flag(name)) : std::nullopt;
-  };
   SettingsChange change;
-  change.shift_mm = number("shift_tolerance_mm", kShiftTolerance_mm);
-  change.rotation_deg = number("rotation_tolerance_deg", kRotationTolerance_deg);
-  if (fields.Has("posture")) change.posture = PostureIn(fields);
-  change.couch_markers = flag("couch_markers");
-  change.auto_stop_s = number("auto_stop_s", kAutoStop_s);
-  change.scan_limit_s = number("scan_limit_s", kScanLimit_s);
-  change.keep_recordings = flag("keep_recordings");
-  change.retention_days = whole("retention_days", kRetention_days);
-  change.idle_logout_min = whole("idle_logout_min", kIdleLogout_min);
+  const Settings any;
+  ForEachSetting(change, any,
+                 [&](const char* name, auto& wanted, const auto&, const auto&... limits) {
+                   if (fields.Has(name)) Take(fields, name, wanted, limits...);
+                 });
   fields.Finish();
   if (change.is_empty()) throw DataError("the body states no setting to change");
   return change;

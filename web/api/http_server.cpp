@@ -53,9 +53,11 @@ std::string_view Name(EventKind kind) {
       return "data";
     case EventKind::kUpdate:
       return "update";
-    default:
-      return "status";
+    case EventKind::kStatus:
+    case EventKind::kProgress:
+      break;
   }
+  return "status";
 }
 
 }  // namespace

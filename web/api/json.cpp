@@ -6,25 +6,8 @@
 #include <algorithm>
 #include <array>
 
-#include "web/security/permissions.hpp"
-#include "web/service/names.hpp"
-
 namespace plumb::web {
 namespace {
-
-constexpr std::array<std::string_view, 6> kStates = {"no_sensor", "ready",  "scanning",
-                                                     "working",   "result", "fault"};
-constexpr std::array<std::string_view, 7> kGuidance = {
-    "none", "slower", "closer", "farther", "tracking_lost", "no_markers", "computer_too_slow"};
-constexpr std::array<std::string_view, 4> kFaultKinds = {"none", "sensor", "scan", "storage"};
-static_assert(kStates.size() == static_cast<std::size_t>(ApplianceState::kFault) + 1);
-static_assert(kGuidance.size() == static_cast<std::size_t>(Guidance::kComputerTooSlow) + 1);
-static_assert(kFaultKinds.size() == static_cast<std::size_t>(FaultKind::kStorage) + 1);
-
-template <std::size_t n, typename Enum>
-std::string_view NameIn(const std::array<std::string_view, n>& names, Enum value) {
-  return names.at(static_cast<std::size_t>(value));
-}
 
 template <typename T>
 Json OrNull(const std::optional<T>& value) {
@@ -33,14 +16,11 @@ Json OrNull(const std::optional<T>& value) {
 
 Json TextOrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
-Json NumbersJson(const std::optional<SixNumbers>& numbers) {
+Json NumbersJson(const std::optional<ReportedNumbers>& numbers) {
   if (!numbers) return nullptr;
-  return {{"vertical_mm", OrNull(numbers->vertical_mm)},
-          {"longitudinal_mm", OrNull(numbers->longitudinal_mm)},
-          {"lateral_mm", OrNull(numbers->lateral_mm)},
-          {"pitch_deg", numbers->pitch_deg},
-          {"roll_deg", numbers->roll_deg},
-          {"yaw_deg", numbers->yaw_deg}};
+  Json json;
+  for (const NumberAxis& axis : kNumberAxes) json[axis.key] = OrNull(axis.In(numbers));
+  return json;
 }
 
 Json ToleranceJson(const Tolerance& tolerance) {
@@ -50,11 +30,11 @@ Json ToleranceJson(const Tolerance& tolerance) {
 Json LiveScanJson(const LiveScan& scan) {
   return {{"id", scan.id},
           {"patient_id", TextOrNull(scan.patient_id)},
-          {"purpose", NameIn(kPurposeNames, scan.purpose)},
+          {"purpose", Name(scan.purpose)},
           {"elapsed_s", scan.elapsed_s},
           {"coverage", OrNull(scan.coverage)},
           {"without_new_surface_s", scan.without_new_surface_s},
-          {"guidance", NameIn(kGuidance, scan.guidance)},
+          {"guidance", Name(scan.guidance)},
           {"keyframes", scan.keyframes},
           {"frames", scan.frames},
           {"frames_tracked", scan.frames_tracked},
@@ -77,9 +57,6 @@ std::string TimeText(std::time_t time) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(time));
 }
 
-std::string_view Name(ApplianceState state) { return NameIn(kStates, state); }
-std::string_view Name(ScanPurpose purpose) { return NameIn(kPurposeNames, purpose); }
-
 namespace {
 
 /// A failed check also counts as overdue, for clients that know only that field.
@@ -89,10 +66,8 @@ void AddDailyCheck(Json& json, DailyCheck check, const char* overdue, const char
 }
 
 Json WordsJson(const std::array<std::string, 6>& words) {
-  static constexpr std::array<const char*, 6> kNames = {"vertical", "longitudinal", "lateral",
-                                                        "pitch",    "roll",         "yaw"};
-  Json json = Json::object();
-  for (std::size_t i = 0; i < words.size(); ++i) json[kNames[i]] = TextOrNull(words[i]);
+  Json json;
+  for (std::size_t i = 0; i < words.size(); ++i) json[kNumberAxes[i].name] = TextOrNull(words[i]);
   return json;
 }
 
@@ -102,8 +77,8 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
   Json json = {{"id", scan.id},
                {"patient_id", TextOrNull(scan.patient_id)},
                {"reference_id", TextOrNull(scan.reference_id)},
-               {"purpose", NameIn(kPurposeNames, scan.purpose)},
-               {"outcome", NameIn(kOutcomeNames, scan.outcome)},
+               {"purpose", Name(scan.purpose)},
+               {"outcome", Name(scan.outcome)},
                {"failure", TextOrNull(scan.failure)},
                {"started_at", TimeText(scan.started_at)},
                {"finished_at", nullptr},
@@ -186,7 +161,7 @@ Json SessionJson(const TreatmentSession& session) {
   return {{"id", session.id},
           {"patient_id", session.patient_id},
           {"patient_code", session.patient_code},
-          {"purpose", NameIn(kPurposeNames, session.purpose)},
+          {"purpose", Name(session.purpose)},
           {"fraction", session.fraction > 0 ? Json(session.fraction) : Json(nullptr)},
           {"num_scans", session.num_scans},
           {"opened_by", session.opened_by},
@@ -209,9 +184,9 @@ Json WaitingJson(const std::vector<WaitingReference>& waiting) {
 
 Json ToJson(const Status& status, WallClock::time_point now) {
   Json json = {
-      {"state", NameIn(kStates, status.state)},
+      {"state", Name(status.state)},
       {"fault", TextOrNull(status.fault)},
-      {"fault_kind", NameIn(kFaultKinds, status.fault_kind)},
+      {"fault_kind", Name(status.fault_kind)},
       {"sensor",
        {{"present", status.sensor.present},
         {"serial", status.sensor.serial},
@@ -226,7 +201,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
         {"warnings", status.storage.warnings}}},
       {"light", status.light},
       {"patient_id", TextOrNull(status.patient_id)},
-      {"next_purpose", NameIn(kPurposeNames, status.next_purpose)},
+      {"next_purpose", Name(status.next_purpose)},
       {"scans_today", status.scans_today},
       {"session", status.session ? SessionJson(*status.session) : Json(nullptr)},
       {"room", ToJson(status.room)},
@@ -321,18 +296,6 @@ Json ToJson(const AuditEntry& entry) {
                      {"time", about->time ? Json(TimeText(*about->time)) : Json(nullptr)}};
   }
   return json;
-}
-
-Json ToJson(const Settings& settings) {
-  return {{"shift_tolerance_mm", settings.tolerance.shift_mm},
-          {"rotation_tolerance_deg", settings.tolerance.rotation_deg},
-          {"posture", settings.posture},
-          {"couch_markers", settings.couch_markers},
-          {"auto_stop_s", settings.auto_stop_s},
-          {"scan_limit_s", settings.scan_limit_s},
-          {"keep_recordings", settings.keep_recordings},
-          {"retention_days", settings.retention_days},
-          {"idle_logout_min", settings.idle_logout_min}};
 }
 
 Json ToJson(const UpdateStatus& update) {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "web/security/sessions.hpp"
-#include "web/service/service_types.hpp"
+#include "web/service/names.hpp"
 #include "web/service/settings_change.hpp"
 
 namespace plumb::web {
@@ -23,7 +23,6 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] Json ToJson(const CheckStatus& checks, WallClock::time_point now);
 [[nodiscard]] Json ToJson(const User& user);  ///< Without the hash.
 [[nodiscard]] Json ToJson(const AuditEntry& entry);
-[[nodiscard]] Json ToJson(const Settings& settings);
 [[nodiscard]] Json ToJson(const UpdateStatus& update);
 [[nodiscard]] std::string Dump(const Json& json);
 
@@ -31,8 +30,6 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] std::string TimeText(WallClock::time_point time);
 /// Of any year: a certificate's end may be past what a time_point holds.
 [[nodiscard]] std::string TimeText(std::time_t time);
-[[nodiscard]] std::string_view Name(ApplianceState state);
-[[nodiscard]] std::string_view Name(ScanPurpose purpose);
 
 /// The fields of a request's body. Every accessor throws DataError naming the field, what was
 /// expected and what was found.

@@ -2,7 +2,6 @@
 // one archive, sensor profiles.
 #include <fmt/format.h>
 
-#include <array>
 #include <charconv>
 #include <filesystem>
 #include <fstream>
@@ -34,18 +33,11 @@ std::string Number(const std::optional<double>& value) {
   return value ? fmt::format("{:.4f}", *value) : std::string();
 }
 
-std::array<std::optional<double>, 6> Values(const std::optional<SixNumbers>& numbers) {
-  if (!numbers) return {};
-  return {numbers->vertical_mm, numbers->longitudinal_mm, numbers->lateral_mm,
-          numbers->pitch_deg,   numbers->roll_deg,        numbers->yaw_deg};
-}
-
 std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
-  std::string text =
-      "patient,scan,fraction,purpose,started_at,verdict,vertical_mm,longitudinal_mm,lateral_mm,"
-      "pitch_deg,roll_deg,yaw_deg,u95_vertical_mm,u95_longitudinal_mm,u95_lateral_mm,u95_pitch_deg,"
-      "u95_roll_deg,u95_yaw_deg,accepted_by,accepted_at,accepted_reason,check_overdue,"
-      "check_failed\r\n";
+  std::string text = "patient,scan,fraction,purpose,started_at,verdict";
+  for (const char* prefix : {",", ",u95_"})
+    for (const NumberAxis& axis : kNumberAxes) text.append(prefix).append(axis.key);
+  text += ",accepted_by,accepted_at,accepted_reason,check_overdue,check_failed\r\n";
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != ScanOutcome::kDone) continue;
     const bool is_advice = scan->result && scan->result->verdict != "no_answer";
@@ -53,13 +45,12 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
         fmt::format("{},{},{},{},{},{}", Cell(patient.code), Cell(scan->id),
                     scan->fraction > 0 ? std::to_string(scan->fraction) : "", Name(scan->purpose),
                     TimeText(scan->started_at), scan->result ? Cell(scan->result->verdict) : "");
-    if (is_advice) {
-      for (const auto& value : Values(scan->result->correction))
-        text.append(1, ',').append(Number(value));
-      for (const auto& value : Values(scan->result->u95)) text.append(1, ',').append(Number(value));
-    } else {
-      text.append(12, ',');
-    }
+    const auto add = [&](const std::optional<ReportedNumbers>& numbers) {
+      for (const NumberAxis& axis : kNumberAxes)
+        text.append(1, ',').append(Number(axis.In(numbers)));
+    };
+    add(is_advice ? scan->result->correction : std::nullopt);
+    add(is_advice ? scan->result->u95 : std::nullopt);
     text += fmt::format(",{},{},{},{},{}\r\n", Cell(scan->accepted_by),
                         scan->accepted_at ? TimeText(*scan->accepted_at) : "",
                         Cell(scan->accepted_reason),

@@ -15,6 +15,8 @@
 #include "web/assets/spanish.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
+#include "web/security/password_rules.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb::web {
 namespace {
@@ -51,20 +53,6 @@ std::string Said(const std::string& text, const ResultWords& words) {
   return EscapeHtml(Typeset(is_spanish ? InSpanish(text).value_or(text) : text));
 }
 
-struct NumberRow {
-  const char* unit;
-  std::optional<double> value, u95;
-};
-
-std::array<NumberRow, 6> Rows(const SixNumbers& value, const SixNumbers& u95) {
-  return {NumberRow{"mm", value.vertical_mm, u95.vertical_mm},
-          NumberRow{"mm", value.longitudinal_mm, u95.longitudinal_mm},
-          NumberRow{"mm", value.lateral_mm, u95.lateral_mm},
-          NumberRow{"\xC2\xB0", value.pitch_deg, u95.pitch_deg},
-          NumberRow{"\xC2\xB0", value.roll_deg, u95.roll_deg},
-          NumberRow{"\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
-}
-
 /// @param query      Query of this page, for the link to it in the other language.
 /// @param refreshes  Reloads the page, without counting as use, because its content may be
 /// outdated.
@@ -94,32 +82,34 @@ std::string LoginForm(const ResultWords& words, std::string_view trouble) {
   return fmt::format(
       "<h1>{}</h1>{}<form method=\"post\" action=\"/login\" class=\"card form\">"
       "<label>{} <input name=\"name\" autocomplete=\"username\" required "
-      "maxlength=\"32\"></label>"
+      "maxlength=\"{}\"></label>"
       "<label>{} <input name=\"password\" type=\"password\" "
-      "autocomplete=\"current-password\" required maxlength=\"128\"></label>"
+      "autocomplete=\"current-password\" required maxlength=\"{}\"></label>"
       "<button class=\"primary\">{}</button></form>",
       words.log_in, trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble),
-      words.name, words.password, words.log_in);
+      words.name, kMaxName, words.password, kMaxPassword, words.log_in);
 }
 
 /// A row of the table. Only the verdict MOVE asks for moves.
-std::string NumberCells(const NumberRow& row, std::string_view name, const std::string& direction,
-                        double tolerance, bool moves, const ResultWords& words) {
-  if (!row.value)
+std::string NumberCells(std::size_t i, const ResultSummary& result, std::string_view name,
+                        const Tolerance& tolerances, const ResultWords& words) {
+  const NumberAxis& axis = kNumberAxes[i];
+  const std::optional<double> value = axis.In(result.correction);
+  if (!value)
     return fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td></td><td></td><td></td><td></td></tr>", name,
         words.terms.not_known);
-  const double u95 = row.u95.value_or(0.0), size = std::abs(*row.value);
-  const bool is_shift = std::string_view(row.unit) == "mm";
+  const double u95 = axis.In(result.u95).value_or(0.0), size = std::abs(*value);
+  const double tolerance = axis.is_shift() ? tolerances.shift_mm : tolerances.rotation_deg;
   const char decimal = words.terms.decimal;
-  const ShownNumber shown = Shown(*row.value, u95, is_shift ? 1 : 2, decimal);
-  const std::string unit = is_shift ? " mm" : row.unit;
+  const ShownNumber shown = Shown(*value, u95, axis.is_shift() ? 1 : 2, decimal);
+  const std::string unit = axis.is_shift() ? " mm" : axis.symbol();
   const bool in = size + u95 <= tolerance, unsure = !in && size <= tolerance;
-  const std::string way = !moves
+  const std::string way = result.verdict != "move"
                               ? std::string(unsure ? words.terms.scan_again : words.terms.no_move)
                           : shown.is_zero ? std::string(words.no_change)
                           : size <= u95   ? std::string(words.terms.insignificant)
-                                          : Said(direction, words);
+                                          : Said(result.words[i], words);
   // A narrow window has no heads above the numbers: what a bare "±" means stands beside it.
   return fmt::format(
       "<tr><th scope=\"row\">{}</th><td>{}{}</td><td data-label=\"{}\">{}</td>"
@@ -145,13 +135,8 @@ std::string NumbersTable(const ResultSummary& result, const std::array<std::stri
                          const Tolerance& tolerance, bool review, const ResultWords& words) {
   if (!result.correction || result.verdict == "no_answer") return "";
   std::string rows, heads;
-  std::size_t i = 0;
-  for (const NumberRow& row : Rows(*result.correction, result.u95.value_or(SixNumbers{}))) {
-    rows += NumberCells(row, EscapeHtml(names[i]), result.words[i],
-                        i < 3 ? tolerance.shift_mm : tolerance.rotation_deg,
-                        result.verdict == "move", words);
-    ++i;
-  }
+  for (std::size_t i = 0; i < names.size(); ++i)
+    rows += NumberCells(i, result, EscapeHtml(names[i]), tolerance, words);
   for (const std::string_view head : words.heads)
     heads += fmt::format("<th scope=\"col\">{}</th>", head);
   return fmt::format(

@@ -5,12 +5,13 @@
 #include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
 #include "web/security/password_rules.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb::web {
 
 void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
   Fields fields(request.body);
-  const std::string reason = fields.Text("reason", 3, 200);
+  const std::string reason = fields.Text("reason", kMinReason, kMaxReason);
   std::string password = fields.Text("password", 1, kMaxPassword);
   fields.Finish();
   Signed(request, std::move(password), respond,

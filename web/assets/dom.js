@@ -1,4 +1,5 @@
 // Elements without markup in strings: what comes from outside is always text.
+import { kPassword } from './limits.js';
 import { S } from './strings.js';
 
 const kSvg = 'http://www.w3.org/2000/svg';
@@ -118,7 +119,7 @@ async function work(button, task) {
 
 /// For what is signed: the person types the own password again.
 export const signingPassword = () => h('input', {
-  type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
+  type: 'password', required: true, autocomplete: 'current-password', ...kPassword,
 });
 
 export function action(label, task, properties) {

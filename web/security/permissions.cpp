@@ -2,8 +2,6 @@
 
 #include <array>
 
-#include "web/service/names.hpp"
-
 namespace plumb::web {
 namespace {
 
@@ -31,6 +29,7 @@ constexpr std::array kTable = {
     Row{Permission::kUpdate, "update", false, false, true, false},
     Row{Permission::kDiagnostics, "diagnostics", false, false, true, false},
 };
+static_assert(kTable.size() == static_cast<std::size_t>(Permission::kDiagnostics) + 1);
 
 }  // namespace
 
@@ -64,16 +63,6 @@ std::string_view Name(Permission permission) {
     if (row.permission == permission) return row.name;
   }
   return {};
-}
-
-std::string_view Name(Role role) { return kRoleNames[static_cast<std::size_t>(role)]; }
-
-std::optional<Role> ParseRole(std::string_view name) {
-  // A display is paired and has no account.
-  for (std::size_t i = 0; i < static_cast<std::size_t>(Role::kDisplay); ++i) {
-    if (kRoleNames[i] == name) return static_cast<Role>(i);
-  }
-  return std::nullopt;
 }
 
 }  // namespace plumb::web

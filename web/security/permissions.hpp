@@ -1,7 +1,6 @@
 // Permissions of the roles.
 #pragma once
 
-#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -31,7 +30,5 @@ enum class Permission {
 [[nodiscard]] bool May(Role role, Permission permission);
 [[nodiscard]] std::vector<Permission> PermissionsOf(Role role);
 [[nodiscard]] std::string_view Name(Permission permission);
-[[nodiscard]] std::string_view Name(Role role);
-[[nodiscard]] std::optional<Role> ParseRole(std::string_view name);
 
 }  // namespace plumb::web

@@ -1,8 +1,10 @@
-// Limits of settings and plans, used by requests, the appliance and the store.
+// Limits of settings, plans and texts, used by requests, the appliance and the store. The page has
+// its own copy in web/assets/limits.js; a test compares them.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <string_view>
 
 namespace plumb::web {
@@ -14,9 +16,23 @@ struct Range {
   [[nodiscard]] constexpr bool Holds(double value) const { return value >= least && value <= most; }
 };
 
-inline constexpr Range kShiftTolerance_mm{0.1, 50}, kRotationTolerance_deg{0.1, 20};
-inline constexpr Range kAutoStop_s{1, 120}, kScanLimit_s{5, 600};
-inline constexpr Range kRetention_days{0, 36500}, kIdleLogout_min{1, 240};
+/// What a person may enter, and what is believed when it is read from the store. The latter is
+/// wider, so that a version that accepts less still reads what was entered before, above all an
+/// approved plan. A value beyond it was not entered: the database was changed or damaged.
+struct Limits {
+  Range entered, stored;
+};
+
+inline constexpr Limits kShiftTolerance_mm{.entered = {0.1, 50}, .stored = {0.001, 1000}};
+inline constexpr Limits kRotationTolerance_deg{.entered = {0.1, 20}, .stored = {0.001, 180}};
+inline constexpr Limits kAutoStop_s{.entered = {1, 120}, .stored = {0.1, 3600}};
+inline constexpr Limits kScanLimit_s{.entered = {5, 600}, .stored = {0.1, 3600}};
+inline constexpr Limits kRetention_days{.entered = {0, 36500}, .stored = {0, 1'000'000}};
+inline constexpr Limits kIdleLogout_min{.entered = {1, 240}, .stored = {1, 100'000}};
+
+/// Lengths of texts in bytes. A name is that of an account, a display, or a patient (its code).
+inline constexpr std::size_t kMaxName = 32, kMaxSite = 64, kMaxNote = 500;
+inline constexpr std::size_t kMinReason = 3, kMaxReason = 200;
 
 /// Head or feet first, supine or prone.
 inline constexpr std::array<std::string_view, 4> kPostures = {"HFS", "HFP", "FFS", "FFP"};

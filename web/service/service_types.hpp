@@ -11,13 +11,24 @@
 #include <string>
 #include <vector>
 
+#include "web/service/reported_numbers.hpp"
+
 namespace plumb::web {
 
 using WallClock = std::chrono::system_clock;
 
+// Names: names.hpp.
 enum class ApplianceState { kNoSensor, kReady, kScanning, kWorking, kResult, kFault };
-enum class FaultKind { kNone, kSensor, kScan, kStorage };
-enum class Guidance {
+/// The reason why the appliance cannot scan, or will not be able to once the running scan has
+/// ended.
+enum class FaultKind {
+  kNone,
+  kSensor,   ///< The sensor is attached and does not work; ends when it works or is unplugged.
+  kScan,     ///< The last scan failed; ends when somebody acknowledges it by a press.
+  kStorage,  ///< Nothing can be stored; ends when the storage works again.
+};
+/// What the person who sweeps should do.
+enum class SweepAdvice {
   kNone,
   kSlower,
   kCloser,
@@ -59,7 +70,7 @@ struct LiveScan {
   /// unknown.
   std::optional<double> coverage;
   double without_new_surface_s = 0.0;  ///< Time since new surface was last seen.
-  Guidance guidance = Guidance::kNone;
+  SweepAdvice guidance = SweepAdvice::kNone;
   std::int64_t keyframes = 0;
   std::int64_t frames = 0;
   std::int64_t frames_tracked = 0;
@@ -75,15 +86,6 @@ struct StorageStatus {
   std::vector<std::string> warnings = {};  ///< Sentences for people: nearly full, no backup.
 };
 
-struct SixNumbers {
-  std::optional<double> vertical_mm;  ///< Shifts are not set with couch-fixed markers.
-  std::optional<double> longitudinal_mm;
-  std::optional<double> lateral_mm;
-  double pitch_deg = 0.0;
-  double roll_deg = 0.0;
-  double yaw_deg = 0.0;
-};
-
 struct Tolerance {
   double shift_mm = 3.0;
   double rotation_deg = 1.0;
@@ -94,10 +96,9 @@ struct ResultSummary {
   std::string verdict;  ///< "in_tolerance", "unsure", "move" or "no_answer".
   std::vector<std::string> reasons;
   /// The motion to APPLY. With "no_answer" it is for analysis only, never to be shown as advice.
-  std::optional<SixNumbers> correction;
-  std::optional<SixNumbers> u95;
-  /// Directions of the correction: vertical, longitudinal, lateral, pitch, roll, yaw; empty if
-  /// unknown.
+  std::optional<ReportedNumbers> correction;
+  std::optional<ReportedNumbers> u95;
+  /// Directions of the correction, in the order of kNumberAxes; empty if unknown.
   std::array<std::string, 6> words;
   std::vector<std::string> body_now;    ///< "left shoulder 9 mm high", before any correction.
   std::vector<std::string> body_after;  ///< The same after the correction: the posture.
@@ -150,8 +151,6 @@ struct Patient {
   bool archived = false;  ///< Not in the list and not to be opened; nothing is deleted.
 };
 
-inline constexpr std::size_t kMaxSite = 64, kMaxNote = 500;  // bytes
-
 /// What people write about a patient's course.
 struct CourseNotes {
   std::string site, note;
@@ -197,7 +196,7 @@ struct ReferencePlan {
   std::optional<std::array<double, 3>>
       isocentre_m;  ///< Reference marker's frame; not set: centroid of the region.
   Tolerance tolerance;
-  std::string posture = "HFS";  ///< HFS, HFP, FFS, FFP.
+  std::string posture = "HFS";  ///< One of kPostures.
   bool couch_markers = false;   ///< Markers are fixed to the couch: no shifts are calculated.
 };
 
@@ -360,15 +359,16 @@ struct AuditEntry {
   std::optional<AuditSubject> about = {};  ///< Of the subject; nothing: its id is what people know.
 };
 
+/// Within the limits of limits.hpp.
 struct Settings {
-  Tolerance tolerance;           ///< For new references.
-  std::string posture = "HFS";   ///< For new references.
-  bool couch_markers = false;    ///< For new references.
-  double auto_stop_s = 10.0;     ///< Time without new coverage; 1..120.
-  double scan_limit_s = 60.0;    ///< 5..600.
+  Tolerance tolerance;          ///< For new references.
+  std::string posture = "HFS";  ///< For new references.
+  bool couch_markers = false;   ///< For new references.
+  double auto_stop_s = 10.0;    ///< Time without new coverage.
+  double scan_limit_s = 60.0;
   bool keep_recordings = false;  ///< Keep the raw frames of scans, with colour.
   int retention_days = 0;        ///< Older scans are removed; 0: never. References are kept.
-  int idle_logout_min = 15;      ///< 1..240.
+  int idle_logout_min = 15;
 };
 
 struct UpdateStatus {

@@ -1,12 +1,31 @@
-// A change of some of the settings.
+// The settings one by one, and a change of some of them.
 #pragma once
 
 #include <optional>
 #include <string>
 
+#include "web/service/limits.hpp"
 #include "web/service/service_types.hpp"
 
 namespace plumb::web {
+
+/// Calls visit(name, change, value, limits) for each of them, or without limits where it has none.
+/// The names are those of the interface, of the store and of the log.
+/// @param change  SettingsChange.
+/// @param values  Settings.
+template <typename Change, typename Values, typename Visit>
+void ForEachSetting(Change& change, Values& values, const Visit& visit) {
+  visit("shift_tolerance_mm", change.shift_mm, values.tolerance.shift_mm, kShiftTolerance_mm);
+  visit("rotation_tolerance_deg", change.rotation_deg, values.tolerance.rotation_deg,
+        kRotationTolerance_deg);
+  visit("posture", change.posture, values.posture);
+  visit("couch_markers", change.couch_markers, values.couch_markers);
+  visit("auto_stop_s", change.auto_stop_s, values.auto_stop_s, kAutoStop_s);
+  visit("scan_limit_s", change.scan_limit_s, values.scan_limit_s, kScanLimit_s);
+  visit("keep_recordings", change.keep_recordings, values.keep_recordings);
+  visit("retention_days", change.retention_days, values.retention_days, kRetention_days);
+  visit("idle_logout_min", change.idle_logout_min, values.idle_logout_min, kIdleLogout_min);
+}
 
 /// Settings that are not set keep their stored value, so that two people who change different ones
 /// at the same time do not undo each other's change.
@@ -21,7 +40,9 @@ struct SettingsChange {
   SettingsChange() = default;
   /// Changes all of them.
   SettingsChange(const Settings& all) {  // NOLINT(google-explicit-constructor): it is a change, too
-    Pair(*this, all, [](auto& change, const auto& value) { change = value; });
+    ForEachSetting(*this, all, [](const char*, auto& change, const auto& value, const auto&...) {
+      change = value;
+    });
   }
 
   [[nodiscard]] bool is_empty() const { return CountSet() == 0; }
@@ -30,30 +51,33 @@ struct SettingsChange {
     return CountSet() == SettingsChange(Settings{}).CountSet();
   }
   [[nodiscard]] Settings AppliedTo(Settings stored) const {
-    Pair(*this, stored, [](const auto& change, auto& value) {
+    ForEachSetting(*this, stored, [](const char*, const auto& change, auto& value, const auto&...) {
       if (change) value = *change;
     });
     return stored;
   }
 
  private:
-  template <typename Change, typename Values, typename Visit>
-  static void Pair(Change& change, Values&& settings, const Visit& visit) {
-    visit(change.shift_mm, settings.tolerance.shift_mm);
-    visit(change.rotation_deg, settings.tolerance.rotation_deg);
-    visit(change.posture, settings.posture);
-    visit(change.couch_markers, settings.couch_markers);
-    visit(change.auto_stop_s, settings.auto_stop_s);
-    visit(change.scan_limit_s, settings.scan_limit_s);
-    visit(change.keep_recordings, settings.keep_recordings);
-    visit(change.retention_days, settings.retention_days);
-    visit(change.idle_logout_min, settings.idle_logout_min);
-  }
   [[nodiscard]] int CountSet() const {
     int count = 0;
-    Pair(*this, Settings{}, [&](const auto& change, const auto&) { count += change ? 1 : 0; });
+    const Settings any;
+    ForEachSetting(*this, any, [&](const char*, const auto& change, const auto&...) {
+      count += change ? 1 : 0;
+    });
     return count;
   }
 };
+
+/// {"shift_tolerance_mm": 3.0, ...}
+template <typename Json>
+[[nodiscard]] Json SettingsAs(const Settings& settings) {
+  Json json;
+  const SettingsChange none;
+  ForEachSetting(none, settings,
+                 [&](const char* name, const auto&, const auto& value, const auto&...) {
+                   json[name] = value;
+                 });
+  return json;
+}
 
 }  // namespace plumb::web

@@ -80,7 +80,7 @@ class RealRuledAppliance : public RuledAppliance {
     serves.get_future().wait();
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     for (bool ready = false; !ready;) {
-      On([&] { ready = served_->appliance.state().phase == ScanPhase::kReady; });
+      On([&] { ready = served_->appliance.state().phase == web::ApplianceState::kReady; });
       if (std::chrono::steady_clock::now() > end)
         throw std::runtime_error("the sensor does not get ready");
       std::this_thread::yield();

@@ -1,9 +1,11 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
 #include "daemon/config/config.hpp"
 #include "tests/support/message_of.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -90,6 +92,21 @@ TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
               AllOf(HasSubstr(":2"), HasSubstr("0.0.0.0:8080")));
   EXPECT_THAT(complaint("[web]\nhost_names = [1]\n"), HasSubstr(":2"));
   EXPECT_THAT(complaint("[gpio]\n"), HasSubstr("[appliance]"));
+}
+
+TEST(ApplianceConfigTest, ATimeThatReplacesASettingHasTheLimitsOfThatSetting) {
+  const auto parse = [](const char* key, double seconds) {
+    return ParseConfig(fmt::format("[appliance]\n{} = {:.1f}\n", key, seconds), "plumb.toml");
+  };
+  const double least_s = web::kAutoStop_s.entered.least, most_s = web::kAutoStop_s.entered.most;
+  EXPECT_EQ(parse("auto_stop_s", least_s).appliance.auto_stop_s, least_s);
+  EXPECT_EQ(parse("auto_stop_s", most_s).appliance.auto_stop_s, most_s);
+  EXPECT_THROW((void)parse("auto_stop_s", least_s - 0.1), DataError);
+  EXPECT_THROW((void)parse("auto_stop_s", most_s + 0.1), DataError);
+  // Trials need shorter sweeps than a person can make.
+  const double longest_s = web::kScanLimit_s.entered.most;
+  EXPECT_EQ(parse("scan_limit_s", longest_s).appliance.scan_limit_s, longest_s);
+  EXPECT_THROW((void)parse("scan_limit_s", longest_s + 0.1), DataError);
 }
 
 TEST(ApplianceConfigTest, ListenAddresses) {

@@ -117,7 +117,7 @@ class ApplianceTest : public ::testing::Test {
     LetOpen();
     bus_.Plug("A");
     bus_.GiveFrame();
-    ASSERT_TRUE(Becomes([&] { return appliance_->state().phase == ScanPhase::kReady; }));
+    ASSERT_TRUE(Becomes([&] { return appliance_->state().phase == web::ApplianceState::kReady; }));
   }
   /// On the loop's thread.
   void AddPassedCheck(const web::Actor& actor) {
@@ -126,8 +126,8 @@ class ApplianceTest : public ::testing::Test {
         TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
   }
   [[nodiscard]] bool IsRunning() const {
-    const ScanPhase phase = appliance_->state().phase;
-    return phase == ScanPhase::kScanning || phase == ScanPhase::kWorking;
+    const web::ApplianceState phase = appliance_->state().phase;
+    return phase == web::ApplianceState::kScanning || phase == web::ApplianceState::kWorking;
   }
 
   static inline const web::Actor kTester{.user = "tester", .address = ""};

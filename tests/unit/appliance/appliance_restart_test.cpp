@@ -35,10 +35,10 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedUnderAScan) {
     MakeReady();
     On([&] {
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
-      ASSERT_EQ(appliance_->state().phase, ScanPhase::kScanning);
+      ASSERT_EQ(appliance_->state().phase, web::ApplianceState::kScanning);
       EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kConflict);
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
-      ASSERT_EQ(appliance_->state().phase, ScanPhase::kWorking);
+      ASSERT_EQ(appliance_->state().phase, web::ApplianceState::kWorking);
       const web::Change answer = Restarted(*services_);
       EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));

@@ -69,7 +69,7 @@ TEST_F(ApplianceSpaceTest, FourFifthsOfTheDiskAreToldByPageStatusAndLight) {
       EXPECT_TRUE(warns());
       EXPECT_EQ(appliance_->StatusJson()["light"], "ready_disk_nearly_full");
       EXPECT_THAT(appliance_->StatusJson()["warnings"].dump(), HasSubstr("80 % full"));
-      EXPECT_EQ(appliance_->state().phase, ScanPhase::kReady);
+      EXPECT_EQ(appliance_->state().phase, web::ApplianceState::kReady);
       EXPECT_TRUE(appliance_->Health().ok);
     });
     SetUsed(75'999);

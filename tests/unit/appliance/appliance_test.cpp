@@ -55,10 +55,10 @@ TEST_F(ApplianceTest, AWorkerIsNotAliveWhileAResultIsComputedWithoutProgress) {
     MakeReady();
     On([&] {
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
-      EXPECT_EQ(appliance_->state().phase, ScanPhase::kScanning);
+      EXPECT_EQ(appliance_->state().phase, web::ApplianceState::kScanning);
       EXPECT_TRUE(appliance_->WorkersAreAlive()) << "it waits for frames";
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
-      EXPECT_EQ(appliance_->state().phase, ScanPhase::kWorking);
+      EXPECT_EQ(appliance_->state().phase, web::ApplianceState::kWorking);
       EXPECT_FALSE(appliance_->WorkersAreAlive());
     });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
@@ -212,7 +212,7 @@ TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVe
     });
     EXPECT_TRUE(Becomes([&] {
       bus_.GiveFrame();
-      return appliance_->state().phase == ScanPhase::kFault;
+      return appliance_->state().phase == web::ApplianceState::kFault;
     }));
     On([&] {
       EXPECT_THAT(
@@ -442,7 +442,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
       page();  // without a check of the day the scan cannot begin
     });
     expect({"tester scan.start: P-1 0, reference"});
-    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ScanPhase::kFault; }));
+    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == web::ApplianceState::kFault; }));
     On([&] {
       page();
       (void)appliance_->store()->checks.Add(
@@ -455,7 +455,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
     });
     expect({"tester press: , ready", "tester scan.start: P-1 0, reference",
             "tester scan.end: P-1 0, reference", "button cancel: P-1 0, reference"});
-    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ScanPhase::kReady; }));
+    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == web::ApplianceState::kReady; }));
     On([&] { button.press(ButtonPress::kLong); });
     expect({"button session.close: P-1 0, "});
   });

@@ -21,7 +21,7 @@ namespace {
 using ::testing::ElementsAre;
 using testing::FakeBus;
 using ::testing::HasSubstr;
-using Kind = ScanOutcome::Kind;
+using Kind = EndedScan::Kind;
 
 class ScanSessionTest : public ::testing::Test {
  protected:
@@ -29,10 +29,10 @@ class ScanSessionTest : public ::testing::Test {
     job_.info = FakeBus::Info();
     job_.stop_after_s = 1000;
     callbacks_.begin = [this] { return folder_.path(); };
-    callbacks_.save = [this](const ScanOutcome& outcome) { saved_.push_back(outcome.kind); };
+    callbacks_.save = [this](const EndedScan& outcome) { saved_.push_back(outcome.kind); };
     callbacks_.update = [](const ScanUpdate&) {};
     callbacks_.sweep_complete = [this] { ++num_complete_; };
-    callbacks_.ended = [this](const ScanOutcome& outcome) {
+    callbacks_.ended = [this](const EndedScan& outcome) {
       const std::lock_guard lock(mutex_);
       outcome_ = outcome;
       changed_.notify_all();
@@ -54,12 +54,12 @@ class ScanSessionTest : public ::testing::Test {
       Push(1);
     }
   }
-  ScanOutcome WaitForEnd() {
+  EndedScan WaitForEnd() {
     std::unique_lock lock(mutex_);
     EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(60), [&] {
       return outcome_.has_value();
     })) << "the scan did not end";
-    return outcome_.value_or(ScanOutcome{});
+    return outcome_.value_or(EndedScan{});
   }
 
   testing::TempFolder folder_;
@@ -70,7 +70,7 @@ class ScanSessionTest : public ::testing::Test {
   int next_ = 0;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<ScanOutcome> outcome_;
+  std::optional<EndedScan> outcome_;
   std::unique_ptr<ScanSession> session_;
 };
 
@@ -78,7 +78,7 @@ TEST_F(ScanSessionTest, ClosingTheFeedEndsTheSweepWithEveryFrameThatWaited) {
   Start();
   Push(12);
   session_->feed()->Close();
-  const ScanOutcome outcome = WaitForEnd();
+  const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason;
   EXPECT_EQ(outcome.frames, 12);
   EXPECT_EQ(outcome.frames_dropped, 0);
@@ -97,7 +97,7 @@ TEST_F(ScanSessionTest, WhatIsKnownOfTheSensorReachesTheSceneAndAScanWithoutMark
     Start();
     Push(12);
     session_->feed()->Close();
-    const ScanOutcome outcome = WaitForEnd();
+    const EndedScan outcome = WaitForEnd();
     EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason;
     EXPECT_THAT(outcome.why_not_learned, HasSubstr("0 markers"));
     const Scene scene = ReadScene(folder_ / "scene");
@@ -122,7 +122,7 @@ TEST_F(ScanSessionTest, FramesThatTrackingIsTooLateForAreDroppedAndCounted) {
   Push(10);
   gate.unlock();
   session_->feed()->Close();
-  const ScanOutcome outcome = WaitForEnd();
+  const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.frames, 2);
   EXPECT_EQ(outcome.frames_dropped, 8);
 }
@@ -146,7 +146,7 @@ TEST_F(ScanSessionTest, DestroyedItCancelsAndWaits) {
 TEST_F(ScanSessionTest, NoFramesAreNoSceneWithAReason) {
   Start();
   session_->feed()->Close();
-  const ScanOutcome outcome = WaitForEnd();
+  const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kNoScene);
   EXPECT_NE(outcome.reason, "");
 }
@@ -156,7 +156,7 @@ TEST_F(ScanSessionTest, AReferenceWithoutItsMarkerIsNoneAndSaysWhatToDo) {
   Start();
   Push(12);
   session_->feed()->Close();
-  const ScanOutcome outcome = WaitForEnd();
+  const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kNoScene);
   EXPECT_THAT(outcome.reason, HasSubstr("reference marker"));
 }
@@ -170,14 +170,14 @@ TEST_F(ScanSessionTest, AFrameOfTheWrongSizeEndsTheScanAndNotTheProcess) {
 }
 
 TEST_F(ScanSessionTest, AStoreThatRefusesFailsTheScanAndIsToldOfTheFailure) {
-  callbacks_.save = [this](const ScanOutcome& outcome) {
+  callbacks_.save = [this](const EndedScan& outcome) {
     saved_.push_back(outcome.kind);
     if (outcome.kind == Kind::kDone) throw IoError("the disk is full");
   };
   Start();
   Push(12);
   session_->feed()->Close();
-  const ScanOutcome outcome = WaitForEnd();
+  const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kFailed);
   EXPECT_EQ(outcome.reason, "the disk is full");
   EXPECT_THAT(saved_, ElementsAre(Kind::kDone, Kind::kFailed));
@@ -194,7 +194,7 @@ TEST_F(ScanSessionTest, AReferenceThatCannotBeReadEndsTheSweepAsAFault) {
   job_.reference_scene = folder_ / "nowhere";
   Start();
   PushUntilTheEnd();
-  const ScanOutcome outcome = WaitForEnd();
+  const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kFailed) << "another sweep would not help";
   EXPECT_THAT(outcome.reason, ::testing::AllOf(HasSubstr("nowhere"), HasSubstr("backup")));
   EXPECT_THAT(saved_, ElementsAre(Kind::kFailed));
@@ -207,7 +207,7 @@ TEST_F(ScanSessionTest, AReferenceThatIsNotWhatWasStoredGivesNoVerdict) {
   };
   Start();
   PushUntilTheEnd();
-  const ScanOutcome outcome = WaitForEnd();
+  const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kFailed);
   EXPECT_FALSE(outcome.verdict);
   EXPECT_THAT(outcome.reason, ::testing::AllOf(HasSubstr("scene/cloud.ply has been changed"),

@@ -13,7 +13,9 @@ namespace {
 using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
-using enum ScanPhase;
+using web::ApplianceState;
+using web::FaultKind;
+using enum ApplianceState;
 using E = ScanEvent;
 using A = ScanAction;
 
@@ -63,7 +65,7 @@ void ForEveryStateAndEvent(const Check& check) {
 
 TEST(ScanStateTest, ReachesAllSixStatesAndOnlyConsistentOnes) {
   const std::vector<ScanState> states = ReachableStates();
-  for (const ScanPhase phase : {kNoSensor, kReady, kScanning, kWorking, kResult, kFault}) {
+  for (const ApplianceState phase : {kNoSensor, kReady, kScanning, kWorking, kResult, kFault}) {
     EXPECT_TRUE(std::any_of(states.begin(), states.end(), [&](const ScanState& s) {
       return s.phase == phase;
     })) << Name(phase);

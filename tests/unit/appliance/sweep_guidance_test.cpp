@@ -8,6 +8,8 @@
 namespace plumb {
 namespace {
 
+using web::SweepAdvice;
+
 constexpr Intrinsics kCamera{
     .width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 159.5, .cy = 119.5};
 constexpr double kFrame_s = 1.0 / 30;
@@ -72,8 +74,8 @@ TEST(SweepGuidanceTest, LostTrackingIsToldAfterAMomentAndEndsWithTheNextPose) {
   TrackingReport lost = SeenFrom(0, 0.9);
   lost.tracked = false;
   EXPECT_EQ(guide.Add(TableAt(0.9, 1.1), lost).advice, SweepAdvice::kNone);
-  EXPECT_EQ(guide.Add(TableAt(0.9, 1.5), lost).advice, SweepAdvice::kLost);
-  EXPECT_NE(guide.Add(TableAt(0.9, 1.6), SeenFrom(0.25, 0.9)).advice, SweepAdvice::kLost);
+  EXPECT_EQ(guide.Add(TableAt(0.9, 1.5), lost).advice, SweepAdvice::kTrackingLost);
+  EXPECT_NE(guide.Add(TableAt(0.9, 1.6), SeenFrom(0.25, 0.9)).advice, SweepAdvice::kTrackingLost);
 }
 
 TEST(SweepGuidanceTest, ASweepThatSeesNoMarkersIsToldAndEndsWithTheNextMarker) {
@@ -88,7 +90,7 @@ TEST(SweepGuidanceTest, ASweepThatSeesNoMarkersIsToldAndEndsWithTheNextMarker) {
   EXPECT_EQ(guide.Add(TableAt(0.9, 8.1), none).advice, SweepAdvice::kNone);
   EXPECT_EQ(guide.Add(TableAt(0.9, 8.3), none).advice, SweepAdvice::kNoMarkers);
   none.tracked = false;
-  EXPECT_EQ(guide.Add(TableAt(0.9, 9.0), none).advice, SweepAdvice::kLost)
+  EXPECT_EQ(guide.Add(TableAt(0.9, 9.0), none).advice, SweepAdvice::kTrackingLost)
       << "the way back comes first";
 }
 

@@ -1,13 +1,20 @@
-// web/openapi.yaml against the server's own table.
+// web/openapi.yaml and the page's own limits against the server's.
 #include <gmock/gmock.h>
 
 #include <fstream>
+#include <iterator>
+#include <regex>
 #include <set>
 
 #include "tests/unit/web/web_fixture.hpp"
+#include "web/security/password_rules.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb::test {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 /// "GET /path permission" of every operation. The file is parsed by its indentation
 /// alone: paths by two, methods by four, the rest deeper.
@@ -38,6 +45,60 @@ TEST_F(DocumentationTest, OpenApiListsExactlyWhatTheServerAnswers) {
   Start();
   const std::vector<std::string> names = server_->RouteNames();
   EXPECT_EQ(DocumentedOperations(), std::set<std::string>(names.begin(), names.end()));
+}
+
+std::string TextOf(const std::string& file) {
+  std::ifstream in(PLUMB_SOURCE_DIR + file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// The numbers that a file states as "NAME: {..., KEY: number, ...}" or "NAME = {...}".
+std::set<double> Stated(const std::string& text, const std::string& name, const std::string& key) {
+  const std::regex place("\\b" + name + "(: | = )\\{[^}]*\\b" + key + ": ([0-9.]+)");
+  std::set<double> numbers;
+  for (std::sregex_iterator at(text.begin(), text.end(), place), end; at != end; ++at)
+    numbers.insert(std::stod((*at)[2]));
+  return numbers;
+}
+
+TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
+  const std::string page = TextOf("/web/assets/limits.js"), api = TextOf("/web/openapi.yaml");
+  for (const auto& [name, limits] : {std::pair{"shift_tolerance_mm", web::kShiftTolerance_mm},
+                                     {"rotation_tolerance_deg", web::kRotationTolerance_deg},
+                                     {"auto_stop_s", web::kAutoStop_s},
+                                     {"scan_limit_s", web::kScanLimit_s},
+                                     {"retention_days", web::kRetention_days},
+                                     {"idle_logout_min", web::kIdleLogout_min}}) {
+    const auto [least, most] = limits.entered;
+    EXPECT_THAT(Stated(page, name, "min"), ElementsAre(least)) << name;
+    EXPECT_THAT(Stated(page, name, "max"), ElementsAre(most)) << name;
+    EXPECT_THAT(Stated(api, name, "minimum"), ElementsAre(least)) << name;
+    EXPECT_THAT(Stated(api, name, "maximum"), ElementsAre(most)) << name;
+    EXPECT_TRUE(limits.stored.Holds(least) && limits.stored.Holds(most)) << name;
+  }
+  for (const auto& [of_page, of_api, most] : {std::tuple{"kName", "name", web::kMaxName},
+                                              {"kSite", "site", web::kMaxSite},
+                                              {"kNote", "note", web::kMaxNote},
+                                              {"kReason", "reason", web::kMaxReason},
+                                              {"kPassword", "password", web::kMaxPassword},
+                                              {"kNewPassword", "password", web::kMaxPassword}}) {
+    EXPECT_THAT(Stated(page, of_page, "maxlength"), ElementsAre(most)) << of_page;
+    EXPECT_THAT(Stated(api, of_api, "maxLength"), ElementsAre(most)) << of_api;
+  }
+  EXPECT_THAT(Stated(page, "kReason", "minlength"), ElementsAre(web::kMinReason));
+  EXPECT_THAT(Stated(api, "reason", "minLength"), ElementsAre(web::kMinReason));
+  EXPECT_THAT(Stated(page, "kNewPassword", "minlength"), ElementsAre(web::kMinPassword));
+  EXPECT_THAT(Stated(api, "password", "minLength"), ElementsAre(web::kMinPassword));
+}
+
+TEST(LimitsTest, ThePageOffersThePosturesOfTheServer) {
+  const std::string page = TextOf("/web/assets/strings/en.js");
+  std::string listed;
+  for (const std::string_view posture : web::kPostures) {
+    EXPECT_THAT(page, HasSubstr(std::string(posture) + ": '"));
+    listed += (listed.empty() ? "" : ", ") + std::string(posture);
+  }
+  EXPECT_THAT(TextOf("/web/openapi.yaml"), HasSubstr("posture: {type: string, enum: [" + listed));
 }
 
 }  // namespace

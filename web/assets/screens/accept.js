@@ -1,6 +1,7 @@
 // What users do with a result: scan again, accept it, make it a reference, download it.
 import { fileUrl, live, may, post } from '../api.js';
 import { action, clear, done, field, form, h, signedTime, signingPassword } from '../dom.js';
+import { kReason } from '../limits.js';
 import { S } from '../strings.js';
 import { closeSession } from '../treatment.js';
 import { acceptanceMark } from './common.js';
@@ -22,7 +23,7 @@ function outsideForm(scan, reload) {
   const text = S.result;
   const isUnsure = scan.result.verdict === 'unsure';
   const label = isUnsure ? text.acceptUnsure : text.acceptOutside;
-  const reason = h('input', { required: true, minlength: 3, maxlength: 200, autocomplete: 'off' });
+  const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
   const password = signingPassword();
   return h('details', { class: 'accept-outside' }, h('summary', {}, `${label}…`),
     h('p', { class: 'hint' }, text.acceptOutsideHint),
@@ -113,7 +114,7 @@ function nextStep({ scan, draft }) {
 export function actions(data, reload) {
   const text = S.result;
   const { scan, patient } = data;
-  const reason = h('input', { required: true, minlength: 3, maxlength: 200, autocomplete: 'off' });
+  const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
   const accept = acceptance(data, reload);
   const newReference = may('plan') && scan.outcome === 'done' && patient
     && scan.purpose !== 'reference'

@@ -1,5 +1,6 @@
 import { get, loadSession, post, put } from '../api.js';
 import { clear, field, form, h, select } from '../dom.js';
+import { kName, kNewPassword, kPassword } from '../limits.js';
 import { S, translated } from '../strings.js';
 
 const kAskAgain_ms = 5000;
@@ -21,13 +22,13 @@ export async function showFault(main, fault) {
 export function showLogin(main, setupRequired, certificate, done) {
   const text = S.login;
   const name = h('input', {
-    name: 'name', autocomplete: 'username', required: true, maxlength: 32, spellcheck: 'false',
-    autocapitalize: 'none',
+    name: 'name', autocomplete: 'username', required: true, spellcheck: 'false',
+    autocapitalize: 'none', ...kName,
   });
   const password = h('input', {
-    name: 'password', type: 'password', required: true, maxlength: 128,
+    name: 'password', type: 'password', required: true,
     autocomplete: setupRequired ? 'new-password' : 'current-password',
-    minlength: setupRequired ? 10 : undefined,
+    ...(setupRequired ? kNewPassword : kPassword),
   });
   const finish = async () => {
     await loadSession();
@@ -49,7 +50,7 @@ export function showLogin(main, setupRequired, certificate, done) {
   });
   code.addEventListener('input', () => { code.value = code.value.toUpperCase(); });
   const repeat = h('input', {
-    type: 'password', required: true, maxlength: 128, autocomplete: 'new-password',
+    type: 'password', required: true, autocomplete: 'new-password', ...kPassword,
   });
   const retention = select(text.retentions, '0');
   clear(main, h('section', { class: 'login card' }, h('h1', {}, text.setupTitle),
@@ -78,10 +79,10 @@ export function showFirstPassword(main, user, done) {
   const text = S.login;
   const name = h('input', { name: 'name', autocomplete: 'username', readonly: true, value: user });
   const secret = (autocomplete, more) => h('input', {
-    type: 'password', required: true, maxlength: 128, autocomplete, ...more,
+    type: 'password', required: true, autocomplete, ...kPassword, ...more,
   });
   const old = secret('current-password');
-  const fresh = secret('new-password', { minlength: 10 });
+  const fresh = secret('new-password', kNewPassword);
   const repeat = secret('new-password');
   clear(main, h('section', { class: 'login card' }, h('h1', {}, text.firstTitle),
     h('p', {}, text.firstText),

@@ -4,6 +4,7 @@ import {
   action, clear, done, enable, field, form, h, localTime, redraw, say, signedTime, signingPassword,
   table, warn,
 } from '../dom.js';
+import { kName, kNote, kReason, kSite } from '../limits.js';
 import { numbersLine } from '../numbers.js';
 import { S } from '../strings.js';
 import { closeSession, openPatient } from '../treatment.js';
@@ -28,10 +29,10 @@ export async function showPatients(place) {
   const search = h('input', { type: 'search', autocomplete: 'off', spellcheck: 'false' });
   const missed = h('p', { class: 'caution' });
   const code = h('input', {
-    required: true, maxlength: 32, pattern: '[A-Za-z0-9_\\-][A-Za-z0-9._\\-]*', autocomplete: 'off',
-    spellcheck: 'false',
+    required: true, pattern: '[A-Za-z0-9_\\-][A-Za-z0-9._\\-]*', autocomplete: 'off',
+    spellcheck: 'false', ...kName,
   });
-  const site = h('input', { maxlength: 64, autocomplete: 'off' });
+  const site = h('input', { autocomplete: 'off', ...kSite });
   const archived = h('input', { type: 'checkbox' });
   let patients = [];
 
@@ -97,12 +98,12 @@ export async function showPatients(place) {
 /// @return {element, draw}  Call draw() when the connection or the session has changed.
 function openButtons(patient) {
   const text = S.patients;
-  const reason = h('input', { maxlength: 200, autocomplete: 'off' });
+  const reason = h('input', { autocomplete: 'off', maxlength: kReason.maxlength });
   const question = h('div', {});
   const open = (purpose) => async () => {
     // The reason for replacing an approved reference is recorded with the new one.
     const replacesOne = purpose === 'reference' && patient.approved_reference_id;
-    if (replacesOne && reason.value.trim().length < 3) {
+    if (replacesOne && reason.value.trim().length < kReason.minlength) {
       reason.focus();
       throw new Error(text.reasonNeeded);
     }
@@ -155,8 +156,8 @@ function openButtons(patient) {
 /// Site, note and archive: what people say of a course, and whether it is still in the list.
 function aboutPatient(patient, reload) {
   const text = S.patients;
-  const site = h('input', { maxlength: 64, autocomplete: 'off', value: patient.site });
-  const note = h('textarea', { maxlength: 500, rows: 3 });
+  const site = h('input', { autocomplete: 'off', value: patient.site, ...kSite });
+  const note = h('textarea', { rows: 3, ...kNote });
   note.value = patient.note;
   const editable = may('patients');
   return h('section', { class: 'card' }, h('h2', {}, text.about),

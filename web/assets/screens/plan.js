@@ -6,6 +6,7 @@ import {
   signedTime, signingPassword, warn,
 } from '../dom.js';
 import { guardLeaving } from '../leave.js';
+import { kBounds } from '../limits.js';
 import { compassOfPlan, marksNote } from '../map_frame.js';
 import { loadMap } from '../maps.js';
 import { kAxes } from '../numbers.js';
@@ -51,16 +52,16 @@ function isInside(region, [x, y]) {
 /// @param plan  What the fields begin with: what is stored, or what was typed before.
 function controls(reference, model, plan, editable) {
   const text = S.plan;
-  const number = (value, step, properties) => h('input', {
-    type: 'number', step, value: value ?? '', disabled: !editable, inputmode: 'decimal',
+  const number = (value, properties) => h('input', {
+    type: 'number', value: value ?? '', disabled: !editable, inputmode: 'decimal',
     ...properties,
   });
   const bad = h('p', { class: 'caution', id: 'isocentre-bad', role: 'alert' });
-  const axes = ['x', 'y', 'z'].map((axis, i) => number(model.isocentre?.[i], '0.001', {
-    'aria-label': `${text.isocentre} ${axis} (m)`, 'aria-describedby': bad.id,
+  const axes = ['x', 'y', 'z'].map((axis, i) => number(model.isocentre?.[i], {
+    step: '0.001', 'aria-label': `${text.isocentre} ${axis} (m)`, 'aria-describedby': bad.id,
   }));
-  const shift = number(plan.shift_tolerance_mm, '0.1', { min: 0.1, max: 50 });
-  const rotation = number(plan.rotation_tolerance_deg, '0.1', { min: 0.1, max: 20 });
+  const shift = number(plan.shift_tolerance_mm, kBounds.shift_tolerance_mm);
+  const rotation = number(plan.rotation_tolerance_deg, kBounds.rotation_tolerance_deg);
   const posture = select(text.postures, plan.posture, { disabled: !editable });
   const couch = checkbox(text.couch, plan.couch_markers, { disabled: !editable });
   /// The field that makes the isocentre neither three numbers nor none.

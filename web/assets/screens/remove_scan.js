@@ -1,6 +1,7 @@
 // Deleting one scan for good: a reason, the scan's number typed, and what stays said before.
 import { get, may, removeFor } from '../api.js';
 import { clear, done, field, form, h } from '../dom.js';
+import { kReason } from '../limits.js';
 import { S } from '../strings.js';
 
 /// Nothing where this account may not, or there is nothing to delete.
@@ -17,9 +18,7 @@ export function removeScan({ scan, patient }) {
       clear(body, h('p', { class: 'caution' }, text.isReference(made.version)));
       return;
     }
-    const reason = h('input', {
-      required: true, minlength: 3, maxlength: 200, autocomplete: 'off',
-    });
+    const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
     const number = h('input', { required: true, autocomplete: 'off', spellcheck: 'false' });
     clear(body, h('p', {}, text.goes), h('p', { class: 'hint' }, text.stays),
       form({ class: 'form inline' }, async () => {

@@ -1,17 +1,10 @@
 import { get, live, may, postLong, put } from '../api.js';
 import { action, checkbox, clear, done, field, form, h, localTime, select } from '../dom.js';
+import { kBounds } from '../limits.js';
 import { S, translated } from '../strings.js';
 import { certificateCard } from './certificate.js';
 import { profileCard } from './sensor_profile.js';
 
-const kNumbers = {
-  shift_tolerance_mm: [0.1, 50, 0.1],
-  rotation_tolerance_deg: [0.1, 20, 0.1],
-  auto_stop_s: [1, 120, 1],
-  scan_limit_s: [5, 600, 1],
-  retention_days: [0, 36500, 1],
-  idle_logout_min: [1, 240, 1],
-};
 const kFlags = ['couch_markers', 'keep_recordings'];
 
 /// When the last backup was made and how it went, and one more now.
@@ -59,9 +52,9 @@ export async function showSettings(place) {
   const { settings, fault } = await readSettings();
   const editable = may('settings');
   const inputs = {};
-  const numbers = Object.entries(kNumbers).map(([name, [min, max, step]]) => {
+  const numbers = Object.entries(kBounds).map(([name, bounds]) => {
     inputs[name] = h('input', {
-      type: 'number', min, max, step, value: settings[name], required: true, disabled: !editable,
+      type: 'number', ...bounds, value: settings[name], required: true, disabled: !editable,
     });
     return field(text[name], inputs[name]);
   });
@@ -85,7 +78,7 @@ export async function showSettings(place) {
   let stored = settings;
   const entered = () => ({
     posture: posture.value,
-    ...Object.fromEntries(Object.keys(kNumbers).map((name) => [name, Number(inputs[name].value)])),
+    ...Object.fromEntries(Object.keys(kBounds).map((name) => [name, Number(inputs[name].value)])),
     ...Object.fromEntries(kFlags.map((name) => [name, inputs[name].isOn()])),
   });
   /// Sends only what was changed here: somebody else may have changed other settings since they
@@ -96,7 +89,7 @@ export async function showSettings(place) {
     if (changed.length) await put('settings', Object.fromEntries(changed));
     stored = await get('settings').catch(() => ({ ...stored, ...wanted }));
     posture.value = stored.posture;
-    for (const name of Object.keys(kNumbers)) inputs[name].value = stored[name];
+    for (const name of Object.keys(kBounds)) inputs[name].value = stored[name];
     for (const name of kFlags) inputs[name].turn(stored[name]);
     alert?.remove();
     done(S.saved);

@@ -3,11 +3,12 @@ import { currentSession, get, may, post, put, remove } from '../api.js';
 import {
   action, checkbox, clear, done, field, form, h, localTime, select, table, warn,
 } from '../dom.js';
+import { kName, kNewPassword, kPassword } from '../limits.js';
 import { preferences } from '../preferences.js';
 import { S } from '../strings.js';
 
 const password = (properties) => h('input', {
-  type: 'password', autocomplete: 'new-password', maxlength: 128, ...properties,
+  type: 'password', autocomplete: 'new-password', ...kPassword, ...properties,
 });
 const accountRoles = () => Object.fromEntries(
   Object.entries(S.roles).filter(([name]) => name !== 'display'));
@@ -24,7 +25,7 @@ function displays() {
   const code = h('input', {
     required: true, maxlength: 7, autocomplete: 'off', spellcheck: 'false', class: 'code',
   });
-  const name = h('input', { required: true, maxlength: 32, autocomplete: 'off' });
+  const name = h('input', { required: true, autocomplete: 'off', ...kName });
   const list = h('div', {});
   const load = async () => {
     const { displays: paired } = await get('displays');
@@ -50,7 +51,7 @@ function displays() {
 function ownPassword() {
   const text = S.users;
   const old = password({ required: true, autocomplete: 'current-password' });
-  const fresh = password({ required: true, minlength: 10 });
+  const fresh = password({ required: true, ...kNewPassword });
   const change = async () => {
     await post('session/password', { old_password: old.value, password: fresh.value });
     old.value = fresh.value = '';
@@ -65,7 +66,7 @@ function userRow(user, reload) {
   const text = S.users;
   const role = select(accountRoles(), user.role, { 'aria-label': `${text.role}, ${user.name}` });
   const disabled = checkbox(text.disable, user.disabled, {});
-  const fresh = password({ minlength: 10 });
+  const fresh = password(kNewPassword);
   const change = async () => {
     // Only what this person changed: somebody else may have changed the rest since it was read.
     const changes = {};
@@ -90,11 +91,11 @@ export async function showUsers(place) {
   const text = S.users;
   const list = h('div', {});
   const name = h('input', {
-    required: true, maxlength: 32, autocomplete: 'off', spellcheck: 'false',
-    autocapitalize: 'none',
+    required: true, autocomplete: 'off', spellcheck: 'false', autocapitalize: 'none',
+    ...kName,
   });
   const role = select(accountRoles(), 'technician', {});
-  const fresh = password({ required: true, minlength: 10 });
+  const fresh = password({ required: true, ...kNewPassword });
   const load = async () => {
     const { users } = await get('users');
     const heads = [text.name, text.role, text.state, S.patients.added, S.action];
