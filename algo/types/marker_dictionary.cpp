@@ -11,9 +11,7 @@
 #include <fmt/ranges.h>
 
 #include "algo/base/errors.hpp"
-#include "algo/types/apriltag_codes.hpp"
-#include "algo/types/aruco_codes.hpp"
-#include "algo/types/aruco_mip_36h12.hpp"
+#include "algo/types/marker_codes.hpp"
 
 namespace plumb {
 namespace {

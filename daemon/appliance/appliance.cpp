@@ -234,7 +234,7 @@ void Appliance::Audit(const web::Actor& actor, const std::string& action,
     } catch (const std::exception& error) {
       return report(error.what());
     }
-    loop_.Post("audit log written", [this] { NotifyDataChanged(); });
+    loop_.Post("audit log written", [this] { NotifyWeb(web::EventKind::kData); });
   });
   if (!posted) report("the store is busy");
 }

@@ -31,7 +31,7 @@
 #include "drivers/button.hpp"
 #include "drivers/indicator.hpp"
 #include "web/service/appliance_service.hpp"
-#include "web/service/room_calibration_service.hpp"
+#include "web/service/room_services.hpp"
 
 namespace plumb {
 
@@ -206,7 +206,7 @@ class Appliance {
   [[nodiscard]] EventLoop& loop() { return loop_; }
   /// Plan of a new reference, from settings and configuration.
   [[nodiscard]] web::ReferencePlan DefaultPlan();
-  void NotifyDataChanged() { NotifyWeb(web::EventKind::kData); }
+  void NotifyWeb(web::EventKind kind);
 
  private:
   /// The running or last scan.
@@ -317,7 +317,6 @@ class Appliance {
   [[nodiscard]] IndicatorPattern Pattern() const;
   void PublishEvent(const WatchedEvent& event);
   void PublishState();
-  void NotifyWeb(web::EventKind kind);
   [[nodiscard]] std::optional<double> Coverage() const;
   [[nodiscard]] std::string FaultReason() const;
 

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "drivers/files/descriptor.hpp"
 #include "drivers/files/file_io.hpp"
 #include "web/http/listen_socket.hpp"
 #include "web/security/sessions.hpp"
@@ -25,36 +26,21 @@ constexpr std::size_t kMaxBytes = 64 << 10;
 constexpr const char* kKeyFile = "page-key.pem";
 constexpr const char* kDeviceFile = "device.key";
 
-/// Closes a descriptor when it is destroyed.
-struct Descriptor {
-  explicit Descriptor(int opened) : fd(opened) {}
-  ~Descriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  const int fd;
-};
-
 void Sync(const fs::path& path, int flags) {
   const Descriptor opened(::open(path.c_str(), flags | O_CLOEXEC));
-  if (opened.fd < 0 || ::fsync(opened.fd) != 0) throw IoError(DescribeWriteError(path, errno));
+  if (opened.get() < 0 || ::fsync(opened.get()) != 0)
+    throw IoError(DescribeWriteError(path, errno));
 }
 
 void WriteSecret(const fs::path& file, const std::string& contents) {
-  const fs::path hidden = file.parent_path() / ("." + file.filename().string() + ".new");
+  const fs::path hidden = file.parent_path() / fmt::format(".{}.new", file.filename().string());
   ::unlink(hidden.c_str());  // left by an interrupted start
   {
     const Descriptor opened(
         ::open(hidden.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
-    if (opened.fd < 0) throw IoError(DescribeWriteError(hidden, errno));
-    for (std::size_t done = 0; done < contents.size();) {
-      const ssize_t count = ::write(opened.fd, contents.data() + done, contents.size() - done);
-      if (count < 0 && errno == EINTR) continue;
-      if (count <= 0) throw IoError(DescribeWriteError(hidden, errno));
-      done += static_cast<std::size_t>(count);
-    }
-    if (::fchmod(opened.fd, 0600) != 0 || ::fsync(opened.fd) != 0)
+    if (opened.get() < 0) throw IoError(DescribeWriteError(hidden, errno));
+    WriteAll(opened, contents, hidden);
+    if (::fchmod(opened.get(), 0600) != 0 || ::fsync(opened.get()) != 0)
       throw IoError(DescribeWriteError(hidden, errno));
   }
   if (::rename(hidden.c_str(), file.c_str()) != 0) throw IoError(DescribeWriteError(file, errno));

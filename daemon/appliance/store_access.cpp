@@ -53,7 +53,7 @@ void StoreAccess::RunOnStoreThread(web::Done done, std::function<std::string(Sto
         appliance->loop().Post("store changed", [appliance, done, answer, alive] {
           if (!*alive) return;
           done(answer);
-          if (answer.result == ChangeResult::kDone) appliance->NotifyDataChanged();
+          if (answer.result == ChangeResult::kDone) appliance->NotifyWeb(web::EventKind::kData);
         });
       });
   if (!posted) done(Refusal(ChangeResult::kFailed, "the store is busy: try again"));

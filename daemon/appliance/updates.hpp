@@ -11,7 +11,7 @@
 #include "daemon/update/system_restart.hpp"
 #include "daemon/update/updater.hpp"
 #include "daemon/update/usb_sticks.hpp"
-#include "web/service/update_service.hpp"
+#include "web/service/upkeep_services.hpp"
 
 namespace plumb {
 

@@ -1,8 +1,12 @@
-#include "daemon/appliance/web_patients.hpp"
+// The page's services for patients and references.
+#include "daemon/appliance/web_services.hpp"
 
 #include <utility>
 
 #include <fmt/format.h>
+
+#include "daemon/files/scene_folder.hpp"
+#include "daemon/loop/log.hpp"
 
 namespace plumb {
 
@@ -18,102 +22,188 @@ std::string WhyNotOpen(bool is_running, const web::Patient& patient, web::ScanPu
   return {};
 }
 
-}  // namespace
+class WebPatients final : public web::PatientService {
+ public:
+  WebPatients(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
 
-std::vector<web::Patient> WebPatients::Patients() {
-  return store_.Read(&Store::patients, [](PatientStore& patients) { return patients.List(); });
-}
-
-std::optional<web::Patient> WebPatients::FindPatient(const std::string& id) {
-  return store_.Read(&Store::patients, [&](PatientStore& patients) { return patients.Find(id); });
-}
-
-void WebPatients::AddPatient(const web::Actor& actor, const std::string& code,
-                             const std::string& site, web::Done done) {
-  store_.Change(&Store::patients, std::move(done),
-                [=](PatientStore& patients) { return patients.Add(actor, code, site); });
-}
-
-void WebPatients::ChangePatient(const web::Actor& actor, const std::string& id,
-                                const web::CourseNotes& wanted,
-                                const std::optional<web::CourseNotes>& shown, web::Done done) {
-  store_.Change(&Store::patients, std::move(done), [=](PatientStore& patients) {
-    patients.Change(actor, id, wanted.site, wanted.note, shown);
-  });
-}
-
-void WebPatients::ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
-                                 web::Done done) {
-  store_.Change(&Store::patients, std::move(done),
-                [=](PatientStore& patients) { patients.Archive(actor, id, archived); });
-}
-
-void WebPatients::WipePatient(const web::Actor& actor, const std::string& id, web::Done done) {
-  const web::Status status = appliance_.WebStatus();
-  if (status.scan && status.scan->patient_id == id) {
-    return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
+  std::vector<web::Patient> Patients() override {
+    return store_.Read(&Store::patients, [](PatientStore& patients) { return patients.List(); });
   }
-  const bool is_open = appliance_.open_patient() == id;
-  if (is_open) {
+
+  std::optional<web::Patient> FindPatient(const std::string& id) override {
+    return store_.Read(&Store::patients, [&](PatientStore& patients) { return patients.Find(id); });
+  }
+
+  void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site,
+                  web::Done done) override {
+    store_.Change(&Store::patients, std::move(done),
+                  [=](PatientStore& patients) { return patients.Add(actor, code, site); });
+  }
+
+  void ChangePatient(const web::Actor& actor, const std::string& id, const web::CourseNotes& wanted,
+                     const std::optional<web::CourseNotes>& shown, web::Done done) override {
+    store_.Change(&Store::patients, std::move(done), [=](PatientStore& patients) {
+      patients.Change(actor, id, wanted.site, wanted.note, shown);
+    });
+  }
+
+  void ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
+                      web::Done done) override {
+    store_.Change(&Store::patients, std::move(done),
+                  [=](PatientStore& patients) { patients.Archive(actor, id, archived); });
+  }
+
+  void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override {
+    const web::Status status = appliance_.WebStatus();
+    if (status.scan && status.scan->patient_id == id) {
+      return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
+    }
+    const bool is_open = appliance_.open_patient() == id;
+    if (is_open) {
+      if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
+        return done(AnswerOf(why));
+      appliance_.SetWiping(true);
+    }
+    // The session ends once the data is removed. A removal that is refused changes nothing.
+    const web::Done wiped = [this, id, is_open, done = std::move(done)](const web::Change& change) {
+      if (is_open) appliance_.SetWiping(false);
+      if (change.result == ChangeResult::kDone) appliance_.ClosePatient(id);
+      done(change);
+    };
+    store_.Change(&Store::removal, wiped,
+                  [=](StoreRemoval& removal) { removal.WipePatient(actor, id); });
+  }
+
+  void OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose,
+                   const std::string& reason, const std::string& replaces,
+                   web::Done done) override {
+    const std::optional<web::Patient> patient = FindPatient(id);
+    if (!patient) return done(Refusal(ChangeResult::kNotFound, "there is no such patient"));
+    if (purpose == web::ScanPurpose::kDailyCheck) {
+      return done(
+          Refusal(ChangeResult::kInvalid, "a daily check is of no patient: open it as a check"));
+    }
+    if (const std::string why = WhyNotOpen(appliance_.IsRunning(), *patient, purpose); !why.empty())
+      return done(AnswerOf(why));
     if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
       return done(AnswerOf(why));
-    appliance_.SetWiping(true);
+    if (const std::string why = appliance_.WhyBlocked(); !why.empty()) return done(AnswerOf(why));
+    if (purpose == web::ScanPurpose::kReference) {
+      if (const std::string why = appliance_.WhyNoReference(); !why.empty())
+        return done(AnswerOf(why));
+    }
+    const auto open = appliance_.WebStatus().session;
+    if (open && open->patient_id == id && open->purpose == purpose &&
+        purpose == web::ScanPurpose::kFraction) {
+      appliance_.OpenSession(open->id, id, purpose, reason, actor);
+      return done({.result = ChangeResult::kDone, .message = {}, .id = open->id, .file = {}});
+    }
+    if (open && open->patient_id != id && open->id != replaces) {
+      return done(AnswerOf(fmt::format("the session of {} is open (opened by {}): close it first",
+                                       open->patient_code, open->opened_by)));
+    }
+    appliance_.SetOpening(true);
+    const web::Done opened = [this, actor, id, purpose, reason,
+                              done = std::move(done)](const web::Change& change) {
+      appliance_.SetOpening(false);
+      if (change.result == ChangeResult::kDone)
+        appliance_.OpenSession(change.id, id, purpose, reason, actor);
+      done(change);
+    };
+    store_.Change(&Store::treatments, opened,
+                  [=](TreatmentStore& treatments) { return treatments.Open(actor, id, purpose); });
   }
-  // The session ends once the data is removed. A removal that is refused changes nothing.
-  const web::Done wiped = [this, id, is_open, done = std::move(done)](const web::Change& change) {
-    if (is_open) appliance_.SetWiping(false);
-    if (change.result == ChangeResult::kDone) appliance_.ClosePatient(id);
-    done(change);
-  };
-  store_.Change(&Store::removal, wiped,
-                [=](StoreRemoval& removal) { removal.WipePatient(actor, id); });
-}
 
-void WebPatients::OpenPatient(const web::Actor& actor, const std::string& id,
-                              web::ScanPurpose purpose, const std::string& reason,
-                              const std::string& replaces, web::Done done) {
-  const std::optional<web::Patient> patient = FindPatient(id);
-  if (!patient) return done(Refusal(ChangeResult::kNotFound, "there is no such patient"));
-  if (purpose == web::ScanPurpose::kDailyCheck) {
-    return done(
-        Refusal(ChangeResult::kInvalid, "a daily check is of no patient: open it as a check"));
+  void CloseSession(const web::Actor& actor, const std::string& session_id,
+                    web::Done done) override {
+    if (!session_id.empty() && appliance_.session_id() != session_id)
+      return done(AnswerOf("this session is closed already, or another one is open by now"));
+    done(AnswerOf(appliance_.CloseSession(actor)));
   }
-  if (const std::string why = WhyNotOpen(appliance_.IsRunning(), *patient, purpose); !why.empty())
-    return done(AnswerOf(why));
-  if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
-    return done(AnswerOf(why));
-  if (const std::string why = appliance_.WhyBlocked(); !why.empty()) return done(AnswerOf(why));
-  if (purpose == web::ScanPurpose::kReference) {
-    if (const std::string why = appliance_.WhyNoReference(); !why.empty())
+
+ private:
+  Appliance& appliance_;
+  StoreAccess& store_;
+};
+
+class WebReferences final : public web::ReferenceService {
+ public:
+  WebReferences(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
+
+  std::vector<web::Reference> References(const std::string& patient_id) override {
+    return store_.Read(&Store::references,
+                       [&](ReferenceStore& references) { return references.List(patient_id); });
+  }
+
+  std::optional<web::Reference> FindReference(const std::string& id) override {
+    return store_.Read(&Store::references,
+                       [&](ReferenceStore& references) { return references.Find(id); });
+  }
+
+  web::RoomOnMap RoomOfReference(const web::Reference& reference) override {
+    const std::optional<web::Scan> scan = ScanOf(reference.scan_id);
+    if (!scan || scan->folder.empty()) return {};
+    try {
+      const auto ways = appliance_.RoomIn(ReadSceneMarkers(scan->folder / "scene"));
+      if (!ways) return {};
+      return {.gantry_xy = {ways->gantry.x(), ways->gantry.y()},
+              .right_xy = {ways->right.x(), ways->right.y()},
+              .is_known = true};
+    } catch (const std::exception& error) {
+      Log(LogLevel::kNotice,
+          fmt::format("no room for reference {}: {}", reference.id, error.what()));
+      return {};
+    }
+  }
+
+  void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason,
+                    web::Done done) override {
+    const std::optional<web::Scan> scan = ScanOf(scan_id);
+    if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
       return done(AnswerOf(why));
+    store_.Change(&Store::references, std::move(done),
+                  [=, appliance = &appliance_](ReferenceStore& references) {
+                    return references.Add(actor, scan_id, reason, appliance->DefaultPlan());
+                  });
   }
-  const auto open = appliance_.WebStatus().session;
-  if (open && open->patient_id == id && open->purpose == purpose &&
-      purpose == web::ScanPurpose::kFraction) {
-    appliance_.OpenSession(open->id, id, purpose, reason, actor);
-    return done({.result = ChangeResult::kDone, .message = {}, .id = open->id, .file = {}});
+
+  void PlanReference(const web::Actor& actor, const std::string& id, int revision,
+                     const web::ReferencePlan& plan, web::Done done) override {
+    store_.Change(&Store::references, std::move(done), [=](ReferenceStore& references) {
+      const std::string planned = references.Plan(actor, id, revision, plan);
+      return planned == id ? std::string() : planned;  // only a new version was made
+    });
   }
-  if (open && open->patient_id != id && open->id != replaces) {
-    return done(AnswerOf(fmt::format("the session of {} is open (opened by {}): close it first",
-                                     open->patient_code, open->opened_by)));
+
+  void ApproveReference(const web::Actor& actor, const std::string& id, int revision,
+                        const std::string& digest, web::Done done) override {
+    const std::optional<web::Reference> reference = FindReference(id);
+    const std::optional<web::Scan> scan =
+        reference ? ScanOf(reference->scan_id) : std::optional<web::Scan>();
+    if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
+      return done(AnswerOf(why));
+    store_.Change(&Store::references, std::move(done), [=](ReferenceStore& references) {
+      references.Approve(actor, id, revision, digest);
+    });
   }
-  appliance_.SetOpening(true);
-  const web::Done opened = [this, actor, id, purpose, reason,
-                            done = std::move(done)](const web::Change& change) {
-    appliance_.SetOpening(false);
-    if (change.result == ChangeResult::kDone)
-      appliance_.OpenSession(change.id, id, purpose, reason, actor);
-    done(change);
-  };
-  store_.Change(&Store::treatments, opened,
-                [=](TreatmentStore& treatments) { return treatments.Open(actor, id, purpose); });
+
+ private:
+  std::optional<web::Scan> ScanOf(const std::string& scan_id) {
+    return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
+  }
+
+  Appliance& appliance_;
+  StoreAccess& store_;
+};
+
+}  // namespace
+
+std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance, StoreAccess& store) {
+  return std::make_unique<WebPatients>(appliance, store);
 }
 
-void WebPatients::CloseSession(const web::Actor& actor, const std::string& session_id,
-                               web::Done done) {
-  if (!session_id.empty() && appliance_.session_id() != session_id)
-    return done(AnswerOf("this session is closed already, or another one is open by now"));
-  done(AnswerOf(appliance_.CloseSession(actor)));
+std::unique_ptr<web::ReferenceService> MakeWebReferences(Appliance& appliance, StoreAccess& store) {
+  return std::make_unique<WebReferences>(appliance, store);
 }
 
 }  // namespace plumb

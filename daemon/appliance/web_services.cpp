@@ -25,18 +25,18 @@ std::string BootId() {
 WebServices::WebServices(Appliance& appliance, const UpdateConfig& update,
                          std::unique_ptr<SystemRestart> restart)
     : store_(appliance),
-      audit_(store_),
-      button_(appliance),
-      patients_(appliance, store_),
-      references_(appliance, store_),
-      scans_(appliance, store_),
-      checks_(appliance, store_),
-      room_(appliance, store_),
-      profiles_(appliance, store_),
-      displays_(store_),
-      accounts_(store_),
-      settings_(store_),
-      maintenance_(appliance, store_),
+      audit_(MakeWebAuditLog(store_)),
+      button_(MakeWebAppliance(appliance)),
+      patients_(MakeWebPatients(appliance, store_)),
+      references_(MakeWebReferences(appliance, store_)),
+      scans_(MakeWebScans(appliance, store_)),
+      checks_(MakeWebChecks(appliance, store_)),
+      room_(MakeWebRoomCalibration(appliance, store_)),
+      profiles_(MakeWebSensorProfiles(appliance, store_)),
+      displays_(MakeWebDisplays(store_)),
+      accounts_(MakeWebAccounts(store_)),
+      settings_(MakeWebSettings(store_)),
+      maintenance_(MakeWebMaintenance(appliance, store_)),
       updates_(
           appliance, std::move(restart),
           {.config = update,
@@ -46,10 +46,10 @@ WebServices::WebServices(Appliance& appliance, const UpdateConfig& update,
                [this](std::function<void()> work) {
                  return background_.PostToFiles(std::move(work));
                },
-           .changed = [this] { button_.Notify(web::EventKind::kUpdate); },
+           .changed = [&appliance] { appliance.NotifyWeb(web::EventKind::kUpdate); },
            .log = [this](
                       const web::Actor& actor, const char* action, const std::string& subject,
-                      const std::string& detail) { audit_.Log(actor, action, subject, detail); }}),
+                      const std::string& detail) { audit_->Log(actor, action, subject, detail); }}),
       background_(appliance.loop()) {}
 
 }  // namespace plumb

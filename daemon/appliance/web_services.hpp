@@ -6,19 +6,30 @@
 #include "daemon/appliance/background_threads.hpp"
 #include "daemon/appliance/store_access.hpp"
 #include "daemon/appliance/updates.hpp"
-#include "daemon/appliance/web_accounts.hpp"
-#include "daemon/appliance/web_appliance.hpp"
-#include "daemon/appliance/web_checks.hpp"
-#include "daemon/appliance/web_maintenance.hpp"
-#include "daemon/appliance/web_patients.hpp"
-#include "daemon/appliance/web_profiles.hpp"
-#include "daemon/appliance/web_references.hpp"
-#include "daemon/appliance/web_room.hpp"
-#include "daemon/appliance/web_scans.hpp"
-#include "daemon/appliance/web_settings.hpp"
 #include "web/service/services.hpp"
 
 namespace plumb {
+
+// The services; each is implemented in the file of its name. Arguments are borrowed.
+[[nodiscard]] std::unique_ptr<web::AccountService> MakeWebAccounts(StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::ApplianceService> MakeWebAppliance(Appliance& appliance);
+[[nodiscard]] std::unique_ptr<web::AuditLog> MakeWebAuditLog(StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::CheckService> MakeWebChecks(Appliance& appliance,
+                                                               StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::DisplayService> MakeWebDisplays(StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::MaintenanceService> MakeWebMaintenance(Appliance& appliance,
+                                                                          StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance,
+                                                                   StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::ReferenceService> MakeWebReferences(Appliance& appliance,
+                                                                       StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::RoomCalibrationService> MakeWebRoomCalibration(
+    Appliance& appliance, StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::ScanService> MakeWebScans(Appliance& appliance,
+                                                             StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::SensorProfileService> MakeWebSensorProfiles(Appliance& appliance,
+                                                                               StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(StoreAccess& store);
 
 /// Owns the services, one class for each subject. Used on the loop's thread.
 class WebServices {
@@ -27,39 +38,39 @@ class WebServices {
   WebServices(Appliance& appliance, const UpdateConfig& update,
               std::unique_ptr<SystemRestart> restart);
 
-  /// References to members of this object.
+  /// References to what this object owns.
   [[nodiscard]] web::Services services() {
     return {.background = background_,
-            .appliance = button_,
-            .patients = patients_,
-            .references = references_,
-            .scans = scans_,
-            .checks = checks_,
-            .room = room_,
-            .profiles = profiles_,
-            .displays = displays_,
-            .accounts = accounts_,
-            .audit = audit_,
-            .settings = settings_,
+            .appliance = *button_,
+            .patients = *patients_,
+            .references = *references_,
+            .scans = *scans_,
+            .checks = *checks_,
+            .room = *room_,
+            .profiles = *profiles_,
+            .displays = *displays_,
+            .accounts = *accounts_,
+            .audit = *audit_,
+            .settings = *settings_,
             .updates = updates_,
-            .maintenance = maintenance_};
+            .maintenance = *maintenance_};
   }
   [[nodiscard]] Updates& updates() { return updates_; }
 
  private:
   StoreAccess store_;
-  WebAuditLog audit_;
-  WebAppliance button_;
-  WebPatients patients_;
-  WebReferences references_;
-  WebScans scans_;
-  WebChecks checks_;
-  WebRoomCalibration room_;
-  WebSensorProfiles profiles_;
-  WebDisplays displays_;
-  WebAccounts accounts_;
-  WebSettings settings_;
-  WebMaintenance maintenance_;
+  std::unique_ptr<web::AuditLog> audit_;
+  std::unique_ptr<web::ApplianceService> button_;
+  std::unique_ptr<web::PatientService> patients_;
+  std::unique_ptr<web::ReferenceService> references_;
+  std::unique_ptr<web::ScanService> scans_;
+  std::unique_ptr<web::CheckService> checks_;
+  std::unique_ptr<web::RoomCalibrationService> room_;
+  std::unique_ptr<web::SensorProfileService> profiles_;
+  std::unique_ptr<web::DisplayService> displays_;
+  std::unique_ptr<web::AccountService> accounts_;
+  std::unique_ptr<web::SettingsService> settings_;
+  std::unique_ptr<web::MaintenanceService> maintenance_;
   // Declared last, so destroyed first: their callbacks and their work use the members above.
   Updates updates_;
   BackgroundThreads background_;

@@ -1,4 +1,5 @@
-#include "daemon/appliance/web_settings.hpp"
+// The page's service for settings and templates.
+#include "daemon/appliance/web_services.hpp"
 
 #include <utility>
 
@@ -28,35 +29,49 @@ std::string CheckSettings(const web::SettingsChange& change) {
   return wrong;
 }
 
+class WebSettings final : public web::SettingsService {
+ public:
+  explicit WebSettings(StoreAccess& store) : store_(store) {}
+
+  web::Settings GetSettings() override {
+    return store_.Read(&Store::settings, [](SettingsStore& settings) { return settings.Get(); });
+  }
+
+  void ChangeSettings(const web::Actor& actor, const web::SettingsChange& change,
+                      web::Done done) override {
+    if (const std::string wrong = CheckSettings(change); !wrong.empty())
+      return done(Refusal(ChangeResult::kInvalid, wrong));
+    // The store's thread makes one change after the other, so none comes between reading and
+    // writing.
+    store_.Change(&Store::settings, std::move(done), [=](SettingsStore& stored) {
+      stored.Change(actor, change.AppliedTo(change.is_complete() ? web::Settings{} : stored.Get()));
+    });
+  }
+
+  std::vector<web::PlanTemplate> Templates() override {
+    return store_.Read(&Store::templates,
+                       [](TemplateStore& templates) { return templates.List(); });
+  }
+
+  void SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
+                   web::Done done) override {
+    store_.Change(&Store::templates, std::move(done),
+                  [=](TemplateStore& templates) { templates.Set(actor, wanted); });
+  }
+
+  void RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) override {
+    store_.Change(&Store::templates, std::move(done),
+                  [=](TemplateStore& templates) { templates.Remove(actor, site); });
+  }
+
+ private:
+  StoreAccess& store_;
+};
+
 }  // namespace
 
-web::Settings WebSettings::GetSettings() {
-  return store_.Read(&Store::settings, [](SettingsStore& settings) { return settings.Get(); });
-}
-
-void WebSettings::ChangeSettings(const web::Actor& actor, const web::SettingsChange& change,
-                                 web::Done done) {
-  if (const std::string wrong = CheckSettings(change); !wrong.empty())
-    return done(Refusal(ChangeResult::kInvalid, wrong));
-  // The store's thread makes one change after the other, so none comes between reading and writing.
-  store_.Change(&Store::settings, std::move(done), [=](SettingsStore& stored) {
-    stored.Change(actor, change.AppliedTo(change.is_complete() ? web::Settings{} : stored.Get()));
-  });
-}
-
-std::vector<web::PlanTemplate> WebSettings::Templates() {
-  return store_.Read(&Store::templates, [](TemplateStore& templates) { return templates.List(); });
-}
-
-void WebSettings::SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
-                              web::Done done) {
-  store_.Change(&Store::templates, std::move(done),
-                [=](TemplateStore& templates) { templates.Set(actor, wanted); });
-}
-
-void WebSettings::RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) {
-  store_.Change(&Store::templates, std::move(done),
-                [=](TemplateStore& templates) { templates.Remove(actor, site); });
+std::unique_ptr<web::SettingsService> MakeWebSettings(StoreAccess& store) {
+  return std::make_unique<WebSettings>(store);
 }
 
 }  // namespace plumb

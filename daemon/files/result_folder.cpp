@@ -1,5 +1,6 @@
 #include "daemon/files/result_folder.hpp"
 
+#include <bit>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -12,10 +13,11 @@
 #include "algo/base/units.hpp"
 #include "algo/render/error_image.hpp"
 #include "algo/render/overlay_image.hpp"
-#include "daemon/files/deformation_file.hpp"
 #include "daemon/files/map_marks.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
+
+static_assert(std::endian::native == std::endian::little, "PLY is written as the bytes in memory");
 
 namespace plumb {
 namespace {
@@ -219,6 +221,27 @@ void WriteRegion(const fs::path& file, const Comparison& comparison) {
   cv::Mat picture;
   cv::threshold(mask, picture, 0, 255, cv::THRESH_BINARY);
   WritePng(file, picture);
+}
+
+/// A binary PLY file with one vertex per sample: float x y z (reference frame, metres), float dx dy
+/// dz (the displacement that remains after the rigid correction, metres), uchar observed (0: no
+/// correspondence in the current scan).
+void WriteDeformationPly(const fs::path& path, const Deformation& deformation) {
+  std::string bytes = fmt::format(
+      "ply\nformat binary_little_endian 1.0\ncomment metres; d: what the rigid correction "
+      "leaves\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+      "property float dx\nproperty float dy\nproperty float dz\nproperty uchar observed\n"
+      "end_header\n",
+      deformation.points.size());
+  const auto append = [&](const Eigen::Vector3f& v) {
+    bytes.append(reinterpret_cast<const char*>(v.data()), 3 * sizeof(float));
+  };
+  for (std::size_t i = 0; i < deformation.points.size(); ++i) {
+    append(deformation.points[i]);
+    append(deformation.shifts_m[i]);
+    bytes.push_back(static_cast<char>(deformation.observed[i]));
+  }
+  WriteWholeFile(path, std::string_view(bytes));
 }
 
 }  // namespace

@@ -6,11 +6,38 @@
 #include <stop_token>
 #include <string>
 
-#include "daemon/pipeline/keypoint_budget.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
-#include "daemon/pipeline/tracking_load.hpp"
 
 namespace plumb {
+
+/// State when a frame arrives at tracking.
+struct TrackingLoad {
+  double frame_period_s = 0.0;  ///< Time between the sensor's frames; 0 if unknown.
+  double tracking_s = 0.0;      ///< Recent time to track one frame; 0 if unknown.
+  double late_s = 0.0;          ///< Lateness of tracking behind the sensor.
+  /// Since the last change of the stride or of the keypoints, or the start of the sweep.
+  double since_change_s = 0.0;
+};
+
+/// Times in seconds.
+struct KeypointBudgetOptions {
+  /// Lateness at which keypoints are reduced: more than a keyframe or two cause, and less than the
+  /// one at which frames are skipped, which costs more.
+  double reduce_late_s = 0.1;
+  double reduce_load = 0.85;     ///< Below it tracking catches up by itself, as in ThinningOptions.
+  double restore_late_s = 0.07;  ///< Up to here tracking is in time: a few keyframes cause that.
+  /// A frame takes 1.3 times as long with all keypoints (measured), so the load then stays below
+  /// 0.7.
+  double restore_load = 0.5;
+  double restore_hold_s = 2.0;  ///< Delay after a change before all keypoints are used again.
+};
+
+/// Whether frames are tracked with fewer keypoints from now on: this starts when tracking is late
+/// and cannot catch up, and ends when every frame is tracked in time and the load is low. Pure.
+/// @param fewer   Whether they are now.
+/// @param stride  One in this many frames is tracked.
+[[nodiscard]] bool NextFewerKeypoints(bool fewer, int stride, const TrackingLoad& load,
+                                      const KeypointBudgetOptions& options = {});
 
 /// Starting values; times in seconds.
 struct ThinningOptions {

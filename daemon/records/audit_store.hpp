@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/records/store_database.hpp"
-#include "web/service/audit_log.hpp"
+#include "web/service/account_services.hpp"
 
 namespace plumb {
 

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
-#include "daemon/records/markers_json.hpp"
 
 namespace plumb {
 namespace {

@@ -1,13 +1,20 @@
-// Storage format of the daily check.
+// Storage formats of marker maps and of the daily check.
 #pragma once
 
 #include <optional>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
 #include "algo/comparison/marker_check.hpp"
+#include "algo/types/marker.hpp"
 #include "web/service/service_types.hpp"
 
 namespace plumb {
+
+[[nodiscard]] nlohmann::ordered_json MarkersJson(const MarkerMap& markers);
+/// Nothing if it is not such a map, or one of its markers is invalid.
+[[nodiscard]] std::optional<MarkerMap> MarkersIn(const nlohmann::ordered_json& json);
 
 /// A check with the markers that it saw, from which the next baseline may be made.
 struct TakenCheck {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "web/service/factory_reset.hpp"
 #include "web/service/service_types.hpp"
+#include "web/service/upkeep_services.hpp"
 
 namespace plumb {
 

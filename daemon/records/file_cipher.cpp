@@ -19,6 +19,7 @@
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/records/file_copy.hpp"
+#include "drivers/files/descriptor.hpp"
 #include "drivers/files/file_io.hpp"
 
 namespace plumb {
@@ -43,24 +44,17 @@ class Pieces {
  public:
   Pieces(const fs::path& path, std::size_t size)
       : path_(path), fd_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), next_(size) {
-    if (fd_ < 0) Fail(errno);
     struct stat status {};
-    const int error = ::fstat(fd_, &status) != 0 ? errno : S_ISREG(status.st_mode) ? 0 : EINVAL;
-    if (error != 0) {
-      ::close(fd_);
-      Fail(error);
-    }
+    if (fd_.get() < 0 || ::fstat(fd_.get(), &status) != 0) Fail(errno);
+    if (!S_ISREG(status.st_mode)) Fail(EINVAL);
   }
-  ~Pieces() { ::close(fd_); }
-  Pieces(const Pieces&) = delete;
-  Pieces& operator=(const Pieces&) = delete;
 
   /// At most the given number of bytes; fewer only at the end of the file.
   std::vector<std::uint8_t> Exactly(std::size_t count) {
     std::vector<std::uint8_t> bytes(count);
     std::size_t filled = 0;
     while (filled < count) {
-      const ssize_t got = ::read(fd_, bytes.data() + filled, count - filled);
+      const ssize_t got = ::read(fd_.get(), bytes.data() + filled, count - filled);
       if (got < 0 && errno == EINTR) continue;
       if (got < 0) Fail(errno);
       if (got == 0) break;
@@ -84,7 +78,7 @@ class Pieces {
     throw SourceUnreadable(fmt::format("cannot read {}: {}", path_.string(), std::strerror(error)));
   }
   fs::path path_;
-  int fd_;
+  Descriptor fd_;
   std::size_t next_;
   std::vector<std::uint8_t> ahead_;
 };

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/check_stop.hpp"
+#include "drivers/files/descriptor.hpp"
 #include "drivers/files/file_io.hpp"
 
 namespace plumb {
@@ -29,22 +30,6 @@ void MakeFolders(const fs::path& folder) {
 [[noreturn]] void FailToRead(const fs::path& path, int error) {
   throw SourceUnreadable(fmt::format("cannot read {}: {}", path.string(), std::strerror(error)));
 }
-
-/// A read-only descriptor of a regular file.
-class Source {
- public:
-  explicit Source(const fs::path& path)
-      : fd_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {
-    if (fd_ < 0) FailToRead(path, errno);
-  }
-  ~Source() { ::close(fd_); }
-  Source(const Source&) = delete;
-  Source& operator=(const Source&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 fs::path InMadeFolders(const fs::path& file) {
   MakeFolders(file.parent_path());
@@ -74,9 +59,9 @@ FileDigest DigestingWriter::Close() {
 FileDigest Copy(const fs::path& from, const fs::path& to, const std::string& path,
                 const std::stop_token& stop) {
   const fs::path source = from / path;
-  const Source file(source);
+  const Descriptor file(::open(source.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   struct stat status {};
-  if (::fstat(file.get(), &status) != 0) FailToRead(source, errno);
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailToRead(source, errno);
   if (!S_ISREG(status.st_mode)) FailToRead(source, EINVAL);
   DigestingWriter copy(to, path);
   std::vector<std::uint8_t> buffer(std::size_t{256} << 10);
@@ -95,13 +80,12 @@ namespace {
 
 /// False if the file system cannot share them. Other errors are left to the copy to report.
 bool Clone(const fs::path& from, const fs::path& to) {
-  const int source = ::open(from.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-  if (source < 0) return false;
-  const int target = ::open(to.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
-  const bool done = target >= 0 && ::ioctl(target, FICLONE, source) == 0;
-  if (target >= 0) ::close(target);
-  if (target >= 0 && !done) ::unlink(to.c_str());
-  ::close(source);
+  const Descriptor source(::open(from.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  if (source.get() < 0) return false;
+  const Descriptor target(::open(to.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
+  if (target.get() < 0) return false;
+  const bool done = ::ioctl(target.get(), FICLONE, source.get()) == 0;
+  if (!done) ::unlink(to.c_str());
   return done;
 }
 
@@ -135,11 +119,9 @@ void PlaceFile(const fs::path& folder, const std::string& name, const std::strin
 }
 
 void SyncDisk(const fs::path& folder) {
-  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  const int result = fd < 0 ? -1 : ::syncfs(fd);
-  const int error = errno;
-  if (fd >= 0) ::close(fd);
-  if (result != 0) throw IoError(DescribeWriteError(folder, error));
+  const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (opened.get() < 0 || ::syncfs(opened.get()) != 0)
+    throw IoError(DescribeWriteError(folder, errno));
 }
 
 }  // namespace plumb

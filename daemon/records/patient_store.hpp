@@ -1,4 +1,4 @@
-// The patients. StoreRemoval removes them.
+// The patients and their treatment sessions. StoreRemoval removes them.
 #pragma once
 
 #include <optional>
@@ -27,6 +27,21 @@ class PatientStore {
               const std::string& note, const std::optional<web::CourseNotes>& shown = {});
   /// kConflict while a session of the patient is open.
   void Archive(const web::Actor& actor, const std::string& id, bool archived);
+
+ private:
+  StoreDatabase& database_;
+};
+
+/// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds.
+class TreatmentStore {
+ public:
+  explicit TreatmentStore(StoreDatabase& database) : database_(database) {}
+
+  /// Closes the open session, if any, and opens one. Returns the id.
+  std::string Open(const web::Actor& actor, const std::string& patient_id,
+                   web::ScanPurpose purpose);
+  void CloseAll(const web::Actor& actor);
+  [[nodiscard]] std::optional<web::TreatmentSession> Opened();
 
  private:
   StoreDatabase& database_;

@@ -11,7 +11,6 @@
 #include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/records/check_json.hpp"
-#include "daemon/records/markers_json.hpp"
 #include "daemon/records/scan_files.hpp"
 
 namespace plumb {

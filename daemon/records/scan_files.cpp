@@ -15,27 +15,16 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
+#include "drivers/files/descriptor.hpp"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Closes its descriptor.
-class Descriptor {
- public:
-  explicit Descriptor(const fs::path& path)
-      : fd_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY)) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
+Descriptor OpenForReading(const fs::path& path) {
+  return Descriptor(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
+}
 
 [[noreturn]] void FailToRead(const fs::path& path, int error) {
   throw IoError(fmt::format("cannot read {}: {}", path.string(), std::strerror(error)));
@@ -91,7 +80,7 @@ std::string Sha256Of(std::string_view text) {
 
 FileLook LookAt(const fs::path& path) {
   FileLook look;
-  const Descriptor file(path);
+  const Descriptor file = OpenForReading(path);
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) {
     look.error = errno;
@@ -108,7 +97,7 @@ FileLook LookAt(const fs::path& path) {
 FileDigest DigestOfFile(const fs::path& folder, const std::string& path,
                         const std::stop_token& stop) {
   const fs::path full = folder / path;
-  const Descriptor file(full);
+  const Descriptor file = OpenForReading(full);
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailToRead(full, errno);
   if (!S_ISREG(status.st_mode)) FailToRead(full, S_ISDIR(status.st_mode) ? EISDIR : EINVAL);

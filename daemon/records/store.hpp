@@ -10,9 +10,9 @@
 
 #include <sys/types.h>
 
+#include "daemon/records/account_store.hpp"
 #include "daemon/records/audit_store.hpp"
 #include "daemon/records/check_store.hpp"
-#include "daemon/records/display_store.hpp"
 #include "daemon/records/file_integrity.hpp"
 #include "daemon/records/patient_store.hpp"
 #include "daemon/records/reference_store.hpp"
@@ -23,9 +23,6 @@
 #include "daemon/records/store_recovery.hpp"
 #include "daemon/records/store_refusal.hpp"
 #include "daemon/records/store_removal.hpp"
-#include "daemon/records/template_store.hpp"
-#include "daemon/records/treatment_store.hpp"
-#include "daemon/records/user_store.hpp"
 
 namespace plumb {
 

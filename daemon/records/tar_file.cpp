@@ -38,18 +38,6 @@ struct FreeEntry {
   void operator()(archive_entry* entry) const { ::archive_entry_free(entry); }
 };
 
-/// Closes its descriptor.
-struct Opened {
-  explicit Opened(const fs::path& path)
-      : fd(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
-  ~Opened() {
-    if (fd >= 0) ::close(fd);
-  }
-  Opened(const Opened&) = delete;
-  Opened& operator=(const Opened&) = delete;
-  const int fd;
-};
-
 std::string ReasonOf(archive* handle) {
   const char* text = handle != nullptr ? ::archive_error_string(handle) : nullptr;
   return text != nullptr ? text : "the reason is not known";
@@ -143,12 +131,12 @@ void TarWriter::Check(int result) const {
 
 void TarWriter::Add(const fs::path& from, const std::string& path, const std::stop_token& stop) {
   const fs::path source = from / path;
-  const Opened file(source);
+  const Descriptor file(::open(source.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   const auto fail = [&](int error) {
     throw IoError(fmt::format("cannot read {}: {}", source.string(), std::strerror(error)));
   };
   struct stat status {};
-  if (file.fd < 0 || ::fstat(file.fd, &status) != 0) fail(errno);
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) fail(errno);
   const std::unique_ptr<archive_entry, FreeEntry> entry(::archive_entry_new());
   ::archive_entry_set_pathname(entry.get(), path.c_str());
   ::archive_entry_set_filetype(entry.get(), AE_IFREG);
@@ -159,7 +147,7 @@ void TarWriter::Add(const fs::path& from, const std::string& path, const std::st
   std::vector<std::uint8_t> piece(kPiece);
   for (std::int64_t left = status.st_size; left > 0;) {
     CheckStop(stop);
-    const ssize_t count = ::read(file.fd, piece.data(), piece.size());
+    const ssize_t count = ::read(file.get(), piece.data(), piece.size());
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) fail(count < 0 ? errno : EIO);
     const la_ssize_t written =
@@ -178,26 +166,20 @@ void TarWriter::Close() {
 TarReader::TarReader(fs::path file)
     : file_(std::move(file)),
       fd_(::open(file_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY)) {
-  if (fd_ < 0)
+  if (fd_.get() < 0)
     throw DataError(fmt::format("cannot read {}: {}", file_.string(), std::strerror(errno)));
   try {
     ReadNames();
   } catch (const SourceUnreadable& error) {
-    ::close(fd_);
     throw DataError(fmt::format("it is no tar archive, or a damaged one ({})", error.what()));
-  } catch (...) {
-    ::close(fd_);
-    throw;
   }
 }
 
-TarReader::~TarReader() { ::close(fd_); }
-
 void TarReader::ReadNames() {
   struct stat status {};
-  if (::fstat(fd_, &status) != 0 || !S_ISREG(status.st_mode))
+  if (::fstat(fd_.get(), &status) != 0 || !S_ISREG(status.st_mode))
     throw DataError("it is neither a folder nor a regular file");
-  const Reader reader = OpenAt(fd_, 0);
+  const Reader reader = OpenAt(fd_.get(), 0);
   std::size_t names = 0;
   for (archive_entry* entry = nullptr;;) {
     const int result = ::archive_read_next_header(reader.get(), &entry);
@@ -223,7 +205,7 @@ void TarReader::Read(const std::string& path, const Take& take) const {
   const auto fail = [&](const std::string& why) {
     throw SourceUnreadable(fmt::format("{} in it cannot be read: {}", path, why));
   };
-  const Reader reader = OpenAt(fd_, found->second.header);
+  const Reader reader = OpenAt(fd_.get(), found->second.header);
   archive_entry* entry = nullptr;
   if (::archive_read_next_header(reader.get(), &entry) != ARCHIVE_OK) fail(ReasonOf(reader.get()));
   const char* name = ::archive_entry_pathname(entry);

@@ -15,6 +15,7 @@
 #include <string>
 
 #include "daemon/records/scan_files.hpp"
+#include "drivers/files/descriptor.hpp"
 
 struct archive;
 
@@ -60,9 +61,6 @@ class TarReader {
  public:
   /// Reads the names of all files. @throws DataError with the reason why it is refused
   explicit TarReader(std::filesystem::path file);
-  ~TarReader();
-  TarReader(const TarReader&) = delete;
-  TarReader& operator=(const TarReader&) = delete;
 
   /// Position and length of each file, by path.
   struct Entry {
@@ -85,7 +83,7 @@ class TarReader {
   void Read(const std::string& path, const Take& take) const;
 
   std::filesystem::path file_;
-  int fd_ = -1;
+  Descriptor fd_;
   std::map<std::string, Entry> entries_;
 };
 

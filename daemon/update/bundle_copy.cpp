@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "drivers/files/descriptor.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/temporary.hpp"
 
@@ -29,7 +30,8 @@ void CheckRoom(const std::filesystem::path& folder, std::uint64_t bytes) {
                               bytes >> 20, room >> 20));
 }
 
-void CopyAll(int from, int to, std::uint64_t bytes, const std::filesystem::path& path) {
+void CopyAll(int from, const Descriptor& to, std::uint64_t bytes,
+             const std::filesystem::path& path) {
   std::vector<char> buffer(std::size_t{1} << 20);
   for (std::uint64_t at = 0; at < bytes;) {
     const ssize_t count = ::pread(from, buffer.data(), buffer.size(), static_cast<off_t>(at));
@@ -37,13 +39,7 @@ void CopyAll(int from, int to, std::uint64_t bytes, const std::filesystem::path&
     if (count < 0)
       throw IoError(fmt::format("the bundle cannot be read: {}", std::strerror(errno)));
     if (count == 0) throw DataError("the bundle became shorter while it was read; send it again");
-    for (ssize_t written = 0; written < count;) {
-      const ssize_t now =
-          ::write(to, buffer.data() + written, static_cast<std::size_t>(count - written));
-      if (now < 0 && errno == EINTR) continue;
-      if (now < 0) throw IoError(DescribeWriteError(path, errno));
-      written += now;
-    }
+    WriteAll(to, {buffer.data(), static_cast<std::size_t>(count)}, path);
     at += static_cast<std::uint64_t>(count);
   }
 }
@@ -62,15 +58,13 @@ std::filesystem::path CopyBundle(int fd, const std::filesystem::path& folder,
   std::error_code ignored;
   std::filesystem::create_directories(folder, ignored);
   CheckRoom(folder, bytes);
-  const auto [path, copy] = MakeUniqueFile(folder, ".upload-");
+  const auto [path, descriptor] = MakeUniqueFile(folder, ".upload-");
   try {
-    CopyAll(fd, copy, bytes, path);
+    CopyAll(fd, Descriptor(descriptor), bytes, path);
   } catch (...) {
-    ::close(copy);
     ::unlink(path.c_str());
     throw;
   }
-  ::close(copy);
   return path;
 }
 

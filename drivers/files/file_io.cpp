@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
+#include "drivers/files/descriptor.hpp"
 
 namespace plumb {
 namespace {
@@ -18,26 +19,11 @@ constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
 
 std::string ErrorText(int error_number) { return std::generic_category().message(error_number); }
 
-/// Closes a descriptor that was opened for reading.
-class ReadDescriptor {
- public:
-  explicit ReadDescriptor(int descriptor) : descriptor_(descriptor) {}
-  ~ReadDescriptor() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  ReadDescriptor(const ReadDescriptor&) = delete;
-  ReadDescriptor& operator=(const ReadDescriptor&) = delete;
-  [[nodiscard]] int get() const { return descriptor_; }
-
- private:
-  int descriptor_;
-};
-
 /// Reads a regular file into any contiguous container of bytes.
 template <typename Container>
 Container ReadInto(const std::filesystem::path& path, std::size_t max_bytes) {
   // O_NONBLOCK: opening a FIFO must not wait for a writer; regular files ignore it.
-  const ReadDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.get() < 0) {
     const int error = errno;
     if (error == ENOENT || error == ENOTDIR)
@@ -163,13 +149,10 @@ void WriteWholeFile(const std::filesystem::path& path, std::string_view text) {
 }
 
 void SyncToDisk(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) throw IoError(DescribeWriteError(path, errno));
-  const int result = ::fsync(descriptor);
-  const int error = errno;
-  ::close(descriptor);
-  if (result != 0 && error != EINVAL)  // EINVAL: a file system without fsync
-    throw IoError(DescribeWriteError(path, error));
+  const Descriptor opened(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (opened.get() < 0) throw IoError(DescribeWriteError(path, errno));
+  if (::fsync(opened.get()) != 0 && errno != EINVAL)  // EINVAL: a file system without fsync
+    throw IoError(DescribeWriteError(path, errno));
 }
 
 }  // namespace plumb

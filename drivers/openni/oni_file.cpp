@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
+#include "drivers/files/descriptor.hpp"
 #include "drivers/files/file_io.hpp"
 
 namespace plumb {
@@ -41,24 +42,14 @@ std::uint32_t Number(std::span<const std::uint8_t> bytes, std::size_t at) {
          std::uint32_t{bytes[at + 3]} << 24;
 }
 
-class Descriptor {
- public:
-  Descriptor(const std::filesystem::path& file, int flags)
-      : value_(::open(file.c_str(), flags | O_CLOEXEC | O_NONBLOCK)) {}
-  ~Descriptor() {
-    if (value_ >= 0) ::close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return value_; }
-  [[nodiscard]] bool is_regular() const {
-    struct stat status {};
-    return value_ >= 0 && ::fstat(value_, &status) == 0 && S_ISREG(status.st_mode);
-  }
+Descriptor OpenedFor(int flags, const std::filesystem::path& file) {
+  return Descriptor(::open(file.c_str(), flags | O_CLOEXEC | O_NONBLOCK));
+}
 
- private:
-  int value_;
-};
+bool IsRegular(const Descriptor& file) {
+  struct stat status {};
+  return file.get() >= 0 && ::fstat(file.get(), &status) == 0 && S_ISREG(status.st_mode);
+}
 
 bool ReadAt(int descriptor, std::uint64_t offset, std::span<std::uint8_t> bytes) {
   for (std::size_t done = 0; done < bytes.size();) {
@@ -113,12 +104,12 @@ std::optional<OniFileSummary> SummariseOniFile(const ReadBytes& read) {
 }
 
 bool HasOniDataBegun(const std::filesystem::path& file, int num_streams) {
-  const Descriptor descriptor(file, O_RDONLY);
+  const Descriptor descriptor = OpenedFor(O_RDONLY, file);
   std::array<std::uint8_t, kRecordHeader> bytes{};
   int num_begun = 0;
   for (std::uint64_t at = kFileHeader; num_begun < num_streams;
        at += Number(bytes, 12) + std::uint64_t{Number(bytes, 16)}) {
-    if (!descriptor.is_regular() || !ReadAt(descriptor.get(), at, bytes)) return false;
+    if (!IsRegular(descriptor) || !ReadAt(descriptor.get(), at, bytes)) return false;
     const bool is_record = std::equal(kRecordMagic.begin(), kRecordMagic.end(), bytes.begin()) &&
                            Number(bytes, 12) >= kRecordHeader;
     if (!is_record) return false;
@@ -128,17 +119,17 @@ bool HasOniDataBegun(const std::filesystem::path& file, int num_streams) {
 }
 
 std::optional<OniFileSummary> SummariseOniFile(const std::filesystem::path& file) {
-  const Descriptor descriptor(file, O_RDONLY);
-  if (!descriptor.is_regular()) return std::nullopt;
+  const Descriptor descriptor = OpenedFor(O_RDONLY, file);
+  if (!IsRegular(descriptor)) return std::nullopt;
   return SummariseOniFile([&](std::uint64_t offset, std::span<std::uint8_t> bytes) {
     return ReadAt(descriptor.get(), offset, bytes);
   });
 }
 
 bool IsOniFile(const std::filesystem::path& file) {
-  const Descriptor descriptor(file, O_RDONLY);
+  const Descriptor descriptor = OpenedFor(O_RDONLY, file);
   std::array<std::uint8_t, kFileMagic.size()> magic{};
-  return descriptor.is_regular() && ReadAt(descriptor.get(), 0, magic) && magic == kFileMagic;
+  return IsRegular(descriptor) && ReadAt(descriptor.get(), 0, magic) && magic == kFileMagic;
 }
 
 OniFileSummary TrimOniFile(const std::filesystem::path& file) {
@@ -147,7 +138,7 @@ OniFileSummary TrimOniFile(const std::filesystem::path& file) {
     throw IoError(
         fmt::format("recording {} was not finished by OpenNI2 (no END record); is the disk full?",
                     file.string()));
-  const Descriptor descriptor(file, O_WRONLY);
+  const Descriptor descriptor = OpenedFor(O_WRONLY, file);
   struct stat status {};
   if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0)
     throw IoError(DescribeWriteError(file, errno));

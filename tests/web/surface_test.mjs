@@ -24,7 +24,7 @@ rmSync(folder, { recursive: true });
 const failures = [];
 const check = (holds, what) => { if (!holds) failures.push(what); };
 
-// --- Packed surfaces, written from the description in daemon/files/compact_mesh.hpp.
+// --- Packed surfaces, written from the description in daemon/files/compact_map.hpp.
 const kStep = 0.001;
 const kLeast = [-0.5, 0.25, 1];
 function packed(content, { vertices, triangles, magic = 'PLM2' }) {
@@ -86,7 +86,7 @@ for (const [what, bytes, expected] of [
 // What the appliance packs, a browser reads.
 const bound = (file, pattern) => Number(pattern.exec(readFileSync(join(source, file), 'utf8'))?.[1]);
 check(bound('web/assets/packed_mesh.js', /kMost = 2 \*\* (\d+);/) === 25, 'the most parts that are read');
-check(bound('daemon/files/compact_mesh.cpp', /kMostParts = std::size_t\{1\} << (\d+);/) === 25, 'the most parts that are packed');
+check(bound('daemon/files/compact_map.cpp', /kMostParts = std::size_t\{1\} << (\d+);/) === 25, 'the most parts that are packed');
 
 // --- The correction, on matrices of plain numbers: rows of a rotation about an axis, and a shift.
 function rigid(axis, degrees, shift) {

@@ -1,4 +1,5 @@
-# What the method needs. Installed beside PlumbConfig.cmake: programs that link the library find the same.
+# What the method needs. Installed beside PlumbConfig.cmake: programs that link the library find the
+# same.
 include(CMakeFindDependencyMacro)
 find_dependency(Threads)
 find_dependency(Eigen3 3.4 NO_MODULE)
@@ -9,7 +10,8 @@ if(NOT TARGET PkgConfig::cairo)
   pkg_check_modules(cairo REQUIRED IMPORTED_TARGET GLOBAL cairo)
 endif()
 
-# Debian ships OpenCV's CMake package only with the whole of OpenCV (highgui, imgcodecs and their closure): here only the modules used.
+# Debian ships OpenCV's CMake package only with the whole of OpenCV (highgui, imgcodecs and their
+# closure): here only the modules used.
 find_path(PLUMB_OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
 foreach(module core imgproc flann features2d calib3d video)
   if(TARGET opencv_${module})

@@ -19,8 +19,9 @@ target_include_directories(plumb_options INTERFACE
 # -ffp-contract=off: no fused multiply-add behind our back, so results agree between machines.
 target_compile_options(plumb_options INTERFACE
   $<BUILD_INTERFACE:-Wall;-Wextra;-Wshadow;-Wnon-virtual-dtor> -ffp-contract=off)
-# The presets make warnings errors, but for what GCC 12 sees where nothing is: in inlined std::string
-# and std::vector of its own library, and in optional and Eigen values that are set before use.
+# The presets make warnings errors, but for what GCC 12 sees where nothing is: in inlined
+# std::string and std::vector of its own library, and in optional and Eigen values that are set
+# before use.
 if(CMAKE_COMPILE_WARNING_AS_ERROR AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(plumb_options INTERFACE
     $<BUILD_INTERFACE:-Wno-error=restrict;-Wno-error=stringop-overflow;-Wno-error=maybe-uninitialized>)
@@ -51,11 +52,13 @@ foreach(pair address:libasan.so thread:libtsan.so)
   list(GET pair 0 sanitizer)
   if(PLUMB_SANITIZE MATCHES ${sanitizer})
     list(GET pair 1 library)
-    execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=${library} OUTPUT_VARIABLE library OUTPUT_STRIP_TRAILING_WHITESPACE)
+    execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=${library}
+      OUTPUT_VARIABLE library OUTPUT_STRIP_TRAILING_WHITESPACE)
     file(REAL_PATH ${library} PLUMB_SANITIZER_RUNTIME)
   endif()
 endforeach()
 if(PLUMB_SANITIZE)
-  target_compile_options(plumb_options INTERFACE -fsanitize=${PLUMB_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
+  target_compile_options(plumb_options INTERFACE -fsanitize=${PLUMB_SANITIZE}
+    -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
   target_link_options(plumb_options INTERFACE -fsanitize=${PLUMB_SANITIZE})
 endif()

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "web/http/router.hpp"
-#include "web/service/audit_log.hpp"
+#include "web/service/account_services.hpp"
 
 namespace plumb::web {
 

@@ -12,7 +12,7 @@
 #include "web/http/message.hpp"
 #include "web/http/router.hpp"
 #include "web/security/sessions.hpp"
-#include "web/service/display_service.hpp"
+#include "web/service/account_services.hpp"
 
 namespace plumb::web {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "web/service/audit_log.hpp"
+#include "web/service/account_services.hpp"
 
 namespace plumb::web {
 

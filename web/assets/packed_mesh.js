@@ -2,9 +2,9 @@
 import { inflated } from './inflate.js';
 
 const kHead = 28;
-const kMost = 2 ** 25;  // vertices or triangles, as daemon/files/compact_mesh.cpp
+const kMost = 2 ** 25;  // vertices or triangles, as daemon/files/compact_map.cpp
 
-/// A packed surface, as daemon/files/compact_mesh.hpp writes it: {positions, corners}, metres, and
+/// A packed surface, as daemon/files/compact_map.hpp writes it: {positions, corners}, metres, and
 /// three corners for each triangle.
 export async function readMesh(buffer) {
   const head = new DataView(buffer);

@@ -2,20 +2,13 @@
 // the web only calls it.
 #pragma once
 
-#include "web/service/account_service.hpp"
+#include "web/service/account_services.hpp"
 #include "web/service/appliance_service.hpp"
-#include "web/service/audit_log.hpp"
 #include "web/service/background_work.hpp"
-#include "web/service/check_service.hpp"
-#include "web/service/display_service.hpp"
-#include "web/service/maintenance_service.hpp"
-#include "web/service/patient_service.hpp"
-#include "web/service/reference_service.hpp"
-#include "web/service/room_calibration_service.hpp"
+#include "web/service/patient_services.hpp"
+#include "web/service/room_services.hpp"
 #include "web/service/scan_service.hpp"
-#include "web/service/sensor_profile_service.hpp"
-#include "web/service/settings_service.hpp"
-#include "web/service/update_service.hpp"
+#include "web/service/upkeep_services.hpp"
 
 namespace plumb::web {
 

@@ -10,7 +10,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/unit_recovery.hpp"
-#include "daemon/appliance/web_settings.hpp"
+#include "daemon/appliance/web_services.hpp"
 #include "daemon/records/file_cipher.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/support/fake_sensor.hpp"
@@ -220,25 +220,25 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
   {
     Appliance appliance(around.loop, PartsOf(around.config, around.bus));
     StoreAccess access(appliance);
-    EXPECT_EQ(WebSettings(access).GetSettings().idle_logout_min, 7);
+    EXPECT_EQ(MakeWebSettings(access)->GetSettings().idle_logout_min, 7);
   }
   set("{");
   EventLoop another;
   Appliance appliance(another, PartsOf(around.config, around.bus));
   StoreAccess access(appliance);
-  EXPECT_THAT(testing::MessageOf<IoError>([&] { (void)WebSettings(access).GetSettings(); }),
+  EXPECT_THAT(testing::MessageOf<IoError>([&] { (void)MakeWebSettings(access)->GetSettings(); }),
               HasSubstr("what is stored cannot be read: the stored settings cannot be read: "))
       << "the page goes by this sentence";
   // A complete set replaces them.
   web::Settings entered;
   entered.idle_logout_min = 9;
   std::optional<web::Change> changed;
-  WebSettings settings(access);
-  settings.ChangeSettings({.user = "anna", .address = {}}, entered,
-                          [&](const web::Change& change) { changed = change; });
+  const auto settings = MakeWebSettings(access);
+  settings->ChangeSettings({.user = "anna", .address = {}}, entered,
+                           [&](const web::Change& change) { changed = change; });
   EXPECT_TRUE(RunUntil(another, [&] { return changed.has_value(); }));
   EXPECT_EQ(changed->result, web::ChangeResult::kDone);
-  EXPECT_EQ(settings.GetSettings().idle_logout_min, 9);
+  EXPECT_EQ(settings->GetSettings().idle_logout_min, 9);
 }
 
 TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {

@@ -14,7 +14,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "daemon/files/compact_mesh.hpp"
+#include "daemon/files/compact_map.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/records/check_json.hpp"
 #include "drivers/files/file_io.hpp"

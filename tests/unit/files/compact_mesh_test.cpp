@@ -1,5 +1,5 @@
 // Packed surfaces read back as the surfaces they were made of.
-#include "daemon/files/compact_mesh.hpp"
+#include "daemon/files/compact_map.hpp"
 
 #include <zlib.h>
 
@@ -17,7 +17,6 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
-#include "daemon/files/compact_map.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "tests/support/temp_folder.hpp"
 

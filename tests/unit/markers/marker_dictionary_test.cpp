@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdint>
 #include <stdexcept>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -70,6 +72,23 @@ TEST(MarkerDictionaryTest, OwnTableKeepsHammingDistanceTwelveOverAllRotations) {
   EXPECT_EQ(SmallestDistance(dictionary), 12);  // the name says 12
   EXPECT_EQ(SmallestDistance(MarkerDictionary::ByName("DICT_APRILTAG_36h11")),
             11);  // the same function on a table of OpenCV's
+}
+
+TEST(MarkerDictionaryTest, EveryWordIsThatOfTheOrigin) {
+  // FNV-1a over the words of each table, which were compared with their origin one by one.
+  const std::pair<const char*, std::uint64_t> expected[] = {
+      {"DICT_4X4_1000", 0xc6543b55c8dc8c0c},       {"DICT_5X5_1000", 0x666f680bb09d55a9},
+      {"DICT_6X6_1000", 0x5c646b325640988f},       {"DICT_7X7_1000", 0xd2494b75807c5f72},
+      {"DICT_APRILTAG_16h5", 0xfbaaef50ee55f655},  {"DICT_APRILTAG_25h9", 0x2dab9ab5b17886c3},
+      {"DICT_APRILTAG_36h10", 0xdff19f85b9cdc6d1}, {"DICT_APRILTAG_36h11", 0x372ad3d15b787261},
+      {"DICT_ARUCO_MIP_36h12", 0xfb8da4524b4ca76f}};
+  for (const auto& [name, digest] : expected) {
+    const MarkerDictionary dictionary = MarkerDictionary::ByName(name);
+    std::uint64_t found = 0xcbf29ce484222325;
+    for (int id = 0; id < dictionary.size(); ++id)
+      found = (found ^ dictionary.Code(id)) * 0x100000001b3;
+    EXPECT_EQ(found, digest) << name;
+  }
 }
 
 TEST(MarkerDictionaryTest, PatternOfMarkerZeroIsTheKnownPrint) {

@@ -1,5 +1,5 @@
 // When live frames are tracked with fewer keypoints: the decision on both sides of each limit.
-#include "daemon/pipeline/keypoint_budget.hpp"
+#include "daemon/pipeline/frame_thinning.hpp"
 
 #include <gtest/gtest.h>
 

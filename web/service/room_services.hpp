@@ -1,4 +1,5 @@
-// The room's calibration, which defines the axes of the room.
+// The room and its sensor: the daily check of the markers, the room's calibration, which defines
+// the axes of the room, and the profile of the sensor unit.
 #pragma once
 
 #include <optional>
@@ -9,6 +10,18 @@
 #include "web/service/service_types.hpp"
 
 namespace plumb::web {
+
+/// The rules of services.hpp hold.
+class CheckService {
+ public:
+  virtual ~CheckService() = default;
+
+  [[nodiscard]] virtual CheckStatus GetChecks() = 0;  ///< (background)
+  /// The next scan, from any button, is a check of the room's markers. kConflict during a scan.
+  virtual void OpenCheck(const Actor& actor, Done done) = 0;
+  /// Sets this check as the baseline. kRefused for the user who took it.
+  virtual void SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) = 0;
+};
 
 /// One check scan that saw the board.
 struct RoomBoardScan {
@@ -63,6 +76,23 @@ class RoomCalibrationService {
   /// The board as a PDF at true size (background). Nothing if the room's markers are too large for
   /// one; the sentence then says so.
   [[nodiscard]] virtual std::optional<std::string> RoomBoardPdf(std::string& why_not) = 0;
+};
+
+/// The rules of services.hpp hold.
+class SensorProfileService {
+ public:
+  virtual ~SensorProfileService() = default;
+
+  [[nodiscard]] virtual SensorProfiles GetSensorProfiles() = 0;  ///< (background)
+  /// One version as written by `plumb calibrate`; nothing if there is none (background).
+  [[nodiscard]] virtual std::optional<std::string> SensorProfileFile(int version) = 0;
+  /// The unit starts again from its stated calibration.
+  /// @param serial  Serial of the unit that the user has seen; kConflict if another one is
+  ///         connected, and during a scan.
+  virtual void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) = 0;
+  /// Restores an earlier version as the newest. kNotFound if it holds no profile.
+  virtual void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
+                                     Done done) = 0;
 };
 
 }  // namespace plumb::web

@@ -1,4 +1,5 @@
-// System updates, the restart after them, and the reset to the state of delivery.
+// Settings and templates of plans, backups and diagnostics, system updates, the restart after them,
+// and the reset to the state of delivery.
 #pragma once
 
 #include <filesystem>
@@ -6,10 +7,41 @@
 #include <vector>
 
 #include "web/service/change.hpp"
-#include "web/service/factory_reset.hpp"
 #include "web/service/service_types.hpp"
+#include "web/service/settings_change.hpp"
 
 namespace plumb::web {
+
+/// The rules of services.hpp hold.
+class SettingsService {
+ public:
+  virtual ~SettingsService() = default;
+
+  [[nodiscard]] virtual Settings GetSettings() = 0;
+  /// kInvalid names the field. Settings that are not part of the change keep what is stored when it
+  /// is made.
+  virtual void ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) = 0;
+  [[nodiscard]] virtual std::vector<PlanTemplate> Templates() = 0;  ///< By site.
+  /// Replaces the template of that site; at most 100 sites.
+  virtual void SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) = 0;
+  virtual void RemoveTemplate(const Actor& actor, const std::string& site, Done done) = 0;
+};
+
+/// The rules of services.hpp hold.
+class MaintenanceService {
+ public:
+  virtual ~MaintenanceService() = default;
+
+  /// Makes a backup in the configured folder, while scans continue; answers when it is done.
+  /// kInvalid if no folder is configured. The message names files that were not as they were
+  /// stored.
+  virtual void MakeBackup(const Actor& actor, Done done) = 0;
+  /// Returns a file (without patient data) that is downloaded once and then removed.
+  virtual void WriteDiagnostics(const Actor& actor, Done done) = 0;
+};
+
+/// What it keeps.
+enum class FactoryReset { kKeepRecords, kWipe };
 
 /// The rules of services.hpp hold.
 class UpdateService {
