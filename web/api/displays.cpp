@@ -136,9 +136,9 @@ void Displays::Approve(const Request& request, const Respond& respond) {
     if (++wrong_codes_ > kMaxWrongCodes) pairings_.clear();
     return respond(ErrorResponse(404, "no screen shows this code; a code is valid for 10 minutes"));
   }
+  static_assert(kMaxDisplays == 20);  // The page translates the sentence with its number.
   if (service_.Displays().size() >= kMaxDisplays)
-    return respond(ErrorResponse(
-        409, fmt::format("{} screens are paired already: remove one first", kMaxDisplays)));
+    return respond(ErrorResponse(409, "20 screens are paired already: remove one first"));
   const Display display{.id = {},
                         .name = name,
                         .token_hash = found->token_hash,
