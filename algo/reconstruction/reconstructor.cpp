@@ -81,7 +81,7 @@ double EdgeSigma(const std::optional<SweepTone>& tone) {
   return std::hypot(kMeasuredEdgeSigma_px, tone.value().sigma_edge_shift_px);
 }
 
-// States how well the sweep showed each term of the calibration.
+// States how well the sweep determined each term of the calibration.
 // @param information  Of the sweep alone; zero if nothing was accepted.
 void StateSigmas(const CalibrationMatrix& information, const CalibrationMatrix& prior,
                  Scene& scene) {
@@ -181,7 +181,7 @@ struct Reconstructor::Impl {
           fmt::format("none of {} frames shows a marker or a surface: check that the sensor looks "
                       "at the scene from 0.5 to 1.5 m",
                       frames.size()));
-    BoundKeyframes(options.max_keyframes, frames, map);
+    BoundKeyframes(options.max_keyframes, ColorPoses(frames, map), frames, map);
     RefreshVelocities(frames, map);
 
     Scene scene;

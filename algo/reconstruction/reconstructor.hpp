@@ -29,7 +29,8 @@ struct ReconstructorOptions {
   /// several spacings.
   double keyframe_spacing = 1.0;
   /// Largest numbers of keyframes that keep their images and that enter the joint solve. They bound
-  /// the memory of long sweeps; a sweep of 300 frames has about 50.
+  /// the memory of long sweeps; 300 frames have about 50 keyframes at 30 Hz and
+  /// 70 at 15 Hz.
   std::size_t max_images = 96;
   std::size_t max_keyframes = 128;
   /// Serial number of the sensor, for `SensorSensitivity::serial`; empty if unknown.

@@ -26,7 +26,7 @@ std::size_t LeastMissed(const TrackingMap& map, const std::vector<std::size_t>& 
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i + 1 < path.size(); ++i) {
     const std::size_t k = path[i];
-    if (!may_go(k)) continue;
+    if (!may_go(k, path[i - 1])) continue;
     const double apart = Apart(map.keyframes[path[i - 1]], map.keyframes[path[i + 1]]);
     if (apart >= least) continue;
     least = apart;
@@ -49,8 +49,7 @@ void ReleaseImages(MapKeyframe& keyframe) {
   keyframe.data.markers = {};
 }
 
-// Replaces keyframe `gone` by the one against which it was tracked, wherever something refers to
-// it.
+// Replaces references to keyframe `gone` by references to the one against which it was tracked.
 void ReferToPrevious(int gone, std::vector<TrackedFrame>& frames, TrackingMap& map) {
   const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(gone)];
   const int previous = keyframe.previous.value();
@@ -96,10 +95,29 @@ void RemoveOthers(const std::vector<std::size_t>& kept, std::vector<TrackedFrame
     renumber(frame.reference_keyframe);
     renumber(frame.previous_keyframe);
   }
-  // The keyframe that first saw a landmark only tells which way it moves when a loop is closed.
+  // Only loop closure, which has ended, uses the keyframe that first saw a landmark.
   for (Landmark& landmark : map.landmarks)
     landmark.first_keyframe =
         new_index[static_cast<std::size_t>(landmark.first_keyframe)].value_or(0);
+}
+
+// Refers the frames' poses to the keyframes as they are now. Frames were tracked before the
+// keyframes were adjusted, and the differences were spread over sections of the path, some of which
+// are gone.
+void PutOnPath(const std::vector<Pose>& path, const TrackingMap& map,
+               std::vector<TrackedFrame>& frames) {
+  const auto pose = [&](int keyframe) {
+    return map.keyframes[static_cast<std::size_t>(keyframe)].T_world_color;
+  };
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    TrackedFrame& frame = frames[i];
+    if (!frame.tracked) continue;
+    if (!frame.keyframe) {
+      frame.T_reference_color = pose(frame.reference_keyframe.value()).inverse() * path[i];
+    } else if (frame.previous_keyframe) {
+      frame.T_previous_color = pose(*frame.previous_keyframe).inverse() * pose(*frame.keyframe);
+    }
+  }
 }
 
 }  // namespace
@@ -108,7 +126,9 @@ void BoundImages(std::size_t max_images, TrackingMap& map) {
   std::vector<std::size_t> with_images;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k)
     if (!map.keyframes[k].is_bare) with_images.push_back(k);
-  const auto may_go = [&](std::size_t k) { return k + kNewestKept < map.keyframes.size(); };
+  const auto may_go = [&](std::size_t k, std::size_t) {
+    return k + kNewestKept < map.keyframes.size();
+  };
   while (with_images.size() > max_images) {
     const std::size_t k = LeastMissed(map, with_images, may_go);
     if (k == 0) return;  // All others are needed.
@@ -117,13 +137,14 @@ void BoundImages(std::size_t max_images, TrackingMap& map) {
   }
 }
 
-void BoundKeyframes(std::size_t max_keyframes, std::vector<TrackedFrame>& frames,
-                    TrackingMap& map) {
+void BoundKeyframes(std::size_t max_keyframes, const std::vector<Pose>& path,
+                    std::vector<TrackedFrame>& frames, TrackingMap& map) {
   if (map.keyframes.size() <= max_keyframes) return;
   std::vector<std::size_t> kept(map.keyframes.size());
   std::iota(kept.begin(), kept.end(), std::size_t{0});
-  const auto may_go = [&](std::size_t k) {
-    return map.keyframes[k].is_bare && map.keyframes[k].previous;
+  // A keyframe that was tracked against another one than that before it begins a new section.
+  const auto may_go = [&](std::size_t k, std::size_t before) {
+    return map.keyframes[k].is_bare && map.keyframes[k].previous == static_cast<int>(before);
   };
   while (kept.size() > max_keyframes) {
     const std::size_t k = LeastMissed(map, kept, may_go);
@@ -132,6 +153,7 @@ void BoundKeyframes(std::size_t max_keyframes, std::vector<TrackedFrame>& frames
     std::erase(kept, k);
   }
   RemoveOthers(kept, frames, map);
+  PutOnPath(path, map, frames);
 }
 
 }  // namespace plumb

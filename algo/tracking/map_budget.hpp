@@ -24,7 +24,9 @@ inline constexpr std::size_t kNewestKept = 12;
 /// frames tracked against it follow from the keyframe against which it was tracked itself. The
 /// joint solve needs memory for each observation and for the square of the number of keyframes.
 ///
+/// @param path  The frames' present colour poses in the map's world, which stay the same.
 /// @param frames  All frames of the map; the indices of keyframes in frames and map are updated.
-void BoundKeyframes(std::size_t max_keyframes, std::vector<TrackedFrame>& frames, TrackingMap& map);
+void BoundKeyframes(std::size_t max_keyframes, const std::vector<Pose>& path,
+                    std::vector<TrackedFrame>& frames, TrackingMap& map);
 
 }  // namespace plumb

@@ -67,7 +67,7 @@ struct Scene {
   std::optional<std::string> sensor_profile;     ///< Name of the sensor unit's profile.
   std::map<std::string, double> calibration;  ///< Estimated calibration; the keys state the units.
   /// Standard deviations of its terms after this sweep and before it. Terms that the sweep does not
-  /// show keep that of before. Empty where nothing was calibrated.
+  /// determine keep their prior one. Empty where nothing was calibrated.
   std::map<std::string, double> calibration_sigma, calibration_prior_sigma;
   std::map<std::string, double> timings_s;
   std::vector<std::string> warnings;

@@ -42,7 +42,7 @@ using WatchedEvent =
 
 /// {"event": NAME, "time": seconds since 1970, ...}
 [[nodiscard]] std::string EventLine(const WatchedEvent& event);
-/// The same of the present state, with which each watcher begins.
+/// The first line for each watcher: the whole status, in the same form.
 [[nodiscard]] std::string StatusEventLine(const nlohmann::json& status);
 
 /// The fields of a scan in its events and in the status.

@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-// The services; each is implemented in the file of its name. Arguments are borrowed.
+// Make the services, which are implemented in web_*.cpp. They keep references to the arguments.
 [[nodiscard]] std::unique_ptr<web::AccountService> MakeWebAccounts(StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::ApplianceService> MakeWebAppliance(Appliance& appliance);
 [[nodiscard]] std::unique_ptr<web::AuditLog> MakeWebAuditLog(StoreAccess& store);

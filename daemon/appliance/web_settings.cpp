@@ -12,19 +12,19 @@ using web::ChangeResult;
 
 namespace {
 
-/// Names a setting that nobody may enter; empty if there is none.
+/// Names the first setting with a value that may not be entered; empty if there is none.
 std::string CheckSettings(const web::SettingsChange& change) {
   const web::Settings settings = change.AppliedTo({});
   std::string wrong;
   const auto check = [&](const char* name, double value, const web::Limits& limits) {
     const auto [least, most] = limits.entered;
-    if (!limits.entered.Holds(value))
+    if (wrong.empty() && !limits.entered.Holds(value))
       wrong = fmt::format("{}: expected {} to {}", name, least, most);
   };
   web::ForEachSetting(change, settings,
                       [&]([[maybe_unused]] const char* name, const auto&, const auto& value,
                           const auto&... limits) { (check(name, value, limits), ...); });
-  if (!web::IsPosture(settings.posture))
+  if (wrong.empty() && !web::IsPosture(settings.posture))
     wrong = fmt::format("posture: expected one of {}", fmt::join(web::kPostures, ", "));
   return wrong;
 }

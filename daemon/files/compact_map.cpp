@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 constexpr std::int16_t kNone = std::numeric_limits<std::int16_t>::min();
 constexpr std::int16_t kMissing = std::numeric_limits<std::int16_t>::max();
 constexpr float kSteps_per_m = 10000.0F;
-constexpr float kMost = 32767.0F;
+constexpr float kLargestTenths = 32767.0F;
 
 /// A zlib stream of the bytes. @throws IoError without memory
 std::string Deflated(std::string_view bytes) {
@@ -50,9 +50,9 @@ cv::Mat Tenths(const cv::Mat& metres) {
     auto* out = tenths.ptr<std::int16_t>(row);
     for (int column = 0; column < metres.cols; ++column) {
       const float value = in[column] * kSteps_per_m;
-      out[column] = std::isnan(value)
-                        ? kNone
-                        : static_cast<std::int16_t>(std::lround(std::clamp(value, -kMost, kMost)));
+      out[column] = std::isnan(value) ? kNone
+                                      : static_cast<std::int16_t>(std::lround(
+                                            std::clamp(value, -kLargestTenths, kLargestTenths)));
     }
   }
   return tenths;
@@ -153,7 +153,7 @@ std::string CompactHeights(const HeightMap& heights, const std::vector<std::uint
 
 namespace {
 
-constexpr float kSteps = 65535.0F;
+constexpr float kMeshSteps = 65535.0F;
 constexpr std::size_t kMostParts = std::size_t{1} << 25;  // a browser reads no more
 
 void AppendNumber(std::string& bytes, std::uint32_t value, int num_bytes) {
@@ -176,7 +176,7 @@ std::string CompactMesh(const TriangleMesh& mesh) {
   for (const Eigen::Vector3f& vertex : mesh.vertices) box.extend(vertex);
   const Eigen::Vector3f least = box.isEmpty() ? Eigen::Vector3f(0, 0, 0) : box.min();
   // A single point still needs a step.
-  const float step = box.isEmpty() ? 1.0F : std::max(box.sizes().maxCoeff() / kSteps, 1e-6F);
+  const float step = box.isEmpty() ? 1.0F : std::max(box.sizes().maxCoeff() / kMeshSteps, 1e-6F);
 
   std::string bytes = "PLM2";
   AppendNumber(bytes, static_cast<std::uint32_t>(mesh.vertices.size()), 4);
@@ -189,7 +189,7 @@ std::string CompactMesh(const TriangleMesh& mesh) {
   for (int axis = 0; axis < 3; ++axis) {
     std::uint32_t before = 0;
     for (const Eigen::Vector3f& vertex : mesh.vertices) {
-      const float steps = std::clamp((vertex[axis] - least[axis]) / step, 0.0F, kSteps);
+      const float steps = std::clamp((vertex[axis] - least[axis]) / step, 0.0F, kMeshSteps);
       const auto now = static_cast<std::uint32_t>(std::lround(steps));
       AppendNumber(content, now - before, 2);
       before = now;

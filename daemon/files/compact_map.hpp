@@ -1,4 +1,4 @@
-// Compact encoding of a scan's maps, for a browser on a slow network.
+// Compact encodings of a scan's maps and surface, for a browser on a slow network.
 #pragma once
 
 #include <cstdint>

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/units.hpp"
+
 namespace plumb {
 
 std::string WhyNotLearned(const Scene& scene, const std::optional<Verdict>& verdict,
@@ -13,6 +15,10 @@ std::string WhyNotLearned(const Scene& scene, const std::optional<Verdict>& verd
   if (!(scene.longest_lost_s <= limits.max_lost_s))
     return fmt::format("tracking was lost for {:.1f} s, at most {:.1f} s are allowed",
                        scene.longest_lost_s, limits.max_lost_s);
+  if (scene.breathing && scene.breathing->amplitude_m > limits.max_breathing_m)
+    return fmt::format("the surface rose and fell by {:.1f} mm, at most {:.1f} mm are allowed",
+                       scene.breathing->amplitude_m / kMillimetre,
+                       limits.max_breathing_m / kMillimetre);
   return {};
 }
 

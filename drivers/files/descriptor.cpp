@@ -11,7 +11,7 @@ void WriteAll(const Descriptor& file, std::string_view bytes, const std::filesys
   while (!bytes.empty()) {
     const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw IoError(DescribeWriteError(path, errno));
+    if (written <= 0) throw IoError(DescribeWriteError(path, written < 0 ? errno : EIO));
     bytes.remove_prefix(static_cast<std::size_t>(written));
   }
 }

@@ -9,7 +9,7 @@
 
 namespace plumb {
 
-/// Owns a descriptor and closes it at the end.
+/// Owns a descriptor and closes it when it is destroyed.
 class Descriptor {
  public:
   /// @param fd  Negative: there is none.
@@ -25,7 +25,8 @@ class Descriptor {
   int fd_;
 };
 
-/// @param path  For the message. @throws IoError as DescribeWriteError() puts it
+/// Writes all bytes, in as many calls as it takes. @param path  Named in the error.
+/// @throws IoError with the text of DescribeWriteError().
 void WriteAll(const Descriptor& file, std::string_view bytes, const std::filesystem::path& path);
 
 }  // namespace plumb

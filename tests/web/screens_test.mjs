@@ -47,6 +47,17 @@ async function watch(page) {
   waiting.set(page, { open, last: Date.now() });
   const ends = (one) => { open.delete(one); waiting.get(page).last = Date.now(); };
   page.on('request', (one) => { if (!/\/events$|\/preview|\/surface$|\/claim$/.test(one.url())) open.add(one); });
+  // A request of the document before is not always reported as ended when another one takes its
+  // place. Changes of the address within a document have no request of their own.
+  let document = null;
+  page.on('request', (one) => {
+    if (one.isNavigationRequest() && one.frame() === page.mainFrame()) document = one;
+  });
+  page.on('framenavigated', (frame) => {
+    if (frame !== page.mainFrame() || !document) return;
+    for (const one of open) if (one !== document) open.delete(one);
+    document = null;
+  });
   page.on('requestfinished', ends);
   page.on('requestfailed', ends);
   page.on('dialog', (dialog) => dialog.accept());

@@ -24,7 +24,9 @@ target_compile_options(plumb_options INTERFACE
 # before use.
 if(CMAKE_COMPILE_WARNING_AS_ERROR AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(plumb_options INTERFACE
-    $<BUILD_INTERFACE:-Wno-error=restrict;-Wno-error=stringop-overflow;-Wno-error=maybe-uninitialized>)
+    $<BUILD_INTERFACE:-Wno-error=restrict>
+    $<BUILD_INTERFACE:-Wno-error=stringop-overflow>
+    $<BUILD_INTERFACE:-Wno-error=maybe-uninitialized>)
 endif()
 
 # Position-independent code, so that one set of objects serves the programs and the Python module.

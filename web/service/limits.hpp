@@ -16,7 +16,7 @@ struct Range {
   [[nodiscard]] constexpr bool Holds(double value) const { return value >= least && value <= most; }
 };
 
-/// What a person may enter, and what is believed when it is read from the store. The latter is
+/// What a person may enter, and what is accepted when it is read from the store. The latter is
 /// wider, so that a version that accepts less still reads what was entered before, above all an
 /// approved plan. A value beyond it was not entered: the database was changed or damaged.
 struct Limits {

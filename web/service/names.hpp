@@ -11,7 +11,7 @@
 
 namespace plumb::web {
 
-/// A name for every value up to the last one; otherwise it does not compile.
+/// One name for each value up to kLast; any other number of names does not compile.
 template <auto kLast, std::size_t kSize>
 consteval std::array<std::string_view, kSize> NamesUpTo(const std::string_view (&names)[kSize]) {
   static_assert(kSize == static_cast<std::size_t>(kLast) + 1);

@@ -12,7 +12,8 @@ struct ReportedNumbers {
   std::optional<double> vertical_mm;  ///< Shifts are not set with couch-fixed markers.
   std::optional<double> longitudinal_mm;
   std::optional<double> lateral_mm;
-  std::optional<double> pitch_deg = 0.0;  ///< Rotations are always set.
+  /// Rotations are always set; optional only so that kNumberAxes has one type of member.
+  std::optional<double> pitch_deg = 0.0;
   std::optional<double> roll_deg = 0.0;
   std::optional<double> yaw_deg = 0.0;
 };

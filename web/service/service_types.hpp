@@ -17,7 +17,7 @@ namespace plumb::web {
 
 using WallClock = std::chrono::system_clock;
 
-// Names: names.hpp.
+// The names of the values are in names.hpp.
 enum class ApplianceState { kNoSensor, kReady, kScanning, kWorking, kResult, kFault };
 /// The reason why the appliance cannot scan, or will not be able to once the running scan has
 /// ended.

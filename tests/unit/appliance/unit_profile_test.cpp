@@ -159,6 +159,11 @@ TEST(WhyNotLearned, NamesEachCheckThatAScanHasToPass) {
   Scene lost = scene;
   lost.longest_lost_s = limits.max_lost_s + 0.01;
   EXPECT_THAT(WhyNotLearned(lost, {}, limits), HasSubstr("lost"));
+  Scene breathing = scene;
+  breathing.breathing = Breathing{.amplitude_m = limits.max_breathing_m};
+  EXPECT_EQ(WhyNotLearned(breathing, {}, limits), "");
+  breathing.breathing->amplitude_m += 1e-6;
+  EXPECT_THAT(WhyNotLearned(breathing, {}, limits), HasSubstr("rose and fell"));
   Scene few = scene;
   few.markers.erase(0);
   EXPECT_THAT(WhyNotLearned(few, {}, limits), HasSubstr("markers"));

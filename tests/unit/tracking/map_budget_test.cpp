@@ -102,7 +102,7 @@ TEST(KeyframeBudget, LeavesASweepWithinTheLimitAsItIs) {
   map.landmarks.resize(1);
   std::vector<TrackedFrame> frames = FramesOf(map);
   BoundImages(20, map);
-  BoundKeyframes(30, frames, map);
+  BoundKeyframes(30, ColorPoses(frames, map), frames, map);
   EXPECT_EQ(map.keyframes.size(), 30U);
   EXPECT_EQ(frames[11].reference_keyframe, 5);
 }
@@ -112,9 +112,12 @@ TEST(KeyframeBudget, AKeyframeThatIsGivenUpBecomesAFrameOfTheSamePath) {
   map.landmarks.resize(1);
   map.landmarks[0].num_observations = 30 * 7;
   std::vector<TrackedFrame> frames = FramesOf(map);
+  // Keyframes are adjusted after they were tracked: this one and the next differ from that.
+  map.keyframes[5].T_world_color.translation().y() += 0.002;
+  map.keyframes[6].T_world_color.translation().y() += 0.003;
   const std::vector<Pose> path = ColorPoses(frames, map);
   BoundImages(29, map);
-  BoundKeyframes(29, frames, map);
+  BoundKeyframes(29, path, frames, map);
   ASSERT_EQ(map.keyframes.size(), 29U);
   EXPECT_EQ(map.landmarks[0].num_observations, 29 * 7) << "one keyframe less observes it";
   EXPECT_FALSE(frames[10].keyframe) << "it lay between two that are 10 cm apart";
@@ -128,12 +131,26 @@ TEST(KeyframeBudget, AKeyframeThatIsGivenUpBecomesAFrameOfTheSamePath) {
     EXPECT_NEAR((after[i].translation() - path[i].translation()).norm(), 0.0, 1e-12) << i;
 }
 
+TEST(KeyframeBudget, KeepsTheFirstKeyframeAfterTrackingWasLost) {
+  TrackingMap map = Way(30);
+  map.landmarks.resize(1);
+  std::vector<TrackedFrame> frames = FramesOf(map);
+  map.keyframes[5].previous = frames[10].previous_keyframe = 2;
+  map.keyframes[5].T_previous_color = frames[10].T_previous_color =
+      map.keyframes[2].T_world_color.inverse() * map.keyframes[5].T_world_color;
+  const std::vector<Pose> path = ColorPoses(frames, map);
+  BoundImages(29, map);
+  BoundKeyframes(29, path, frames, map);
+  EXPECT_EQ(map.keyframes.size(), 30U);
+  EXPECT_EQ(frames[10].keyframe, 5);
+}
+
 TEST(KeyframeBudget, GivesUpNoneThatHasImages) {
   TrackingMap map = Way(40);
   map.landmarks.resize(1);
   std::vector<TrackedFrame> frames = FramesOf(map);
   BoundImages(30, map);
-  BoundKeyframes(20, frames, map);
+  BoundKeyframes(20, ColorPoses(frames, map), frames, map);
   EXPECT_EQ(map.keyframes.size(), 30U);
   EXPECT_EQ(WithImages(map).size(), 30U);
 }
