@@ -49,43 +49,64 @@ void ReleaseImages(MapKeyframe& keyframe) {
   keyframe.data.markers = {};
 }
 
-// Replaces references to keyframe `gone` by references to the one against which it was tracked.
-void ReferToPrevious(int gone, std::vector<TrackedFrame>& frames, TrackingMap& map) {
-  const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(gone)];
+// Links the keyframes that were tracked against `gone` to the one against which it was tracked.
+void LinkToPrevious(std::size_t gone, TrackingMap& map) {
+  const MapKeyframe& keyframe = map.keyframes[gone];
   const int previous = keyframe.previous.value();
   const Pose T_previous_gone =
       map.keyframes[static_cast<std::size_t>(previous)].T_world_color.inverse() *
       keyframe.T_world_color;
-  const auto refer = [&](std::optional<int>& reference, Pose& T_reference_color) {
-    if (reference != gone) return;
-    reference = previous;
-    T_reference_color = T_previous_gone * T_reference_color;
+  for (MapKeyframe& other : map.keyframes) {
+    if (other.previous != static_cast<int>(gone)) continue;
+    other.previous = previous;
+    other.T_previous_color = T_previous_gone * other.T_previous_color;
+  }
+}
+
+// Lets the frames refer to kept keyframes only, from where they are on the path. The poses at which
+// they were tracked are not enough: keyframes were adjusted since, and the differences were spread
+// over sections of the path, some of which end.
+void ReferToKept(const std::vector<bool>& is_kept, const std::vector<Pose>& path,
+                 const TrackingMap& map, std::vector<TrackedFrame>& frames) {
+  const auto pose = [&](int keyframe) {
+    return map.keyframes[static_cast<std::size_t>(keyframe)].T_world_color;
   };
-  for (TrackedFrame& frame : frames) {
-    if (frame.keyframe == gone) {
+  const auto refer = [&](std::optional<int>& keyframe) {
+    if (keyframe && !is_kept[static_cast<std::size_t>(*keyframe)])
+      keyframe = map.keyframes[static_cast<std::size_t>(*keyframe)].previous;
+  };
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    TrackedFrame& frame = frames[i];
+    if (frame.keyframe && !is_kept[static_cast<std::size_t>(*frame.keyframe)]) {
       frame.keyframe.reset();
       frame.previous_keyframe.reset();
     }
-    refer(frame.reference_keyframe, frame.T_reference_color);
-    refer(frame.previous_keyframe, frame.T_previous_color);
+    refer(frame.reference_keyframe);
+    refer(frame.previous_keyframe);
+    if (!frame.tracked) continue;
+    if (!frame.keyframe) {
+      frame.T_reference_color = pose(frame.reference_keyframe.value()).inverse() * path[i];
+    } else if (frame.previous_keyframe) {
+      frame.T_previous_color = pose(*frame.previous_keyframe).inverse() * pose(*frame.keyframe);
+    }
   }
-  for (MapKeyframe& other : map.keyframes) refer(other.previous, other.T_previous_color);
 }
 
-// Removes all keyframes but those in `kept` from the map.
-void RemoveOthers(const std::vector<std::size_t>& kept, std::vector<TrackedFrame>& frames,
+// Removes all other keyframes from the map.
+void RemoveOthers(const std::vector<bool>& is_kept, std::vector<TrackedFrame>& frames,
                   TrackingMap& map) {
   std::vector<std::optional<int>> new_index(map.keyframes.size());
-  for (std::size_t i = 0; i < kept.size(); ++i) new_index[kept[i]] = static_cast<int>(i);
+  std::vector<MapKeyframe> kept;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
-    if (new_index[k]) continue;
+    if (is_kept[k]) {
+      new_index[k] = static_cast<int>(kept.size());
+      kept.push_back(std::move(map.keyframes[k]));
+      continue;
+    }
     for (const KeypointObservation& o : map.keyframes[k].keypoints)
       --map.landmarks[static_cast<std::size_t>(o.landmark)].num_observations;
   }
-  std::vector<MapKeyframe> keyframes;
-  keyframes.reserve(kept.size());
-  for (const std::size_t k : kept) keyframes.push_back(std::move(map.keyframes[k]));
-  map.keyframes = std::move(keyframes);
+  map.keyframes = std::move(kept);
   const auto renumber = [&](std::optional<int>& keyframe) {
     if (keyframe) keyframe = new_index[static_cast<std::size_t>(*keyframe)];
   };
@@ -99,25 +120,6 @@ void RemoveOthers(const std::vector<std::size_t>& kept, std::vector<TrackedFrame
   for (Landmark& landmark : map.landmarks)
     landmark.first_keyframe =
         new_index[static_cast<std::size_t>(landmark.first_keyframe)].value_or(0);
-}
-
-// Refers the frames' poses to the keyframes as they are now. Frames were tracked before the
-// keyframes were adjusted, and the differences were spread over sections of the path, some of which
-// are gone.
-void PutOnPath(const std::vector<Pose>& path, const TrackingMap& map,
-               std::vector<TrackedFrame>& frames) {
-  const auto pose = [&](int keyframe) {
-    return map.keyframes[static_cast<std::size_t>(keyframe)].T_world_color;
-  };
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    TrackedFrame& frame = frames[i];
-    if (!frame.tracked) continue;
-    if (!frame.keyframe) {
-      frame.T_reference_color = pose(frame.reference_keyframe.value()).inverse() * path[i];
-    } else if (frame.previous_keyframe) {
-      frame.T_previous_color = pose(*frame.previous_keyframe).inverse() * pose(*frame.keyframe);
-    }
-  }
 }
 
 }  // namespace
@@ -146,14 +148,16 @@ void BoundKeyframes(std::size_t max_keyframes, const std::vector<Pose>& path,
   const auto may_go = [&](std::size_t k, std::size_t before) {
     return map.keyframes[k].is_bare && map.keyframes[k].previous == static_cast<int>(before);
   };
+  std::vector<bool> is_kept(kept.size(), true);
   while (kept.size() > max_keyframes) {
     const std::size_t k = LeastMissed(map, kept, may_go);
     if (k == 0) break;  // All others are needed.
-    ReferToPrevious(static_cast<int>(k), frames, map);
+    LinkToPrevious(k, map);
+    is_kept[k] = false;
     std::erase(kept, k);
   }
-  RemoveOthers(kept, frames, map);
-  PutOnPath(path, map, frames);
+  ReferToKept(is_kept, path, map, frames);
+  RemoveOthers(is_kept, frames, map);
 }
 
 }  // namespace plumb

@@ -255,12 +255,9 @@ std::vector<std::string> Appliance::StorageWarnings() const {
         unusable_.scans));
   if (unusable_.set_aside > 0)
     warnings.push_back(fmt::format(
-        "{} been set aside. Restore a more recent backup, or move the contents of the set-aside "
-        "folder to another disk.",
-        unusable_.set_aside == 1
-            ? "1 scan folder is missing from the database and has"
-            : fmt::format("{} scan folders are missing from the database and have",
-                          unusable_.set_aside)));
+        "Scan folders set aside because they have no entry in the database: {}. Restore a more "
+        "recent backup, or move the contents of the set-aside folder to another disk.",
+        unusable_.set_aside));
   if (!record_fault_.empty()) warnings.push_back(record_fault_);
   // The demo stores nothing of value.
   if (parts_.config.appliance.backup_folder.empty() && parts_.demo_patient.empty())

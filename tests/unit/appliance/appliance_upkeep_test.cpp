@@ -220,7 +220,7 @@ TEST_F(ApplianceUpkeepTest, FoldersThatWereSetAsideAreAWarning) {
   fs::copy(state() / "scans" / "000003", state() / "scans" / "000007", fs::copy_options::recursive);
   Play([&] {
     EXPECT_TRUE(Comes([&] {
-      return Warns("1 scan folder is missing from the database and has been set aside");
+      return Warns("Scan folders set aside because they have no entry in the database: 1.");
     }));
   });
 }

@@ -72,52 +72,62 @@ TEST(ImageBudget, LeavesNoGapsAsASweepGrows) {
     EXPECT_LE(kept[i] - kept[i - 1], 10U) << "after " << kept[i - 1];
 }
 
-// A frame for each keyframe and one after it, tracked against the keyframe before.
-std::vector<TrackedFrame> FramesOf(TrackingMap& map) {
+struct Sweep {
+  TrackingMap map;
   std::vector<TrackedFrame> frames;
-  for (int k = 0; k < static_cast<int>(map.keyframes.size()); ++k) {
-    MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(k)];
+};
+
+// A straight way with a frame for each keyframe and one after it. All keyframes observe one
+// landmark.
+Sweep MakeSweep(int num_keyframes) {
+  Sweep sweep{Way(num_keyframes), {}};
+  sweep.map.landmarks.resize(1);
+  for (const MapKeyframe& keyframe : sweep.map.keyframes)
+    sweep.map.landmarks[0].num_observations += static_cast<int>(keyframe.keypoints.size());
+  for (int k = 0; k < num_keyframes; ++k) {
+    MapKeyframe& keyframe = sweep.map.keyframes[static_cast<std::size_t>(k)];
     TrackedFrame frame;
     frame.tracked = true;
     frame.color_time_s = k;
     frame.keyframe = frame.reference_keyframe = k;
     if (k > 0) {
-      const MapKeyframe& before = map.keyframes[static_cast<std::size_t>(k - 1)];
+      const MapKeyframe& before = sweep.map.keyframes[static_cast<std::size_t>(k - 1)];
       keyframe.previous = frame.previous_keyframe = k - 1;
       keyframe.T_previous_color = frame.T_previous_color =
           before.T_world_color.inverse() * keyframe.T_world_color;
     }
-    frames.push_back(frame);
+    sweep.frames.push_back(frame);
     frame.keyframe.reset();
     frame.previous_keyframe.reset();
     frame.color_time_s = k + 0.5;
     frame.T_reference_color.translation().x() = 0.04;
-    frames.push_back(frame);
+    sweep.frames.push_back(frame);
   }
-  return frames;
+  return sweep;
+}
+
+// Returns the path before.
+std::vector<Pose> Bound(std::size_t max_images, std::size_t max_keyframes, Sweep& sweep) {
+  const std::vector<Pose> path = ColorPoses(sweep.frames, sweep.map);
+  BoundImages(max_images, sweep.map);
+  BoundKeyframes(max_keyframes, path, sweep.frames, sweep.map);
+  return path;
 }
 
 TEST(KeyframeBudget, LeavesASweepWithinTheLimitAsItIs) {
-  TrackingMap map = Way(30);
-  map.landmarks.resize(1);
-  std::vector<TrackedFrame> frames = FramesOf(map);
-  BoundImages(20, map);
-  BoundKeyframes(30, ColorPoses(frames, map), frames, map);
-  EXPECT_EQ(map.keyframes.size(), 30U);
-  EXPECT_EQ(frames[11].reference_keyframe, 5);
+  Sweep sweep = MakeSweep(30);
+  Bound(20, 30, sweep);
+  EXPECT_EQ(sweep.map.keyframes.size(), 30U);
+  EXPECT_EQ(sweep.frames[11].reference_keyframe, 5);
 }
 
 TEST(KeyframeBudget, AKeyframeThatIsGivenUpBecomesAFrameOfTheSamePath) {
-  TrackingMap map = Way(30);
-  map.landmarks.resize(1);
-  map.landmarks[0].num_observations = 30 * 7;
-  std::vector<TrackedFrame> frames = FramesOf(map);
+  Sweep sweep = MakeSweep(30);
+  auto& [map, frames] = sweep;
   // Keyframes are adjusted after they were tracked: this one and the next differ from that.
   map.keyframes[5].T_world_color.translation().y() += 0.002;
   map.keyframes[6].T_world_color.translation().y() += 0.003;
-  const std::vector<Pose> path = ColorPoses(frames, map);
-  BoundImages(29, map);
-  BoundKeyframes(29, path, frames, map);
+  const std::vector<Pose> path = Bound(29, 29, sweep);
   ASSERT_EQ(map.keyframes.size(), 29U);
   EXPECT_EQ(map.landmarks[0].num_observations, 29 * 7) << "one keyframe less observes it";
   EXPECT_FALSE(frames[10].keyframe) << "it lay between two that are 10 cm apart";
@@ -131,28 +141,36 @@ TEST(KeyframeBudget, AKeyframeThatIsGivenUpBecomesAFrameOfTheSamePath) {
     EXPECT_NEAR((after[i].translation() - path[i].translation()).norm(), 0.0, 1e-12) << i;
 }
 
+TEST(KeyframeBudget, KeepsThePathWhereSeveralInARowAreGivenUp) {
+  Sweep sweep = MakeSweep(60);
+  for (std::size_t k = 1; k < 60; ++k)
+    sweep.map.keyframes[k].T_world_color.translation().y() += 0.001 * static_cast<double>(k % 7);
+  const std::vector<Pose> path = Bound(15, 16, sweep);
+  ASSERT_EQ(sweep.map.keyframes.size(), 16U);
+  EXPECT_EQ(sweep.map.landmarks[0].num_observations, 16 * 7);
+  for (std::size_t k = 1; k < 16; ++k)
+    EXPECT_EQ(sweep.map.keyframes[k].previous, static_cast<int>(k - 1)) << k;
+  const std::vector<Pose> after = ColorPoses(sweep.frames, sweep.map);
+  for (std::size_t i = 0; i < path.size(); ++i)
+    EXPECT_NEAR((after[i].translation() - path[i].translation()).norm(), 0.0, 1e-12) << i;
+}
+
 TEST(KeyframeBudget, KeepsTheFirstKeyframeAfterTrackingWasLost) {
-  TrackingMap map = Way(30);
-  map.landmarks.resize(1);
-  std::vector<TrackedFrame> frames = FramesOf(map);
+  Sweep sweep = MakeSweep(30);
+  auto& [map, frames] = sweep;
   map.keyframes[5].previous = frames[10].previous_keyframe = 2;
   map.keyframes[5].T_previous_color = frames[10].T_previous_color =
       map.keyframes[2].T_world_color.inverse() * map.keyframes[5].T_world_color;
-  const std::vector<Pose> path = ColorPoses(frames, map);
-  BoundImages(29, map);
-  BoundKeyframes(29, path, frames, map);
+  Bound(29, 29, sweep);
   EXPECT_EQ(map.keyframes.size(), 30U);
   EXPECT_EQ(frames[10].keyframe, 5);
 }
 
 TEST(KeyframeBudget, GivesUpNoneThatHasImages) {
-  TrackingMap map = Way(40);
-  map.landmarks.resize(1);
-  std::vector<TrackedFrame> frames = FramesOf(map);
-  BoundImages(30, map);
-  BoundKeyframes(20, ColorPoses(frames, map), frames, map);
-  EXPECT_EQ(map.keyframes.size(), 30U);
-  EXPECT_EQ(WithImages(map).size(), 30U);
+  Sweep sweep = MakeSweep(40);
+  Bound(30, 20, sweep);
+  EXPECT_EQ(sweep.map.keyframes.size(), 30U);
+  EXPECT_EQ(WithImages(sweep.map).size(), 30U);
 }
 
 }  // namespace
