@@ -18,14 +18,13 @@
 namespace plumb {
 
 using store::kSelf;
-using web::ApplianceState;
 
 namespace {
 
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
 
-const web::Actor kButton{.user = "button", .address = ""};
+const Actor kButton{.user = "button", .address = ""};
 
 /// {"appliance.quota_gb": [null, "50"], "web.listen": ["'a'", "'b'", "restart"]}: before and after,
 /// null for the default. @param kept  The keys that take effect only after a restart.
@@ -149,7 +148,7 @@ Appliance::Answer Appliance::WhyNotChangeSession() const {
 }
 
 /// Without a running scan and a shown result, a long press ends the treatment session.
-Appliance::Answer Appliance::Press(ButtonPress press, const web::Actor& actor) {
+Appliance::Answer Appliance::Press(ButtonPress press, const Actor& actor) {
   if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady &&
       !session_id_.empty() && !IsOwnSession())
     return CloseSession(actor);
@@ -157,13 +156,13 @@ Appliance::Answer Appliance::Press(ButtonPress press, const web::Actor& actor) {
                 &actor);
 }
 
-Appliance::Answer Appliance::StartSweep(const web::Actor& actor) {
+Appliance::Answer Appliance::StartSweep(const Actor& actor) {
   return Handle(ScanEvent::kStart, &actor);
 }
-Appliance::Answer Appliance::EndSweep(const web::Actor& actor) {
+Appliance::Answer Appliance::EndSweep(const Actor& actor) {
   return Handle(ScanEvent::kEndSweep, &actor);
 }
-Appliance::Answer Appliance::Cancel(const web::Actor& actor) {
+Appliance::Answer Appliance::Cancel(const Actor& actor) {
   return Handle(ScanEvent::kCancel, &actor);
 }
 
@@ -178,13 +177,13 @@ Appliance::Answer Appliance::WhyNotScan() const {
   return WhyNoSpace();
 }
 
-Appliance::Answer Appliance::Handle(ScanEvent event, const web::Actor* actor) {
+Appliance::Answer Appliance::Handle(ScanEvent event, const Actor* actor) {
   const ScanState before = state_;
   ScanTransition transition = Next(state_, event);
   const bool starts = std::find(transition.actions.begin(), transition.actions.end(),
                                 ScanAction::kStartScan) != transition.actions.end();
   Answer answer(transition.refusal);
-  if (!answer.empty() && before.fault == web::FaultKind::kStorage && !space_fault_.empty())
+  if (!answer.empty() && before.fault == FaultKind::kStorage && !space_fault_.empty())
     answer = space_fault_;
   if (starts) {
     answer = WhyNotScan();
@@ -208,7 +207,7 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const web::Actor* actor) {
   return answer;
 }
 
-void Appliance::AuditAct(ScanAction action, const web::Actor& actor) {
+void Appliance::AuditAct(ScanAction action, const Actor& actor) {
   switch (action) {
     case ScanAction::kStartScan:
       return Audit(actor, "scan.start", scan_.session_id, ScanKind());
@@ -222,8 +221,8 @@ void Appliance::AuditAct(ScanAction action, const web::Actor& actor) {
   }
 }
 
-void Appliance::Audit(const web::Actor& actor, const std::string& action,
-                      const std::string& subject, const std::string& detail) {
+void Appliance::Audit(const Actor& actor, const std::string& action, const std::string& subject,
+                      const std::string& detail) {
   const auto report = [action](std::string_view why) {
     Log(LogLevel::kError, fmt::format("the audit log does not take '{}': {}", action, why));
   };
@@ -262,7 +261,7 @@ void Appliance::Act(ScanAction action) {
 
 /// These run on the scan's thread: they use the store, which is thread-safe, and copies; everything
 /// else is posted. Of a check only its numbers are kept.
-Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
+Appliance::Answer Appliance::OpenCheck(const Actor& actor) {
   if (std::string why = WhyNotIdle(); !why.empty()) return why;
   check_ = actor;
   NotifyWeb(web::EventKind::kStatus);
@@ -315,8 +314,7 @@ void Appliance::LogSensor(const SensorEvent& event) {
 }
 
 void Appliance::OpenSession(const std::string& session_id, const std::string& patient_id,
-                            web::ScanPurpose purpose, const std::string& reason,
-                            const web::Actor& actor) {
+                            ScanPurpose purpose, const std::string& reason, const Actor& actor) {
   session_id_ = session_id;
   open_patient_ = patient_id;
   opened_by_ = actor;
@@ -331,12 +329,12 @@ void Appliance::ForgetSession() {
   session_id_.clear();
   open_patient_.clear();
   reference_reason_.clear();
-  purpose_ = web::ScanPurpose::kFraction;
+  purpose_ = ScanPurpose::kFraction;
   session_timer_.Disarm();
   NotifyWeb(web::EventKind::kStatus);
 }
 
-Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
+Appliance::Answer Appliance::CloseSession(const Actor& actor) {
   if (std::string why = WhyNotIdle(); !why.empty()) return why;
   if (std::string why = WhyNotChangeSession(); !why.empty()) return why;
   if (session_id_.empty()) return "no session is open";

@@ -81,16 +81,16 @@ class Appliance {
   using Answer = std::string;
   /// The audit log names the actor of this and the next three functions, and the session of the
   /// scan that the call started, ended or discarded.
-  Answer Press(ButtonPress press, const web::Actor& actor);
+  Answer Press(ButtonPress press, const Actor& actor);
   /// Like a press, but for one purpose each.
-  Answer StartSweep(const web::Actor& actor);
-  Answer EndSweep(const web::Actor& actor);
+  Answer StartSweep(const Actor& actor);
+  Answer EndSweep(const Actor& actor);
   /// Discards the running scan.
-  Answer Cancel(const web::Actor& actor);
+  Answer Cancel(const Actor& actor);
   /// Makes a backup off the loop, while scans continue. Calls `done` on the loop with an error
   /// (empty if it was made) and the contents.
   /// @param key_file  Key for encryption; empty: the configured one, if any.
-  void BackUp(const web::Actor& actor, const std::filesystem::path& folder,
+  void BackUp(const Actor& actor, const std::filesystem::path& folder,
               std::function<void(const std::string& error, const BackupReport& report)> done,
               const std::filesystem::path& key_file = {});
   /// Target of today's backup; empty if no folder is configured.
@@ -108,14 +108,14 @@ class Appliance {
   /// @param scan  The scan that is to be the reference. One taken before a check had passed must be
   ///         confirmed by a later check of the same day (CheckStore::ConfirmsScan), or repeated. It
   ///         must also be repeated if the first check after it failed.
-  [[nodiscard]] std::string WhyNoReference(const std::optional<web::Scan>& scan = {});
+  [[nodiscard]] std::string WhyNoReference(const std::optional<Scan>& scan = {});
   /// Time that the sensor must have been on before a reference scan; from any thread.
   [[nodiscard]] double warm_up_min() const { return warm_up_min_; }
   /// The session that the store has opened: scans belong to it until it is closed.
   void OpenSession(const std::string& session_id, const std::string& patient_id,
-                   web::ScanPurpose purpose, const std::string& reason, const web::Actor& actor);
+                   ScanPurpose purpose, const std::string& reason, const Actor& actor);
   /// Ends the session, also in the store. Not while a scan runs.
-  Answer CloseSession(const web::Actor& actor);
+  Answer CloseSession(const Actor& actor);
   /// Until the store has opened a session, no scan begins, and no session is opened or closed.
   void SetOpening(bool opening) { opening_ = opening; }
   /// The same while the store removes the data of the patient whose session is open.
@@ -138,8 +138,8 @@ class Appliance {
   void ClosePatient(const std::string& patient_id);
   /// The next scan is the daily check of the room's markers; scans after it belong to the open
   /// patient again.
-  Answer OpenCheck(const web::Actor& actor);
-  [[nodiscard]] web::CheckStatus Checks();
+  Answer OpenCheck(const Actor& actor);
+  [[nodiscard]] CheckStatus Checks();
   /// Reloads the calibration of the room, and whether a marker has moved since.
   void RefreshRoom();
   /// Where the gantry is on the maps of a scene, as a comparison with it would find it; not set if
@@ -152,9 +152,9 @@ class Appliance {
   /// The board for the room's markers; from any thread.
   [[nodiscard]] std::string RoomBoardPdf() const;
   /// Whose scans of the board count for the next calibration, and since when; from any thread.
-  [[nodiscard]] std::pair<std::string, web::WallClock::time_point> RoomScansWanted() const;
+  [[nodiscard]] std::pair<std::string, WallClock::time_point> RoomScansWanted() const;
   /// Profile of the connected sensor unit; from any thread.
-  [[nodiscard]] web::SensorProfiles SensorProfiles() const;
+  [[nodiscard]] SensorProfiles UnitProfiles() const;
   [[nodiscard]] std::optional<std::string> SensorProfileFile(int version) const;
   /// Why the profile of that unit may not be changed now; empty if it may.
   [[nodiscard]] Answer WhyNotChangeProfile(const std::string& serial) const;
@@ -180,8 +180,8 @@ class Appliance {
   void SetPage(PageNotes page) { page_ = std::move(page); }
   /// The answer of the control socket to "status".
   [[nodiscard]] nlohmann::json StatusJson();
-  [[nodiscard]] web::Status WebStatus();
-  [[nodiscard]] web::Health Health();
+  [[nodiscard]] Status WebStatus();
+  [[nodiscard]] Health health();
   /// One line for systemd.
   [[nodiscard]] std::string StatusLine() const;
   /// False if a busy worker shows no progress: systemd's watchdog must then not be fed.
@@ -198,14 +198,14 @@ class Appliance {
   [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
   /// Surface of the running sweep; null if there is none or nothing has been seen yet.
   [[nodiscard]] std::shared_ptr<const LiveSurfaceView> SurfaceSoFar() const {
-    return state_.phase == web::ApplianceState::kScanning ? scan_.update.surface : nullptr;
+    return state_.phase == ApplianceState::kScanning ? scan_.update.surface : nullptr;
   }
   [[nodiscard]] const ScanState& state() const { return state_; }
   /// Changes of the store, one after the other, off the loop.
   [[nodiscard]] WorkThread& store_thread() { return store_thread_; }
   [[nodiscard]] EventLoop& loop() { return loop_; }
   /// Plan of a new reference, from settings and configuration.
-  [[nodiscard]] web::ReferencePlan DefaultPlan();
+  [[nodiscard]] ReferencePlan DefaultPlan();
   void NotifyWeb(web::EventKind kind);
 
  private:
@@ -215,7 +215,7 @@ class Appliance {
     std::string patient_id;
     std::string session_id;
     std::string reference_id;
-    web::ScanPurpose purpose = web::ScanPurpose::kFraction;
+    ScanPurpose purpose = ScanPurpose::kFraction;
     double reference_area_m2 = 0.0;
     std::chrono::steady_clock::time_point started, ended;
     double first_frame_ms = 0.0;  ///< From the press to the first frame used.
@@ -255,11 +255,11 @@ class Appliance {
   void CountUnusable();
   void LogRecovery(const RecoveryReport& found) const;
   /// @param actor  Who asks for it; null: the appliance itself.
-  Answer Handle(ScanEvent event, const web::Actor* actor = nullptr);
-  void Audit(const web::Actor& actor, const std::string& action, const std::string& subject,
+  Answer Handle(ScanEvent event, const Actor* actor = nullptr);
+  void Audit(const Actor& actor, const std::string& action, const std::string& subject,
              const std::string& detail);
   /// Adds what a person did with the scan to the audit log.
-  void AuditAct(ScanAction action, const web::Actor& actor);
+  void AuditAct(ScanAction action, const Actor& actor);
   /// Purpose of the running or last scan by its stored name, or "unassigned".
   [[nodiscard]] std::string ScanKind() const;
   void ArmSessionTimer();
@@ -268,16 +268,16 @@ class Appliance {
   [[nodiscard]] bool IsOwnSession() const;
   [[nodiscard]] bool HasPatientsSession() const;
   [[nodiscard]] std::optional<double> SecondsSinceSensor() const;
-  [[nodiscard]] std::string WhySensorIsCold(const std::optional<web::Scan>& scan) const;
-  [[nodiscard]] web::DailyCheck DailyCheckToday();
+  [[nodiscard]] std::string WhySensorIsCold(const std::optional<Scan>& scan) const;
+  [[nodiscard]] DailyCheck DailyCheckToday();
   void NoteDropped(const ScanUpdate& update);
   void Act(ScanAction action);
   Answer WhyNotScan() const;
   void StartScan();
   void BeginSession();
-  [[nodiscard]] ScanJob MakeJob(const web::Settings& settings);
+  [[nodiscard]] ScanJob MakeJob(const Settings& settings);
   [[nodiscard]] std::optional<RoomAxes> RoomOfJob() const;
-  void ReportRoom(web::Status& status) const;
+  void ReportRoom(Status& status) const;
   [[nodiscard]] std::optional<Pose> RoomPose() const;
   [[nodiscard]] std::shared_ptr<UnitProfile> MakeUnitProfile();
   /// Empty if the unit has none of its own: some sensors are known only by their port.
@@ -311,8 +311,8 @@ class Appliance {
   [[nodiscard]] double UsedShare() const;
   [[nodiscard]] bool IsNearlyFull() const;
   void FailStorage(const std::string& what, StorageFault kind);
-  void ReadStored(web::Status& status);
-  void ReadStoredOrFail(web::Status& status);
+  void ReadStored(Status& status);
+  void ReadStoredOrFail(Status& status);
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
   void PublishEvent(const WatchedEvent& event);
@@ -359,11 +359,11 @@ class Appliance {
   ScanState state_;
   std::string sensor_fault_, scan_fault_, rolled_back_;
   std::string session_id_, open_patient_, reference_reason_;
-  web::Actor opened_by_;  ///< The user who opened the session.
-  web::ScanPurpose purpose_ = web::ScanPurpose::kFraction;
+  Actor opened_by_;  ///< The user who opened the session.
+  ScanPurpose purpose_ = ScanPurpose::kFraction;
   bool opening_ = false;
   bool wiping_ = false;
-  std::optional<web::Actor>
+  std::optional<Actor>
       check_;  ///< If set, the next or running scan is the daily check requested by this user.
   CurrentScan scan_;
   std::optional<CurrentScan> last_result_;
@@ -383,6 +383,6 @@ class Appliance {
 };
 
 /// Midnight, local time.
-[[nodiscard]] web::WallClock::time_point StartOfDay();
+[[nodiscard]] WallClock::time_point StartOfDay();
 
 }  // namespace plumb

@@ -179,7 +179,7 @@ void GiveWayToScans() {
 }  // namespace
 
 void Appliance::BackUp(
-    const web::Actor& actor, const std::filesystem::path& folder,
+    const Actor& actor, const std::filesystem::path& folder,
     std::function<void(const std::string& error, const BackupReport& report)> done,
     const std::filesystem::path& key_file) {
   if (store_ == nullptr || !storage_fault_.empty())

@@ -9,12 +9,12 @@
 namespace plumb {
 namespace {
 
-web::SensorProfileVersion Shown(const ProfileVersion& version) {
-  web::SensorProfileVersion shown{.version = version.version,
-                                  .made_at = version.made,
-                                  .cause = version.cause,
-                                  .num_sweeps = 0,
-                                  .values = {}};
+SensorProfileVersion Shown(const ProfileVersion& version) {
+  SensorProfileVersion shown{.version = version.version,
+                             .made_at = version.made,
+                             .cause = version.cause,
+                             .num_sweeps = 0,
+                             .values = {}};
   if (!version.profile) return shown;
   CalibrationModel model;
   MoveCalibration(version.profile->mean, model);
@@ -47,9 +47,9 @@ std::shared_ptr<UnitProfile> Appliance::MakeUnitProfile() {
   return std::make_shared<UnitProfile>(profiles_, sensor.sensor.serial, sensor.info.intrinsics);
 }
 
-web::SensorProfiles Appliance::SensorProfiles() const {
+SensorProfiles Appliance::UnitProfiles() const {
   const SensorSnapshot sensor = sensors_->snapshot();
-  web::SensorProfiles shown;
+  SensorProfiles shown;
   if (!sensor.present) {
     shown.why_none = "no sensor is attached";
     return shown;

@@ -77,7 +77,7 @@ std::optional<RoomWays> Appliance::RoomIn(const MarkerMap& scene) const {
   return T_iec_scene ? std::optional(WaysOfRoom(*T_iec_scene)) : std::nullopt;
 }
 
-void Appliance::ReportRoom(web::Status& status) const {
+void Appliance::ReportRoom(Status& status) const {
   if (!room_.due.empty())
     status.warnings.push_back(fmt::format(
         "The room must be calibrated again; until then, directions refer to the patient: {}",
@@ -93,7 +93,7 @@ void Appliance::ReportRoom(web::Status& status) const {
                  .is_known = T_iec_reference.has_value()};
 }
 
-std::pair<std::string, web::WallClock::time_point> Appliance::RoomScansWanted() const {
+std::pair<std::string, WallClock::time_point> Appliance::RoomScansWanted() const {
   return {sensors_->snapshot().sensor.serial, StartOfDay()};
 }
 

@@ -17,7 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double kDroppedSmoothing_s = 1.0;
-const web::Actor kAuto{.user = "auto", .address = ""};
+const Actor kAuto{.user = "auto", .address = ""};
 
 double Milliseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
@@ -40,9 +40,9 @@ void Appliance::BeginSession() {
   scan_ = {};
   scan_.patient_id = check_ ? std::string() : open_patient_;
   scan_.session_id = check_ ? std::string() : session_id_;
-  scan_.purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
+  scan_.purpose = check_ ? ScanPurpose::kDailyCheck : purpose_;
   scan_.started = Clock::now();
-  const web::Settings settings = store_->settings.Get();
+  const Settings settings = store_->settings.Get();
   ScanJob job = MakeJob(settings);
   if (job.is_reference) {
     if (const std::string why = WhyNoReference(); !why.empty()) throw DataError(why);
@@ -65,12 +65,11 @@ void Appliance::BeginSession() {
 }
 
 std::string Appliance::ScanKind() const {
-  const bool is_unassigned =
-      scan_.patient_id.empty() && scan_.purpose != web::ScanPurpose::kDailyCheck;
+  const bool is_unassigned = scan_.patient_id.empty() && scan_.purpose != ScanPurpose::kDailyCheck;
   return std::string(is_unassigned ? "unassigned" : Name(scan_.purpose));
 }
 
-ScanJob Appliance::MakeJob(const web::Settings& settings) {
+ScanJob Appliance::MakeJob(const Settings& settings) {
   ScanJob job;
   const SensorSnapshot sensor = sensors_->snapshot();
   job.info = sensor.info;
@@ -86,12 +85,12 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
     return job;
   }
   if (scan_.patient_id.empty()) return job;  // no session is open, so there is no comparison
-  const std::optional<web::Reference> reference = store_->references.Approved(scan_.patient_id);
+  const std::optional<Reference> reference = store_->references.Approved(scan_.patient_id);
   if (reference) scan_.reference_area_m2 = store_->scans.SweptArea(reference->scan_id);
-  if (!reference && scan_.purpose == web::ScanPurpose::kFraction)
-    scan_.purpose = web::ScanPurpose::kReference;
-  job.is_reference = scan_.purpose == web::ScanPurpose::kReference;
-  if (reference && scan_.purpose == web::ScanPurpose::kFraction) {
+  if (!reference && scan_.purpose == ScanPurpose::kFraction)
+    scan_.purpose = ScanPurpose::kReference;
+  job.is_reference = scan_.purpose == ScanPurpose::kReference;
+  if (reference && scan_.purpose == ScanPurpose::kFraction) {
     scan_.reference_id = reference->id;
     job.reference_scene = store_->folders.Scan(reference->scan_id) / "scene";
     job.check_reference = [this, scan = reference->scan_id](const std::stop_token& stop) {
@@ -104,8 +103,8 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   return job;
 }
 
-web::ReferencePlan Appliance::DefaultPlan() {
-  const web::Settings settings = store_ ? store_->settings.Get() : web::Settings{};
+ReferencePlan Appliance::DefaultPlan() {
+  const Settings settings = store_ ? store_->settings.Get() : Settings{};
   return {.region_m = {},
           .isocentre_m = {},
           .tolerance = settings.tolerance,
@@ -121,10 +120,9 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
     loop_.Post("scan begun", [this, id] { scan_.id = *id; });
     return store_->folders.Staging(*id);
   };
-  const bool is_demo =
-      !parts_.demo_patient.empty() && record.purpose == web::ScanPurpose::kReference;
-  const web::ReferencePlan plan = DefaultPlan();
-  const bool is_reference = record.purpose == web::ScanPurpose::kReference;
+  const bool is_demo = !parts_.demo_patient.empty() && record.purpose == ScanPurpose::kReference;
+  const ReferencePlan plan = DefaultPlan();
+  const bool is_reference = record.purpose == ScanPurpose::kReference;
   callbacks.save = [this, id, plan, is_demo, is_reference, reason = record.reason,
                     actor = opened_by_, patient = record.patient_id](const EndedScan& outcome) {
     if (id->empty()) return;  // it never began
@@ -134,8 +132,8 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
     FinishedScan finished{.failure = outcome.reason,
                           .result_json = is_done ? outcome.result_json : std::string(),
                           .swept_area_m2 = outcome.swept_area_m2};
-    if (is_done) finished.outcome = web::ScanOutcome::kDone;
-    if (outcome.kind == Kind::kCancelled) finished.outcome = web::ScanOutcome::kCancelled;
+    if (is_done) finished.outcome = ScanOutcome::kDone;
+    if (outcome.kind == Kind::kCancelled) finished.outcome = ScanOutcome::kCancelled;
     store_->scans.Finish(*id, finished);
     const auto demo = store_->patients.FindByCode(parts_.demo_patient);
     if (!is_reference || !is_done) return;
@@ -218,7 +216,7 @@ void Appliance::OnEnded(const EndedScan& outcome) {
     if (state_.cancelling)
       Log(LogLevel::kNotice, "the scan was stored before it could be discarded: its result stands",
           {{"SCAN", scan_.id}});
-    const bool is_check = scan_.purpose == web::ScanPurpose::kDailyCheck;
+    const bool is_check = scan_.purpose == ScanPurpose::kDailyCheck;
     if (!is_check) last_result_ = scan_;
     const std::string answer = outcome.check
                                    ? std::string("daily check ") + Name(outcome.check->check.status)
@@ -241,7 +239,7 @@ void Appliance::OnEnded(const EndedScan& outcome) {
     PublishEvent(ResultEvent{scan_.id, answer});
   }
   if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
-  if (scan_.purpose == web::ScanPurpose::kDailyCheck) RefreshRoom();
+  if (scan_.purpose == ScanPurpose::kDailyCheck) RefreshRoom();
   check_.reset();
   ticks_to_file_check_ = std::min(ticks_to_file_check_, kFirstFileCheckTicks);  // of a recording
   NotifyWeb(web::EventKind::kResult);

@@ -33,7 +33,7 @@ std::uint64_t Appliance::NeededBytes() const {
   constexpr double kScene = 16e6, kSceneOfPixel = 110.0, kFrameOfPixel = 2.6, kFramesPerSecond = 30;
   const Intrinsics camera = sensors_->snapshot().info.intrinsics;
   const double pixels = std::max(320.0 * 240.0, static_cast<double>(camera.width) * camera.height);
-  const web::Settings settings = store_ ? store_->settings.Get() : web::Settings{};
+  const Settings settings = store_ ? store_->settings.Get() : Settings{};
   double bytes = kScene + kSceneOfPixel * pixels;
   if (!check_ && (parts_.config.appliance.keep_recordings || settings.keep_recordings)) {
     const double sweep_s = parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s);
@@ -67,8 +67,8 @@ Appliance::Answer Appliance::WhyNoSpace() const {
 /// State and light must not say "ready" while each press is refused. A result, or the failure of a
 /// scan, stays until it has been seen.
 void Appliance::WatchSpace() {
-  if (IsRunning() || state_.phase == web::ApplianceState::kResult ||
-      state_.fault == web::FaultKind::kScan || !storage_fault_.empty())
+  if (IsRunning() || state_.phase == ApplianceState::kResult || state_.fault == FaultKind::kScan ||
+      !storage_fault_.empty())
     return;
   Answer why;
   try {

@@ -19,10 +19,6 @@
 
 namespace plumb {
 
-using web::ApplianceState;
-using web::FaultKind;
-using web::SweepAdvice;
-
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -56,13 +52,13 @@ bool IsReadOnly(const std::filesystem::path& folder) {
 
 }  // namespace
 
-web::WallClock::time_point StartOfDay() {
+WallClock::time_point StartOfDay() {
   const std::time_t now = std::time(nullptr);
   std::tm local{};
   ::localtime_r(&now, &local);
   local.tm_hour = local.tm_min = local.tm_sec = 0;
   local.tm_isdst = -1;  // summer time may have begun or ended since midnight
-  return web::WallClock::from_time_t(std::mktime(&local));
+  return WallClock::from_time_t(std::mktime(&local));
 }
 
 IndicatorPattern Appliance::Pattern() const {
@@ -197,7 +193,7 @@ Json Appliance::StatusJson() {
       const bool is_shown = ended.correction && *ended.verdict != Verdict::kNoAnswer;
       const Json correction = is_shown ? Json(CorrectionJson(*ended.correction)) : Json(nullptr);
       last["correction"] = correction;
-      for (const web::NumberAxis& axis : web::kNumberAxes)
+      for (const NumberAxis& axis : kNumberAxes)
         last[axis.key] = correction.is_object() ? correction[axis.key] : Json(nullptr);
     }
   }
@@ -227,9 +223,9 @@ Json Appliance::StatusJson() {
           {"version", Version()}};
 }
 
-web::Status Appliance::WebStatus() {
+Status Appliance::WebStatus() {
   const SensorSnapshot sensor = sensors_->snapshot();
-  web::Status status;
+  Status status;
   status.state = state_.phase;
   status.fault = FaultReason();
   if (state_.phase == ApplianceState::kFault) status.fault_kind = state_.fault;
@@ -247,22 +243,21 @@ web::Status Appliance::WebStatus() {
   status.storage.warnings = StorageWarnings();
   status.light = Name(shown_);
   status.patient_id = check_ ? std::string() : open_patient_;
-  status.next_purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
+  status.next_purpose = check_ ? ScanPurpose::kDailyCheck : purpose_;
   if (IsRunning()) {
-    status.scan =
-        web::LiveScan{.id = scan_.id,
-                      .patient_id = scan_.patient_id,
-                      .purpose = scan_.purpose,
-                      .elapsed_s = SecondsSince(scan_.started),
-                      .coverage = Coverage(),
-                      .without_new_surface_s = scan_.update.guidance.without_new_area_s,
-                      .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_share),
-                      .keyframes = scan_.update.keyframes,
-                      .frames = scan_.update.frames,
-                      .frames_tracked = scan_.update.frames_tracked,
-                      .frames_dropped = scan_.update.frames_dropped,
-                      .step = scan_.update.step,
-                      .step_fraction = scan_.update.fraction};
+    status.scan = LiveScan{.id = scan_.id,
+                           .patient_id = scan_.patient_id,
+                           .purpose = scan_.purpose,
+                           .elapsed_s = SecondsSince(scan_.started),
+                           .coverage = Coverage(),
+                           .without_new_surface_s = scan_.update.guidance.without_new_area_s,
+                           .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_share),
+                           .keyframes = scan_.update.keyframes,
+                           .frames = scan_.update.frames,
+                           .frames_tracked = scan_.update.frames_tracked,
+                           .frames_dropped = scan_.update.frames_dropped,
+                           .step = scan_.update.step,
+                           .step_fraction = scan_.update.fraction};
   }
   status.version = Version();
   status.warnings = page_.warnings;
@@ -283,24 +278,24 @@ std::optional<double> Appliance::SecondsSinceSensor() const {
   return sensors_->snapshot().present ? std::optional(SecondsSince(sensor_since_)) : std::nullopt;
 }
 
-web::DailyCheck Appliance::DailyCheckToday() {
+DailyCheck Appliance::DailyCheckToday() {
   return store_->checks.StateSince(StartOfDay(), sensors_->snapshot().sensor.serial);
 }
 
-std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
+std::string Appliance::WhyNoReference(const std::optional<Scan>& scan) {
   if (!parts_.demo_patient.empty() || store_ == nullptr) return {};
-  const web::DailyCheck today = DailyCheckToday();
-  if (today == web::DailyCheck::kFailed) {
+  const DailyCheck today = DailyCheckToday();
+  if (today == DailyCheck::kFailed) {
     return "the daily check has failed, and references need one that has passed since: open Daily "
            "check, find out why it failed, sweep over all markers of the room, then go on here";
   }
-  if (today == web::DailyCheck::kOverdue) {
+  if (today == DailyCheck::kOverdue) {
     return "the daily check is overdue, and references need one that has passed today: open Daily "
            "check, sweep over all markers of the room, then go on here";
   }
-  const bool is_unconfirmed = scan && scan->daily_check != web::DailyCheck::kPassed &&
-                              !store_->checks.ConfirmsScan(scan->id);
-  if (is_unconfirmed && scan->daily_check == web::DailyCheck::kFailed) {
+  const bool is_unconfirmed =
+      scan && scan->daily_check != DailyCheck::kPassed && !store_->checks.ConfirmsScan(scan->id);
+  if (is_unconfirmed && scan->daily_check == DailyCheck::kFailed) {
     return "this scan was taken after a failed daily check, and no check of the same day and "
            "sensor has confirmed it: scan the reference again";
   }
@@ -316,7 +311,7 @@ std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
 }
 
 /// Depth drifts while a sensor warms up: a reference would keep that error for a whole course.
-std::string Appliance::WhySensorIsCold(const std::optional<web::Scan>& scan) const {
+std::string Appliance::WhySensorIsCold(const std::optional<Scan>& scan) const {
   const std::optional<double> on_s = scan ? scan->sensor_on_s : SecondsSinceSensor();
   if (!on_s || *on_s >= 60 * warm_up_min()) return {};
   if (scan) {
@@ -332,7 +327,7 @@ std::string Appliance::WhySensorIsCold(const std::optional<web::Scan>& scan) con
       warm_up_min());
 }
 
-void Appliance::ReadStored(web::Status& status) {
+void Appliance::ReadStored(Status& status) {
   status.daily_check = DailyCheckToday();
   status.reference_block = WhyNoReference();
   status.session = store_->treatments.Opened();
@@ -347,7 +342,7 @@ void Appliance::ReadStored(web::Status& status) {
 
 /// A request for the status must not end the appliance. A failure is posted, because this call may
 /// be part of reporting it.
-void Appliance::ReadStoredOrFail(web::Status& status) {
+void Appliance::ReadStoredOrFail(Status& status) {
   if (store_ == nullptr) return;
   const auto fail = [this](const std::exception& error, StorageFault kind) {
     loop_.Post("store failed",
@@ -362,14 +357,14 @@ void Appliance::ReadStoredOrFail(web::Status& status) {
   }
 }
 
-web::CheckStatus Appliance::Checks() {
+CheckStatus Appliance::Checks() {
   constexpr int kShown = 60;
   return {.checks = store_->checks.List(kShown),
           .baseline = store_->checks.Baseline(),
           .today = DailyCheckToday()};
 }
 
-web::Health Appliance::Health() {
+Health Appliance::health() {
   if (!parts_.configuration_fault.empty()) return {.ok = false, .reason = storage_fault_};
   if (!storage_fault_.empty()) return {.ok = false, .reason = "storage: " + storage_fault_};
   if (IsReadOnly(parts_.config.appliance.state))

@@ -25,7 +25,7 @@ namespace {
 /// If the display cannot be paired, that is logged, and scanning remains possible.
 void PairProvisionedDisplay(const std::filesystem::path& state, Store& store) {
   try {
-    const std::optional<web::Display> display = ProvisionedDisplay(state);
+    const std::optional<Display> display = ProvisionedDisplay(state);
     if (display && store.displays.AddProvisioned(*display))
       Log(LogLevel::kNotice, "the display of the provisioning file is paired");
   } catch (const std::exception& error) {
@@ -53,7 +53,7 @@ void Appliance::UseStore(std::unique_ptr<Store> store) {
   if (!parts_.demo_patient.empty()) {
     const auto patient = store->patients.FindByCode(parts_.demo_patient);
     open_patient_ = patient ? patient->id : store->patients.Add(kSelf, parts_.demo_patient, "");
-    session_id_ = store->treatments.Open(kSelf, open_patient_, web::ScanPurpose::kFraction);
+    session_id_ = store->treatments.Open(kSelf, open_patient_, ScanPurpose::kFraction);
     opened_by_ = kSelf;
   }
   store_.Replace(std::move(store));
@@ -118,7 +118,7 @@ void Appliance::RetryStorage() {
 /// Tries a store that is open for changes: safe mode ends if it can be read and written again.
 void Appliance::ProbeStore() {
   try {
-    web::Status status;
+    Status status;
     ReadStored(status);
   } catch (const DatabaseCorrupt& error) {
     return EndRetry(error.what(), StorageFault::kDamage);

@@ -10,7 +10,7 @@
 namespace plumb {
 namespace {
 
-const web::Actor kSocket{.user = "control socket", .address = {}};
+const Actor kSocket{.user = "control socket", .address = {}};
 
 std::string BackupDone(const BackupReport& report) {
   return ControlLine({{"ok", true},
@@ -20,7 +20,7 @@ std::string BackupDone(const BackupReport& report) {
                       {"problems", report.problems}});
 }
 
-std::string UpdateLine(const web::UpdateStatus& status) {
+std::string UpdateLine(const UpdateStatus& status) {
   return ControlLine({{"ok", true},
                       {"installing", status.installing},
                       {"fraction", status.fraction},
@@ -30,11 +30,11 @@ std::string UpdateLine(const web::UpdateStatus& status) {
                       {"rolled_back", status.rolled_back}});
 }
 
-web::Done ReplyWith(const ControlServer::Reply& reply) {
-  return [reply](const web::Change& change) {
-    reply(change.result == web::ChangeResult::kDone
+Done ReplyWith(const ControlServer::Reply& reply) {
+  return [reply](const Change& change) {
+    reply(change.result == ChangeResult::kDone
               ? ControlDone()
-              : ControlRefusal(change.message, change.result == web::ChangeResult::kInvalid));
+              : ControlRefusal(change.message, change.result == ChangeResult::kInvalid));
   };
 }
 

@@ -31,7 +31,7 @@ Json FieldsOf(const ResultEvent& event) {
 }
 Json FieldsOf(const SensorEvent& event) {
   static constexpr auto kNames =
-      web::NamesUpTo<SensorEvent::Kind::kStalled>({"ready", "lost", "failed", "others", "stalled"});
+      NamesUpTo<SensorEvent::Kind::kStalled>({"ready", "lost", "failed", "others", "stalled"});
   return {{"event", "sensor"},
           {"what", kNames.at(static_cast<std::size_t>(event.kind))},
           {"serial", event.sensor.serial},
@@ -75,7 +75,7 @@ Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
 }
 
 std::string_view Name(IndicatorPattern pattern) {
-  static constexpr auto kNames = web::NamesUpTo<IndicatorPattern::kStopped>(
+  static constexpr auto kNames = NamesUpTo<IndicatorPattern::kStopped>(
       {"off", "no_sensor", "ready", "scanning", "too_fast", "too_near", "too_far", "working",
        "done", "result_in_tolerance", "result_unsure", "result_move", "no_answer", "fault",
        "ready_rolled_back", "ready_disk_nearly_full", "stopped"});

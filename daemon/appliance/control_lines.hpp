@@ -17,7 +17,7 @@ namespace plumb {
 
 struct IgnoredEvent {
   ScanEvent what;
-  web::ApplianceState state;
+  ApplianceState state;
   std::string reason;
 };
 struct LightEvent {
@@ -33,7 +33,7 @@ struct ResultEvent {
   std::string answer;  ///< The verdict, or why there is none.
 };
 struct StateEvent {
-  web::ApplianceState state;
+  ApplianceState state;
   std::string reason;  ///< In a fault.
   bool cancelling;
 };

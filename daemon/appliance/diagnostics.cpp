@@ -50,8 +50,8 @@ void Mask(Json& json) {
 
 }  // namespace
 
-std::string DiagnosticsText(const Json& status, const web::Health& health, const std::string& loop,
-                            const std::vector<web::AuditEntry>& audit) {
+std::string DiagnosticsText(const Json& status, const Health& health, const std::string& loop,
+                            const std::vector<AuditEntry>& audit) {
   constexpr std::array kStatus = {"state",       "reason", "sensor",   "light",
                                   "rolled_back", "page",   "warnings", "version"};
   constexpr std::array kLast = {"frames",          "frames_dropped",   "images_lost",
@@ -64,8 +64,7 @@ std::string DiagnosticsText(const Json& status, const web::Health& health, const
       fmt::format("plumbd {}\nhealth: {}\nstatus: {}\n\nthe event loop:\n{}\nlast actions:\n",
                   Version(), health.ok ? "ok" : Masked(health.reason),
                   shown.dump(-1, ' ', false, Json::error_handler_t::replace), loop);
-  for (const web::AuditEntry& entry : audit)
-    text += fmt::format("{} {}\n", entry.number, entry.action);
+  for (const AuditEntry& entry : audit) text += fmt::format("{} {}\n", entry.number, entry.action);
   return text;
 }
 

@@ -7,7 +7,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "web/service/service_types.hpp"
+#include "web/model/audit.hpp"
+#include "web/model/status.hpp"
 
 namespace plumb {
 
@@ -16,8 +17,8 @@ namespace plumb {
 /// out.
 /// @param status  Appliance::StatusJson().
 /// @param loop  LoopTable().
-[[nodiscard]] std::string DiagnosticsText(const nlohmann::json& status, const web::Health& health,
+[[nodiscard]] std::string DiagnosticsText(const nlohmann::json& status, const Health& health,
                                           const std::string& loop,
-                                          const std::vector<web::AuditEntry>& audit);
+                                          const std::vector<AuditEntry>& audit);
 
 }  // namespace plumb

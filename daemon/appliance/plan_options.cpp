@@ -37,7 +37,7 @@ void CheckPoint(std::string_view field, const std::array<double, N>& point) {
 
 }  // namespace
 
-CompareOptions CompareOptionsFor(const web::ReferencePlan& plan, const CompareOptions& configured) {
+CompareOptions CompareOptionsFor(const ReferencePlan& plan, const CompareOptions& configured) {
   CompareOptions options = configured;
   if (!plan.region_m.empty() && plan.region_m.size() < 3)
     Fail(fmt::format("region_m: expected no corner or at least 3, found {}", plan.region_m.size()));

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "algo/comparison/comparison.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/reference.hpp"
 
 namespace plumb {
 
@@ -11,7 +11,7 @@ namespace plumb {
 /// no isocentre: the region's centroid); everything else is as configured for the room.
 /// @throws DataError naming the invalid field of the plan: no scan is compared with values that
 ///         nobody approved.
-[[nodiscard]] CompareOptions CompareOptionsFor(const web::ReferencePlan& plan,
+[[nodiscard]] CompareOptions CompareOptionsFor(const ReferencePlan& plan,
                                                const CompareOptions& configured);
 
 }  // namespace plumb

@@ -18,8 +18,9 @@
 #include "daemon/config/config_section.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "drivers/files/file_io.hpp"
+#include "web/model/account.hpp"
+#include "web/model/limits.hpp"
 #include "web/security/sessions.hpp"
-#include "web/service/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -51,7 +52,7 @@ bool IsPlainFile(const std::string& name) {
 }
 
 bool IsDisplayName(const std::string& name) {
-  return IsWord(name, " ._-", web::kMaxName) && name.front() != ' ' && name.back() != ' ';
+  return IsWord(name, " ._-", kMaxName) && name.front() != ' ' && name.back() != ' ';
 }
 
 /// 32 or 128 bits, or nothing.
@@ -147,7 +148,7 @@ void ReadDisplay(Section section, const toml::table& root, const fs::path& file,
   if (name.empty()) return;
   try {
     const std::string key = CheckedDisplayKey(file.parent_path() / key_file);
-    given.display = web::Display{
+    given.display = Display{
         .id = {},
         .name = name,
         .token_hash = web::StoredHashOf(key),
@@ -221,18 +222,18 @@ void ApplyProvisioning(const Provisioning& given, const fs::path& unit, const fs
                fmt::format("{} {}\n", given.display->token_hash, given.display->name));
 }
 
-std::optional<web::Display> ProvisionedDisplay(const fs::path& state) {
+std::optional<Display> ProvisionedDisplay(const fs::path& state) {
   const fs::path file = state / kDisplayFile;
   std::error_code ignored;
   if (fs::symlink_status(file, ignored).type() == fs::file_type::not_found) return std::nullopt;
   std::string text = ReadTextFile(file, kMaxBytes);
   if (text.ends_with('\n')) text.pop_back();
   const std::size_t space = std::min(text.find(' '), text.size());
-  web::Display display{.id = {},
-                       .name = text.substr(std::min(space + 1, text.size())),
-                       .token_hash = text.substr(0, space),
-                       .paired_at = {},
-                       .paired_by = {}};
+  Display display{.id = {},
+                  .name = text.substr(std::min(space + 1, text.size())),
+                  .token_hash = text.substr(0, space),
+                  .paired_at = {},
+                  .paired_by = {}};
   if (!IsHex(display.token_hash, kKeyDigits) || !IsDisplayName(display.name))
     throw DataError(fmt::format("{}: expected a hash of {} digits and a name, found {} characters",
                                 file.string(), kKeyDigits, text.size()));

@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "web/model/account.hpp"
+#include "web/model/settings.hpp"
 #include "web/security/tls_identity.hpp"
-#include "web/service/service_types.hpp"
 
 namespace plumb {
 
@@ -19,7 +20,7 @@ struct Provisioning {
   std::string gateway;
   std::vector<std::string> dns, time_servers;
   std::optional<web::TlsIdentity> page;  ///< Certificate and key of the page.
-  std::optional<web::Display> display;   ///< Its name and the hash of its key.
+  std::optional<Display> display;        ///< Its name and the hash of its key.
 };
 
 /// Reads and checks the whole file; the files that it names are in its folder.
@@ -37,6 +38,6 @@ void ApplyProvisioning(const Provisioning& given, const std::filesystem::path& u
                        const std::filesystem::path& state);
 
 /// The display that ApplyProvisioning() wrote, if any. @throws DataError
-[[nodiscard]] std::optional<web::Display> ProvisionedDisplay(const std::filesystem::path& state);
+[[nodiscard]] std::optional<Display> ProvisionedDisplay(const std::filesystem::path& state);
 
 }  // namespace plumb

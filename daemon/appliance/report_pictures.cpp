@@ -82,7 +82,7 @@ std::vector<std::uint8_t> RegionLike(const HeightMap& heights, const fs::path& f
   return region;
 }
 
-std::vector<std::uint8_t> PlannedRegion(const GridShape& grid, const web::ReferencePlan& plan) {
+std::vector<std::uint8_t> PlannedRegion(const GridShape& grid, const ReferencePlan& plan) {
   if (plan.region_m.size() < 3) return {};
   std::vector<cv::Point> corners;
   for (const auto& [x, y] : plan.region_m)
@@ -120,7 +120,7 @@ std::vector<cv::Mat> ComparisonPictures(const fs::path& scan_folder,
   });
 }
 
-PlanPictures ReferencePictures(const fs::path& scan_folder, const web::ReferencePlan& plan,
+PlanPictures ReferencePictures(const fs::path& scan_folder, const ReferencePlan& plan,
                                const RoomFinder& room_in, const PictureWords& words,
                                const SideWords& sides) {
   PlanPictures plans;

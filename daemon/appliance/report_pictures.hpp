@@ -13,7 +13,7 @@
 #include "algo/render/picture_words.hpp"
 #include "algo/types/scene.hpp"
 #include "daemon/files/map_marks.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/reference.hpp"
 
 namespace plumb {
 
@@ -41,8 +41,7 @@ struct PlanPictures {
 /// in the planned posture.
 /// @param room_in  Empty: the room is not known.
 [[nodiscard]] PlanPictures ReferencePictures(const std::filesystem::path& scan_folder,
-                                             const web::ReferencePlan& plan,
-                                             const RoomFinder& room_in, const PictureWords& words,
-                                             const SideWords& sides);
+                                             const ReferencePlan& plan, const RoomFinder& room_in,
+                                             const PictureWords& words, const SideWords& sides);
 
 }  // namespace plumb

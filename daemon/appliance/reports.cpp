@@ -17,7 +17,13 @@
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 #include "web/api/local_time.hpp"
-#include "web/service/limits.hpp"
+#include "web/model/check.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/numbers.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/reference.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb {
 namespace {
@@ -48,7 +54,7 @@ std::string Said(double value, const ReportWords& words) {
 }
 
 std::string Footer(const ReportWords& words) {
-  return Filled(words.printed, Version(), web::LocalTimeText(web::WallClock::now()));
+  return Filled(words.printed, Version(), web::LocalTimeText(WallClock::now()));
 }
 
 ReportTexts TextsOf(const ReportWords& words) {
@@ -79,10 +85,9 @@ Json JsonIn(const std::filesystem::path& file) {
   }
 }
 
-std::string_view VerdictOf(const web::Scan& scan, const ReportWords& words) {
+std::string_view VerdictOf(const Scan& scan, const ReportWords& words) {
   if (!scan.result) {
-    return scan.purpose == web::ScanPurpose::kReference ? words.verdict_reference
-                                                        : words.verdict_none;
+    return scan.purpose == ScanPurpose::kReference ? words.verdict_reference : words.verdict_none;
   }
   const std::string& verdict = scan.result->verdict;
   return verdict == "in_tolerance" ? words.verdict_in
@@ -91,7 +96,7 @@ std::string_view VerdictOf(const web::Scan& scan, const ReportWords& words) {
                                    : words.terms.no_answer;
 }
 
-std::string WhyOf(const web::Scan& scan, Language language) {
+std::string WhyOf(const Scan& scan, Language language) {
   const ReportWords& words = WordsOf(language);
   if (!scan.result) return Translated(scan.failure, language);
   const std::string& verdict = scan.result->verdict;
@@ -102,19 +107,19 @@ std::string WhyOf(const web::Scan& scan, Language language) {
 }
 
 /// A correction without an answer must not be applied, so it is left out.
-bool IsAdvice(const web::Scan& scan) {
+bool IsAdvice(const Scan& scan) {
   return scan.result && scan.result->correction && scan.result->verdict != "no_answer";
 }
 
-std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const Json& result,
-                                    const web::Tolerance& tolerance, Language language) {
+std::vector<ReportNumber> NumbersOf(const Scan& scan, const Json& result,
+                                    const Tolerance& tolerance, Language language) {
   std::vector<ReportNumber> numbers;
   if (!IsAdvice(scan)) return numbers;
   const ReportWords& words = WordsOf(language);
   const std::array<std::string, 6> names = AxisNames(result, words.terms);
   const bool moves = scan.result->verdict == "move";
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const web::NumberAxis& axis = web::kNumberAxes[i];
+    const NumberAxis& axis = kNumberAxes[i];
     const std::optional<double> value = axis.In(scan.result->correction);
     const double half = axis.In(scan.result->u95).value_or(0.0);
     const double limit = axis.is_shift() ? tolerance.shift_mm : tolerance.rotation_deg;
@@ -133,7 +138,7 @@ std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const Json& result,
   return numbers;
 }
 
-ReportFacts QualityOf(const web::Scan& scan, const Json& scene, const Json& result,
+ReportFacts QualityOf(const Scan& scan, const Json& scene, const Json& result,
                       const ReportWords& words) {
   ReportFacts facts;
   const auto add = [&](std::string_view name, std::string value) {
@@ -171,9 +176,9 @@ ReportFacts QualityOf(const web::Scan& scan, const Json& scene, const Json& resu
 
 /// Index of a direction's name in result.json among the six; nothing if it is none of them.
 std::optional<std::size_t> AxisNamed(const std::string& name) {
-  const auto* const found = std::ranges::find(web::kNumberAxes, name, &web::NumberAxis::name);
-  if (found == web::kNumberAxes.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - web::kNumberAxes.begin());
+  const auto* const found = std::ranges::find(kNumberAxes, name, &NumberAxis::name);
+  if (found == kNumberAxes.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - kNumberAxes.begin());
 }
 
 /// Adds what the comparison could not rely on.
@@ -210,7 +215,7 @@ void AddWarningsTo(std::vector<std::string>& cautions, const Json& file, Languag
 }
 
 /// Cautions beside the verdict, for the report, the page without script and the print view.
-std::vector<std::string> CautionsIn(const web::Scan& scan, const Json& scene, const Json& result,
+std::vector<std::string> CautionsIn(const Scan& scan, const Json& scene, const Json& result,
                                     double warm_up_min, Language language) {
   const ReportWords& words = WordsOf(language);
   std::vector<std::string> cautions;
@@ -230,22 +235,23 @@ std::vector<std::string> CautionsIn(const web::Scan& scan, const Json& scene, co
   return cautions;
 }
 
-std::string PlanText(const web::ReferencePlan& plan, const ReportWords& words) {
-  const auto name = std::find(web::kPostures.begin(), web::kPostures.end(), plan.posture);
-  const std::string posture = name == web::kPostures.end()
-                                  ? plan.posture
-                                  : std::string(words.postures[static_cast<std::size_t>(
-                                        std::distance(web::kPostures.begin(), name))]);
+std::string PlanText(const ReferencePlan& plan, const ReportWords& words) {
+  const auto name = std::find(kPostures.begin(), kPostures.end(), plan.posture);
+  const std::string posture =
+      name == kPostures.end()
+          ? plan.posture
+          : std::string(
+                words.postures[static_cast<std::size_t>(std::distance(kPostures.begin(), name))]);
   return fmt::format("{}, {}", posture,
                      plan.couch_markers ? words.couch_markers : words.room_markers);
 }
 
-std::string ToleranceText(const web::Tolerance& tolerance, const ReportWords& words) {
+std::string ToleranceText(const Tolerance& tolerance, const ReportWords& words) {
   return fmt::format("\u00b1{} mm, \u00b1{}\u00b0", Said(tolerance.shift_mm, words),
                      Said(tolerance.rotation_deg, words));
 }
 
-std::string RegionText(const web::ReferencePlan& plan, const ReportWords& words) {
+std::string RegionText(const ReferencePlan& plan, const ReportWords& words) {
   const auto& region = plan.region_m;
   if (region.size() < 3) return std::string(words.whole_body);
   double twice_m2 = 0.0;
@@ -256,13 +262,13 @@ std::string RegionText(const web::ReferencePlan& plan, const ReportWords& words)
   return Filled(words.corners, region.size(), 1e4 * std::abs(twice_m2) / 2);
 }
 
-std::string IsocentreText(const web::ReferencePlan& plan, const ReportWords& words) {
+std::string IsocentreText(const ReferencePlan& plan, const ReportWords& words) {
   if (!plan.isocentre_m) return std::string(words.middle);
   const auto& [x, y, z] = *plan.isocentre_m;
   return fmt::format("x {}; y {}; z {} m", Said(x, 3, words), Said(y, 3, words), Said(z, 3, words));
 }
 
-void AddReferenceTo(ReportFacts& facts, const web::Reference& reference, const ReportWords& words) {
+void AddReferenceTo(ReportFacts& facts, const Reference& reference, const ReportWords& words) {
   facts.emplace_back(words.reference, Filled(words.version, reference.version,
                                              web::LocalTimeText(reference.created_at)));
   facts.emplace_back(words.plan, PlanText(reference.plan, words));
@@ -277,18 +283,18 @@ void AddReferenceTo(ReportFacts& facts, const web::Reference& reference, const R
   facts.emplace_back(words.checksum, reference.digest.substr(0, 16));
 }
 
-std::string AcceptedText(const web::Scan& scan, const ReportWords& words) {
+std::string AcceptedText(const Scan& scan, const ReportWords& words) {
   if (scan.accepted_by.empty()) return {};
   const std::string who = scan.accepted_at ? fmt::format("{}, {}", scan.accepted_by,
                                                          web::LocalTimeText(*scan.accepted_at))
                                            : scan.accepted_by;
   if (scan.accepted_reason.empty()) return Filled(words.accepted_by, who);
-  return Filled(web::IsUnsure(scan) ? words.accepted_unsure : words.accepted_outside, who,
+  return Filled(IsUnsure(scan) ? words.accepted_unsure : words.accepted_outside, who,
                 scan.accepted_reason);
 }
 
-ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>& patient,
-                       const std::optional<web::Reference>& reference, const ReportWords& words) {
+ReportFacts IdentityOf(const Scan& scan, const std::optional<Patient>& patient,
+                       const std::optional<Reference>& reference, const ReportWords& words) {
   ReportFacts facts;
   const auto add = [&](std::string_view name, std::string value) {
     facts.emplace_back(name, std::move(value));
@@ -306,13 +312,12 @@ ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>&
 
 /// The reference of the comparison; for a scan of a reference, the reference made from it, with its
 /// plan and approver.
-std::optional<web::Reference> ReferenceFor(const ReportSources& stored, const web::Scan& scan) {
-  if (!scan.reference_id.empty() || scan.purpose != web::ScanPurpose::kReference)
+std::optional<Reference> ReferenceFor(const ReportSources& stored, const Scan& scan) {
+  if (!scan.reference_id.empty() || scan.purpose != ScanPurpose::kReference)
     return stored.references.Find(scan.reference_id);
-  const std::vector<web::Reference> references = stored.references.List(scan.patient_id);
-  const auto found =
-      std::find_if(references.begin(), references.end(),
-                   [&](const web::Reference& one) { return one.scan_id == scan.id; });
+  const std::vector<Reference> references = stored.references.List(scan.patient_id);
+  const auto found = std::find_if(references.begin(), references.end(),
+                                  [&](const Reference& one) { return one.scan_id == scan.id; });
   return found == references.end() ? std::nullopt : std::optional(*found);
 }
 
@@ -321,21 +326,20 @@ struct ReportPictures {
   std::string note;  ///< To be read below them.
 };
 
-ReportPictures PlanPicturesOf(const std::filesystem::path& scan_folder,
-                              const web::ReferencePlan& plan, const RoomFinder& room_in,
-                              const ReportWords& words) {
+ReportPictures PlanPicturesOf(const std::filesystem::path& scan_folder, const ReferencePlan& plan,
+                              const RoomFinder& room_in, const ReportWords& words) {
   PlanPictures drawn = ReferencePictures(scan_folder, plan, room_in, words.pictures, words.sides);
   return {.pictures = std::move(drawn.pictures),
           .note = std::string(drawn.names_sides ? words.planned_sides : "")};
 }
 
-ReportPictures PicturesOf(const ReportSources& stored, const web::Scan& scan,
-                          const std::optional<web::Reference>& reference, const Json& result,
+ReportPictures PicturesOf(const ReportSources& stored, const Scan& scan,
+                          const std::optional<Reference>& reference, const Json& result,
                           const ReportWords& words) {
   if (!reference || scan.folder.empty()) return {};
-  if (scan.purpose == web::ScanPurpose::kReference)
+  if (scan.purpose == ScanPurpose::kReference)
     return PlanPicturesOf(scan.folder, reference->plan, stored.room_in, words);
-  const std::optional<web::Scan> of_reference = stored.scans.Find(reference->scan_id);
+  const std::optional<Scan> of_reference = stored.scans.Find(reference->scan_id);
   if (!scan.result || !of_reference || of_reference->folder.empty()) return {};
   return {.pictures = ComparisonPictures(scan.folder, of_reference->folder, result,
                                          reference->plan.tolerance.shift_mm * kMillimetre,
@@ -345,13 +349,13 @@ ReportPictures PicturesOf(const ReportSources& stored, const web::Scan& scan,
 
 }  // namespace
 
-ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Language language) {
+ScanReport DescribeScan(const ReportSources& stored, const Scan& scan, Language language) {
   const ReportWords& words = WordsOf(language);
-  const std::optional<web::Patient> patient = stored.patients.Find(scan.patient_id);
-  const std::optional<web::Reference> reference = ReferenceFor(stored, scan);
+  const std::optional<Patient> patient = stored.patients.Find(scan.patient_id);
+  const std::optional<Reference> reference = ReferenceFor(stored, scan);
   const Json scene = JsonIn(scan.folder / "scene/scene.json");
   const Json result = JsonIn(scan.folder / "result/result.json");
-  const web::Tolerance tolerance = reference ? reference->plan.tolerance : web::Tolerance{};
+  const Tolerance tolerance = reference ? reference->plan.tolerance : Tolerance{};
   ReportPictures drawn = PicturesOf(stored, scan, reference, result, words);
   ScanReport report{.texts = TextsOf(words),
                     .title = std::string(words.scan_title),
@@ -372,7 +376,7 @@ ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Lang
   return report;
 }
 
-CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& patient,
+CourseReport DescribeCourse(const ReportSources& stored, const Patient& patient,
                             Language language) {
   const ReportWords& words = WordsOf(language);
   CourseReport report{
@@ -385,25 +389,25 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
       .footer = Footer(words)};
   if (const auto reference = stored.references.Find(patient.approved_reference_id))
     AddReferenceTo(report.identity, *reference, words);
-  std::vector<web::Scan> scans = stored.scans.List(patient.id, kMaxScans);
+  std::vector<Scan> scans = stored.scans.List(patient.id, kMaxScans);
   bool is_any_overdue = false, is_any_failed = false;
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
-    if (scan->outcome != web::ScanOutcome::kDone) continue;
+    if (scan->outcome != ScanOutcome::kDone) continue;
     CourseRow row{.fraction = scan->fraction > 0 ? std::to_string(scan->fraction) : "-",
                   .when = web::LocalTimeText(scan->started_at),
                   .verdict = std::string(VerdictOf(*scan, words)),
                   .accepted = AcceptedText(*scan, words),
                   .values = {}};
-    if (scan->daily_check == web::DailyCheck::kOverdue) {
+    if (scan->daily_check == DailyCheck::kOverdue) {
       row.verdict += " *";
       is_any_overdue = true;
-    } else if (scan->daily_check == web::DailyCheck::kFailed) {
+    } else if (scan->daily_check == DailyCheck::kFailed) {
       row.verdict += " **";
       is_any_failed = true;
     }
     if (IsAdvice(*scan)) {
       for (std::size_t i = 0; i < row.values.size(); ++i) {
-        const web::NumberAxis& axis = web::kNumberAxes[i];
+        const NumberAxis& axis = kNumberAxes[i];
         if (const auto value = axis.In(scan->result->correction))
           row.values[i] = CourseValue{*value, axis.In(scan->result->u95).value_or(0.0)};
       }
@@ -417,7 +421,7 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
   return report;
 }
 
-web::ResultNotes NotesOf(const ReportSources& stored, const web::Scan& scan, Language language) {
+web::ResultNotes NotesOf(const ReportSources& stored, const Scan& scan, Language language) {
   const auto notes = [&](const Json& scene, const Json& result) {
     return web::ResultNotes{
         .axes = AxisNames(result, WordsOf(language).terms),
@@ -431,7 +435,7 @@ web::ResultNotes NotesOf(const ReportSources& stored, const web::Scan& scan, Lan
   }
 }
 
-std::vector<std::string> ComparisonPngs(const ReportSources& stored, const web::Scan& scan,
+std::vector<std::string> ComparisonPngs(const ReportSources& stored, const Scan& scan,
                                         Language language) {
   std::vector<std::string> files;
   if (!scan.result) return files;
@@ -451,11 +455,11 @@ std::vector<std::string> ComparisonPngs(const ReportSources& stored, const web::
   return files;
 }
 
-std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan, Language language) {
+std::string ScanReportPdf(const ReportSources& stored, const Scan& scan, Language language) {
   return PdfOf(DescribeScan(stored, scan, language));
 }
 
-std::string CourseReportPdf(const ReportSources& stored, const web::Patient& patient,
+std::string CourseReportPdf(const ReportSources& stored, const Patient& patient,
                             Language language) {
   return PdfOf(DescribeCourse(stored, patient, language));
 }

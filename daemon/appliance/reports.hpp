@@ -25,28 +25,27 @@ struct ReportSources {
 
 /// One page: identity, plan and approval, verdict, the six numbers with uncertainty and tolerance,
 /// quality, pictures, acceptance.
-[[nodiscard]] ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan,
+[[nodiscard]] ScanReport DescribeScan(const ReportSources& stored, const Scan& scan,
                                       web::Language language);
 /// All compared scans of a patient, oldest first.
-[[nodiscard]] CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& patient,
+[[nodiscard]] CourseReport DescribeCourse(const ReportSources& stored, const Patient& patient,
                                           web::Language language);
 
 /// Names of the six numbers, and cautions to read beside the verdict: lost frames, a cold sensor,
 /// an overdue check, a room that is not calibrated, ignored markers, uncertain directions,
 /// warnings.
-[[nodiscard]] web::ResultNotes NotesOf(const ReportSources& stored, const web::Scan& scan,
+[[nodiscard]] web::ResultNotes NotesOf(const ReportSources& stored, const Scan& scan,
                                        web::Language language);
 
 /// The pictures of the comparison as PNG files, in the order of web::ComparisonPicture; empty if
 /// the scan was not compared, or a record or file that they need is missing or damaged.
-[[nodiscard]] std::vector<std::string> ComparisonPngs(const ReportSources& stored,
-                                                      const web::Scan& scan,
+[[nodiscard]] std::vector<std::string> ComparisonPngs(const ReportSources& stored, const Scan& scan,
                                                       web::Language language);
 
 /// The reports as files. @throws IoError
-[[nodiscard]] std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan,
+[[nodiscard]] std::string ScanReportPdf(const ReportSources& stored, const Scan& scan,
                                         web::Language language);
-[[nodiscard]] std::string CourseReportPdf(const ReportSources& stored, const web::Patient& patient,
+[[nodiscard]] std::string CourseReportPdf(const ReportSources& stored, const Patient& patient,
                                           web::Language language);
 
 }  // namespace plumb

@@ -71,7 +71,7 @@ struct ScanUpdate {
   std::shared_ptr<const LiveSurfaceView> surface;  ///< Null: nothing can be shown yet.
 };
 
-/// How the scan ended, and its results. The store keeps the former as a web::ScanOutcome.
+/// How the scan ended, and its results. The store keeps the former as a ScanOutcome.
 struct EndedScan {
   enum class Kind { kDone, kNoScene, kCancelled, kFailed };
   Kind kind = Kind::kFailed;

@@ -2,9 +2,6 @@
 
 namespace plumb {
 
-using web::ApplianceState;
-using web::FaultKind;
-
 namespace {
 
 ScanTransition Stay(const ScanState& state) {
@@ -216,7 +213,7 @@ ScanTransition Next(const ScanState& before, ScanEvent event) {
 }
 
 const char* Name(ScanEvent event) {
-  static constexpr auto kNames = web::NamesUpTo<ScanEvent::kStorageWorks>(
+  static constexpr auto kNames = NamesUpTo<ScanEvent::kStorageWorks>(
       {"sensor_ready", "sensor_lost", "sensor_failed", "short_press", "long_press", "start",
        "end_sweep", "cancel", "sweep_complete", "scan_done", "scan_failed", "scan_cancelled",
        "result_expired", "storage_failed", "storage_works"});

@@ -4,17 +4,17 @@
 #include <string_view>
 #include <vector>
 
-#include "web/service/names.hpp"
+#include "web/model/status.hpp"
 
 namespace plumb {
 
 struct ScanState {
-  web::ApplianceState phase = web::ApplianceState::kNoSensor;
+  ApplianceState phase = ApplianceState::kNoSensor;
   bool has_sensor = false;  ///< Attached, open and streaming.
   bool sensor_fails =
       false;  ///< Attached but not working, whatever else is wrong; never together with has_sensor.
   /// Not kNone only in phase kFault, or in a scan that is being cancelled because of it.
-  web::FaultKind fault = web::FaultKind::kNone;
+  FaultKind fault = FaultKind::kNone;
   /// The running scan was requested to stop and has not stopped yet; kScanning and kWorking only.
   bool cancelling = false;
   bool operator==(const ScanState&) const = default;

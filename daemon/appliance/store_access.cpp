@@ -8,13 +8,11 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
-web::Change Refusal(ChangeResult result, std::string message) {
+Change Refusal(ChangeResult result, std::string message) {
   return {.result = result, .message = std::move(message), .id = {}, .file = {}};
 }
 
-web::Change AnswerOf(const std::string& why_not) {
+Change AnswerOf(const std::string& why_not) {
   return Refusal(why_not.empty() ? ChangeResult::kDone : ChangeResult::kConflict, why_not);
 }
 
@@ -34,13 +32,13 @@ std::string StoreAccess::WhyUnreadable(const std::function<void(Store&)>& read) 
   return {};
 }
 
-void StoreAccess::RunOnStoreThread(web::Done done, std::function<std::string(Store&)> change) {
+void StoreAccess::RunOnStoreThread(Done done, std::function<std::string(Store&)> change) {
   Store* store = appliance_.store();
   if (store == nullptr) return done(Refusal(ChangeResult::kFailed, appliance_.storage_fault()));
   // The store's thread outlives this object, which must not be used there.
   const bool posted = appliance_.store_thread().Post(
       [store, done, appliance = &appliance_, change = std::move(change), alive = alive_] {
-        web::Change answer;
+        Change answer;
         try {
           answer.id = change(*store);
         } catch (const StoreRefusal& refusal) {

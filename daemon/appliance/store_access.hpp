@@ -10,14 +10,14 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
-#include "web/service/change.hpp"
+#include "web/model/change.hpp"
 
 namespace plumb {
 
 /// An answer with a message, mostly for a change that was not made.
-[[nodiscard]] web::Change Refusal(web::ChangeResult result, std::string message);
+[[nodiscard]] Change Refusal(ChangeResult result, std::string message);
 /// Done if `why_not` is empty, otherwise a conflict with the state of the appliance.
-[[nodiscard]] web::Change AnswerOf(const std::string& why_not);
+[[nodiscard]] Change AnswerOf(const std::string& why_not);
 
 /// Changes run on the store's thread and call `done` on the loop; reads answer at once. Used on the
 /// loop's thread, Read() on any. In safe mode without a store reads return nothing, and changes
@@ -34,7 +34,7 @@ class StoreAccess {
   /// Runs `change` with one service of the store on the store's thread. Its return value is the id
   /// of a new record, if any; its exceptions become the answer.
   template <typename Service, typename Function>
-  void Change(Service Store::*service, web::Done done, Function change) {
+  void Write(Service Store::*service, Done done, Function change) {
     RunOnStoreThread(std::move(done),
                      [service, change = std::move(change)](Store& store) -> std::string {
                        using Result = std::invoke_result_t<const Function&, Service&>;
@@ -79,7 +79,7 @@ class StoreAccess {
   [[nodiscard]] std::string WhyUnreadable(const std::function<void(Store&)>& read) const;
 
  private:
-  void RunOnStoreThread(web::Done done, std::function<std::string(Store&)> change);
+  void RunOnStoreThread(Done done, std::function<std::string(Store&)> change);
   /// What is said of it, in the log too.
   static std::string Unreadable(const std::exception& error);
 

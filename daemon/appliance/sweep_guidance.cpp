@@ -6,8 +6,6 @@
 
 namespace plumb {
 
-using web::SweepAdvice;
-
 namespace {
 
 // surfaces farther away are the room, measured with low accuracy

@@ -7,7 +7,7 @@
 
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/types/frame.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/status.hpp"
 
 namespace plumb {
 
@@ -32,7 +32,7 @@ struct GuidanceOptions {
 
 /// State of the sweep up to now.
 struct SweepGuidance {
-  web::SweepAdvice advice = web::SweepAdvice::kNone;
+  SweepAdvice advice = SweepAdvice::kNone;
   double speed_m_s = 0.0;
   double turn_rad_s = 0.0;
   double median_depth_m = 0.0;
@@ -57,7 +57,7 @@ class SweepGuide {
  private:
   void UpdateSpeed(double time_s, const TrackingReport& report);
   void UpdateArea(const Frame& frame, const TrackingReport& report);
-  [[nodiscard]] web::SweepAdvice Advice(double time_s) const;
+  [[nodiscard]] SweepAdvice Advice(double time_s) const;
 
   Intrinsics intrinsics_;
   GuidanceOptions options_;

@@ -13,13 +13,11 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
-const web::Actor kInstaller{.user = "installer", .address = {}};
+const Actor kInstaller{.user = "installer", .address = {}};
 
-web::Change Conflict(std::string why) {
+Change Conflict(std::string why) {
   return {.result = ChangeResult::kConflict, .message = std::move(why), .id = {}, .file = {}};
 }
 
@@ -76,56 +74,56 @@ std::string Updates::WhyNotRestart() const {
   return appliance_.WhyNotRestart();
 }
 
-void Updates::AddBundle(const web::Actor& actor, const std::filesystem::path& file,
-                        const std::string& name, web::Done done) {
-  const web::Change change = updater_.Add(file, name);
+void Updates::AddBundle(const Actor& actor, const std::filesystem::path& file,
+                        const std::string& name, Done done) {
+  const Change change = updater_.Add(file, name);
   options_.log(actor, change.result == ChangeResult::kDone ? "update.upload" : "update.refuse",
                name, change.message);
   done(change);
 }
 
-void Updates::RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) {
-  const web::Change change = updater_.Remove(name);
+void Updates::RemoveBundle(const Actor& actor, const std::string& name, Done done) {
+  const Change change = updater_.Remove(name);
   if (change.result == ChangeResult::kDone) options_.log(actor, "update.remove", name, "");
   done(change);
 }
 
-void Updates::InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) {
+void Updates::InstallUpdate(const Actor& actor, const std::string& bundle, Done done) {
   if (const std::string why = WhyNotInstall(); !why.empty()) return done(Conflict(why));
   updater_.Install(bundle, LogInstall(actor, bundle, std::move(done)));
 }
 
-web::Done Updates::LogInstall(const web::Actor& actor, const std::string& bundle, web::Done done) {
-  return [this, actor, bundle, done = std::move(done)](const web::Change& change) {
+Done Updates::LogInstall(const Actor& actor, const std::string& bundle, Done done) {
+  return [this, actor, bundle, done = std::move(done)](const Change& change) {
     options_.log(actor, change.result == ChangeResult::kDone ? "update.install" : "update.refuse",
                  bundle, change.message);
     done(change);
   };
 }
 
-void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
-                          const std::string& name, web::Done done) {
+void Updates::InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile> file,
+                          const std::string& name, Done done) {
   if (const std::string why = WhyNotInstall(); !why.empty()) return done(Conflict(why));
-  if (const web::UpdateStatus status = updater_.status(); !status.supported)
+  if (const UpdateStatus status = updater_.status(); !status.supported)
     return done(Conflict(status.message));
   if (copying_ || updater_.is_installing())
     return done(Conflict("another bundle is being installed: wait until it is done"));
   copying_ = true;
   const auto copied = [this, actor, name, done](const std::filesystem::path& copy,
-                                                const web::Change& failure) {
+                                                const Change& failure) {
     copying_ = false;
     if (copy.empty()) {
       options_.log(actor, "update.refuse", name, failure.message);
       return done(failure);
     }
-    const auto drop = [copy, done](const web::Change& why) {
+    const auto drop = [copy, done](const Change& why) {
       std::error_code ignored;
       std::filesystem::remove(copy, ignored);
       done(why);
     };
     // A scan may have started during the copying.
     if (const std::string why = WhyNotInstall(); !why.empty()) return drop(Conflict(why));
-    AddBundle(actor, copy, name, [this, actor, name, drop, done](const web::Change& added) {
+    AddBundle(actor, copy, name, [this, actor, name, drop, done](const Change& added) {
       if (added.result != ChangeResult::kDone) return drop(added);
       updater_.InstallCopy(name, LogInstall(actor, name, done));
     });
@@ -133,7 +131,7 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
   const auto work = [file = std::move(file), folder = options_.config.folder,
                      max_bytes = static_cast<std::uint64_t>(options_.config.max_bundle_mb) << 20,
                      copied, &loop = appliance_.loop(), alive = alive_] {
-    web::Change failure;
+    Change failure;
     std::filesystem::path copy;
     try {
       copy = CopyBundle(file->fd(), folder, max_bytes);
@@ -151,7 +149,7 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
   done(Conflict("the disk is busy: try again"));
 }
 
-void Updates::InstallFromStick(const web::Actor& actor, const std::string& bundle, web::Done done) {
+void Updates::InstallFromStick(const Actor& actor, const std::string& bundle, Done done) {
   auto file = std::make_shared<const AttachedFile>(sticks_.Open(bundle));
   if (file->fd() < 0) {
     return done({.result = ChangeResult::kNotFound,
@@ -162,13 +160,13 @@ void Updates::InstallFromStick(const web::Actor& actor, const std::string& bundl
   InstallFile(actor, std::move(file), bundle, std::move(done));
 }
 
-void Updates::RestartSystem(const web::Actor& actor, web::Done done) {
+void Updates::RestartSystem(const Actor& actor, Done done) {
   if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
   restarting_ = true;  // no scan, session or update may begin before the machine goes down
   GoDown(actor, std::move(done));
 }
 
-void Updates::ResetToFactory(const web::Actor& actor, web::FactoryReset kind, web::Done done) {
+void Updates::ResetToFactory(const Actor& actor, FactoryReset kind, Done done) {
   if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
   restarting_ = true;
   const auto noted = [this, actor, kind, done](const std::string& failure) {
@@ -177,8 +175,8 @@ void Updates::ResetToFactory(const web::Actor& actor, web::FactoryReset kind, we
       return done({.result = ChangeResult::kFailed, .message = failure, .id = {}, .file = {}});
     }
     options_.log(actor, "system.factory_reset_request", "",
-                 kind == web::FactoryReset::kWipe ? "everything is removed" : "records are kept");
-    GoDown(actor, [this, done](const web::Change& change) {
+                 kind == FactoryReset::kWipe ? "everything is removed" : "records are kept");
+    GoDown(actor, [this, done](const Change& change) {
       if (change.result != ChangeResult::kDone) CancelFactoryReset(options_.state);
       done(change);
     });
@@ -200,7 +198,7 @@ void Updates::ResetToFactory(const web::Actor& actor, web::FactoryReset kind, we
   done(Conflict("the disk is busy: try again"));
 }
 
-void Updates::GoDown(const web::Actor& actor, web::Done done) {
+void Updates::GoDown(const Actor& actor, Done done) {
   options_.log(actor, "system.restart", "", "");
   Log(LogLevel::kNotice, fmt::format("{} restarts the machine", actor.user));
   restart_->Restart(
@@ -231,7 +229,7 @@ void Updates::OnStillRunning() {
   Log(LogLevel::kError, text);
 }
 
-void Updates::ForgetRollBack(const web::Actor& actor, web::Done done) {
+void Updates::ForgetRollBack(const Actor& actor, Done done) {
   if (updater_.status().rolled_back.empty())
     return done(Conflict("the machine has not been rolled back"));
   updater_.ForgetRollBack();

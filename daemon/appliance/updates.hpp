@@ -24,7 +24,7 @@ struct UpdatesOptions {
   std::string boot = {};  ///< Unique for each start of the machine; empty if unknown.
   std::function<bool(std::function<void()>)> run_in_background;  ///< See UpdaterOptions.
   std::function<void()> changed;  ///< Called when GetUpdate() has changed.
-  std::function<void(const web::Actor& actor, const char* action, const std::string& subject,
+  std::function<void(const Actor& actor, const char* action, const std::string& subject,
                      const std::string& detail)>
       log;  ///< Writes to the audit log.
 };
@@ -39,33 +39,31 @@ class Updates : public web::UpdateService {
   Updates(const Updates&) = delete;
   Updates& operator=(const Updates&) = delete;
 
-  [[nodiscard]] web::UpdateStatus GetUpdate() override { return updater_.status(); }
-  void AddBundle(const web::Actor& actor, const std::filesystem::path& file,
-                 const std::string& name, web::Done done) override;
-  void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
-  void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
+  [[nodiscard]] UpdateStatus GetUpdate() override { return updater_.status(); }
+  void AddBundle(const Actor& actor, const std::filesystem::path& file, const std::string& name,
+                 Done done) override;
+  void RemoveBundle(const Actor& actor, const std::string& name, Done done) override;
+  void InstallUpdate(const Actor& actor, const std::string& bundle, Done done) override;
   /// Copies the open file to the bundles, off the loop, then installs it. The copy is removed
   /// when the installation has ended or was refused.
-  void InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
-                   const std::string& name, web::Done done);
+  void InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile> file,
+                   const std::string& name, Done done);
   [[nodiscard]] std::vector<std::string> StickBundles() override { return sticks_.Bundles(); }
-  void InstallFromStick(const web::Actor& actor, const std::string& bundle,
-                        web::Done done) override;
-  void RestartSystem(const web::Actor& actor, web::Done done) override;
-  void ResetToFactory(const web::Actor& actor, web::FactoryReset kind, web::Done done) override;
-  void ForgetRollBack(const web::Actor& actor, web::Done done) override;
+  void InstallFromStick(const Actor& actor, const std::string& bundle, Done done) override;
+  void RestartSystem(const Actor& actor, Done done) override;
+  void ResetToFactory(const Actor& actor, FactoryReset kind, Done done) override;
+  void ForgetRollBack(const Actor& actor, Done done) override;
 
  private:
   /// Passes the answer on to `done` and writes it to the audit log.
-  [[nodiscard]] web::Done LogInstall(const web::Actor& actor, const std::string& bundle,
-                                     web::Done done);
+  [[nodiscard]] Done LogInstall(const Actor& actor, const std::string& bundle, Done done);
   /// Why no update may begin now; empty if it may.
   [[nodiscard]] std::string WhyNotInstall() const;
   [[nodiscard]] std::string WhyNotRestart() const;
   /// Why no scan may begin now; empty if it may.
   [[nodiscard]] std::string WhyNotScan() const;
   /// Requests the restart; `restarting_` is set.
-  void GoDown(const web::Actor& actor, web::Done done);
+  void GoDown(const Actor& actor, Done done);
   /// The machine still runs although its restart was accepted: scans are possible again, and no
   /// later restart carries out a factory reset that was requested with this one.
   void OnStillRunning();
@@ -75,7 +73,7 @@ class Updates : public web::UpdateService {
   UpdatesOptions options_;
   UsbSticks sticks_;
   bool restarting_ = false, copying_ = false;
-  web::Actor restarted_by_;
+  Actor restarted_by_;
   EventLoop::Source restart_limit_;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   Updater updater_;  // Declared last, so destroyed first: its callbacks use the members above.

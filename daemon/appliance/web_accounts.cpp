@@ -9,8 +9,6 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
 class WebAccounts final : public web::AccountService {
@@ -21,33 +19,31 @@ class WebAccounts final : public web::AccountService {
     return store_.WhyUnreadable([](Store& store) { (void)store.users.List(); });
   }
 
-  std::vector<web::User> Users() override {
+  std::vector<User> Users() override {
     return store_.Read(&Store::users, [](UserStore& users) { return users.List(); });
   }
 
-  std::optional<web::User> FindUser(const std::string& name) override {
+  std::optional<User> FindUser(const std::string& name) override {
     return store_.ReadOrNothing(&Store::users, [&](UserStore& users) { return users.Find(name); });
   }
 
-  void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override {
-    store_.Change(&Store::users, std::move(done),
-                  [=](UserStore& users) { users.Add(actor, user); });
+  void AddUser(const Actor& actor, const User& user, Done done) override {
+    store_.Write(&Store::users, std::move(done), [=](UserStore& users) { users.Add(actor, user); });
   }
 
-  void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override {
-    store_.Change(&Store::users, std::move(done),
-                  [=](UserStore& users) { users.Change(actor, change); });
+  void ChangeUser(const Actor& actor, const UserChange& change, Done done) override {
+    store_.Write(&Store::users, std::move(done),
+                 [=](UserStore& users) { users.Change(actor, change); });
   }
 
-  web::Preferences PreferencesOf(const std::string& name) override {
+  Preferences PreferencesOf(const std::string& name) override {
     return store_.ReadOrNothing(&Store::users,
                                 [&](UserStore& users) { return users.PreferencesOf(name); });
   }
 
-  void SetPreferences(const web::Actor& actor, const web::Preferences& preferences,
-                      web::Done done) override {
-    store_.Change(&Store::users, std::move(done),
-                  [=](UserStore& users) { users.SetPreferences(actor.user, preferences); });
+  void SetPreferences(const Actor& actor, const Preferences& preferences, Done done) override {
+    store_.Write(&Store::users, std::move(done),
+                 [=](UserStore& users) { users.SetPreferences(actor.user, preferences); });
   }
 
  private:
@@ -58,19 +54,19 @@ class WebDisplays final : public web::DisplayService {
  public:
   explicit WebDisplays(StoreAccess& store) : store_(store) {}
 
-  std::vector<web::Display> Displays() override {
+  std::vector<Display> Displays() override {
     return store_.ReadOrNothing(&Store::displays,
                                 [](DisplayStore& displays) { return displays.List(); });
   }
 
-  void AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) override {
-    store_.Change(&Store::displays, std::move(done),
-                  [=](DisplayStore& displays) { return displays.Add(actor, display); });
+  void AddDisplay(const Actor& actor, const Display& display, Done done) override {
+    store_.Write(&Store::displays, std::move(done),
+                 [=](DisplayStore& displays) { return displays.Add(actor, display); });
   }
 
-  void RemoveDisplay(const web::Actor& actor, const std::string& id, web::Done done) override {
-    store_.Change(&Store::displays, std::move(done),
-                  [=](DisplayStore& displays) { displays.Remove(actor, id); });
+  void RemoveDisplay(const Actor& actor, const std::string& id, Done done) override {
+    store_.Write(&Store::displays, std::move(done),
+                 [=](DisplayStore& displays) { displays.Remove(actor, id); });
   }
 
  private:
@@ -81,18 +77,18 @@ class WebAuditLog final : public web::AuditLog {
  public:
   explicit WebAuditLog(StoreAccess& store) : store_(store) {}
 
-  void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+  void Log(const Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail) override {
-    const auto report = [action](const web::Change& answer) {
+    const auto report = [action](const Change& answer) {
       if (answer.result == ChangeResult::kDone) return;
       plumb::Log(LogLevel::kError,
                  fmt::format("the audit log does not take '{}': {}", action, answer.message));
     };
-    store_.Change(&Store::audit, report,
-                  [=](AuditStore& audit) { audit.Log(actor, action, subject, detail); });
+    store_.Write(&Store::audit, report,
+                 [=](AuditStore& audit) { audit.Log(actor, action, subject, detail); });
   }
 
-  std::vector<web::AuditEntry> Audit(const web::AuditQuery& query) override {
+  std::vector<AuditEntry> Audit(const AuditQuery& query) override {
     return store_.Read(&Store::audit, [&](AuditStore& audit) { return audit.Find(query); });
   }
 

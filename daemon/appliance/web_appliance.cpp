@@ -22,9 +22,9 @@ class WebAppliance final : public web::ApplianceService {
  public:
   explicit WebAppliance(Appliance& appliance) : appliance_(appliance) {}
 
-  web::Status GetStatus() override { return appliance_.WebStatus(); }
+  Status GetStatus() override { return appliance_.WebStatus(); }
 
-  web::Health GetHealth() override { return appliance_.Health(); }
+  Health GetHealth() override { return appliance_.health(); }
 
   std::shared_ptr<const std::string> Preview() override {
     const auto now = std::chrono::steady_clock::now();
@@ -57,21 +57,19 @@ class WebAppliance final : public web::ApplianceService {
     return packed_;
   }
 
-  void Press(const web::Actor& actor, web::Done done) override {
+  void Press(const Actor& actor, Done done) override {
     done(AnswerOf(appliance_.Press(ButtonPress::kShort, actor)));
   }
 
-  void StartSweep(const web::Actor& actor, web::Done done) override {
+  void StartSweep(const Actor& actor, Done done) override {
     done(AnswerOf(appliance_.StartSweep(actor)));
   }
 
-  void EndSweep(const web::Actor& actor, web::Done done) override {
+  void EndSweep(const Actor& actor, Done done) override {
     done(AnswerOf(appliance_.EndSweep(actor)));
   }
 
-  void Cancel(const web::Actor& actor, web::Done done) override {
-    done(AnswerOf(appliance_.Cancel(actor)));
-  }
+  void Cancel(const Actor& actor, Done done) override { done(AnswerOf(appliance_.Cancel(actor))); }
 
   void SetListener(std::function<void(web::EventKind)> listener) override {
     appliance_.SetWebListener(std::move(listener));

@@ -18,8 +18,6 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
 class WebMaintenance final : public web::MaintenanceService {
@@ -27,7 +25,7 @@ class WebMaintenance final : public web::MaintenanceService {
   WebMaintenance(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
   ~WebMaintenance() override { *alive_ = false; }
 
-  void MakeBackup(const web::Actor& actor, web::Done done) override {
+  void MakeBackup(const Actor& actor, Done done) override {
     const std::filesystem::path folder = appliance_.BackupTarget();
     if (folder.empty())
       return done(Refusal(ChangeResult::kInvalid,
@@ -39,16 +37,16 @@ class WebMaintenance final : public web::MaintenanceService {
         });
   }
 
-  void WriteDiagnostics(const web::Actor& actor, web::Done done) override {
+  void WriteDiagnostics(const Actor& actor, Done done) override {
     const nlohmann::json status = appliance_.StatusJson();
     const std::string loop = LoopTable(appliance_.loop().meter());
-    const web::Health health = appliance_.Health();
-    const auto report = [done = std::move(done)](const web::Change& change) {
-      web::Change answer = change;
+    const Health health = appliance_.health();
+    const auto report = [done = std::move(done)](const Change& change) {
+      Change answer = change;
       answer.file = std::exchange(answer.id, {});
       done(answer);
     };
-    store_.Change(&Store::audit, report, [=](AuditStore& audit) {
+    store_.Write(&Store::audit, report, [=](AuditStore& audit) {
       const std::string text =
           DiagnosticsText(status, health, loop, audit.Find({0, 500, "", /*views=*/false}));
       std::string name;

@@ -10,14 +10,12 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
 /// Why this patient cannot be opened for that purpose; empty if it can.
-std::string WhyNotOpen(bool is_running, const web::Patient& patient, web::ScanPurpose purpose) {
+std::string WhyNotOpen(bool is_running, const Patient& patient, ScanPurpose purpose) {
   if (is_running) return "a scan is running: wait for its result, then open the patient";
-  if (purpose == web::ScanPurpose::kFraction && patient.approved_reference_id.empty())
+  if (purpose == ScanPurpose::kFraction && patient.approved_reference_id.empty())
     return "this patient has no approved reference: scan and approve one first";
   return {};
 }
@@ -26,35 +24,35 @@ class WebPatients final : public web::PatientService {
  public:
   WebPatients(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
 
-  std::vector<web::Patient> Patients() override {
+  std::vector<Patient> Patients() override {
     return store_.Read(&Store::patients, [](PatientStore& patients) { return patients.List(); });
   }
 
-  std::optional<web::Patient> FindPatient(const std::string& id) override {
+  std::optional<Patient> FindPatient(const std::string& id) override {
     return store_.Read(&Store::patients, [&](PatientStore& patients) { return patients.Find(id); });
   }
 
-  void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site,
-                  web::Done done) override {
-    store_.Change(&Store::patients, std::move(done),
-                  [=](PatientStore& patients) { return patients.Add(actor, code, site); });
+  void AddPatient(const Actor& actor, const std::string& code, const std::string& site,
+                  Done done) override {
+    store_.Write(&Store::patients, std::move(done),
+                 [=](PatientStore& patients) { return patients.Add(actor, code, site); });
   }
 
-  void ChangePatient(const web::Actor& actor, const std::string& id, const web::CourseNotes& wanted,
-                     const std::optional<web::CourseNotes>& shown, web::Done done) override {
-    store_.Change(&Store::patients, std::move(done), [=](PatientStore& patients) {
+  void ChangePatient(const Actor& actor, const std::string& id, const CourseNotes& wanted,
+                     const std::optional<CourseNotes>& shown, Done done) override {
+    store_.Write(&Store::patients, std::move(done), [=](PatientStore& patients) {
       patients.Change(actor, id, wanted.site, wanted.note, shown);
     });
   }
 
-  void ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
-                      web::Done done) override {
-    store_.Change(&Store::patients, std::move(done),
-                  [=](PatientStore& patients) { patients.Archive(actor, id, archived); });
+  void ArchivePatient(const Actor& actor, const std::string& id, bool archived,
+                      Done done) override {
+    store_.Write(&Store::patients, std::move(done),
+                 [=](PatientStore& patients) { patients.Archive(actor, id, archived); });
   }
 
-  void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override {
-    const web::Status status = appliance_.WebStatus();
+  void WipePatient(const Actor& actor, const std::string& id, Done done) override {
+    const Status status = appliance_.WebStatus();
     if (status.scan && status.scan->patient_id == id) {
       return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
     }
@@ -65,21 +63,20 @@ class WebPatients final : public web::PatientService {
       appliance_.SetWiping(true);
     }
     // The session ends once the data is removed. A removal that is refused changes nothing.
-    const web::Done wiped = [this, id, is_open, done = std::move(done)](const web::Change& change) {
+    const Done wiped = [this, id, is_open, done = std::move(done)](const Change& change) {
       if (is_open) appliance_.SetWiping(false);
       if (change.result == ChangeResult::kDone) appliance_.ClosePatient(id);
       done(change);
     };
-    store_.Change(&Store::removal, wiped,
-                  [=](StoreRemoval& removal) { removal.WipePatient(actor, id); });
+    store_.Write(&Store::removal, wiped,
+                 [=](StoreRemoval& removal) { removal.WipePatient(actor, id); });
   }
 
-  void OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose,
-                   const std::string& reason, const std::string& replaces,
-                   web::Done done) override {
-    const std::optional<web::Patient> patient = FindPatient(id);
+  void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
+                   const std::string& reason, const std::string& replaces, Done done) override {
+    const std::optional<Patient> patient = FindPatient(id);
     if (!patient) return done(Refusal(ChangeResult::kNotFound, "there is no such patient"));
-    if (purpose == web::ScanPurpose::kDailyCheck) {
+    if (purpose == ScanPurpose::kDailyCheck) {
       return done(
           Refusal(ChangeResult::kInvalid, "a daily check is of no patient: open it as a check"));
     }
@@ -88,13 +85,13 @@ class WebPatients final : public web::PatientService {
     if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
       return done(AnswerOf(why));
     if (const std::string why = appliance_.WhyBlocked(); !why.empty()) return done(AnswerOf(why));
-    if (purpose == web::ScanPurpose::kReference) {
+    if (purpose == ScanPurpose::kReference) {
       if (const std::string why = appliance_.WhyNoReference(); !why.empty())
         return done(AnswerOf(why));
     }
     const auto open = appliance_.WebStatus().session;
     if (open && open->patient_id == id && open->purpose == purpose &&
-        purpose == web::ScanPurpose::kFraction) {
+        purpose == ScanPurpose::kFraction) {
       appliance_.OpenSession(open->id, id, purpose, reason, actor);
       return done({.result = ChangeResult::kDone, .message = {}, .id = open->id, .file = {}});
     }
@@ -103,19 +100,18 @@ class WebPatients final : public web::PatientService {
                                        open->patient_code, open->opened_by)));
     }
     appliance_.SetOpening(true);
-    const web::Done opened = [this, actor, id, purpose, reason,
-                              done = std::move(done)](const web::Change& change) {
+    const Done opened = [this, actor, id, purpose, reason,
+                         done = std::move(done)](const Change& change) {
       appliance_.SetOpening(false);
       if (change.result == ChangeResult::kDone)
         appliance_.OpenSession(change.id, id, purpose, reason, actor);
       done(change);
     };
-    store_.Change(&Store::treatments, opened,
-                  [=](TreatmentStore& treatments) { return treatments.Open(actor, id, purpose); });
+    store_.Write(&Store::treatments, opened,
+                 [=](TreatmentStore& treatments) { return treatments.Open(actor, id, purpose); });
   }
 
-  void CloseSession(const web::Actor& actor, const std::string& session_id,
-                    web::Done done) override {
+  void CloseSession(const Actor& actor, const std::string& session_id, Done done) override {
     if (!session_id.empty() && appliance_.session_id() != session_id)
       return done(AnswerOf("this session is closed already, or another one is open by now"));
     done(AnswerOf(appliance_.CloseSession(actor)));
@@ -130,18 +126,18 @@ class WebReferences final : public web::ReferenceService {
  public:
   WebReferences(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
 
-  std::vector<web::Reference> References(const std::string& patient_id) override {
+  std::vector<Reference> References(const std::string& patient_id) override {
     return store_.Read(&Store::references,
                        [&](ReferenceStore& references) { return references.List(patient_id); });
   }
 
-  std::optional<web::Reference> FindReference(const std::string& id) override {
+  std::optional<Reference> FindReference(const std::string& id) override {
     return store_.Read(&Store::references,
                        [&](ReferenceStore& references) { return references.Find(id); });
   }
 
-  web::RoomOnMap RoomOfReference(const web::Reference& reference) override {
-    const std::optional<web::Scan> scan = ScanOf(reference.scan_id);
+  RoomOnMap RoomOfReference(const Reference& reference) override {
+    const std::optional<Scan> scan = ScanOf(reference.scan_id);
     if (!scan || scan->folder.empty()) return {};
     try {
       const auto ways = appliance_.RoomIn(ReadSceneMarkers(scan->folder / "scene"));
@@ -156,39 +152,38 @@ class WebReferences final : public web::ReferenceService {
     }
   }
 
-  void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason,
-                    web::Done done) override {
-    const std::optional<web::Scan> scan = ScanOf(scan_id);
+  void AddReference(const Actor& actor, const std::string& scan_id, const std::string& reason,
+                    Done done) override {
+    const std::optional<Scan> scan = ScanOf(scan_id);
     if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
       return done(AnswerOf(why));
-    store_.Change(&Store::references, std::move(done),
-                  [=, appliance = &appliance_](ReferenceStore& references) {
-                    return references.Add(actor, scan_id, reason, appliance->DefaultPlan());
-                  });
+    store_.Write(&Store::references, std::move(done),
+                 [=, appliance = &appliance_](ReferenceStore& references) {
+                   return references.Add(actor, scan_id, reason, appliance->DefaultPlan());
+                 });
   }
 
-  void PlanReference(const web::Actor& actor, const std::string& id, int revision,
-                     const web::ReferencePlan& plan, web::Done done) override {
-    store_.Change(&Store::references, std::move(done), [=](ReferenceStore& references) {
+  void PlanReference(const Actor& actor, const std::string& id, int revision,
+                     const ReferencePlan& plan, Done done) override {
+    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
       const std::string planned = references.Plan(actor, id, revision, plan);
       return planned == id ? std::string() : planned;  // only a new version was made
     });
   }
 
-  void ApproveReference(const web::Actor& actor, const std::string& id, int revision,
-                        const std::string& digest, web::Done done) override {
-    const std::optional<web::Reference> reference = FindReference(id);
-    const std::optional<web::Scan> scan =
-        reference ? ScanOf(reference->scan_id) : std::optional<web::Scan>();
+  void ApproveReference(const Actor& actor, const std::string& id, int revision,
+                        const std::string& digest, Done done) override {
+    const std::optional<Reference> reference = FindReference(id);
+    const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
     if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
       return done(AnswerOf(why));
-    store_.Change(&Store::references, std::move(done), [=](ReferenceStore& references) {
+    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
       references.Approve(actor, id, revision, digest);
     });
   }
 
  private:
-  std::optional<web::Scan> ScanOf(const std::string& scan_id) {
+  std::optional<Scan> ScanOf(const std::string& scan_id) {
     return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
   }
 

@@ -10,29 +10,26 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
 class WebChecks final : public web::CheckService {
  public:
   WebChecks(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
 
-  web::CheckStatus GetChecks() override {
+  CheckStatus GetChecks() override {
     return store_.Read([this](Store&) { return appliance_.Checks(); });
   }
 
-  void OpenCheck(const web::Actor& actor, web::Done done) override {
+  void OpenCheck(const Actor& actor, Done done) override {
     if (const std::string refusal = appliance_.OpenCheck(actor); !refusal.empty())
       return done(AnswerOf(refusal));
-    store_.Change(&Store::audit, std::move(done),
-                  [=](AuditStore& audit) { audit.Log(actor, "check.open", "", ""); });
+    store_.Write(&Store::audit, std::move(done),
+                 [=](AuditStore& audit) { audit.Log(actor, "check.open", "", ""); });
   }
 
-  void SetCheckBaseline(const web::Actor& actor, const std::string& check_id,
-                        web::Done done) override {
-    store_.Change(&Store::checks, std::move(done),
-                  [=](CheckStore& checks) { checks.SetBaseline(actor, check_id); });
+  void SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) override {
+    store_.Write(&Store::checks, std::move(done),
+                 [=](CheckStore& checks) { checks.SetBaseline(actor, check_id); });
   }
 
  private:
@@ -58,14 +55,13 @@ class WebRoomCalibration final : public web::RoomCalibrationService {
     return status;
   }
 
-  void SignRoomCalibration(const web::Actor& actor, const std::string& digest,
-                           web::Done done) override {
+  void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) override {
     const auto [serial, since] = appliance_.RoomScansWanted();
     // StoreAccess calls nothing once the services are destroyed, and the appliance outlives them.
-    store_.Change(
+    store_.Write(
         &Store::room,
-        [&appliance = appliance_, done = std::move(done)](const web::Change& answer) {
-          if (answer.result == web::ChangeResult::kDone) appliance.RefreshRoom();
+        [&appliance = appliance_, done = std::move(done)](const Change& answer) {
+          if (answer.result == ChangeResult::kDone) appliance.RefreshRoom();
           done(answer);
         },
         [=, serial = serial, since = since](RoomStore& room) {
@@ -92,22 +88,21 @@ class WebSensorProfiles final : public web::SensorProfileService {
   WebSensorProfiles(Appliance& appliance, StoreAccess& store)
       : appliance_(appliance), store_(store) {}
 
-  web::SensorProfiles GetSensorProfiles() override { return appliance_.SensorProfiles(); }
+  SensorProfiles GetSensorProfiles() override { return appliance_.UnitProfiles(); }
 
   std::optional<std::string> SensorProfileFile(int version) override {
     return appliance_.SensorProfileFile(version);
   }
 
-  void ResetSensorProfile(const web::Actor& actor, const std::string& serial,
-                          web::Done done) override {
+  void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) override {
     ChangeProfile(serial, done, [=, shelf = appliance_.profiles()](AuditStore& audit) {
       const int version = shelf->Reset(serial);
       audit.Log(actor, "profile.reset", serial, fmt::format("version {}", version));
     });
   }
 
-  void RollBackSensorProfile(const web::Actor& actor, const std::string& serial, int version,
-                             web::Done done) override {
+  void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
+                             Done done) override {
     ChangeProfile(serial, done, [=, shelf = appliance_.profiles()](AuditStore& audit) {
       try {
         const int made = shelf->RollBack(serial, version);
@@ -121,13 +116,13 @@ class WebSensorProfiles final : public web::SensorProfileService {
 
  private:
   /// As StoreAccess::Change(); afterwards the last scan's objection to the profile is discarded.
-  void ChangeProfile(const std::string& serial, const web::Done& done,
+  void ChangeProfile(const std::string& serial, const Done& done,
                      std::function<void(AuditStore&)> change) {
     if (const std::string why = appliance_.WhyNotChangeProfile(serial); !why.empty())
       return done(AnswerOf(why));
-    store_.Change(
+    store_.Write(
         &Store::audit,
-        [this, done](const web::Change& answer) {
+        [this, done](const Change& answer) {
           if (answer.result == ChangeResult::kDone) appliance_.ForgetDrift();
           done(answer);
         },

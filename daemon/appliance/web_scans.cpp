@@ -17,50 +17,47 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
 class WebScans final : public web::ScanService {
  public:
   WebScans(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
 
-  std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override {
+  std::vector<Scan> Scans(const std::string& patient_id, int limit) override {
     return store_.Read(&Store::scans,
                        [&](ScanStore& scans) { return scans.List(patient_id, limit); });
   }
 
-  std::optional<web::Scan> FindScan(const std::string& id) override {
+  std::optional<Scan> FindScan(const std::string& id) override {
     return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(id); });
   }
 
-  void AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
-                  web::Done done) override {
+  void AcceptScan(const Actor& actor, const std::string& id, const std::string& reason,
+                  Done done) override {
     if (appliance_.IsRunning())
       return done(AnswerOf("a scan is running: accept its result, not an older one"));
-    const std::optional<web::Scan> scan = FindScan(id);
+    const std::optional<Scan> scan = FindScan(id);
     if (!scan) return done(Refusal(ChangeResult::kNotFound, "there is no such scan"));
     // A scan from an earlier run of the appliance is too old to act on.
-    if (scan->result &&
-        appliance_.AgeOf(id).value_or(web::kResultValid_s + 1) > web::kResultValid_s)
+    if (scan->result && appliance_.AgeOf(id).value_or(kResultValid_s + 1) > kResultValid_s)
       return done(AnswerOf("this result is older than 2 minutes: scan again, then accept"));
     // Another person may be on the couch by now.
     const auto open = appliance_.WebStatus().session;
     if (!scan->patient_id.empty() && (!open || open->patient_id != scan->patient_id))
       return done(AnswerOf("the session of this patient is not open: a result is accepted in it"));
-    store_.Change(&Store::scans, std::move(done),
-                  [=](ScanStore& scans) { scans.Accept(actor, id, reason); });
+    store_.Write(&Store::scans, std::move(done),
+                 [=](ScanStore& scans) { scans.Accept(actor, id, reason); });
   }
 
-  void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason,
-                  web::Done done) override {
-    store_.Change(&Store::removal, std::move(done),
-                  [=](StoreRemoval& removal) { removal.RemoveScan(actor, id, reason); });
+  void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
+                  Done done) override {
+    store_.Write(&Store::removal, std::move(done),
+                 [=](StoreRemoval& removal) { removal.RemoveScan(actor, id, reason); });
   }
 
   std::optional<std::string> CompactMap(const std::string& scan_id,
                                         const std::string& name) override {
-    const std::optional<web::Scan> scan = FindScan(scan_id);
+    const std::optional<Scan> scan = FindScan(scan_id);
     if (!scan || scan->folder.empty()) return std::nullopt;
     try {
       return name == "mesh" ? SurfaceOf(*scan) : plumb::CompactMap(scan->folder, name);
@@ -73,7 +70,7 @@ class WebScans final : public web::ScanService {
 
   web::ResultNotes Notes(const std::string& scan_id, web::Language language) override {
     return store_.Read([&](Store& store) -> web::ResultNotes {
-      const std::optional<web::Scan> scan = store.scans.Find(scan_id);
+      const std::optional<Scan> scan = store.scans.Find(scan_id);
       return scan ? NotesOf(SourcesIn(store), *scan, language) : web::ResultNotes{};
     });
   }
@@ -81,7 +78,7 @@ class WebScans final : public web::ScanService {
   std::optional<std::string> PictureOf(const std::string& scan_id, web::ComparisonPicture picture,
                                        web::Language language) override {
     return store_.Read([&](Store& store) -> std::optional<std::string> {
-      const std::optional<web::Scan> scan = store.scans.Find(scan_id);
+      const std::optional<Scan> scan = store.scans.Find(scan_id);
       if (!scan || scan->folder.empty()) return std::nullopt;
       // Held while drawing, so that a second request for the same scan waits instead of drawing
       // too.
@@ -106,7 +103,7 @@ class WebScans final : public web::ScanService {
   std::optional<std::string> ScanReport(const std::string& scan_id,
                                         web::Language language) override {
     return store_.Read([&](Store& store) -> std::optional<std::string> {
-      const std::optional<web::Scan> scan = store.scans.Find(scan_id);
+      const std::optional<Scan> scan = store.scans.Find(scan_id);
       return scan ? std::optional(ScanReportPdf(SourcesIn(store), *scan, language)) : std::nullopt;
     });
   }
@@ -114,7 +111,7 @@ class WebScans final : public web::ScanService {
   std::optional<std::string> CourseReport(const std::string& patient_id,
                                           web::Language language) override {
     return store_.Read([&](Store& store) -> std::optional<std::string> {
-      const std::optional<web::Patient> patient = store.patients.Find(patient_id);
+      const std::optional<Patient> patient = store.patients.Find(patient_id);
       return patient ? std::optional(CourseReportPdf(SourcesIn(store), *patient, language))
                      : std::nullopt;
     });
@@ -138,7 +135,7 @@ class WebScans final : public web::ScanService {
   }
 
   /// @throws DataError if there is none, or it cannot be read.
-  std::string SurfaceOf(const web::Scan& scan) {
+  std::string SurfaceOf(const Scan& scan) {
     // Held while packing, so that a second request for the same scan waits instead of packing too.
     const std::lock_guard lock(packed_mutex_);
     const auto found =

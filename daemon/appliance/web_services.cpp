@@ -48,7 +48,7 @@ WebServices::WebServices(Appliance& appliance, const UpdateConfig& update,
                },
            .changed = [&appliance] { appliance.NotifyWeb(web::EventKind::kUpdate); },
            .log = [this](
-                      const web::Actor& actor, const char* action, const std::string& subject,
+                      const Actor& actor, const char* action, const std::string& subject,
                       const std::string& detail) { audit_->Log(actor, action, subject, detail); }}),
       background_(appliance.loop()) {}
 

@@ -8,24 +8,22 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
 /// Names the first setting with a value that may not be entered; empty if there is none.
-std::string CheckSettings(const web::SettingsChange& change) {
-  const web::Settings settings = change.AppliedTo({});
+std::string CheckSettings(const SettingsChange& change) {
+  const Settings settings = change.AppliedTo({});
   std::string wrong;
-  const auto check = [&](const char* name, double value, const web::Limits& limits) {
+  const auto check = [&](const char* name, double value, const Limits& limits) {
     const auto [least, most] = limits.entered;
     if (wrong.empty() && !limits.entered.Holds(value))
       wrong = fmt::format("{}: expected {} to {}", name, least, most);
   };
-  web::ForEachSetting(change, settings,
-                      [&]([[maybe_unused]] const char* name, const auto&, const auto& value,
-                          const auto&... limits) { (check(name, value, limits), ...); });
-  if (wrong.empty() && !web::IsPosture(settings.posture))
-    wrong = fmt::format("posture: expected one of {}", fmt::join(web::kPostures, ", "));
+  ForEachSetting(change, settings,
+                 [&]([[maybe_unused]] const char* name, const auto&, const auto& value,
+                     const auto&... limits) { (check(name, value, limits), ...); });
+  if (wrong.empty() && !IsPosture(settings.posture))
+    wrong = fmt::format("posture: expected one of {}", fmt::join(kPostures, ", "));
   return wrong;
 }
 
@@ -33,35 +31,33 @@ class WebSettings final : public web::SettingsService {
  public:
   explicit WebSettings(StoreAccess& store) : store_(store) {}
 
-  web::Settings GetSettings() override {
+  Settings GetSettings() override {
     return store_.Read(&Store::settings, [](SettingsStore& settings) { return settings.Get(); });
   }
 
-  void ChangeSettings(const web::Actor& actor, const web::SettingsChange& change,
-                      web::Done done) override {
+  void ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) override {
     if (const std::string wrong = CheckSettings(change); !wrong.empty())
       return done(Refusal(ChangeResult::kInvalid, wrong));
     // The store's thread makes one change after the other, so none comes between reading and
     // writing.
-    store_.Change(&Store::settings, std::move(done), [=](SettingsStore& stored) {
-      stored.Change(actor, change.AppliedTo(change.is_complete() ? web::Settings{} : stored.Get()));
+    store_.Write(&Store::settings, std::move(done), [=](SettingsStore& stored) {
+      stored.Change(actor, change.AppliedTo(change.is_complete() ? Settings{} : stored.Get()));
     });
   }
 
-  std::vector<web::PlanTemplate> Templates() override {
+  std::vector<PlanTemplate> Templates() override {
     return store_.Read(&Store::templates,
                        [](TemplateStore& templates) { return templates.List(); });
   }
 
-  void SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
-                   web::Done done) override {
-    store_.Change(&Store::templates, std::move(done),
-                  [=](TemplateStore& templates) { templates.Set(actor, wanted); });
+  void SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) override {
+    store_.Write(&Store::templates, std::move(done),
+                 [=](TemplateStore& templates) { templates.Set(actor, wanted); });
   }
 
-  void RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) override {
-    store_.Change(&Store::templates, std::move(done),
-                  [=](TemplateStore& templates) { templates.Remove(actor, site); });
+  void RemoveTemplate(const Actor& actor, const std::string& site, Done done) override {
+    store_.Write(&Store::templates, std::move(done),
+                 [=](TemplateStore& templates) { templates.Remove(actor, site); });
   }
 
  private:

@@ -35,7 +35,7 @@ int Reset(const Options& options) {
     throw std::invalid_argument(
         fmt::format("this removes {} in {}: confirm with --yes", what, options.state.string()));
   RequestFactoryReset(options.state,
-                      options.wipe ? web::FactoryReset::kWipe : web::FactoryReset::kKeepRecords,
+                      options.wipe ? FactoryReset::kWipe : FactoryReset::kKeepRecords,
                       {.user = "command line", .address = {}});
   PrintOut(fmt::format("the next start of plumbd removes {}: systemctl restart plumbd\n", what));
   return kDone;

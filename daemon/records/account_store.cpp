@@ -10,7 +10,6 @@ namespace plumb {
 
 using store::FromStored;
 using store::Now;
-using web::ChangeResult;
 
 namespace {
 
@@ -19,14 +18,14 @@ constexpr const char* kUserColumns =
 
 /// An account whose role cannot be read is disabled, not left out: if no account were found, the
 /// page would offer to create the first one.
-web::User ReadUser(const Statement& row) {
-  web::User user{.name = row.Text(0),
-                 .role = web::Role::kTechnician,
-                 .password_hash = row.Text(2),
-                 .disabled = row.Integer(3) != 0,
-                 .created_at = FromStored(row.Integer(4))};
+User ReadUser(const Statement& row) {
+  User user{.name = row.Text(0),
+            .role = Role::kTechnician,
+            .password_hash = row.Text(2),
+            .disabled = row.Integer(3) != 0,
+            .created_at = FromStored(row.Integer(4))};
   try {
-    user.role = store::Parse<web::Role>("role", row.Text(1));
+    user.role = store::Parse<Role>("role", row.Text(1));
   } catch (const DataError&) {
     user.disabled = true;
   }
@@ -35,23 +34,23 @@ web::User ReadUser(const Statement& row) {
 
 }  // namespace
 
-std::vector<web::User> UserStore::List() {
+std::vector<User> UserStore::List() {
   const StoreDatabase::Held rows = database_.ForRows();
   static const std::string kSql = std::string(kUserColumns) + "ORDER BY name LIMIT 1000";
   Statement query = rows->Prepare(kSql.c_str());
-  std::vector<web::User> users;
+  std::vector<User> users;
   while (query.Step()) users.push_back(ReadUser(query));
   return users;
 }
 
-std::optional<web::User> UserStore::Find(const std::string& name) {
+std::optional<User> UserStore::Find(const std::string& name) {
   const StoreDatabase::Held rows = database_.ForRows();
   static const std::string kSql = std::string(kUserColumns) + "WHERE name = ?";
   Statement query = rows->Prepare(kSql.c_str());
   return query.Bind(name).Step() ? std::optional(ReadUser(query)) : std::nullopt;
 }
 
-void UserStore::Add(const web::Actor& actor, const web::User& user) {
+void UserStore::Add(const Actor& actor, const User& user) {
   StoreChange change(database_);
   try {
     change
@@ -72,9 +71,9 @@ void UserStore::Add(const web::Actor& actor, const web::User& user) {
   change.Commit();
 }
 
-void UserStore::Change(const web::Actor& actor, const web::UserChange& wanted) {
+void UserStore::Change(const Actor& actor, const UserChange& wanted) {
   StoreChange change(database_);
-  web::User user;
+  User user;
   {
     static const std::string kSql = std::string(kUserColumns) + "WHERE name = ?";
     Statement query = change.Prepare(kSql.c_str());
@@ -109,14 +108,14 @@ void UserStore::Change(const web::Actor& actor, const web::UserChange& wanted) {
   change.Commit();
 }
 
-web::Preferences UserStore::PreferencesOf(const std::string& name) {
+Preferences UserStore::PreferencesOf(const std::string& name) {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare("SELECT language, theme FROM preferences WHERE user = ?");
   if (!query.Bind(name).Step()) return {};
   return {.language = query.Text(0), .theme = query.Text(1)};
 }
 
-void UserStore::SetPreferences(const std::string& name, const web::Preferences& preferences) {
+void UserStore::SetPreferences(const std::string& name, const Preferences& preferences) {
   StoreChange change(database_);
   try {
     change.Prepare("INSERT OR REPLACE INTO preferences (user, language, theme) VALUES (?, ?, ?)")
@@ -134,7 +133,7 @@ using store::ParseId;
 
 namespace {
 
-void Insert(StoreChange& change, const web::Actor& actor, const web::Display& display) {
+void Insert(StoreChange& change, const Actor& actor, const Display& display) {
   change
       .Prepare("INSERT INTO displays (name, token_hash, paired_at, paired_by) VALUES (?, ?, ?, ?)")
       .Bind(display.name)
@@ -146,11 +145,11 @@ void Insert(StoreChange& change, const web::Actor& actor, const web::Display& di
 
 }  // namespace
 
-std::vector<web::Display> DisplayStore::List() {
+std::vector<Display> DisplayStore::List() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
       "SELECT id, name, token_hash, paired_at, paired_by FROM displays ORDER BY id LIMIT 100");
-  std::vector<web::Display> displays;
+  std::vector<Display> displays;
   while (query.Step()) {
     displays.push_back({.id = query.Text(0),
                         .name = query.Text(1),
@@ -161,7 +160,7 @@ std::vector<web::Display> DisplayStore::List() {
   return displays;
 }
 
-std::string DisplayStore::Add(const web::Actor& actor, const web::Display& display) {
+std::string DisplayStore::Add(const Actor& actor, const Display& display) {
   StoreChange change(database_);
   Insert(change, actor, display);
   const std::string id = std::to_string(change.last_id());
@@ -170,7 +169,7 @@ std::string DisplayStore::Add(const web::Actor& actor, const web::Display& displ
   return id;
 }
 
-bool DisplayStore::AddProvisioned(const web::Display& display) {
+bool DisplayStore::AddProvisioned(const Display& display) {
   StoreChange change(database_);
   // Not in the table of displays, so that the key stays known when its display is removed.
   change.Prepare("INSERT OR IGNORE INTO settings (name, value) VALUES (?, ?)")
@@ -180,9 +179,9 @@ bool DisplayStore::AddProvisioned(const web::Display& display) {
   if (change.num_changed() == 0) return false;
   {
     Statement query = change.Prepare("SELECT COUNT(*) FROM displays");
-    if (query.Step() && query.Integer(0) >= static_cast<std::int64_t>(web::kMaxDisplays))
+    if (query.Step() && query.Integer(0) >= static_cast<std::int64_t>(kMaxDisplays))
       throw StoreRefusal(ChangeResult::kConflict,
-                         fmt::format("{} screens are paired already", web::kMaxDisplays));
+                         fmt::format("{} screens are paired already", kMaxDisplays));
   }
   Insert(change, store::kSelf, display);
   change.Log(store::kSelf, "display.provision", display.name, "");
@@ -190,7 +189,7 @@ bool DisplayStore::AddProvisioned(const web::Display& display) {
   return true;
 }
 
-void DisplayStore::Remove(const web::Actor& actor, const std::string& id) {
+void DisplayStore::Remove(const Actor& actor, const std::string& id) {
   StoreChange change(database_);
   std::string name;
   {

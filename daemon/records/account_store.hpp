@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "daemon/records/store_database.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
 
 namespace plumb {
 
@@ -16,16 +16,16 @@ class UserStore {
  public:
   explicit UserStore(StoreDatabase& database) : database_(database) {}
 
-  [[nodiscard]] std::vector<web::User> List();  ///< By name.
-  [[nodiscard]] std::optional<web::User> Find(const std::string& name);
+  [[nodiscard]] std::vector<User> List();  ///< By name.
+  [[nodiscard]] std::optional<User> Find(const std::string& name);
   /// kConflict for a name that another account has.
-  void Add(const web::Actor& actor, const web::User& user);
+  void Add(const Actor& actor, const User& user);
   /// kConflict if no enabled engineer would be left.
-  void Change(const web::Actor& actor, const web::UserChange& wanted);
+  void Change(const Actor& actor, const UserChange& wanted);
   /// Empty if none were chosen.
-  [[nodiscard]] web::Preferences PreferencesOf(const std::string& name);
+  [[nodiscard]] Preferences PreferencesOf(const std::string& name);
   /// Without an entry in the log. kNotFound for a name that no account has.
-  void SetPreferences(const std::string& name, const web::Preferences& preferences);
+  void SetPreferences(const std::string& name, const Preferences& preferences);
 
  private:
   StoreDatabase& database_;
@@ -36,12 +36,12 @@ class DisplayStore {
  public:
   explicit DisplayStore(StoreDatabase& database) : database_(database) {}
 
-  [[nodiscard]] std::vector<web::Display> List();
-  std::string Add(const web::Actor& actor, const web::Display& display);  ///< Returns the id.
+  [[nodiscard]] std::vector<Display> List();
+  std::string Add(const Actor& actor, const Display& display);  ///< Returns the id.
   /// Adds the display of the provisioning file. Its key counts once: false, and nothing is changed,
   /// if it was added before, even if the display has been removed since.
-  bool AddProvisioned(const web::Display& display);
-  void Remove(const web::Actor& actor, const std::string& id);
+  bool AddProvisioned(const Display& display);
+  void Remove(const Actor& actor, const std::string& id);
 
  private:
   StoreDatabase& database_;

@@ -52,7 +52,7 @@ std::string ChainOfUnchained(Database& database) {
 
 }  // namespace
 
-void AppendAuditEntry(Database& database, const web::Actor& actor, const std::string& action,
+void AppendAuditEntry(Database& database, const Actor& actor, const std::string& action,
                       const std::string& subject, const std::string& detail) {
   std::int64_t number = 1;
   {
@@ -82,14 +82,14 @@ void AppendAuditEntry(Database& database, const web::Actor& actor, const std::st
       .Run();
 }
 
-void AuditStore::Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+void AuditStore::Log(const Actor& actor, const std::string& action, const std::string& subject,
                      const std::string& detail) {
   StoreChange change(database_);
   change.Log(actor, action, subject, detail);
   change.Commit();
 }
 
-std::vector<web::AuditEntry> AuditStore::Find(const web::AuditQuery& wanted) {
+std::vector<AuditEntry> AuditStore::Find(const AuditQuery& wanted) {
   const StoreDatabase::Held lists = database_.ForLists();
   Statement query = lists->Prepare(
       "SELECT number, time, user, address, action, subject, detail FROM audit WHERE (?1 <= 0 OR "
@@ -97,7 +97,7 @@ std::vector<web::AuditEntry> AuditStore::Find(const web::AuditQuery& wanted) {
       "'view.') ORDER BY number DESC LIMIT ?4");
   query.Bind(wanted.before).Bind(wanted.actions).Bind(std::int64_t{wanted.views});
   query.Bind(std::int64_t{wanted.limit});
-  std::vector<web::AuditEntry> entries;
+  std::vector<AuditEntry> entries;
   while (query.Step()) {
     entries.push_back({.number = query.Integer(0),
                        .time = FromStored(query.Integer(1)),
@@ -107,7 +107,7 @@ std::vector<web::AuditEntry> AuditStore::Find(const web::AuditQuery& wanted) {
                        .subject = query.Text(5),
                        .detail = query.Text(6)});
   }
-  for (web::AuditEntry& entry : entries)
+  for (AuditEntry& entry : entries)
     entry.about = DescribeSubject(*lists, entry.action, entry.subject);
   return entries;
 }

@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "daemon/records/store_database.hpp"
-#include "web/service/account_services.hpp"
+#include "web/model/audit.hpp"
 
 namespace plumb {
 
 /// Adds an entry as part of the open transaction. Each entry carries the SHA-256 of the previous
 /// entry and itself.
-void AppendAuditEntry(Database& database, const web::Actor& actor, const std::string& action,
+void AppendAuditEntry(Database& database, const Actor& actor, const std::string& action,
                       const std::string& subject, const std::string& detail);
 
 /// The newest entry of the log. Its digest covers all earlier entries, so anyone who has kept a
@@ -34,10 +34,10 @@ class AuditStore {
  public:
   explicit AuditStore(StoreDatabase& database) : database_(database) {}
 
-  void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+  void Log(const Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail);
   /// Newest first.
-  [[nodiscard]] std::vector<web::AuditEntry> Find(const web::AuditQuery& wanted);
+  [[nodiscard]] std::vector<AuditEntry> Find(const AuditQuery& wanted);
   /// The newest kMaxExported entries, oldest first: one JSON object per line, with all fields that
   /// the chain covers and its digests. A field that is not UTF-8 is exported with U+FFFD, and its
   /// bytes as numbers in FIELD_bytes.

@@ -54,13 +54,13 @@ constexpr std::array kPrefixes = {
 
 }  // namespace
 
-std::optional<web::AuditSubject> DescribeSubject(Database& database, const std::string& action,
-                                                 const std::string& subject) {
+std::optional<AuditSubject> DescribeSubject(Database& database, const std::string& action,
+                                            const std::string& subject) {
   const auto prefix = std::ranges::find_if(
       kPrefixes, [&](const Prefix& one) { return action.starts_with(one.action); });
   const auto id = store::ParseId(subject);
   if (prefix == kPrefixes.end() || !id) return std::nullopt;
-  web::AuditSubject about;
+  AuditSubject about;
   about.kind = prefix->kind.name;
   Statement query = database.Prepare(prefix->kind.query);
   if (!query.Bind(*id).Step()) return about;

@@ -6,14 +6,14 @@
 #include <string>
 
 #include "daemon/records/database.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/audit.hpp"
 
 namespace plumb {
 
 /// @returns nothing where the subject is what people know already: an account, a file, no subject.
 /// @throws IoError and its kinds
-[[nodiscard]] std::optional<web::AuditSubject> DescribeSubject(Database& database,
-                                                               const std::string& action,
-                                                               const std::string& subject);
+[[nodiscard]] std::optional<AuditSubject> DescribeSubject(Database& database,
+                                                          const std::string& action,
+                                                          const std::string& subject);
 
 }  // namespace plumb

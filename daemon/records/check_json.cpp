@@ -86,8 +86,8 @@ std::optional<MarkerBaseline> BaselineIn(const std::string& check_json) {
                         json.value("marker_length_m", 0.0)};
 }
 
-web::CheckRecord CheckIn(const std::string& check_json) {
-  web::CheckRecord record;
+CheckRecord CheckIn(const std::string& check_json) {
+  CheckRecord record;
   const Json json = ParseBoundedJsonOrNothing<Json>(check_json);
   const auto unreadable = [&record](const char* why) {
     record = {};

@@ -8,7 +8,7 @@
 
 #include "algo/comparison/marker_check.hpp"
 #include "algo/types/marker.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/check.hpp"
 
 namespace plumb {
 
@@ -32,6 +32,6 @@ struct TakenCheck {
 
 /// The page's record of it; the caller adds id, time, user and sensor. One that cannot be read is a
 /// failed check whose reason says so.
-[[nodiscard]] web::CheckRecord CheckIn(const std::string& check_json);
+[[nodiscard]] CheckRecord CheckIn(const std::string& check_json);
 
 }  // namespace plumb

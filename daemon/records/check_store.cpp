@@ -12,15 +12,14 @@ using store::FromStored;
 using store::Now;
 using store::ParseId;
 using store::ToStored;
-using web::ChangeResult;
 
 namespace {
 
 constexpr const char* kNewestChecks =
     "SELECT id, time, user, sensor_serial, json FROM checks ORDER BY id DESC LIMIT ?";
 
-web::CheckRecord ReadCheck(const Statement& row) {
-  web::CheckRecord record = CheckIn(row.Text(4));
+CheckRecord ReadCheck(const Statement& row) {
+  CheckRecord record = CheckIn(row.Text(4));
   record.id = row.Text(0);
   record.time = FromStored(row.Integer(1));
   record.user = row.Text(2);
@@ -30,7 +29,7 @@ web::CheckRecord ReadCheck(const Statement& row) {
 
 }  // namespace
 
-std::string CheckStore::Add(const web::Actor& actor, const std::string& sensor_serial,
+std::string CheckStore::Add(const Actor& actor, const std::string& sensor_serial,
                             const TakenCheck& taken) {
   const char* status = Name(taken.check.status);
   StoreChange change(database_);
@@ -49,23 +48,22 @@ std::string CheckStore::Add(const web::Actor& actor, const std::string& sensor_s
   return id;
 }
 
-std::vector<web::CheckRecord> CheckStore::List(int limit) {
+std::vector<CheckRecord> CheckStore::List(int limit) {
   const StoreDatabase::Held lists = database_.ForLists();
   Statement query = lists->Prepare(kNewestChecks);
   query.Bind(std::int64_t{limit});
-  std::vector<web::CheckRecord> checks;
+  std::vector<CheckRecord> checks;
   while (query.Step()) checks.push_back(ReadCheck(query));
   return checks;
 }
 
-std::optional<web::CheckRecord> CheckStore::Last() {
+std::optional<CheckRecord> CheckStore::Last() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(kNewestChecks);
   return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadCheck(query)) : std::nullopt;
 }
 
-web::DailyCheck CheckStore::StateSince(web::WallClock::time_point since,
-                                       const std::string& sensor_serial) {
+DailyCheck CheckStore::StateSince(WallClock::time_point since, const std::string& sensor_serial) {
   const StoreDatabase::Held rows = database_.ForRows();
   // Ordered by id, not by time: the clock may have been set back between a pass and a failure.
   Statement query = rows->Prepare(
@@ -73,8 +71,8 @@ web::DailyCheck CheckStore::StateSince(web::WallClock::time_point since,
       "sensor_serial IN (?1, ''))) OR (status = 'passed' AND time <= ?2 AND (?1 = '' OR "
       "sensor_serial = ?1)) ORDER BY id DESC LIMIT 1");
   if (!query.Bind(sensor_serial).Bind(Now()).Step() || query.Integer(1) < ToStored(since))
-    return web::DailyCheck::kOverdue;
-  return query.Integer(0) != 0 ? web::DailyCheck::kFailed : web::DailyCheck::kPassed;
+    return DailyCheck::kOverdue;
+  return query.Integer(0) != 0 ? DailyCheck::kFailed : DailyCheck::kPassed;
 }
 
 bool CheckStore::ConfirmsScan(const std::string& scan_id) {
@@ -108,17 +106,17 @@ bool CheckStore::RefutesScan(const std::string& scan_id) {
   return query.Bind(*number).Step() && query.Integer(0) != 0;
 }
 
-std::optional<web::CheckBaseline> CheckStore::Baseline() {
+std::optional<CheckBaseline> CheckStore::Baseline() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
       "SELECT check_id, set_at, set_by, json FROM check_baselines JOIN checks ON checks.id = "
       "check_id ORDER BY check_baselines.id DESC "
       "LIMIT 1");
   if (!query.Step()) return std::nullopt;
-  return web::CheckBaseline{.check_id = query.Text(0),
-                            .set_at = FromStored(query.Integer(1)),
-                            .set_by = query.Text(2),
-                            .num_markers = CheckIn(query.Text(3)).num_markers};
+  return CheckBaseline{.check_id = query.Text(0),
+                       .set_at = FromStored(query.Integer(1)),
+                       .set_by = query.Text(2),
+                       .num_markers = CheckIn(query.Text(3)).num_markers};
 }
 
 std::optional<MarkerBaseline> CheckStore::BaselineMarkers() {
@@ -133,7 +131,7 @@ std::optional<MarkerBaseline> CheckStore::BaselineMarkers() {
   return markers;
 }
 
-void CheckStore::SetBaseline(const web::Actor& actor, const std::string& check_id) {
+void CheckStore::SetBaseline(const Actor& actor, const std::string& check_id) {
   const std::optional<std::int64_t> number = ParseId(check_id);
   StoreChange change(database_);
   std::string described;

@@ -7,7 +7,9 @@
 
 #include "daemon/records/check_json.hpp"
 #include "daemon/records/store_database.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/check.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb {
 
@@ -17,16 +19,15 @@ class CheckStore {
   explicit CheckStore(StoreDatabase& database) : database_(database) {}
 
   /// Returns the id.
-  std::string Add(const web::Actor& actor, const std::string& sensor_serial,
-                  const TakenCheck& taken);
-  [[nodiscard]] std::vector<web::CheckRecord> List(int limit);  ///< Newest first.
-  [[nodiscard]] std::optional<web::CheckRecord> Last();
+  std::string Add(const Actor& actor, const std::string& sensor_serial, const TakenCheck& taken);
+  [[nodiscard]] std::vector<CheckRecord> List(int limit);  ///< Newest first.
+  [[nodiscard]] std::optional<CheckRecord> Last();
   /// State by the newest check since then that passed or failed. Checks of other sensors do not
   /// count, except that a failed check without a serial number counts for every sensor. A pass
   /// dated in the future is ignored.
   /// @param sensor_serial  Sensor that must have been checked; empty: any.
-  [[nodiscard]] web::DailyCheck StateSince(web::WallClock::time_point since,
-                                           const std::string& sensor_serial = {});
+  [[nodiscard]] DailyCheck StateSince(WallClock::time_point since,
+                                      const std::string& sensor_serial = {});
   /// Whether a later check confirms that sensor and markers were correct at this scan: of the same
   /// unit, passed on the day of the scan and after it, with no failed check in between and against
   /// a baseline from before the scan.
@@ -36,11 +37,11 @@ class CheckStore {
   /// serial number counts for every sensor.
   [[nodiscard]] bool RefutesScan(const std::string& scan_id);
 
-  [[nodiscard]] std::optional<web::CheckBaseline> Baseline();
+  [[nodiscard]] std::optional<CheckBaseline> Baseline();
   /// The markers of the baseline; nothing without a baseline.
   /// @throws DataError if they cannot be read.
   [[nodiscard]] std::optional<MarkerBaseline> BaselineMarkers();
-  void SetBaseline(const web::Actor& actor, const std::string& check_id);
+  void SetBaseline(const Actor& actor, const std::string& check_id);
 
  private:
   StoreDatabase& database_;

@@ -22,7 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-using web::FactoryReset;
 
 constexpr std::size_t kMaxBytes = 4096;
 constexpr const char* kKeep = "keep_records";
@@ -34,7 +33,7 @@ constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", "provisi
 
 struct Request {
   FactoryReset kind = FactoryReset::kKeepRecords;
-  web::Actor actor;
+  Actor actor;
 };
 
 /// @throws DataError
@@ -103,7 +102,7 @@ void Wipe(const fs::path& state) {
 }
 
 /// With its entry in the log; a store that cannot be opened is not changed.
-std::string KeepRecords(const fs::path& state, const web::Actor& actor) {
+std::string KeepRecords(const fs::path& state, const Actor& actor) {
   std::string done;
   {
     Store store(state);
@@ -123,7 +122,7 @@ std::string KeepRecords(const fs::path& state, const web::Actor& actor) {
 
 }  // namespace
 
-void RequestFactoryReset(const fs::path& state, FactoryReset kind, const web::Actor& actor) {
+void RequestFactoryReset(const fs::path& state, FactoryReset kind, const Actor& actor) {
   const Json json = {{"kind", kind == FactoryReset::kWipe ? kWipe : kKeep},
                      {"user", actor.user},
                      {"address", actor.address}};

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "web/service/service_types.hpp"
-#include "web/service/upkeep_services.hpp"
+#include "web/model/account.hpp"
+#include "web/model/settings.hpp"
 
 namespace plumb {
 
@@ -16,8 +16,7 @@ inline constexpr const char* kFactoryResetFile = "factory-reset.json";
 
 /// Records the request and who made it, durably. The file gets the folder's owner.
 /// @throws IoError
-void RequestFactoryReset(const std::filesystem::path& state, web::FactoryReset kind,
-                         const web::Actor& actor);
+void RequestFactoryReset(const std::filesystem::path& state, FactoryReset kind, const Actor& actor);
 
 /// Withdraws a request that has not been carried out.
 void CancelFactoryReset(const std::filesystem::path& state);

@@ -69,7 +69,7 @@ std::optional<CheckedScan> FileIntegrity::CheckNext(std::chrono::hours at_least,
   std::string id;
   {
     const StoreDatabase::Held writer = database_.ForChanges();
-    const web::WallClock::time_point now = web::WallClock::now();
+    const WallClock::time_point now = WallClock::now();
     // A time in the future is ignored, and files that were unavailable may be back.
     Statement query = writer->Prepare(
         "SELECT id FROM scans WHERE has_folder = 1 AND (checked_at <= ?1 OR checked_at > ?2 OR "

@@ -13,7 +13,6 @@ using store::FromStored;
 using store::Now;
 using store::ParseId;
 using store::RequireId;
-using web::ChangeResult;
 
 namespace {
 
@@ -28,7 +27,7 @@ constexpr const char* kPatientColumns =
     "   (SELECT ifnull(max(version), 0) FROM refs AS r WHERE r.patient_id = patients.id AND "
     "r.approved_by <> '') ORDER BY version DESC LIMIT 1), note, archived FROM patients ";
 
-web::Patient ReadPatient(const Statement& row) {
+Patient ReadPatient(const Statement& row) {
   return {.id = row.Text(0),
           .code = row.Text(1),
           .site = row.Text(2),
@@ -42,17 +41,17 @@ web::Patient ReadPatient(const Statement& row) {
 
 }  // namespace
 
-std::vector<web::Patient> PatientStore::List() {
+std::vector<Patient> PatientStore::List() {
   const StoreDatabase::Held lists = database_.ForLists();
   static const std::string kSql =
       std::string(kPatientColumns) + "WHERE id > 0 ORDER BY code LIMIT 1000";
   Statement query = lists->Prepare(kSql.c_str());
-  std::vector<web::Patient> patients;
+  std::vector<Patient> patients;
   while (query.Step()) patients.push_back(ReadPatient(query));
   return patients;
 }
 
-std::optional<web::Patient> PatientStore::Find(const std::string& id) {
+std::optional<Patient> PatientStore::Find(const std::string& id) {
   const std::optional<std::int64_t> number = ParseId(id);
   if (!number) return std::nullopt;
   const StoreDatabase::Held rows = database_.ForRows();
@@ -61,7 +60,7 @@ std::optional<web::Patient> PatientStore::Find(const std::string& id) {
   return query.Bind(*number).Step() ? std::optional(ReadPatient(query)) : std::nullopt;
 }
 
-std::optional<web::Patient> PatientStore::FindByCode(const std::string& code) {
+std::optional<Patient> PatientStore::FindByCode(const std::string& code) {
   const StoreDatabase::Held rows = database_.ForRows();
   static const std::string kSql =
       std::string(kPatientColumns) + "WHERE code = ? COLLATE NOCASE AND id > 0";
@@ -69,7 +68,7 @@ std::optional<web::Patient> PatientStore::FindByCode(const std::string& code) {
   return query.Bind(code).Step() ? std::optional(ReadPatient(query)) : std::nullopt;
 }
 
-std::string PatientStore::Add(const web::Actor& actor, const std::string& code,
+std::string PatientStore::Add(const Actor& actor, const std::string& code,
                               const std::string& site) {
   StoreChange change(database_);
   {  // PX-1 and px-1 would be confused at the couch
@@ -96,11 +95,11 @@ std::string PatientStore::Add(const web::Actor& actor, const std::string& code,
   return id;
 }
 
-void PatientStore::Change(const web::Actor& actor, const std::string& id, const std::string& site,
-                          const std::string& note, const std::optional<web::CourseNotes>& shown) {
+void PatientStore::Change(const Actor& actor, const std::string& id, const std::string& site,
+                          const std::string& note, const std::optional<CourseNotes>& shown) {
   const std::int64_t number = RequireId(id, "patient");
   StoreChange change(database_);
-  web::CourseNotes before;
+  CourseNotes before;
   {
     Statement query = change.Prepare("SELECT site, note FROM patients WHERE id = ? AND id > 0");
     const bool exists = query.Bind(number).Step();
@@ -127,7 +126,7 @@ void PatientStore::Change(const web::Actor& actor, const std::string& id, const 
   change.Commit();
 }
 
-void PatientStore::Archive(const web::Actor& actor, const std::string& id, bool archived) {
+void PatientStore::Archive(const Actor& actor, const std::string& id, bool archived) {
   const std::int64_t number = RequireId(id, "patient");
   StoreChange change(database_);
   {
@@ -149,7 +148,7 @@ void PatientStore::Archive(const web::Actor& actor, const std::string& id, bool 
 
 namespace {
 
-void CloseOpenSessions(StoreChange& change, const web::Actor& actor) {
+void CloseOpenSessions(StoreChange& change, const Actor& actor) {
   std::vector<std::string> open;
   {
     Statement query = change.Prepare("SELECT id FROM sessions WHERE closed_at IS NULL");
@@ -167,8 +166,8 @@ void CloseOpenSessions(StoreChange& change, const web::Actor& actor) {
 
 }  // namespace
 
-std::string TreatmentStore::Open(const web::Actor& actor, const std::string& patient_id,
-                                 web::ScanPurpose purpose) {
+std::string TreatmentStore::Open(const Actor& actor, const std::string& patient_id,
+                                 ScanPurpose purpose) {
   const std::optional<std::int64_t> patient = ParseId(patient_id);
   StoreChange change(database_);
   CloseOpenSessions(change, actor);
@@ -187,7 +186,7 @@ std::string TreatmentStore::Open(const web::Actor& actor, const std::string& pat
     if (query.Integer(1) != 0)
       throw StoreRefusal(ChangeResult::kConflict,
                          "this patient is archived: take it out of the archive first");
-    if (purpose == web::ScanPurpose::kFraction)
+    if (purpose == ScanPurpose::kFraction)
       fraction = std::max<std::int64_t>(1, query.Integer(0) + query.Integer(2));
   }
   change
@@ -206,13 +205,13 @@ std::string TreatmentStore::Open(const web::Actor& actor, const std::string& pat
   return id;
 }
 
-void TreatmentStore::CloseAll(const web::Actor& actor) {
+void TreatmentStore::CloseAll(const Actor& actor) {
   StoreChange change(database_);
   CloseOpenSessions(change, actor);
   change.Commit();
 }
 
-std::optional<web::TreatmentSession> TreatmentStore::Opened() {
+std::optional<TreatmentSession> TreatmentStore::Opened() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
       "SELECT sessions.id, patient_id, code, purpose, fraction, opened_by, opened_at, (SELECT "
@@ -220,14 +219,14 @@ std::optional<web::TreatmentSession> TreatmentStore::Opened() {
       "patients ON patients.id = patient_id WHERE closed_at IS NULL ORDER BY sessions.id DESC "
       "LIMIT 1");
   if (!query.Step()) return std::nullopt;
-  return web::TreatmentSession{.id = query.Text(0),
-                               .patient_id = query.Text(1),
-                               .patient_code = query.Text(2),
-                               .purpose = store::Parse<web::ScanPurpose>("purpose", query.Text(3)),
-                               .fraction = static_cast<int>(query.Integer(4)),
-                               .num_scans = static_cast<int>(query.Integer(7)),
-                               .opened_by = query.Text(5),
-                               .opened_at = FromStored(query.Integer(6))};
+  return TreatmentSession{.id = query.Text(0),
+                          .patient_id = query.Text(1),
+                          .patient_code = query.Text(2),
+                          .purpose = store::Parse<ScanPurpose>("purpose", query.Text(3)),
+                          .fraction = static_cast<int>(query.Integer(4)),
+                          .num_scans = static_cast<int>(query.Integer(7)),
+                          .opened_by = query.Text(5),
+                          .opened_at = FromStored(query.Integer(6))};
 }
 
 }  // namespace plumb

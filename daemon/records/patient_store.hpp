@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "daemon/records/store_database.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/scan.hpp"
 
 namespace plumb {
 
@@ -15,18 +17,18 @@ class PatientStore {
  public:
   explicit PatientStore(StoreDatabase& database) : database_(database) {}
 
-  [[nodiscard]] std::vector<web::Patient> List();  ///< By code.
-  [[nodiscard]] std::optional<web::Patient> Find(const std::string& id);
+  [[nodiscard]] std::vector<Patient> List();  ///< By code.
+  [[nodiscard]] std::optional<Patient> Find(const std::string& id);
   /// Letter case is ignored.
-  [[nodiscard]] std::optional<web::Patient> FindByCode(const std::string& code);
+  [[nodiscard]] std::optional<Patient> FindByCode(const std::string& code);
   /// Returns the id. kConflict for a code that another patient has.
-  std::string Add(const web::Actor& actor, const std::string& code, const std::string& site);
+  std::string Add(const Actor& actor, const std::string& code, const std::string& site);
   /// @param shown  What the person has seen; kConflict if something else is stored by now. Not set:
   ///        what is stored is replaced in any case.
-  void Change(const web::Actor& actor, const std::string& id, const std::string& site,
-              const std::string& note, const std::optional<web::CourseNotes>& shown = {});
+  void Change(const Actor& actor, const std::string& id, const std::string& site,
+              const std::string& note, const std::optional<CourseNotes>& shown = {});
   /// kConflict while a session of the patient is open.
-  void Archive(const web::Actor& actor, const std::string& id, bool archived);
+  void Archive(const Actor& actor, const std::string& id, bool archived);
 
  private:
   StoreDatabase& database_;
@@ -38,10 +40,9 @@ class TreatmentStore {
   explicit TreatmentStore(StoreDatabase& database) : database_(database) {}
 
   /// Closes the open session, if any, and opens one. Returns the id.
-  std::string Open(const web::Actor& actor, const std::string& patient_id,
-                   web::ScanPurpose purpose);
-  void CloseAll(const web::Actor& actor);
-  [[nodiscard]] std::optional<web::TreatmentSession> Opened();
+  std::string Open(const Actor& actor, const std::string& patient_id, ScanPurpose purpose);
+  void CloseAll(const Actor& actor);
+  [[nodiscard]] std::optional<TreatmentSession> Opened();
 
  private:
   StoreDatabase& database_;

@@ -24,7 +24,7 @@
 #include "daemon/records/summed_folder.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/temporary.hpp"
-#include "web/service/limits.hpp"
+#include "web/model/limits.hpp"
 
 namespace plumb {
 
@@ -110,7 +110,7 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
   const std::optional<std::int64_t> patient = FindCode(*database, code);
   if (!patient)
     throw DataError(fmt::format("there is no patient with the code '{}' in {}",
-                                code.substr(0, web::kMaxName), state.string()));
+                                code.substr(0, kMaxName), state.string()));
   const Json rows = PatientRows(*database, *patient);
   const TemporaryFolder own(fs::temp_directory_path(), "plumb-");
   WriteWholeFile(own.path() / kRecord, Json{{"rows", rows},
@@ -197,7 +197,7 @@ class PatientImport {
     }
     const Json& patient = rows().at("patients")[0];
     report_.code = patient.value("code", "");
-    const bool is_code = !report_.code.empty() && report_.code.size() <= web::kMaxName &&
+    const bool is_code = !report_.code.empty() && report_.code.size() <= kMaxName &&
                          report_.code.find_first_not_of(
                              "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
                              "abcdefghijklmnopqrstuvwxyz"

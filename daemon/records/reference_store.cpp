@@ -14,7 +14,6 @@ using store::Now;
 using store::ParseId;
 using store::RequireId;
 using store::ScanId;
-using web::ChangeResult;
 
 namespace {
 
@@ -33,7 +32,7 @@ std::string DigestOf(const Statement& row) {
 }
 
 /// @throws DataError naming the version whose plan cannot be read: it must not be used.
-web::ReferencePlan PlanIn(const Statement& row) {
+ReferencePlan PlanIn(const Statement& row) {
   try {
     return ParsePlan(row.Text(9));
   } catch (const DataError& error) {
@@ -42,35 +41,35 @@ web::ReferencePlan PlanIn(const Statement& row) {
 }
 
 /// Without its plan.
-web::Reference ReadReferenceRow(const Statement& row) {
-  web::Reference reference{.id = row.Text(0),
-                           .patient_id = row.Text(1),
-                           .version = static_cast<int>(row.Integer(2)),
-                           .scan_id = ScanId(row.Integer(3)),
-                           .created_at = FromStored(row.Integer(4)),
-                           .created_by = row.Text(5),
-                           .reason = row.Text(6),
-                           .revision = static_cast<int>(row.Integer(10)),
-                           .digest = {},
-                           .planned_by = row.Text(11),
-                           .approved_by = row.Text(7),
-                           .approved_at = {},
-                           .plan = {}};
+Reference ReadReferenceRow(const Statement& row) {
+  Reference reference{.id = row.Text(0),
+                      .patient_id = row.Text(1),
+                      .version = static_cast<int>(row.Integer(2)),
+                      .scan_id = ScanId(row.Integer(3)),
+                      .created_at = FromStored(row.Integer(4)),
+                      .created_by = row.Text(5),
+                      .reason = row.Text(6),
+                      .revision = static_cast<int>(row.Integer(10)),
+                      .digest = {},
+                      .planned_by = row.Text(11),
+                      .approved_by = row.Text(7),
+                      .approved_at = {},
+                      .plan = {}};
   if (!row.IsNull(8)) reference.approved_at = FromStored(row.Integer(8));
   reference.digest = DigestOf(row);
   return reference;
 }
 
 /// @throws DataError if the plan cannot be read; it is never replaced by a default.
-web::Reference ReadReference(const Statement& row) {
-  web::Reference reference = ReadReferenceRow(row);
+Reference ReadReference(const Statement& row) {
+  Reference reference = ReadReferenceRow(row);
   reference.plan = PlanIn(row);
   return reference;
 }
 
 /// For lists: an unreadable one does not hide the others.
-web::Reference ListReference(const Statement& row) {
-  web::Reference reference = ReadReferenceRow(row);
+Reference ListReference(const Statement& row) {
+  Reference reference = ReadReferenceRow(row);
   try {
     reference.plan = PlanIn(row);
   } catch (const DataError& error) {
@@ -86,7 +85,7 @@ void RequireRevision(std::int64_t stored, int read) {
 }
 
 /// One person plans, another approves.
-void RequireSecondPerson(const web::Reference& reference, const web::Actor& approver) {
+void RequireSecondPerson(const Reference& reference, const Actor& approver) {
   if (reference.planned_by.empty())
     throw StoreRefusal(ChangeResult::kConflict,
                        "nobody has planned this reference: save its plan first");
@@ -97,7 +96,7 @@ void RequireSecondPerson(const web::Reference& reference, const web::Actor& appr
 
 }  // namespace
 
-std::vector<web::WaitingReference> ReferenceStore::Waiting() {
+std::vector<WaitingReference> ReferenceStore::Waiting() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
       "SELECT refs.id, patient_id, code, version, planned_by FROM refs JOIN patients ON "
@@ -105,7 +104,7 @@ std::vector<web::WaitingReference> ReferenceStore::Waiting() {
       "ifnull(max(version), 0) FROM refs AS r WHERE r.patient_id = refs.patient_id AND "
       "r.approved_by <> '') AND NOT EXISTS (SELECT 1 FROM refs AS newer WHERE newer.patient_id = "
       "refs.patient_id AND newer.version > refs.version) ORDER BY refs.id DESC LIMIT 20");
-  std::vector<web::WaitingReference> waiting;
+  std::vector<WaitingReference> waiting;
   while (query.Step()) {
     waiting.push_back({.reference_id = query.Text(0),
                        .patient_id = query.Text(1),
@@ -116,8 +115,8 @@ std::vector<web::WaitingReference> ReferenceStore::Waiting() {
   return waiting;
 }
 
-std::vector<web::Reference> ReferenceStore::List(const std::string& patient_id) {
-  std::vector<web::Reference> references;
+std::vector<Reference> ReferenceStore::List(const std::string& patient_id) {
+  std::vector<Reference> references;
   const std::optional<std::int64_t> number = ParseId(patient_id);
   if (!number) return references;
   const StoreDatabase::Held lists = database_.ForLists();
@@ -129,7 +128,7 @@ std::vector<web::Reference> ReferenceStore::List(const std::string& patient_id) 
   return references;
 }
 
-std::optional<web::Reference> ReferenceStore::Find(const std::string& id) {
+std::optional<Reference> ReferenceStore::Find(const std::string& id) {
   const std::optional<std::int64_t> number = ParseId(id);
   if (!number) return std::nullopt;
   const StoreDatabase::Held rows = database_.ForRows();
@@ -138,7 +137,7 @@ std::optional<web::Reference> ReferenceStore::Find(const std::string& id) {
   return query.Bind(*number).Step() ? std::optional(ReadReference(query)) : std::nullopt;
 }
 
-std::optional<web::Reference> ReferenceStore::Approved(const std::string& patient_id) {
+std::optional<Reference> ReferenceStore::Approved(const std::string& patient_id) {
   const std::optional<std::int64_t> number = ParseId(patient_id);
   if (!number) return std::nullopt;
   const StoreDatabase::Held rows = database_.ForRows();
@@ -149,8 +148,8 @@ std::optional<web::Reference> ReferenceStore::Approved(const std::string& patien
   return query.Bind(*number).Step() ? std::optional(ReadReference(query)) : std::nullopt;
 }
 
-std::string ReferenceStore::Add(const web::Actor& actor, const std::string& scan_id,
-                                const std::string& reason, const web::ReferencePlan& plan) {
+std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
+                                const std::string& reason, const ReferencePlan& plan) {
   const std::int64_t scan = RequireId(scan_id, "scan");
   StoreChange change(database_);
   std::int64_t patient = 0;
@@ -190,8 +189,8 @@ std::string ReferenceStore::Add(const web::Actor& actor, const std::string& scan
   return id;
 }
 
-std::string ReferenceStore::Plan(const web::Actor& actor, const std::string& id, int revision,
-                                 const web::ReferencePlan& plan) {
+std::string ReferenceStore::Plan(const Actor& actor, const std::string& id, int revision,
+                                 const ReferencePlan& plan) {
   const std::int64_t number = RequireId(id, "reference");
   StoreChange change(database_);
   bool is_approved = false;
@@ -233,10 +232,10 @@ std::string ReferenceStore::Plan(const web::Actor& actor, const std::string& id,
   return changed;
 }
 
-void ReferenceStore::Approve(const web::Actor& actor, const std::string& id, int revision,
+void ReferenceStore::Approve(const Actor& actor, const std::string& id, int revision,
                              const std::string& digest, bool two_users) {
   const std::int64_t number = RequireId(id, "reference");
-  if (const std::optional<web::Reference> reference = Find(id)) {  // before the lock is taken
+  if (const std::optional<Reference> reference = Find(id)) {  // before the lock is taken
     const std::string fault = integrity_.Check(reference->scan_id, /*scene_only=*/true);
     if (!fault.empty())
       throw StoreRefusal(ChangeResult::kConflict,
@@ -251,7 +250,7 @@ void ReferenceStore::Approve(const web::Actor& actor, const std::string& id, int
     Statement query = change.Prepare(kSql.c_str());
     if (!query.Bind(number).Step())
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
-    const web::Reference reference = ReadReferenceRow(query);
+    const Reference reference = ReadReferenceRow(query);
     if (!reference.approved_by.empty())
       throw StoreRefusal(ChangeResult::kConflict, "this reference is approved already");
     RequireRevision(reference.revision, revision);

@@ -7,7 +7,8 @@
 
 #include "daemon/records/file_integrity.hpp"
 #include "daemon/records/store_database.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/reference.hpp"
 
 namespace plumb {
 
@@ -19,24 +20,24 @@ class ReferenceStore {
       : database_(database), integrity_(integrity) {}
 
   /// Drafts that are newer than the approved version of their patient; at most 20.
-  [[nodiscard]] std::vector<web::WaitingReference> Waiting();
+  [[nodiscard]] std::vector<WaitingReference> Waiting();
   /// Newest first. An unreadable one is marked and does not hide others.
-  [[nodiscard]] std::vector<web::Reference> List(const std::string& patient_id);
-  [[nodiscard]] std::optional<web::Reference> Find(const std::string& id);
-  [[nodiscard]] std::optional<web::Reference> Approved(const std::string& patient_id);
+  [[nodiscard]] std::vector<Reference> List(const std::string& patient_id);
+  [[nodiscard]] std::optional<Reference> Find(const std::string& id);
+  [[nodiscard]] std::optional<Reference> Approved(const std::string& patient_id);
 
   /// Creates a draft. Returns the id.
-  std::string Add(const web::Actor& actor, const std::string& scan_id, const std::string& reason,
-                  const web::ReferencePlan& plan);
+  std::string Add(const Actor& actor, const std::string& scan_id, const std::string& reason,
+                  const ReferencePlan& plan);
   /// Changes a draft, or creates a new version of an approved reference. Returns the id.
   /// @param revision  The revision that was read; kConflict if another one has been saved since.
-  std::string Plan(const web::Actor& actor, const std::string& id, int revision,
-                   const web::ReferencePlan& plan);
+  std::string Plan(const Actor& actor, const std::string& id, int revision,
+                   const ReferencePlan& plan);
   /// @param digest  Digest of the data that was read and is signed; kConflict if another one is
   ///         stored. Empty: not compared.
   /// @param two_users  The approver must be another person than the one who created or planned it;
   ///         false only for the demo's "auto".
-  void Approve(const web::Actor& actor, const std::string& id, int revision,
+  void Approve(const Actor& actor, const std::string& id, int revision,
                const std::string& digest = {}, bool two_users = true);
 
  private:

@@ -7,14 +7,14 @@
 
 #include "algo/comparison/marker_check.hpp"
 #include "algo/comparison/room_board.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb {
 
 /// A check scan in which markers of the board were seen.
 struct BoardScan {
   std::string check_id;
-  web::WallClock::time_point time;
+  WallClock::time_point time;
   std::string user;
   std::string dictionary;
   double marker_length_m = 0.0;
@@ -42,7 +42,7 @@ struct RoomCandidate {
 /// A signed calibration.
 struct SignedRoom {
   int version = 0;
-  web::WallClock::time_point signed_at;
+  WallClock::time_point signed_at;
   std::string signed_by;
   std::string digest;
   RoomFit fit;

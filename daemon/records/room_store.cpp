@@ -14,7 +14,6 @@ namespace plumb {
 using store::FromStored;
 using store::Now;
 using store::ToStored;
-using web::ChangeResult;
 
 namespace {
 
@@ -81,8 +80,7 @@ RoomCandidate ReadCandidate(Database& database, const std::string& serial, std::
 
 }  // namespace
 
-RoomCandidate RoomStore::Candidate(const std::string& sensor_serial,
-                                   web::WallClock::time_point since) {
+RoomCandidate RoomStore::Candidate(const std::string& sensor_serial, WallClock::time_point since) {
   const StoreDatabase::Held lists = database_.ForLists();
   return ReadCandidate(*lists, sensor_serial, ToStored(since));
 }
@@ -107,8 +105,8 @@ std::vector<SignedRoom> RoomStore::List(int limit) {
   return rooms;
 }
 
-std::string RoomStore::Sign(const web::Actor& actor, const std::string& sensor_serial,
-                            web::WallClock::time_point since, const std::string& digest) {
+std::string RoomStore::Sign(const Actor& actor, const std::string& sensor_serial,
+                            WallClock::time_point since, const std::string& digest) {
   StoreChange change(database_);
   const RoomCandidate candidate = ReadCandidate(change.database(), sensor_serial, ToStored(since));
   if (!candidate.why_not.empty()) throw StoreRefusal(ChangeResult::kConflict, candidate.why_not);

@@ -17,15 +17,15 @@ class RoomStore {
 
   /// Uses the check scans with this sensor since the given time and since the last signature.
   [[nodiscard]] RoomCandidate Candidate(const std::string& sensor_serial,
-                                        web::WallClock::time_point since);
+                                        WallClock::time_point since);
   /// @throws DataError for one that cannot be read.
   [[nodiscard]] std::optional<SignedRoom> Newest();
   /// Newest first, without unreadable ones.
   [[nodiscard]] std::vector<SignedRoom> List(int limit);
   /// @param digest  Digest of the candidate that was read; kConflict if another one would be
   ///         stored. Returns the version.
-  std::string Sign(const web::Actor& actor, const std::string& sensor_serial,
-                   web::WallClock::time_point since, const std::string& digest);
+  std::string Sign(const Actor& actor, const std::string& sensor_serial,
+                   WallClock::time_point since, const std::string& digest);
   /// Why a new calibration is due, by the newest check since the signature that saw enough of the
   /// room; empty if it is not due.
   [[nodiscard]] std::string WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits);

@@ -23,7 +23,6 @@ using store::Now;
 using store::ParseId;
 using store::ScanId;
 using store::ToStored;
-using web::ChangeResult;
 
 namespace {
 
@@ -36,13 +35,13 @@ constexpr const char* kScanColumns =
 
 /// The column check_overdue stores the value of the enum. Older versions read every value but 0 as
 /// overdue.
-web::DailyCheck DailyCheckOf(std::int64_t stored) {
-  static_assert(static_cast<int>(web::DailyCheck::kPassed) == 0 &&
-                static_cast<int>(web::DailyCheck::kOverdue) == 1 &&
-                static_cast<int>(web::DailyCheck::kFailed) == 2);
-  return stored == 0   ? web::DailyCheck::kPassed
-         : stored == 2 ? web::DailyCheck::kFailed
-                       : web::DailyCheck::kOverdue;
+DailyCheck DailyCheckOf(std::int64_t stored) {
+  static_assert(static_cast<int>(DailyCheck::kPassed) == 0 &&
+                static_cast<int>(DailyCheck::kOverdue) == 1 &&
+                static_cast<int>(DailyCheck::kFailed) == 2);
+  return stored == 0   ? DailyCheck::kPassed
+         : stored == 2 ? DailyCheck::kFailed
+                       : DailyCheck::kOverdue;
 }
 
 /// Flushes a folder, or with ::syncfs everything on its disk.
@@ -56,9 +55,9 @@ void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
 }
 
 /// Verdict and numbers for the log: "move: vertical +1.2, ..., yaw -0.10".
-std::string Described(const web::ResultSummary& result) {
+std::string Described(const ResultSummary& result) {
   std::string text = result.verdict;
-  for (const web::NumberAxis& axis : web::kNumberAxes) {
+  for (const NumberAxis& axis : kNumberAxes) {
     if (const auto value = axis.In(result.correction))
       text += fmt::format(", {} {:+.2f} {}", axis.name, *value, axis.unit);
   }
@@ -68,26 +67,26 @@ std::string Described(const web::ResultSummary& result) {
 }  // namespace
 
 /// @throws DataError where the row or its result cannot be read: nothing of it is ever a default.
-web::Scan ScanStore::ReadScan(const Statement& row) const {
-  web::Scan scan{.id = ScanId(row.Integer(0)),
-                 .patient_id = row.Integer(1) == 0 ? std::string() : row.Text(1),
-                 .reference_id = row.Text(2),
-                 .purpose = store::Parse<web::ScanPurpose>("purpose", row.Text(3)),
-                 .outcome = store::Parse<web::ScanOutcome>("outcome", row.Text(4)),
-                 .failure = row.Text(5),
-                 .started_at = FromStored(row.Integer(6)),
-                 .finished_at = {},
-                 .result = {},
-                 .accepted_by = row.Text(8),
-                 .accepted_reason = row.Text(11),
-                 .accepted_at = {},
-                 .session_id = row.Text(12),
-                 .fraction = static_cast<int>(row.Integer(13)),
-                 .sensor_on_s = {},
-                 .daily_check = DailyCheckOf(row.Integer(15)),
-                 .sensor_serial = row.Text(18),
-                 .session_by = row.Text(19),
-                 .folder = {}};
+Scan ScanStore::ReadScan(const Statement& row) const {
+  Scan scan{.id = ScanId(row.Integer(0)),
+            .patient_id = row.Integer(1) == 0 ? std::string() : row.Text(1),
+            .reference_id = row.Text(2),
+            .purpose = store::Parse<ScanPurpose>("purpose", row.Text(3)),
+            .outcome = store::Parse<ScanOutcome>("outcome", row.Text(4)),
+            .failure = row.Text(5),
+            .started_at = FromStored(row.Integer(6)),
+            .finished_at = {},
+            .result = {},
+            .accepted_by = row.Text(8),
+            .accepted_reason = row.Text(11),
+            .accepted_at = {},
+            .session_id = row.Text(12),
+            .fraction = static_cast<int>(row.Integer(13)),
+            .sensor_on_s = {},
+            .daily_check = DailyCheckOf(row.Integer(15)),
+            .sensor_serial = row.Text(18),
+            .session_by = row.Text(19),
+            .folder = {}};
   if (!row.IsNull(14)) scan.sensor_on_s = row.Real(14);
   if (!row.IsNull(17)) scan.accepted_at = FromStored(row.Integer(17));
   if (!row.IsNull(7)) scan.finished_at = FromStored(row.Integer(7));
@@ -101,14 +100,14 @@ web::Scan ScanStore::ReadScan(const Statement& row) const {
 }
 
 /// For lists: one that cannot be read does not hide the others. It has no result, and says why.
-web::Scan ScanStore::ListScan(const Statement& row) const {
+Scan ScanStore::ListScan(const Statement& row) const {
   try {
     return ReadScan(row);
   } catch (const DataError& error) {
-    web::Scan scan;
+    Scan scan;
     scan.id = ScanId(row.Integer(0));
     if (row.Integer(1) != 0) scan.patient_id = row.Text(1);
-    scan.outcome = web::ScanOutcome::kFailed;
+    scan.outcome = ScanOutcome::kFailed;
     scan.failure = error.what();
     scan.started_at = FromStored(row.Integer(6));
     return scan;
@@ -124,8 +123,8 @@ void FailInterruptedScans(Database& database) {
       .Run();
 }
 
-std::vector<web::Scan> ScanStore::List(const std::string& patient_id, int limit) {
-  std::vector<web::Scan> scans;
+std::vector<Scan> ScanStore::List(const std::string& patient_id, int limit) {
+  std::vector<Scan> scans;
   const std::optional<std::int64_t> number = ParseId(patient_id);
   if (!number && !patient_id.empty()) return scans;
   const StoreDatabase::Held lists = database_.ForLists();
@@ -139,7 +138,7 @@ std::vector<web::Scan> ScanStore::List(const std::string& patient_id, int limit)
   return scans;
 }
 
-std::optional<web::Scan> ScanStore::Find(const std::string& id) {
+std::optional<Scan> ScanStore::Find(const std::string& id) {
   const std::optional<std::int64_t> number = ParseId(id);
   if (!number) return std::nullopt;
   const StoreDatabase::Held rows = database_.ForRows();
@@ -148,7 +147,7 @@ std::optional<web::Scan> ScanStore::Find(const std::string& id) {
   return query.Bind(*number).Step() ? std::optional(ReadScan(query)) : std::nullopt;
 }
 
-int ScanStore::CountSince(const std::string& patient_id, web::WallClock::time_point since) {
+int ScanStore::CountSince(const std::string& patient_id, WallClock::time_point since) {
   const std::optional<std::int64_t> number = ParseId(patient_id);
   if (!number) return 0;
   const StoreDatabase::Held rows = database_.ForRows();
@@ -203,12 +202,12 @@ std::string ScanStore::Begin(const NewScan& scan) {
 }
 
 void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished) {
-  const bool is_done = finished.outcome == web::ScanOutcome::kDone;
+  const bool is_done = finished.outcome == ScanOutcome::kDone;
   const fs::path staging = folders_.Staging(scan_id);
   std::error_code ignored;
   // A failed sweep is kept for inspection if its recording is complete.
   const bool has_recording = fs::exists(staging / kRecordingFolder / "rgb.txt", ignored);
-  const bool is_kept = is_done || (finished.outcome == web::ScanOutcome::kFailed && has_recording);
+  const bool is_kept = is_done || (finished.outcome == ScanOutcome::kFailed && has_recording);
   // Read before the lock is taken, so that nothing else waits for it.
   const std::vector<FileDigest> files =
       is_done ? DigestsOfScan(staging) : std::vector<FileDigest>();
@@ -251,7 +250,7 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
       .Bind(std::int64_t{has_folder})
       .Bind(number)
       .Run();
-  if (finished.outcome == web::ScanOutcome::kDone && !finished.result_json.empty()) {
+  if (finished.outcome == ScanOutcome::kDone && !finished.result_json.empty()) {
     database.Prepare("INSERT INTO results (scan_id, json) VALUES (?, ?)")
         .Bind(number)
         .Bind(finished.result_json)
@@ -261,7 +260,7 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
   transaction.Commit();
 }
 
-void ScanStore::Accept(const web::Actor& actor, const std::string& id, const std::string& reason) {
+void ScanStore::Accept(const Actor& actor, const std::string& id, const std::string& reason) {
   const std::optional<std::int64_t> number = ParseId(id);
   StoreChange change(database_);
   std::string described;
@@ -278,7 +277,7 @@ void ScanStore::Accept(const web::Actor& actor, const std::string& id, const std
       throw StoreRefusal(ChangeResult::kConflict,
                          "this scan has no result: only a compared scan is accepted");
     }
-    const web::ResultSummary result = SummaryOf(query.Text(2));
+    const ResultSummary result = SummaryOf(query.Text(2));
     if (result.verdict == "no_answer")
       throw StoreRefusal(ChangeResult::kConflict,
                          "this scan gave no answer: there is nothing to accept");

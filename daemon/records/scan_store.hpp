@@ -9,7 +9,10 @@
 #include "daemon/records/scan_files.hpp"
 #include "daemon/records/scan_folders.hpp"
 #include "daemon/records/store_database.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/check.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb {
 
@@ -17,17 +20,17 @@ namespace plumb {
 struct NewScan {
   std::string patient_id;
   std::string reference_id;  ///< Empty without a reference.
-  web::ScanPurpose purpose = web::ScanPurpose::kFraction;
+  ScanPurpose purpose = ScanPurpose::kFraction;
   std::string sensor_serial;
   std::string reason;           ///< Reason for a new reference.
   std::string session_id = {};  ///< Empty without an open session.
   std::optional<double> sensor_on_s = {};
-  web::DailyCheck daily_check = web::DailyCheck::kPassed;
+  DailyCheck daily_check = DailyCheck::kPassed;
 };
 
 /// Outcome of a scan.
 struct FinishedScan {
-  web::ScanOutcome outcome = web::ScanOutcome::kFailed;
+  ScanOutcome outcome = ScanOutcome::kFailed;
   std::string failure;
   std::string result_json;  ///< Empty if nothing was compared.
   double swept_area_m2 = 0.0;
@@ -52,11 +55,11 @@ class ScanStore {
 
   /// Newest first; a scan that cannot be read is listed as failed, with that reason.
   /// @param patient_id  Empty: all patients.
-  [[nodiscard]] std::vector<web::Scan> List(const std::string& patient_id, int limit);
+  [[nodiscard]] std::vector<Scan> List(const std::string& patient_id, int limit);
   /// @throws DataError if it cannot be read
-  [[nodiscard]] std::optional<web::Scan> Find(const std::string& id);
+  [[nodiscard]] std::optional<Scan> Find(const std::string& id);
   /// Completed scans of a patient.
-  [[nodiscard]] int CountSince(const std::string& patient_id, web::WallClock::time_point since);
+  [[nodiscard]] int CountSince(const std::string& patient_id, WallClock::time_point since);
   /// The newest scan that was stored with files.
   [[nodiscard]] std::optional<std::string> NewestWithFiles();
   /// Surface seen by a scan's sweep; 0 if unknown.
@@ -69,15 +72,15 @@ class ScanStore {
   void Finish(const std::string& scan_id, const FinishedScan& finished);
   /// Verdict, numbers and reason are logged. kConflict if a newer scan of the patient is done or
   /// running, and for a result that is not in tolerance without a reason.
-  void Accept(const web::Actor& actor, const std::string& id, const std::string& reason = {});
+  void Accept(const Actor& actor, const std::string& id, const std::string& reason = {});
 
   /// The scan that has begun and not ended. Stable while the caller holds the connection for
   /// changes.
   [[nodiscard]] std::optional<std::int64_t> running() const { return running_; }
 
  private:
-  web::Scan ReadScan(const Statement& row) const;
-  web::Scan ListScan(const Statement& row) const;
+  Scan ReadScan(const Statement& row) const;
+  Scan ListScan(const Statement& row) const;
   static void NoteEnd(Database& database, const std::string& scan_id, const FinishedScan& finished,
                       bool has_folder, const std::vector<FileDigest>& files);
 

@@ -7,13 +7,13 @@
 
 namespace plumb {
 
-web::Settings SettingsStore::Get() {
+Settings SettingsStore::Get() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare("SELECT value FROM settings WHERE name = 'settings'");
-  return query.Step() ? ParseSettings(query.Text(0)) : web::Settings{};
+  return query.Step() ? ParseSettings(query.Text(0)) : Settings{};
 }
 
-void SettingsStore::Change(const web::Actor& actor, const web::Settings& settings) {
+void SettingsStore::Change(const Actor& actor, const Settings& settings) {
   StoreChange change(database_);
   const std::string text = SettingsJson(settings);
   std::string stored;
@@ -39,14 +39,12 @@ std::string Described(double width_mm, double height_mm, double shift_mm, double
 
 }  // namespace
 
-using web::ChangeResult;
-
-std::vector<web::PlanTemplate> TemplateStore::List() {
+std::vector<PlanTemplate> TemplateStore::List() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
       "SELECT site, width_mm, height_mm, shift_mm, rotation_deg, changed_by FROM templates ORDER "
       "BY site LIMIT 100");
-  std::vector<web::PlanTemplate> templates;
+  std::vector<PlanTemplate> templates;
   while (query.Step()) {
     templates.push_back({.site = query.Text(0),
                          .width_mm = query.Real(1),
@@ -57,7 +55,7 @@ std::vector<web::PlanTemplate> TemplateStore::List() {
   return templates;
 }
 
-void TemplateStore::Set(const web::Actor& actor, const web::PlanTemplate& wanted) {
+void TemplateStore::Set(const Actor& actor, const PlanTemplate& wanted) {
   constexpr std::int64_t kMaxTemplates = 100;
   StoreChange change(database_);
   {
@@ -93,7 +91,7 @@ void TemplateStore::Set(const web::Actor& actor, const web::PlanTemplate& wanted
   change.Commit();
 }
 
-void TemplateStore::Remove(const web::Actor& actor, const std::string& site) {
+void TemplateStore::Remove(const Actor& actor, const std::string& site) {
   StoreChange change(database_);
   change.Prepare("DELETE FROM templates WHERE site = ?").Bind(site).Run();
   if (change.num_changed() == 0)

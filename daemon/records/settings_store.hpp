@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "daemon/records/store_database.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/settings.hpp"
 
 namespace plumb {
 
@@ -15,8 +17,8 @@ class SettingsStore {
  public:
   explicit SettingsStore(StoreDatabase& database) : database_(database) {}
 
-  [[nodiscard]] web::Settings Get();
-  void Change(const web::Actor& actor, const web::Settings& settings);
+  [[nodiscard]] Settings Get();
+  void Change(const Actor& actor, const Settings& settings);
 
  private:
   StoreDatabase& database_;
@@ -27,10 +29,10 @@ class TemplateStore {
  public:
   explicit TemplateStore(StoreDatabase& database) : database_(database) {}
 
-  [[nodiscard]] std::vector<web::PlanTemplate> List();  ///< By site.
+  [[nodiscard]] std::vector<PlanTemplate> List();  ///< By site.
   /// Replaces the template of that site. kConflict above 100 sites.
-  void Set(const web::Actor& actor, const web::PlanTemplate& wanted);
-  void Remove(const web::Actor& actor, const std::string& site);
+  void Set(const Actor& actor, const PlanTemplate& wanted);
+  void Remove(const Actor& actor, const std::string& site);
 
  private:
   StoreDatabase& database_;

@@ -83,7 +83,7 @@ void RequireLastingPlace(const fs::path& target, const fs::path& state) {
     throw std::invalid_argument(why);
 }
 
-BackupReport StoreBackup::Make(const web::Actor& actor, const std::filesystem::path& target,
+BackupReport StoreBackup::Make(const Actor& actor, const std::filesystem::path& target,
                                const std::stop_token& stop, const BackupSecret* secret) {
   RequireLastingPlace(target, folders_.state());
   const RemovalGate::Backup guard(gate_);

@@ -33,7 +33,7 @@ class StoreBackup {
   /// While scans continue; nothing is removed meanwhile. See backup.hpp.
   /// @throws StoreRefusal if a backup is being made already; std::invalid_argument for a target at
   ///         which it would be lost; IoError; Interrupted
-  BackupReport Make(const web::Actor& actor, const std::filesystem::path& target,
+  BackupReport Make(const Actor& actor, const std::filesystem::path& target,
                     const std::stop_token& stop = {}, const BackupSecret* secret = nullptr);
 
  private:

@@ -10,8 +10,8 @@ StoreDatabase::StoreDatabase(std::unique_ptr<Database> write, const std::filesys
                              Database::Access readers)
     : write_(std::move(write)), row_(file, readers), list_(file, readers) {}
 
-void StoreChange::Log(const web::Actor& actor, const std::string& action,
-                      const std::string& subject, const std::string& detail) {
+void StoreChange::Log(const Actor& actor, const std::string& action, const std::string& subject,
+                      const std::string& detail) {
   AppendAuditEntry(*held_, actor, action, subject, detail);
 }
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "daemon/records/database.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
 
 namespace plumb {
 
@@ -60,7 +60,7 @@ class StoreChange {
   [[nodiscard]] std::int64_t last_id() const { return held_->last_id(); }
   [[nodiscard]] int num_changed() const { return held_->num_changed(); }
   /// Adds an entry to the audit log.
-  void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+  void Log(const Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail);
   void Commit() { transaction_.Commit(); }
   [[nodiscard]] Database& database() { return *held_; }

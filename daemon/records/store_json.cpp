@@ -10,7 +10,11 @@
 #include "algo/acceptance/acceptance.hpp"
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
-#include "web/service/settings_change.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/numbers.hpp"
+#include "web/model/reference.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/settings.hpp"
 
 namespace plumb {
 namespace {
@@ -25,13 +29,13 @@ using Json = nlohmann::json;
 }
 
 // Results are read by the names with which the method writes them.
-static_assert(std::ranges::equal(web::kNumberAxes, kNumberNames, std::equal_to<std::string_view>(),
-                                 &web::NumberAxis::name));
+static_assert(std::ranges::equal(kNumberAxes, kNumberNames, std::equal_to<std::string_view>(),
+                                 &NumberAxis::name));
 
 /// Couch-fixed markers do not determine shifts; a missing angle is never treated as zero.
-web::ReportedNumbers NumbersOf(const Json& json) {
-  web::ReportedNumbers numbers;
-  for (const web::NumberAxis& axis : web::kNumberAxes) {
+ReportedNumbers NumbersOf(const Json& json) {
+  ReportedNumbers numbers;
+  for (const NumberAxis& axis : kNumberAxes) {
     const auto found = json.find(axis.key);
     if (axis.is_shift() && (found == json.end() || found->is_null())) continue;
     if (found == json.end() || !found->is_number())
@@ -58,7 +62,7 @@ std::string VerdictIn(const Json& json) {
   RefuseResult("it has no verdict that this version knows");
 }
 
-void ReadWords(const Json& result, web::ResultSummary& summary) {
+void ReadWords(const Json& result, ResultSummary& summary) {
   const auto text = [](const Json& json, const char* key) {
     const auto found = json.find(key);
     return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
@@ -66,7 +70,7 @@ void ReadWords(const Json& result, web::ResultSummary& summary) {
   if (const auto words = result.value(Json::json_pointer("/correction/words"), Json());
       words.is_object()) {
     for (std::size_t i = 0; i < summary.words.size(); ++i)
-      summary.words[i] = text(words, web::kNumberAxes[i].name);
+      summary.words[i] = text(words, kNumberAxes[i].name);
   }
   const auto parts = result.value(Json::json_pointer("/body/parts"), Json());
   for (const Json& part : parts.is_array() ? parts : Json::array()) {
@@ -98,14 +102,14 @@ class Stored {
     const auto found = json_.find(key);
     return found == json_.end() ? nullptr : &*found;
   }
-  [[nodiscard]] double Number(const char* key, web::Range range) const {
+  [[nodiscard]] double Number(const char* key, Range range) const {
     const Json* value = Find(key);
     if (value == nullptr || !value->is_number()) Fail(fmt::format("{} is not a number", key));
     return InRange(key, value->get<double>(), range);
   }
-  [[nodiscard]] web::Tolerance Tolerance() const {
-    return {.shift_mm = Number("shift_tolerance_mm", web::kShiftTolerance_mm.stored),
-            .rotation_deg = Number("rotation_tolerance_deg", web::kRotationTolerance_deg.stored)};
+  [[nodiscard]] Tolerance ReadTolerance() const {
+    return {.shift_mm = Number("shift_tolerance_mm", kShiftTolerance_mm.stored),
+            .rotation_deg = Number("rotation_tolerance_deg", kRotationTolerance_deg.stored)};
   }
   [[nodiscard]] bool Flag(const char* key) const {
     const Json* value = Find(key);
@@ -114,10 +118,10 @@ class Stored {
   }
   [[nodiscard]] std::string Posture(const char* key) const {
     const Json* value = Find(key);
-    for (const std::string_view posture : web::kPostures) {
+    for (const std::string_view posture : kPostures) {
       if (value != nullptr && *value == posture) return std::string(posture);
     }
-    Fail(fmt::format("{} is none of {}", key, fmt::join(web::kPostures, ", ")));
+    Fail(fmt::format("{} is none of {}", key, fmt::join(kPostures, ", ")));
   }
   /// A point of finite numbers.
   template <std::size_t kSize>
@@ -135,7 +139,7 @@ class Stored {
  private:
   static constexpr double kMaxCoordinate_m = 1000.0;
 
-  [[nodiscard]] double InRange(const char* key, double value, web::Range range) const {
+  [[nodiscard]] double InRange(const char* key, double value, Range range) const {
     if (!range.Holds(value))
       Fail(fmt::format("{} is {}, expected {} to {}", key, value, range.least, range.most));
     return value;
@@ -147,7 +151,7 @@ class Stored {
 
 }  // namespace
 
-std::string PlanJson(const web::ReferencePlan& plan) {
+std::string PlanJson(const ReferencePlan& plan) {
   Json json = {{"region_m", plan.region_m},
                {"shift_tolerance_mm", plan.tolerance.shift_mm},
                {"rotation_tolerance_deg", plan.tolerance.rotation_deg},
@@ -157,15 +161,15 @@ std::string PlanJson(const web::ReferencePlan& plan) {
   return json.dump();
 }
 
-web::ReferencePlan ParsePlan(const std::string& text) {
+ReferencePlan ParsePlan(const std::string& text) {
   const Stored stored(text, "a stored plan");
-  web::ReferencePlan plan;
+  ReferencePlan plan;
   const Json* region = stored.Find("region_m");
   if (region == nullptr || !region->is_array()) stored.Fail("region_m is not a list of points");
   for (const Json& point : *region) plan.region_m.push_back(stored.Point<2>("region_m", point));
   if (plan.region_m.size() == 1 || plan.region_m.size() == 2)
     stored.Fail("region_m has fewer than 3 points");
-  plan.tolerance = stored.Tolerance();
+  plan.tolerance = stored.ReadTolerance();
   plan.posture = stored.Posture("posture");
   plan.couch_markers = stored.Flag("couch_markers");
   if (const Json* isocentre = stored.Find("isocentre_m"))
@@ -173,13 +177,11 @@ web::ReferencePlan ParsePlan(const std::string& text) {
   return plan;
 }
 
-std::string SettingsJson(const web::Settings& settings) {
-  return web::SettingsAs<Json>(settings).dump();
-}
+std::string SettingsJson(const Settings& settings) { return SettingsAs<Json>(settings).dump(); }
 
-std::string SettingsChanges(const std::string& stored, const web::Settings& settings) {
+std::string SettingsChanges(const std::string& stored, const Settings& settings) {
   const Json before = ParseBoundedJsonOrNothing(stored);
-  const Json wanted = web::SettingsAs<Json>(settings);
+  const Json wanted = SettingsAs<Json>(settings);
   Json changes = Json::object();
   for (const auto& [name, after] : wanted.items()) {
     if (!before.is_object() || !before.contains(name)) {
@@ -191,38 +193,38 @@ std::string SettingsChanges(const std::string& stored, const web::Settings& sett
   return changes.dump();
 }
 
-web::Settings ParseSettings(const std::string& text) {
+Settings ParseSettings(const std::string& text) {
   const Stored stored(text, "the stored settings");
-  web::Settings s;
-  const auto number = [&](const char* key, double& value, const web::Limits& limits) {
+  Settings s;
+  const auto number = [&](const char* key, double& value, const Limits& limits) {
     if (stored.Find(key) != nullptr) value = stored.Number(key, limits.stored);
   };
-  const auto whole = [&](const char* key, int& value, const web::Limits& limits) {
+  const auto whole = [&](const char* key, int& value, const Limits& limits) {
     double read = value;
     number(key, read, limits);
     value = static_cast<int>(read);
   };
-  s.tolerance = stored.Tolerance();
+  s.tolerance = stored.ReadTolerance();
   s.posture = stored.Posture("posture");
   s.couch_markers = stored.Flag("couch_markers");
-  number("auto_stop_s", s.auto_stop_s, web::kAutoStop_s);
-  number("scan_limit_s", s.scan_limit_s, web::kScanLimit_s);
+  number("auto_stop_s", s.auto_stop_s, kAutoStop_s);
+  number("scan_limit_s", s.scan_limit_s, kScanLimit_s);
   if (stored.Find("keep_recordings") != nullptr) s.keep_recordings = stored.Flag("keep_recordings");
-  whole("retention_days", s.retention_days, web::kRetention_days);
-  whole("idle_logout_min", s.idle_logout_min, web::kIdleLogout_min);
+  whole("retention_days", s.retention_days, kRetention_days);
+  whole("idle_logout_min", s.idle_logout_min, kIdleLogout_min);
   return s;
 }
 
-web::ResultSummary SummaryOf(const std::string& result_json) {
+ResultSummary SummaryOf(const std::string& result_json) {
   const Json json = ParseBoundedJsonOrNothing(result_json);
   if (!json.is_object()) RefuseResult("expected a JSON object, found none");
-  web::ResultSummary summary{.verdict = VerdictIn(json),
-                             .reasons = {},
-                             .correction = {},
-                             .u95 = {},
-                             .words = {},
-                             .body_now = {},
-                             .body_after = {}};
+  ResultSummary summary{.verdict = VerdictIn(json),
+                        .reasons = {},
+                        .correction = {},
+                        .u95 = {},
+                        .words = {},
+                        .body_now = {},
+                        .body_after = {}};
   ReadWords(json, summary);
   if (const auto reasons = json.find("reasons"); reasons != json.end()) {
     if (!reasons->is_array()) RefuseResult("its reasons are not a list");

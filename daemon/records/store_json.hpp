@@ -3,27 +3,29 @@
 
 #include <string>
 
-#include "web/service/service_types.hpp"
+#include "web/model/reference.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/settings.hpp"
 
 namespace plumb {
 
-[[nodiscard]] std::string PlanJson(const web::ReferencePlan& plan);
+[[nodiscard]] std::string PlanJson(const ReferencePlan& plan);
 /// Values that decide about a patient are never guessed: all must be present and valid.
 /// @throws DataError stating what is wrong.
-[[nodiscard]] web::ReferencePlan ParsePlan(const std::string& text);
+[[nodiscard]] ReferencePlan ParsePlan(const std::string& text);
 
-[[nodiscard]] std::string SettingsJson(const web::Settings& settings);
+[[nodiscard]] std::string SettingsJson(const Settings& settings);
 /// For the log: {"NAME": [before, after]} for every setting that differs; [after] alone for a
 /// setting that `stored` does not contain.
 /// @param stored  As written by SettingsJson(), or anything else.
-[[nodiscard]] std::string SettingsChanges(const std::string& stored, const web::Settings& settings);
+[[nodiscard]] std::string SettingsChanges(const std::string& stored, const Settings& settings);
 /// Settings that an older Plumb did not know may be missing and get their default; nothing else
 /// may.
 /// @throws DataError stating what is wrong.
-[[nodiscard]] web::Settings ParseSettings(const std::string& text);
+[[nodiscard]] Settings ParseSettings(const std::string& text);
 
 /// The list entry of a result.json. Missing numbers are never treated as zero.
 /// @throws DataError stating what is wrong.
-[[nodiscard]] web::ResultSummary SummaryOf(const std::string& result_json);
+[[nodiscard]] ResultSummary SummaryOf(const std::string& result_json);
 
 }  // namespace plumb

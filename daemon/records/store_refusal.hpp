@@ -4,19 +4,19 @@
 #include <stdexcept>
 #include <string>
 
-#include "web/service/change.hpp"
+#include "web/model/change.hpp"
 
 namespace plumb {
 
 /// A refused change and its reason; the message is for the person who requested it.
 class StoreRefusal : public std::runtime_error {
  public:
-  StoreRefusal(web::ChangeResult result, const std::string& message)
+  StoreRefusal(ChangeResult result, const std::string& message)
       : std::runtime_error(message), result_(result) {}
-  [[nodiscard]] web::ChangeResult result() const { return result_; }
+  [[nodiscard]] ChangeResult result() const { return result_; }
 
  private:
-  web::ChangeResult result_;
+  ChangeResult result_;
 };
 
 }  // namespace plumb

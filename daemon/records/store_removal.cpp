@@ -19,7 +19,6 @@ using store::ParseId;
 using store::RequireId;
 using store::ScanId;
 using store::ToStored;
-using web::ChangeResult;
 
 namespace {
 
@@ -52,7 +51,7 @@ std::vector<std::string> ScansOf(Statement query) {
 std::unique_lock<std::mutex> RemovalGate::LockRemovals() {
   std::unique_lock lock(mutex_);
   if (backing_up_)
-    throw StoreRefusal(web::ChangeResult::kConflict,
+    throw StoreRefusal(ChangeResult::kConflict,
                        "a backup is being made, and nothing is removed meanwhile: try again when "
                        "it is done");
   return lock;
@@ -61,7 +60,7 @@ std::unique_lock<std::mutex> RemovalGate::LockRemovals() {
 RemovalGate::Backup::Backup(RemovalGate& gate) : gate_(gate) {
   const std::lock_guard lock(gate_.mutex_);  // a removal in progress ends first
   if (gate_.backing_up_.exchange(true))
-    throw StoreRefusal(web::ChangeResult::kConflict, "a backup is being made already");
+    throw StoreRefusal(ChangeResult::kConflict, "a backup is being made already");
 }
 
 void StoreRemoval::RemoveFiles(const std::string& scan_id) {
@@ -72,7 +71,7 @@ void StoreRemoval::RemoveFiles(const std::string& scan_id) {
     fs::remove_all(folder, ignored);
 }
 
-void StoreRemoval::WipePatient(const web::Actor& actor, const std::string& id) {
+void StoreRemoval::WipePatient(const Actor& actor, const std::string& id) {
   const std::int64_t number = RequireId(id, "patient");
   std::vector<std::string> scans;
   const std::unique_lock removals = gate_.LockRemovals();
@@ -106,7 +105,7 @@ void StoreRemoval::WipePatient(const web::Actor& actor, const std::string& id) {
   database_.ForChanges()->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Run();
 }
 
-void StoreRemoval::RemoveScan(const web::Actor& actor, const std::string& id,
+void StoreRemoval::RemoveScan(const Actor& actor, const std::string& id,
                               const std::string& reason) {
   const std::optional<std::int64_t> number = ParseId(id);
   if (reason.empty())
@@ -170,7 +169,7 @@ void StoreRemoval::LeaveOutOfSight(std::vector<std::string>& scan_ids) {
 
 int StoreRemoval::RemoveOldScans(int retention_days, const std::stop_token& stop) {
   if (retention_days <= 0) return 0;
-  const web::WallClock::time_point now = web::WallClock::now();
+  const WallClock::time_point now = WallClock::now();
   std::vector<std::string> old;
   {
     const StoreDatabase::Held writer = database_.ForChanges();

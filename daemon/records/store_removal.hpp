@@ -52,10 +52,10 @@ class StoreRemoval {
       : database_(database), folders_(folders), scans_(scans), gate_(gate) {}
 
   /// Removes all stored data of a patient except the entries of the log.
-  void WipePatient(const web::Actor& actor, const std::string& id);
+  void WipePatient(const Actor& actor, const std::string& id);
   /// kConflict for a scan that references are made from, for a running scan, and while a backup is
   /// made; kInvalid without a reason.
-  void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason);
+  void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason);
   /// Removes scans older than the given number of days (0: none) except those that references are
   /// made from, and those whose files cannot be seen now. Returns how many. Age is by the wall
   /// clock: call it only while that can be trusted.

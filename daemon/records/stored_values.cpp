@@ -11,20 +11,19 @@
 
 namespace plumb::store {
 
-std::int64_t ToStored(web::WallClock::time_point time) {
+std::int64_t ToStored(WallClock::time_point time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
 }
 
 /// A damaged stamp may lie beyond what the clock can hold: then it is the end of that.
-web::WallClock::time_point FromStored(std::int64_t us) {
+WallClock::time_point FromStored(std::int64_t us) {
   constexpr std::int64_t kMost_us =
-      std::chrono::duration_cast<std::chrono::microseconds>(web::WallClock::duration::max())
-          .count();
-  return web::WallClock::time_point(std::chrono::duration_cast<web::WallClock::duration>(
+      std::chrono::duration_cast<std::chrono::microseconds>(WallClock::duration::max()).count();
+  return WallClock::time_point(std::chrono::duration_cast<WallClock::duration>(
       std::chrono::microseconds(std::clamp(us, -kMost_us, kMost_us))));
 }
 
-std::int64_t Now() { return ToStored(web::WallClock::now()); }
+std::int64_t Now() { return ToStored(WallClock::now()); }
 
 std::optional<std::int64_t> ParseId(std::string_view text) {
   constexpr std::size_t kMaxDigits = 15;
@@ -37,7 +36,7 @@ std::optional<std::int64_t> ParseId(std::string_view text) {
 
 std::int64_t RequireId(const std::string& text, const char* what) {
   if (const std::optional<std::int64_t> id = ParseId(text)) return *id;
-  throw StoreRefusal(web::ChangeResult::kNotFound,
+  throw StoreRefusal(ChangeResult::kNotFound,
                      fmt::format("there is no {} '{}'", what, text.substr(0, 32)));
 }
 

@@ -6,18 +6,20 @@
 #include <string>
 #include <string_view>
 
-#include "web/service/names.hpp"
+#include "algo/base/names.hpp"
+#include "web/model/account.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb::store {
 
 /// The appliance itself, as named in the audit log.
-inline const web::Actor kSelf{.user = "plumbd", .address = ""};
+inline const Actor kSelf{.user = "plumbd", .address = ""};
 /// The commands of `plumb`, which do not know who calls them.
-inline const web::Actor kCommand{.user = "command line", .address = ""};
+inline const Actor kCommand{.user = "command line", .address = ""};
 
 /// Microseconds since 1970.
-[[nodiscard]] std::int64_t ToStored(web::WallClock::time_point time);
-[[nodiscard]] web::WallClock::time_point FromStored(std::int64_t us);
+[[nodiscard]] std::int64_t ToStored(WallClock::time_point time);
+[[nodiscard]] WallClock::time_point FromStored(std::int64_t us);
 /// The time now, as it is stored.
 [[nodiscard]] std::int64_t Now();
 
@@ -33,7 +35,7 @@ inline const web::Actor kCommand{.user = "command line", .address = ""};
 /// @throws DataError for a name that this version does not know.
 template <typename Enum>
 [[nodiscard]] Enum Parse(const char* what, std::string_view name) {
-  if (const std::optional<Enum> value = web::Named<Enum>(name)) return *value;
+  if (const std::optional<Enum> value = Named<Enum>(name)) return *value;
   RefuseName(what, name);
 }
 

@@ -19,8 +19,6 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
 constexpr std::size_t kMaxListed = 32;
@@ -49,7 +47,7 @@ class DeferredClose {
 
 }  // namespace
 
-web::Change Refused(ChangeResult result, std::string message) {
+Change Refused(ChangeResult result, std::string message) {
   return {.result = result, .message = std::move(message), .id = {}, .file = {}};
 }
 
@@ -71,7 +69,7 @@ bool BundleFolder::Has(const std::string& name) const {
   return std::find(known.begin(), known.end(), name) != known.end();
 }
 
-web::Change BundleFolder::Add(const std::filesystem::path& file, const std::string& name) const {
+Change BundleFolder::Add(const std::filesystem::path& file, const std::string& name) const {
   if (const std::string why = WhyNoBundle(file, max_bytes_); !why.empty()) {
     return Refused(ChangeResult::kInvalid,
                    name + why.substr(std::min(why.size(), file.filename().string().size())));
@@ -93,7 +91,7 @@ web::Change BundleFolder::Add(const std::filesystem::path& file, const std::stri
   return {};
 }
 
-web::Change BundleFolder::Remove(const std::string& name) const {
+Change BundleFolder::Remove(const std::string& name) const {
   if (!Has(name)) return Refused(ChangeResult::kNotFound, "there is no such bundle");
   std::error_code error;
   const DeferredClose removed(folder_ / name, run_in_background_);

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "web/service/change.hpp"
+#include "web/model/change.hpp"
 
 namespace plumb {
 
-[[nodiscard]] web::Change Refused(web::ChangeResult result, std::string message);
+[[nodiscard]] Change Refused(ChangeResult result, std::string message);
 
 /// Files named NAME.raucb. Not thread-safe.
 class BundleFolder {
@@ -30,8 +30,8 @@ class BundleFolder {
   [[nodiscard]] bool Has(const std::string& name) const;
   /// Moves a file into the folder: kInvalid if it cannot be a bundle, kConflict if there are too
   /// many.
-  [[nodiscard]] web::Change Add(const std::filesystem::path& file, const std::string& name) const;
-  [[nodiscard]] web::Change Remove(const std::string& name) const;
+  [[nodiscard]] Change Add(const std::filesystem::path& file, const std::string& name) const;
+  [[nodiscard]] Change Remove(const std::string& name) const;
   /// Removes incomplete uploads from before a power cut.
   void RemoveUnfinished() const;
 

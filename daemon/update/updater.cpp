@@ -17,8 +17,6 @@
 
 namespace plumb {
 
-using web::ChangeResult;
-
 namespace {
 
 constexpr const char* kService = "de.pengutronix.rauc";
@@ -87,7 +85,7 @@ struct Updater::Impl {
   double fraction = 0.0;
   std::string bundle;
   std::string copy;  ///< Bundle to remove when its installation ends.
-  web::Done done;
+  Done done;
 
   void Disconnect() {
     is_there = false;
@@ -138,7 +136,7 @@ struct Updater::Impl {
     Notify();
   }
 
-  void Answer(web::Change change) {
+  void Answer(Change change) {
     if (auto asked = std::exchange(done, nullptr)) asked(change);
   }
 
@@ -173,7 +171,7 @@ struct Updater::Impl {
   /// If the installation was given up, RAUC may still be reading the file: it has it open, so that
   /// the contents remain.
   void RemoveCopy(const std::string& name) {
-    const web::Change removed = folder.Remove(name);
+    const Change removed = folder.Remove(name);
     if (removed.result == ChangeResult::kFailed) Log(LogLevel::kWarning, removed.message);
     states.erase(name);
   }
@@ -401,7 +399,7 @@ struct Updater::Impl {
     return 0;
   }
 
-  void Install(const std::string& name, web::Done asked) {
+  void Install(const std::string& name, Done asked) {
     if (bus.get() == nullptr || !is_there)
       return asked(
           Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine"));
@@ -433,10 +431,10 @@ struct Updater::Impl {
     if (!options.run_in_background || !options.run_in_background(look)) look();
   }
 
-  void InstallCopy(const std::string& name, web::Done asked) {
+  void InstallCopy(const std::string& name, Done asked) {
     if (is_installing)
       return Install(name, std::move(asked));  // refused; that installation may use the file
-    Install(name, [this, name, asked = std::move(asked)](const web::Change& change) {
+    Install(name, [this, name, asked = std::move(asked)](const Change& change) {
       if (change.result == ChangeResult::kDone) {
         copy = name;
       } else {
@@ -471,7 +469,7 @@ Updater::~Updater() = default;
 
 bool Updater::is_installing() const { return impl_->is_installing; }
 
-web::UpdateStatus Updater::status() {
+UpdateStatus Updater::status() {
   if (!impl_->is_there && std::chrono::steady_clock::now() - impl_->looked_at >= kLookAgain) {
     if (impl_->bus.get() == nullptr) {
       impl_->Connect();
@@ -480,7 +478,7 @@ web::UpdateStatus Updater::status() {
       impl_->bus.Process();
     }
   }
-  web::UpdateStatus status;
+  UpdateStatus status;
   status.supported = impl_->is_there;
   status.failure = impl_->is_installing ? std::string() : impl_->last_failure;
   status.restart_needed =
@@ -501,20 +499,20 @@ web::UpdateStatus Updater::status() {
   return status;
 }
 
-web::Change Updater::Add(const std::filesystem::path& file, const std::string& name) {
+Change Updater::Add(const std::filesystem::path& file, const std::string& name) {
   if (!impl_->is_there)
     return Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine");
   if (impl_->is_installing)
     return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
-  web::Change change = impl_->folder.Add(file, name);
+  Change change = impl_->folder.Add(file, name);
   if (change.result == ChangeResult::kDone) impl_->ForgetBundle(name);
   return change;
 }
 
-web::Change Updater::Remove(const std::string& name) {
+Change Updater::Remove(const std::string& name) {
   if (impl_->is_installing)
     return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
-  web::Change change = impl_->folder.Remove(name);
+  Change change = impl_->folder.Remove(name);
   if (change.result == ChangeResult::kDone) impl_->ForgetBundle(name);
   return change;
 }
@@ -525,11 +523,9 @@ void Updater::ForgetRollBack() {
   impl_->Notify();
 }
 
-void Updater::Install(const std::string& name, web::Done done) {
-  impl_->Install(name, std::move(done));
-}
+void Updater::Install(const std::string& name, Done done) { impl_->Install(name, std::move(done)); }
 
-void Updater::InstallCopy(const std::string& name, web::Done done) {
+void Updater::InstallCopy(const std::string& name, Done done) {
   impl_->InstallCopy(name, std::move(done));
 }
 

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "daemon/loop/event_loop.hpp"
-#include "web/service/change.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/change.hpp"
+#include "web/model/status.hpp"
 
 namespace plumb {
 
@@ -56,18 +56,18 @@ class Updater {
 
   [[nodiscard]] bool is_installing() const;
   /// Also searches for RAUC if there was none, at most every few seconds.
-  [[nodiscard]] web::UpdateStatus status();
+  [[nodiscard]] UpdateStatus status();
   /// Moves a file into the bundles: kInvalid if it cannot be a bundle, kConflict if there are too
   /// many.
-  web::Change Add(const std::filesystem::path& file, const std::string& name);
-  web::Change Remove(const std::string& name);
+  Change Add(const std::filesystem::path& file, const std::string& name);
+  Change Remove(const std::string& name);
   /// Lets RAUC check and install NAME of the folder. `done` is called once it has begun, or with
   /// the reason why not.
-  void Install(const std::string& name, web::Done done);
+  void Install(const std::string& name, Done done);
   /// Like Install(), for a bundle that was copied here only to be installed. The copy is removed
   /// when the installation ends or is refused, whatever the outcome: it can be copied again, and
   /// copies that stay would fill the folder.
-  void InstallCopy(const std::string& name, web::Done done);
+  void InstallCopy(const std::string& name, Done done);
   /// The roll-back was acknowledged and is not reported any more.
   void ForgetRollBack();
 

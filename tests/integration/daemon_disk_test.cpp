@@ -330,9 +330,9 @@ TEST_F(DaemonDiskTest,
   Store store(state());
   EXPECT_EQ(store.recovery().broken_references, 0);
   EXPECT_EQ(store.recovery().lost_scans, 0);
-  const std::vector<web::Scan> scans = store.scans.List("", 10);
+  const std::vector<Scan> scans = store.scans.List("", 10);
   ASSERT_EQ(scans.size(), 2U);
-  EXPECT_EQ(scans[0].outcome, web::ScanOutcome::kFailed);
+  EXPECT_EQ(scans[0].outcome, ScanOutcome::kFailed);
   EXPECT_TRUE(store.references.Approved(scans[0].patient_id).has_value());
 }
 
@@ -374,7 +374,7 @@ TEST_F(DaemonDiskTest, ACopyOfTheDiskAtAnyMomentStartsWithEveryScanThatWasAnnoun
       EXPECT_EQ(store.recovery().lost_scans, 0);
       EXPECT_EQ(store.recovery().broken_references, 0);
       for (const std::string& scan : announced) {
-        EXPECT_EQ(store.scans.Find(scan)->outcome, web::ScanOutcome::kDone) << scan;
+        EXPECT_EQ(store.scans.Find(scan)->outcome, ScanOutcome::kDone) << scan;
         const auto files = testing::FilesBelow(mounted / "scans" / scan);
         EXPECT_GT(files.size(), 3U) << scan;
         EXPECT_TRUE(files == testing::FilesBelow(state() / "scans" / scan)) << scan;

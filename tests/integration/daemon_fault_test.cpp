@@ -250,7 +250,7 @@ TEST_F(DaemonFaultTest, SigtermWhileScanningAndWhileWorkingEndsCleanly) {
     Store store(folder_ / "state");
     EXPECT_EQ(store.recovery().interrupted_scans + store.recovery().orphaned_folders, 0)
         << "nothing was left to repair";
-    EXPECT_EQ(store.scans.List("", 1).at(0).outcome, web::ScanOutcome::kCancelled);
+    EXPECT_EQ(store.scans.List("", 1).at(0).outcome, ScanOutcome::kCancelled);
   }
 }
 
@@ -260,11 +260,11 @@ void ExpectConsistent(const fs::path& state) {
   EXPECT_EQ(store.recovery().lost_scans, 0);
   EXPECT_EQ(store.recovery().broken_references, 0) << "the approved reference must survive";
   std::vector<std::string> with_folder;
-  for (const web::Scan& scan : store.scans.List("", 10000)) {
-    EXPECT_NE(scan.outcome, web::ScanOutcome::kRunning);
-    EXPECT_EQ(scan.outcome == web::ScanOutcome::kDone, !scan.folder.empty()) << scan.id;
+  for (const Scan& scan : store.scans.List("", 10000)) {
+    EXPECT_NE(scan.outcome, ScanOutcome::kRunning);
+    EXPECT_EQ(scan.outcome == ScanOutcome::kDone, !scan.folder.empty()) << scan.id;
     if (!scan.folder.empty()) with_folder.push_back(scan.id);
-    if (!scan.reference_id.empty() && scan.outcome == web::ScanOutcome::kDone) {
+    if (!scan.reference_id.empty() && scan.outcome == ScanOutcome::kDone) {
       EXPECT_TRUE(fs::exists(scan.folder / "result" / "result.json")) << scan.id;
     }
   }
@@ -308,10 +308,9 @@ TEST_F(DaemonFaultTest, KilledAtAnyMomentNothingIsHalf) {
     ExpectConsistent(folder_ / "state");
   }
   Store store(folder_ / "state");
-  const std::vector<web::Scan> scans = store.scans.List("", 10000);
-  const auto num_done = std::count_if(scans.begin(), scans.end(), [](const web::Scan& s) {
-    return s.outcome == web::ScanOutcome::kDone;
-  });
+  const std::vector<Scan> scans = store.scans.List("", 10000);
+  const auto num_done = std::count_if(
+      scans.begin(), scans.end(), [](const Scan& s) { return s.outcome == ScanOutcome::kDone; });
   std::printf("%d rounds: %d scans done, %zu begun\n", rounds, static_cast<int>(num_done),
               scans.size());
 }
@@ -519,7 +518,7 @@ TEST_F(DaemonFaultTest, AClockThatStepsDisturbsNoTimer) {
   plumbd.ScanOnce();
   EXPECT_EQ(plumbd.Stop(), 0);
   Store store(folder_ / "state");
-  const std::vector<web::Scan> scans = store.scans.List("", 10);
+  const std::vector<Scan> scans = store.scans.List("", 10);
   ASSERT_EQ(scans.size(), 2U);
   EXPECT_LT(scans[0].started_at, scans[1].finished_at) << "the clock did step";
   EXPECT_EQ(scans[0].id, "000002") << "and the order is that of the scans all the same";

@@ -207,10 +207,10 @@ void FakeAppliance::EndCheck() {
   check.sensor_serial = status.sensor.serial;
   checks.checks.insert(checks.checks.begin(), check);
   if (check.status == "passed") {
-    checks.today = web::DailyCheck::kPassed;
+    checks.today = DailyCheck::kPassed;
     status.reference_block.clear();
   } else if (check.status == "failed") {
-    checks.today = web::DailyCheck::kFailed;
+    checks.today = DailyCheck::kFailed;
     status.reference_block =
         "the daily check has failed, and references need one that has passed since: open Daily "
         "check, find out why it failed, sweep over all markers of the room, then go on here";
@@ -473,7 +473,7 @@ void FakeAppliance::Log(const Actor& actor, const std::string& action, const std
                    actor.address, action, subject, detail});
 }
 
-std::vector<AuditEntry> FakeAppliance::Audit(const web::AuditQuery& query) {
+std::vector<AuditEntry> FakeAppliance::Audit(const AuditQuery& query) {
   std::vector<AuditEntry> found;
   for (auto entry = audit.rbegin();
        entry != audit.rend() && found.size() < static_cast<std::size_t>(query.limit); ++entry) {

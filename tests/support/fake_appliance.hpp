@@ -40,47 +40,46 @@ class FakeAppliance : public web::BackgroundWork,
   }
 
   // --- what tests turn
-  web::Status status;
-  web::Health health;
-  web::Settings settings;
-  web::UpdateStatus update;
-  std::vector<web::Patient> patients;
-  std::vector<web::Reference> references;
-  std::optional<web::RoomOnMap> room_of_references;  ///< Not set: as the status states it.
-  std::vector<web::Scan> scans;                      ///< Oldest first.
-  web::CheckStatus checks;
-  web::SensorProfiles profiles;
+  Status status;
+  Health health;
+  Settings settings;
+  UpdateStatus update;
+  std::vector<Patient> patients;
+  std::vector<Reference> references;
+  std::optional<RoomOnMap> room_of_references;  ///< Not set: as the status states it.
+  std::vector<Scan> scans;                      ///< Oldest first.
+  CheckStatus checks;
+  SensorProfiles profiles;
   web::RoomCalibrationStatus room;
-  bool is_board_there = false;  ///< Check scans see the board of the room's calibration.
-  std::optional<web::CheckRecord>
-      next_check;  ///< What the next check scan finds; nothing: it passes.
+  bool is_board_there = false;            ///< Check scans see the board of the room's calibration.
+  std::optional<CheckRecord> next_check;  ///< What the next check scan finds; nothing: it passes.
   /// Reads a map of a scan's folder; none: there are no maps.
   std::function<std::optional<std::string>(const std::filesystem::path&, const std::string&)>
       make_map;
-  std::vector<web::Display> displays;
-  std::vector<web::User> users;
-  std::string accounts_fault;          ///< Why none of them can be looked up; empty: they can.
-  std::vector<web::AuditEntry> audit;  ///< Oldest first.
+  std::vector<Display> displays;
+  std::vector<User> users;
+  std::string accounts_fault;     ///< Why none of them can be looked up; empty: they can.
+  std::vector<AuditEntry> audit;  ///< Oldest first.
   std::string ExportAudit() override { return "{\"number\":1}\n"; }
   std::shared_ptr<const std::string> preview, surface;
   std::filesystem::path diagnostics_file;
   std::uint64_t uploaded_bytes = 0;
-  std::optional<web::FactoryReset> factory_reset;  ///< Asked for.
+  std::optional<FactoryReset> factory_reset;  ///< Asked for.
   std::vector<std::string> stick = {"plumb-0.4.0.raucb"};
   int num_restarts = 0;  ///< Asked for and done; a fake machine stays on.
   /// Folder of the n-th finished scan (0, 1, ...) with its result; a scan beyond the list uses the
   /// last.
   struct Recorded {
     std::filesystem::path folder;
-    std::optional<web::ResultSummary> result;
+    std::optional<ResultSummary> result;
   };
   std::vector<std::function<Recorded()>> recorded;
   std::string backup_fault;               ///< Why no backup can be made; empty: one can.
   std::optional<Recorded> next_recorded;  ///< Set: what the next finished scan shows, out of turn.
   std::chrono::milliseconds sweep{3000};
   std::chrono::milliseconds work{600};
-  double swept = 0.0;                        ///< Share of the running sweep.
-  std::optional<web::SweepAdvice> guidance;  ///< Set: what every sweep advises.
+  double swept = 0.0;                   ///< Share of the running sweep.
+  std::optional<SweepAdvice> guidance;  ///< Set: what every sweep advises.
   /// Set: completions wait here until the test calls them.
   bool hold_completions = false;
   std::vector<std::function<void()>> held;
@@ -97,7 +96,7 @@ class FakeAppliance : public web::BackgroundWork,
   /// The running scan, or none, fails as one of plumbd does: a press acknowledges.
   void Fail(const std::string& reason);
   /// A check scan that saw the board of the room's calibration.
-  void SeeBoard(const web::CheckRecord& check);
+  void SeeBoard(const CheckRecord& check);
   void Unplug();
   void Plug();
 
@@ -105,60 +104,56 @@ class FakeAppliance : public web::BackgroundWork,
   bool RunInBackground(web::BackgroundPool where, std::function<void()> work,
                        std::function<void()> done) override;
   /// With the age of the last result, unless a test has set one.
-  web::Status GetStatus() override;
-  web::Health GetHealth() override { return health; }
+  Status GetStatus() override;
+  Health GetHealth() override { return health; }
   std::shared_ptr<const std::string> Preview() override { return preview; }
   std::shared_ptr<const std::string> SweptSurface() override {
-    return status.state == web::ApplianceState::kScanning ? surface : nullptr;
+    return status.state == ApplianceState::kScanning ? surface : nullptr;
   }
-  void Press(const web::Actor& actor, web::Done done) override;
-  void StartSweep(const web::Actor& actor, web::Done done) override;
-  void EndSweep(const web::Actor& actor, web::Done done) override;
-  void Cancel(const web::Actor& actor, web::Done done) override;
+  void Press(const Actor& actor, Done done) override;
+  void StartSweep(const Actor& actor, Done done) override;
+  void EndSweep(const Actor& actor, Done done) override;
+  void Cancel(const Actor& actor, Done done) override;
   void SetListener(std::function<void(web::EventKind)> listener) override {
     listener_ = std::move(listener);
   }
-  std::vector<web::Patient> Patients() override { return patients; }
-  std::optional<web::Patient> FindPatient(const std::string& id) override;
-  void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site,
-                  web::Done done) override;
+  std::vector<Patient> Patients() override { return patients; }
+  std::optional<Patient> FindPatient(const std::string& id) override;
+  void AddPatient(const Actor& actor, const std::string& code, const std::string& site,
+                  Done done) override;
   /// No check has passed today; `block` as in Status::reference_block. Empty: one has.
   void SetOverdue(const std::string& block) {
-    checks.today = status.daily_check =
-        block.empty() ? web::DailyCheck::kPassed : web::DailyCheck::kOverdue;
+    checks.today = status.daily_check = block.empty() ? DailyCheck::kPassed : DailyCheck::kOverdue;
     status.reference_block = block;
     Notify(web::EventKind::kStatus);
   }
-  std::vector<web::PlanTemplate> templates;
-  [[nodiscard]] std::vector<web::PlanTemplate> Templates() override { return templates; }
-  void SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
-                   web::Done done) override;
-  void RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) override;
-  void ChangePatient(const web::Actor& actor, const std::string& id, const web::CourseNotes& wanted,
-                     const std::optional<web::CourseNotes>& shown, web::Done done) override;
-  void ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
-                      web::Done done) override;
-  void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override;
-  void OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose,
-                   const std::string& reason, const std::string& replaces, web::Done done) override;
-  void CloseSession(const web::Actor& actor, const std::string& session_id,
-                    web::Done done) override;
-  std::vector<web::Reference> References(const std::string& patient_id) override;
-  std::optional<web::Reference> FindReference(const std::string& id) override;
-  web::RoomOnMap RoomOfReference(const web::Reference& reference) override;
-  void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason,
-                    web::Done done) override;
-  void PlanReference(const web::Actor& actor, const std::string& id, int revision,
-                     const web::ReferencePlan& plan, web::Done done) override;
-  void ApproveReference(const web::Actor& actor, const std::string& id, int revision,
-                        const std::string& digest, web::Done done) override;
-  std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
-  std::optional<web::Scan> FindScan(const std::string& id) override;
-  void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason,
-                  web::Done done) override;
-  void MakeBackup(const web::Actor& actor, web::Done done) override;
-  void AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
-                  web::Done done) override;
+  std::vector<PlanTemplate> templates;
+  [[nodiscard]] std::vector<PlanTemplate> Templates() override { return templates; }
+  void SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) override;
+  void RemoveTemplate(const Actor& actor, const std::string& site, Done done) override;
+  void ChangePatient(const Actor& actor, const std::string& id, const CourseNotes& wanted,
+                     const std::optional<CourseNotes>& shown, Done done) override;
+  void ArchivePatient(const Actor& actor, const std::string& id, bool archived, Done done) override;
+  void WipePatient(const Actor& actor, const std::string& id, Done done) override;
+  void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
+                   const std::string& reason, const std::string& replaces, Done done) override;
+  void CloseSession(const Actor& actor, const std::string& session_id, Done done) override;
+  std::vector<Reference> References(const std::string& patient_id) override;
+  std::optional<Reference> FindReference(const std::string& id) override;
+  RoomOnMap RoomOfReference(const Reference& reference) override;
+  void AddReference(const Actor& actor, const std::string& scan_id, const std::string& reason,
+                    Done done) override;
+  void PlanReference(const Actor& actor, const std::string& id, int revision,
+                     const ReferencePlan& plan, Done done) override;
+  void ApproveReference(const Actor& actor, const std::string& id, int revision,
+                        const std::string& digest, Done done) override;
+  std::vector<Scan> Scans(const std::string& patient_id, int limit) override;
+  std::optional<Scan> FindScan(const std::string& id) override;
+  void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
+                  Done done) override;
+  void MakeBackup(const Actor& actor, Done done) override;
+  void AcceptScan(const Actor& actor, const std::string& id, const std::string& reason,
+                  Done done) override;
   std::optional<std::string> CompactMap(const std::string& scan_id,
                                         const std::string& name) override {
     const auto scan = FindScan(scan_id);
@@ -169,7 +164,7 @@ class FakeAppliance : public web::BackgroundWork,
     const bool is_spanish = language == web::Language::kSpanish;
     const web::ResultTerms& terms = is_spanish ? web::kSpanishTerms : web::kEnglishTerms;
     const std::string said(
-        web::DailyCheckCaution(scan ? scan->daily_check : web::DailyCheck::kPassed, terms));
+        web::DailyCheckCaution(scan ? scan->daily_check : DailyCheck::kPassed, terms));
     web::ResultNotes notes{.axes = axis_names, .cautions = {}};
     if (is_spanish) std::ranges::copy(terms.axes, notes.axes.begin());
     if (!said.empty()) notes.cautions.push_back(said);
@@ -197,67 +192,60 @@ class FakeAppliance : public web::BackgroundWork,
     return FindPatient(patient_id) ? std::optional<std::string>("%PDF-1.5 a course") : std::nullopt;
   }
   web::Language report_language = web::Language::kEnglish;  ///< Of the last report.
-  web::CheckStatus GetChecks() override { return checks; }
-  void OpenCheck(const web::Actor& actor, web::Done done) override;
-  void SetCheckBaseline(const web::Actor& actor, const std::string& check_id,
-                        web::Done done) override;
+  CheckStatus GetChecks() override { return checks; }
+  void OpenCheck(const Actor& actor, Done done) override;
+  void SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) override;
   web::RoomCalibrationStatus GetRoomCalibration() override { return room; }
-  void SignRoomCalibration(const web::Actor& actor, const std::string& digest,
-                           web::Done done) override;
+  void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) override;
   std::optional<std::string> RoomBoardPdf(std::string& why_not) override;
-  web::SensorProfiles GetSensorProfiles() override { return profiles; }
+  SensorProfiles GetSensorProfiles() override { return profiles; }
   std::optional<std::string> SensorProfileFile(int version) override;
-  void ResetSensorProfile(const web::Actor& actor, const std::string& serial,
-                          web::Done done) override;
-  void RollBackSensorProfile(const web::Actor& actor, const std::string& serial, int version,
-                             web::Done done) override;
-  std::vector<web::Display> Displays() override { return displays; }
-  void AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) override;
-  void RemoveDisplay(const web::Actor& actor, const std::string& id, web::Done done) override;
+  void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) override;
+  void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
+                             Done done) override;
+  std::vector<Display> Displays() override { return displays; }
+  void AddDisplay(const Actor& actor, const Display& display, Done done) override;
+  void RemoveDisplay(const Actor& actor, const std::string& id, Done done) override;
   std::string WhyUnreadable() override { return accounts_fault; }
-  std::vector<web::User> Users() override { return users; }
-  std::optional<web::User> FindUser(const std::string& name) override;
-  void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
-  void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
-  web::Preferences PreferencesOf(const std::string& name) override { return preferences_[name]; }
-  void SetPreferences(const web::Actor& actor, const web::Preferences& preferences,
-                      web::Done done) override;
-  void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+  std::vector<User> Users() override { return users; }
+  std::optional<User> FindUser(const std::string& name) override;
+  void AddUser(const Actor& actor, const User& user, Done done) override;
+  void ChangeUser(const Actor& actor, const UserChange& change, Done done) override;
+  Preferences PreferencesOf(const std::string& name) override { return preferences_[name]; }
+  void SetPreferences(const Actor& actor, const Preferences& preferences, Done done) override;
+  void Log(const Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail) override;
-  std::vector<web::AuditEntry> Audit(const web::AuditQuery& query) override;
-  web::Settings GetSettings() override { return settings; }
-  void ChangeSettings(const web::Actor& actor, const web::SettingsChange& change,
-                      web::Done done) override;
-  web::UpdateStatus GetUpdate() override { return update; }
-  void AddBundle(const web::Actor& actor, const std::filesystem::path& file,
-                 const std::string& name, web::Done done) override;
-  void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
-  void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
+  std::vector<AuditEntry> Audit(const AuditQuery& query) override;
+  Settings GetSettings() override { return settings; }
+  void ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) override;
+  UpdateStatus GetUpdate() override { return update; }
+  void AddBundle(const Actor& actor, const std::filesystem::path& file, const std::string& name,
+                 Done done) override;
+  void RemoveBundle(const Actor& actor, const std::string& name, Done done) override;
+  void InstallUpdate(const Actor& actor, const std::string& bundle, Done done) override;
   [[nodiscard]] std::vector<std::string> StickBundles() override { return stick; }
-  void InstallFromStick(const web::Actor& actor, const std::string& bundle,
-                        web::Done done) override;
-  void RestartSystem(const web::Actor& actor, web::Done done) override;
-  void ResetToFactory(const web::Actor& actor, web::FactoryReset kind, web::Done done) override;
-  void ForgetRollBack(const web::Actor& actor, web::Done done) override;
-  void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
+  void InstallFromStick(const Actor& actor, const std::string& bundle, Done done) override;
+  void RestartSystem(const Actor& actor, Done done) override;
+  void ResetToFactory(const Actor& actor, FactoryReset kind, Done done) override;
+  void ForgetRollBack(const Actor& actor, Done done) override;
+  void WriteDiagnostics(const Actor& actor, Done done) override;
 
   /// A reference made of a scan, as AddReference() does it, without the log.
-  web::Reference& MakeReference(const web::Scan& scan, const std::string& by,
-                                const std::string& reason);
+  Reference& MakeReference(const Scan& scan, const std::string& by, const std::string& reason);
 
  private:
-  [[nodiscard]] static web::Change Refusal(web::ChangeResult result, std::string message);
+  [[nodiscard]] static Change Refusal(ChangeResult result, std::string message);
   /// As the store describes it; sessions are remembered, all else is looked up.
-  [[nodiscard]] std::optional<web::AuditSubject> SubjectOf(const web::AuditEntry& entry);
-  void Finish(const web::Done& done, web::Change change);
-  void Did(const web::Actor& actor, const std::string& action, const std::string& subject,
-           const web::Done& done, const std::string& id = "");
+  [[nodiscard]] std::optional<AuditSubject> SubjectOf(const AuditEntry& entry);
+  void Finish(const Done& done, Change change);
+  void Did(const Actor& actor, const std::string& action, const std::string& subject,
+           const Done& done, const std::string& id = "");
   void EndScan();
   void TellWaiting();
-  [[nodiscard]] bool IsOld(const web::Scan& scan) const;
+  [[nodiscard]] bool IsOld(const Scan& scan) const;
   void EndCheck();
   void CloseCheck();
-  [[nodiscard]] web::Patient* PatientOf(const std::string& id);
+  [[nodiscard]] Patient* PatientOf(const std::string& id);
 
   std::function<void(web::EventKind)> listener_;
   std::optional<std::chrono::steady_clock::time_point> phase_begun_;
@@ -265,9 +253,9 @@ class FakeAppliance : public web::BackgroundWork,
   bool is_check_ = false;  ///< The next or running scan is a check.
   std::string checker_, patient_before_check_;
   int next_id_ = 1;
-  std::map<std::string, web::Preferences> preferences_;
+  std::map<std::string, Preferences> preferences_;
   std::map<std::string, int> num_fractions_;
-  std::map<std::string, web::TreatmentSession> sessions_;  ///< By id: all that were opened.
+  std::map<std::string, TreatmentSession> sessions_;  ///< By id: all that were opened.
 };
 
 }  // namespace plumb::test

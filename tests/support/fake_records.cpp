@@ -160,10 +160,10 @@ void FakeAppliance::CloseSession(const Actor& actor, const std::string& session_
   Did(actor, "session.close", id, done);
 }
 
-std::optional<web::AuditSubject> FakeAppliance::SubjectOf(const web::AuditEntry& entry) {
+std::optional<AuditSubject> FakeAppliance::SubjectOf(const AuditEntry& entry) {
   const auto begins = [&](const char* action) { return entry.action.starts_with(action); };
   const auto about = [&](const char* kind, bool exists, const std::string& patient_id, int number) {
-    web::AuditSubject subject;
+    AuditSubject subject;
     subject.kind = kind;
     subject.exists = exists;
     if (const Patient* patient = PatientOf(patient_id)) subject.patient_code = patient->code;

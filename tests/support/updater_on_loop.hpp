@@ -37,8 +37,8 @@ class UpdaterOnLoop : public ::testing::Test {
     done.get_future().wait();
   }
 
-  [[nodiscard]] web::UpdateStatus StatusNow() {
-    web::UpdateStatus status;
+  [[nodiscard]] UpdateStatus StatusNow() {
+    UpdateStatus status;
     On([&] { status = updater_->status(); });
     return status;
   }
@@ -55,15 +55,14 @@ class UpdaterOnLoop : public ::testing::Test {
   }
 
   /// @param file  Name of a bundle in the updater's folder.
-  web::Change Install(const std::string& file) { return Ask(&Updater::Install, file); }
-  web::Change InstallCopy(const std::string& file) { return Ask(&Updater::InstallCopy, file); }
+  Change Install(const std::string& file) { return Ask(&Updater::Install, file); }
+  Change InstallCopy(const std::string& file) { return Ask(&Updater::InstallCopy, file); }
 
-  web::Change Ask(void (Updater::*install)(const std::string&, web::Done),
-                  const std::string& file) {
-    auto answer = std::make_shared<std::promise<web::Change>>();
+  Change Ask(void (Updater::*install)(const std::string&, Done), const std::string& file) {
+    auto answer = std::make_shared<std::promise<Change>>();
     On([&] {
-      (updater_.get()->*install)(
-          file, [answer](const web::Change& change) { answer->set_value(change); });
+      (updater_.get()->*install)(file,
+                                 [answer](const Change& change) { answer->set_value(change); });
     });
     auto future = answer->get_future();
     if (future.wait_for(kPatience) != std::future_status::ready) {

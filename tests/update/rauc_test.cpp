@@ -29,7 +29,6 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::TempFolder;
-using web::ChangeResult;
 
 constexpr uid_t kNobody = 65534;
 
@@ -181,7 +180,7 @@ class RaucTest : public testing::UpdaterOnLoop {
   /// Also waits for its end. Gives why it failed, or nothing.
   std::string InstallToTheEnd(const std::string& name) {
     const int before = num_ended_;
-    const web::Change change = Install(name + ".raucb");
+    const Change change = Install(name + ".raucb");
     if (change.result != ChangeResult::kDone) return change.message;
     if (!Becomes([&] { return num_ended_ > before; })) return "it does not end";
     return failure_;
@@ -258,7 +257,7 @@ TEST_F(RaucTest, ASecondAttemptOnARefusedBundleGivesTheSameReason) {
     ASSERT_EQ(::rename((folder_ / "updates" / "good.raucb").c_str(),
                        (folder_ / "updates" / ".upload-1").c_str()),
               0);
-    web::Change change;
+    Change change;
     On([&] { change = updater_->Add(folder_ / "updates" / ".upload-1", "stranger.raucb"); });
     EXPECT_EQ(change.result, ChangeResult::kDone) << change.message;
     EXPECT_EQ(InstallToTheEnd("stranger"), "");
@@ -270,7 +269,7 @@ TEST_F(RaucTest, ABundleCanBeRemovedAfterRaucHasTakenItOver) {
   Take("good");
   Play([&] {
     EXPECT_EQ(InstallToTheEnd("good"), "");
-    web::Change change;
+    Change change;
     On([&] { change = updater_->Remove("good.raucb"); });
     EXPECT_EQ(change.result, ChangeResult::kDone) << change.message;
     EXPECT_TRUE(StatusNow().bundles.empty());

@@ -256,15 +256,12 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "unplug") service.Unplug();
   if (name == "plug") service.Plug();
   if (name == "fail") service.Fail("the recording cannot be written");
-  if (name == "press") service.Press({"button", ""}, [](const web::Change&) {});
+  if (name == "press") service.Press({"button", ""}, [](const Change&) {});
   if (name == "guide") {  // none: as the sweep goes
-    static const std::map<std::string, web::SweepAdvice> kGuidance = {
-        {"good", web::SweepAdvice::kNone},
-        {"slower", web::SweepAdvice::kSlower},
-        {"closer", web::SweepAdvice::kCloser},
-        {"farther", web::SweepAdvice::kFarther},
-        {"lost", web::SweepAdvice::kTrackingLost},
-        {"too_slow", web::SweepAdvice::kComputerTooSlow}};
+    static const std::map<std::string, SweepAdvice> kGuidance = {
+        {"good", SweepAdvice::kNone},         {"slower", SweepAdvice::kSlower},
+        {"closer", SweepAdvice::kCloser},     {"farther", SweepAdvice::kFarther},
+        {"lost", SweepAdvice::kTrackingLost}, {"too_slow", SweepAdvice::kComputerTooSlow}};
     std::string what;
     words >> what;
     service.guidance.reset();
@@ -300,7 +297,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.Notify(web::EventKind::kStatus);
   }
   if (name == "markermoved") {
-    web::CheckRecord check;
+    CheckRecord check;
     check.reasons = {"marker 7 moved 12 mm",
                      "the markers lie 3.4 mm (RMS) from where they were, at most 3 mm are allowed"};
     check.items = {
@@ -321,7 +318,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     const auto turned = [](const std::array<double, 2>& way) {
       return std::array<double, 2>{-way[1], way[0]};
     };
-    if (const web::RoomOnMap& room = service.status.room; what == "turned")
+    if (const RoomOnMap& room = service.status.room; what == "turned")
       service.room_of_references = {
           .gantry_xy = turned(room.gantry_xy), .right_xy = turned(room.right_xy), .is_known = true};
     service.Notify(web::EventKind::kStatus);
@@ -346,8 +343,8 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   }
   if (name == "full" || name == "emptied") {
     const bool is_full = name == "full";
-    service.status.state = is_full ? web::ApplianceState::kFault : web::ApplianceState::kReady;
-    service.status.fault_kind = is_full ? web::FaultKind::kStorage : web::FaultKind::kNone;
+    service.status.state = is_full ? ApplianceState::kFault : ApplianceState::kReady;
+    service.status.fault_kind = is_full ? FaultKind::kStorage : FaultKind::kNone;
     service.status.fault = is_full
                                ? "the disk is full: 90 MB are free, a scan may need 700; remove "
                                  "scans that are no longer needed"
@@ -380,7 +377,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   }
   if (name == "tolerated" || name == "unsure") {
     FakeAppliance::Recorded shown = Moved(recorder, "z", 0, "HFS");
-    web::ResultSummary& result = *shown.result;
+    ResultSummary& result = *shown.result;
     result.verdict = name == "unsure" ? "unsure" : "in_tolerance";
     if (name == "unsure") {
       result.correction->vertical_mm = -2.8;
@@ -399,7 +396,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.Notify(web::EventKind::kUpdate);
   }
   if (name == "old" && !service.scans.empty()) {
-    service.scans.back().finished_at = web::WallClock::now() - std::chrono::minutes(10);
+    service.scans.back().finished_at = WallClock::now() - std::chrono::minutes(10);
     service.status.last_result = service.scans.back();
     service.Notify(web::EventKind::kResult);
   }
@@ -418,19 +415,18 @@ std::vector<std::string> ReadCommands(std::string& rest) {
 }
 
 /// Of a sensor whose fourth sweep showed another focal length.
-web::SensorProfiles KnownSensor() {
+SensorProfiles KnownSensor() {
   const auto learned = [](int version, double focal) {
     const int age_days = 30 - 7 * version;
-    return web::SensorProfileVersion{
-        .version = version,
-        .made_at = web::WallClock::now() - std::chrono::hours(24 * age_days),
-        .cause = "learned",
-        .num_sweeps = version,
-        .values = {{"focal_x_scale", focal},
-                   {"focal_y_scale", focal},
-                   {"depth_scale", 1.0123},
-                   {"depth_offset_m", -0.0042},
-                   {"color_readout_s", 0.0267}}};
+    return SensorProfileVersion{.version = version,
+                                .made_at = WallClock::now() - std::chrono::hours(24 * age_days),
+                                .cause = "learned",
+                                .num_sweeps = version,
+                                .values = {{"focal_x_scale", focal},
+                                           {"focal_y_scale", focal},
+                                           {"depth_scale", 1.0123},
+                                           {"depth_offset_m", -0.0042},
+                                           {"color_readout_s", 0.0267}}};
   };
   return {.serial = "17110415",
           .why_none = {},
@@ -490,10 +486,10 @@ int Serve(const fs::path& root, bool tls) {
       }
     }
     service.Tick(std::chrono::steady_clock::now());
-    if (service.status.state == web::ApplianceState::kScanning)
+    if (service.status.state == ApplianceState::kScanning)
       service.surface = std::make_shared<const std::string>(
           SurfaceAt(recorder.reference(), std::min(1.0, service.swept),
-                    service.status.scan->purpose == web::ScanPurpose::kFraction));
+                    service.status.scan->purpose == ScanPurpose::kFraction));
     server.Run();
   }
 }

@@ -6,13 +6,16 @@
 #include <algorithm>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/names.hpp"
 #include "web/api/json.hpp"
 #include "web/api/look_back.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/connection_table.hpp"
 #include "web/http/gate.hpp"
+#include "web/model/account.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/wall_clock.hpp"
 #include "web/security/password_rules.hpp"
-#include "web/service/limits.hpp"
 
 namespace plumb::web {
 namespace {

@@ -15,7 +15,13 @@
 #include "web/api/look_back.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
-#include "web/service/limits.hpp"
+#include "web/model/audit.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/settings.hpp"
+#include "web/model/status.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb::web {
 namespace {
@@ -436,11 +442,10 @@ void AddUpdateRoutes(Table& table, UpdateService& updates) {
                 const std::string& name = request.arguments[0];
                 if (!name.ends_with(".raucb"))
                   throw DataError("a bundle's name must end with .raucb");
-                updates.AddBundle(
-                    request.actor(), request.upload->path(), name,
-                    [respond, kept = request.upload](const plumb::web::Change& change) {
-                      respond(ChangeResponse(change));
-                    });
+                updates.AddBundle(request.actor(), request.upload->path(), name,
+                                  [respond, kept = request.upload](const Change& change) {
+                                    respond(ChangeResponse(change));
+                                  });
               });
   table.Write("POST", "/api/v1/update/seen", Permission::kUpdate, BodyKind::kNone,
               [&updates](const Request& request, const Respond& respond) {

@@ -9,7 +9,9 @@
 #include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
 #include "web/http/checks.hpp"
-#include "web/service/limits.hpp"
+#include "web/model/account.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb::web {
 namespace {

@@ -7,9 +7,14 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/names.hpp"
 #include "web/api/json.hpp"
 #include "web/http/checks.hpp"
-#include "web/service/limits.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/reference.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/settings.hpp"
 
 namespace plumb::web {
 namespace {

@@ -238,8 +238,7 @@ std::optional<std::string> HttpServer::setup_code() const { return impl_->accoun
 std::vector<std::string> HttpServer::RouteNames() const {
   std::vector<std::string> names;
   for (const Route& route : impl_->router().routes()) {
-    names.push_back(
-        fmt::format("{} {} {}", route.method, route.pattern, plumb::web::Name(route.permission)));
+    names.push_back(fmt::format("{} {} {}", route.method, route.pattern, Name(route.permission)));
   }
   return names;
 }

@@ -5,9 +5,16 @@
 #include <set>
 #include <string>
 
+#include "web/model/account.hpp"
+#include "web/model/audit.hpp"
+#include "web/model/check.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/reference.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/settings.hpp"
+#include "web/model/status.hpp"
+#include "web/model/wall_clock.hpp"
 #include "web/security/sessions.hpp"
-#include "web/service/names.hpp"
-#include "web/service/settings_change.hpp"
 
 namespace plumb::web {
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "web/service/service_types.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb::web {
 

@@ -15,8 +15,15 @@
 #include "web/assets/spanish.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
+#include "web/model/account.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/numbers.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/reference.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/status.hpp"
+#include "web/model/wall_clock.hpp"
 #include "web/security/password_rules.hpp"
-#include "web/service/limits.hpp"
 
 namespace plumb::web {
 namespace {

@@ -4,8 +4,9 @@
 #include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
+#include "web/model/account.hpp"
+#include "web/model/limits.hpp"
 #include "web/security/password_rules.hpp"
-#include "web/service/limits.hpp"
 
 namespace plumb::web {
 

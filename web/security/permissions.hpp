@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
 
 namespace plumb::web {
 

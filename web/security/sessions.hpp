@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
 
 namespace plumb::web {
 

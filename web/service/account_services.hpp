@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "web/service/change.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/audit.hpp"
+#include "web/model/change.hpp"
 
 namespace plumb::web {
 
@@ -39,14 +40,6 @@ class DisplayService {
   [[nodiscard]] virtual std::vector<Display> Displays() = 0;
   virtual void AddDisplay(const Actor& actor, const Display& display, Done done) = 0;
   virtual void RemoveDisplay(const Actor& actor, const std::string& id, Done done) = 0;
-};
-
-/// Selection of entries.
-struct AuditQuery {
-  std::int64_t before = 0;  ///< Only entries older than this number; 0: from the newest one.
-  int limit = 100;
-  std::string actions = {};  ///< Prefix of their actions; empty: all.
-  bool views = true;         ///< Include views of patient data.
 };
 
 /// The rules of services.hpp hold.

@@ -5,8 +5,9 @@
 #include <memory>
 #include <string>
 
-#include "web/service/change.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/change.hpp"
+#include "web/model/status.hpp"
 
 namespace plumb::web {
 

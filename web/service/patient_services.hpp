@@ -5,8 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "web/service/change.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/change.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/reference.hpp"
+#include "web/model/scan.hpp"
+#include "web/model/status.hpp"
 
 namespace plumb::web {
 

@@ -6,8 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "web/service/change.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/change.hpp"
+#include "web/model/check.hpp"
+#include "web/model/sensor_profile.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb::web {
 

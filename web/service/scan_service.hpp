@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "web/service/change.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/account.hpp"
+#include "web/model/change.hpp"
+#include "web/model/scan.hpp"
 
 namespace plumb::web {
 

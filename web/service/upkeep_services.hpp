@@ -6,9 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "web/service/change.hpp"
-#include "web/service/service_types.hpp"
-#include "web/service/settings_change.hpp"
+#include "web/model/account.hpp"
+#include "web/model/change.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/settings.hpp"
+#include "web/model/status.hpp"
 
 namespace plumb::web {
 
@@ -39,9 +41,6 @@ class MaintenanceService {
   /// Returns a file (without patient data) that is downloaded once and then removed.
   virtual void WriteDiagnostics(const Actor& actor, Done done) = 0;
 };
-
-/// What it keeps.
-enum class FactoryReset { kKeepRecords, kWipe };
 
 /// The rules of services.hpp hold.
 class UpdateService {

@@ -80,7 +80,7 @@ class RealRuledAppliance : public RuledAppliance {
     serves.get_future().wait();
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     for (bool ready = false; !ready;) {
-      On([&] { ready = served_->appliance.state().phase == web::ApplianceState::kReady; });
+      On([&] { ready = served_->appliance.state().phase == ApplianceState::kReady; });
       if (std::chrono::steady_clock::now() > end)
         throw std::runtime_error("the sensor does not get ready");
       std::this_thread::yield();
@@ -100,12 +100,11 @@ class RealRuledAppliance : public RuledAppliance {
       Store& store = *served_->appliance.store();
       id = store.scans.Begin({.patient_id = patient_id,
                               .reference_id = {},
-                              .purpose = web::ScanPurpose::kReference,
+                              .purpose = ScanPurpose::kReference,
                               .sensor_serial = "A",
                               .reason = {}});
       testing::FillScan(store.folders.Staging(id));
-      store.scans.Finish(id,
-                         {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}});
+      store.scans.Finish(id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}});
     });
     return id;
   }

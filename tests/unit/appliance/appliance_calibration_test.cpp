@@ -21,18 +21,17 @@ using testing::FakeBus;
 class ApplianceProfileTest : public ApplianceTest {
  protected:
   /// What the page's last request was answered.
-  web::Change Asked(const std::function<void(web::Done)>& ask) {
-    const auto answer = std::make_shared<std::promise<web::Change>>();
-    On([&] { ask([answer](const web::Change& change) { answer->set_value(change); }); });
+  Change Asked(const std::function<void(Done)>& ask) {
+    const auto answer = std::make_shared<std::promise<Change>>();
+    On([&] { ask([answer](const Change& change) { answer->set_value(change); }); });
     return answer->get_future().get();
   }
-  web::Change Reset(const std::string& serial) {
-    return Asked([&](web::Done done) {
-      services_->services().profiles.ResetSensorProfile(erik_, serial, done);
-    });
+  Change Reset(const std::string& serial) {
+    return Asked(
+        [&](Done done) { services_->services().profiles.ResetSensorProfile(erik_, serial, done); });
   }
-  web::Change RollBack(int version) {
-    return Asked([&](web::Done done) {
+  Change RollBack(int version) {
+    return Asked([&](Done done) {
       services_->services().profiles.RollBackSensorProfile(erik_, "A", version, done);
     });
   }
@@ -45,7 +44,7 @@ class ApplianceProfileTest : public ApplianceTest {
     return fmt::format("{}, {} sweeps", options.profile->name, options.profile->num_sweeps);
   }
 
-  const web::Actor erik_{.user = "erik", .address = {}};
+  const Actor erik_{.user = "erik", .address = {}};
 };
 
 TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
@@ -54,9 +53,9 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
   for (known.num_sweeps = 4; known.num_sweeps <= 5; ++known.num_sweeps) (void)shelf.Add("A", known);
   Play([&] {
     EXPECT_EQ(services_->services().profiles.GetSensorProfiles().why_none, "no sensor is attached");
-    EXPECT_EQ(Reset("A").result, web::ChangeResult::kConflict);
+    EXPECT_EQ(Reset("A").result, ChangeResult::kConflict);
     MakeReady();
-    const web::SensorProfiles shown = services_->services().profiles.GetSensorProfiles();
+    const SensorProfiles shown = services_->services().profiles.GetSensorProfiles();
     EXPECT_EQ(shown.serial, "A");
     EXPECT_EQ(shown.why_none, "");
     ASSERT_EQ(shown.versions.size(), 2U);
@@ -65,12 +64,12 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
     EXPECT_EQ(shown.versions[0].cause, "learned");
     EXPECT_EQ(NextScanBeginsFrom(), "A version 2, 5 sweeps");
 
-    EXPECT_EQ(Reset("B").result, web::ChangeResult::kConflict) << "another unit";
-    EXPECT_EQ(RollBack(7).result, web::ChangeResult::kNotFound);
+    EXPECT_EQ(Reset("B").result, ChangeResult::kConflict) << "another unit";
+    EXPECT_EQ(RollBack(7).result, ChangeResult::kNotFound);
     EXPECT_EQ(NextScanBeginsFrom(), "A version 2, 5 sweeps") << "refused: nothing has changed";
-    EXPECT_EQ(Reset("A").result, web::ChangeResult::kDone);
+    EXPECT_EQ(Reset("A").result, ChangeResult::kDone);
     EXPECT_EQ(NextScanBeginsFrom(), "none");
-    EXPECT_EQ(RollBack(1).result, web::ChangeResult::kDone);
+    EXPECT_EQ(RollBack(1).result, ChangeResult::kDone);
     EXPECT_EQ(NextScanBeginsFrom(), "A version 4, 4 sweeps");
     EXPECT_FALSE(services_->services().profiles.SensorProfileFile(3)) << "the reset";
     EXPECT_THAT(services_->services().profiles.SensorProfileFile(4).value_or(""),
@@ -82,13 +81,13 @@ TEST_F(ApplianceProfileTest, NothingChangesUnderAScan) {
   Play([&] {
     MakeReady();
     On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
-    const web::Change answer = Reset("A");
-    EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+    const Change answer = Reset("A");
+    EXPECT_EQ(answer.result, ChangeResult::kConflict);
     EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
     EXPECT_TRUE(services_->services().profiles.GetSensorProfiles().versions.empty());
     On([&] { EXPECT_EQ(appliance_->Cancel(kTester), ""); });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
-    EXPECT_EQ(Reset("A").result, web::ChangeResult::kDone);
+    EXPECT_EQ(Reset("A").result, ChangeResult::kDone);
     EXPECT_EQ(services_->services().profiles.GetSensorProfiles().versions.size(), 1U);
   });
 }
@@ -99,7 +98,7 @@ TEST_F(ApplianceProfileTest, SwitchedOffItSaysSo) {
     MakeReady();
     EXPECT_THAT(services_->services().profiles.GetSensorProfiles().why_none,
                 ::testing::HasSubstr("switched off"));
-    EXPECT_EQ(Reset("A").result, web::ChangeResult::kConflict);
+    EXPECT_EQ(Reset("A").result, ChangeResult::kConflict);
   });
 }
 
@@ -108,9 +107,9 @@ class ApplianceRoomTest : public ApplianceProfileTest {
   void ScanBoard() {
     On([&] { (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver()); });
   }
-  web::ChangeResult Sign() {
+  ChangeResult Sign() {
     const std::string digest = services_->services().room.GetRoomCalibration().digest;
-    return Asked([&](web::Done done) {
+    return Asked([&](Done done) {
              services_->services().room.SignRoomCalibration(erik_, digest, done);
            })
         .result;
@@ -119,15 +118,15 @@ class ApplianceRoomTest : public ApplianceProfileTest {
   std::optional<Eigen::Vector2d> Gantry() {
     std::optional<Eigen::Vector2d> gantry;
     On([&] {
-      const web::Status status = appliance_->WebStatus();
+      const Status status = appliance_->WebStatus();
       if (status.room.is_known) gantry = Eigen::Vector2d(status.room.gantry_xy.data());
       warnings_ = fmt::format("{}", fmt::join(status.warnings, "; "));
     });
     return gantry;
   }
   /// A reference whose scan saw these markers.
-  web::Reference ReferenceOf(const MarkerMap& markers) {
-    std::optional<web::Reference> reference;
+  Reference ReferenceOf(const MarkerMap& markers) {
+    std::optional<Reference> reference;
     On([&] {
       Store& store = *appliance_->store();
       test::SyntheticOptions options;
@@ -136,12 +135,11 @@ class ApplianceRoomTest : public ApplianceProfileTest {
       scene.markers = markers;
       const std::string id = store.scans.Begin({.patient_id = store.patients.Add(erik_, "P-1", ""),
                                                 .reference_id = {},
-                                                .purpose = web::ScanPurpose::kReference,
+                                                .purpose = ScanPurpose::kReference,
                                                 .sensor_serial = "A",
                                                 .reason = {}});
       WriteScene(scene, store.folders.Staging(id) / "scene");
-      store.scans.Finish(id,
-                         {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}});
+      store.scans.Finish(id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}});
       reference = store.references.Find(store.references.Add(erik_, id, "", {}));
     });
     return reference.value();
@@ -159,11 +157,11 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
     EXPECT_EQ(Gantry(), configured);
     EXPECT_TRUE(services_->services().room.GetRoomCalibration().is_configured);
     for (int i = 0; i < 3; ++i) {
-      EXPECT_NE(Sign(), web::ChangeResult::kDone) << i << " scans";
+      EXPECT_NE(Sign(), ChangeResult::kDone) << i << " scans";
       ScanBoard();
     }
     EXPECT_EQ(Gantry(), configured) << "not signed yet";
-    EXPECT_EQ(Sign(), web::ChangeResult::kDone);
+    EXPECT_EQ(Sign(), ChangeResult::kDone);
     ASSERT_TRUE(Gantry());
     EXPECT_LT((*Gantry() - calibrated).norm(), 1e-6);
     EXPECT_THAT(warnings_, ::testing::HasSubstr("T_iec_reference of the configuration is ignored"));
@@ -179,7 +177,7 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
     EXPECT_THAT(services_->services().room.GetRoomCalibration().due,
                 ::testing::HasSubstr("marker 4"));
     for (int i = 0; i < 3; ++i) ScanBoard();
-    EXPECT_EQ(Sign(), web::ChangeResult::kDone);
+    EXPECT_EQ(Sign(), ChangeResult::kDone);
     EXPECT_TRUE(Gantry());
     EXPECT_EQ(services_->services().room.GetRoomCalibration().versions.front().version, 2);
   });
@@ -197,12 +195,12 @@ TEST_F(ApplianceRoomTest, OnTheMapsOfAReferenceTheRoomLiesAsItsOwnMarkersSay) {
   while (two.size() > 2) two.erase(two.begin());
   Play([&] {
     MakeReady();
-    const web::Reference reference = ReferenceOf(turned);
+    const Reference reference = ReferenceOf(turned);
     const auto shown = [&] { return services_->services().references.RoomOfReference(reference); };
     EXPECT_TRUE(shown().is_known);
     EXPECT_EQ(shown().gantry_xy, (std::array<double, 2>{0, 1})) << "as it is configured";
     for (int i = 0; i < 3; ++i) ScanBoard();
-    EXPECT_EQ(Sign(), web::ChangeResult::kDone);
+    EXPECT_EQ(Sign(), ChangeResult::kDone);
     ASSERT_TRUE(Gantry());
     const Eigen::Vector2d expected = turn.linear().topLeftCorner<2, 2>() * *Gantry();
     ASSERT_TRUE(shown().is_known);

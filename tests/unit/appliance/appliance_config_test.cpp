@@ -5,7 +5,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/config/config.hpp"
 #include "tests/support/message_of.hpp"
-#include "web/service/limits.hpp"
+#include "web/model/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -98,13 +98,13 @@ TEST(ApplianceConfigTest, ATimeThatReplacesASettingHasTheLimitsOfThatSetting) {
   const auto parse = [](const char* key, double seconds) {
     return ParseConfig(fmt::format("[appliance]\n{} = {:.1f}\n", key, seconds), "plumb.toml");
   };
-  const double least_s = web::kAutoStop_s.entered.least, most_s = web::kAutoStop_s.entered.most;
+  const double least_s = kAutoStop_s.entered.least, most_s = kAutoStop_s.entered.most;
   EXPECT_EQ(parse("auto_stop_s", least_s).appliance.auto_stop_s, least_s);
   EXPECT_EQ(parse("auto_stop_s", most_s).appliance.auto_stop_s, most_s);
   EXPECT_THROW((void)parse("auto_stop_s", least_s - 0.1), DataError);
   EXPECT_THROW((void)parse("auto_stop_s", most_s + 0.1), DataError);
   // Trials need shorter sweeps than a person can make.
-  const double longest_s = web::kScanLimit_s.entered.most;
+  const double longest_s = kScanLimit_s.entered.most;
   EXPECT_EQ(parse("scan_limit_s", longest_s).appliance.scan_limit_s, longest_s);
   EXPECT_THROW((void)parse("scan_limit_s", longest_s + 0.1), DataError);
 }

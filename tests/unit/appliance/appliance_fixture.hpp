@@ -117,20 +117,20 @@ class ApplianceTest : public ::testing::Test {
     LetOpen();
     bus_.Plug("A");
     bus_.GiveFrame();
-    ASSERT_TRUE(Becomes([&] { return appliance_->state().phase == web::ApplianceState::kReady; }));
+    ASSERT_TRUE(Becomes([&] { return appliance_->state().phase == ApplianceState::kReady; }));
   }
   /// On the loop's thread.
-  void AddPassedCheck(const web::Actor& actor) {
+  void AddPassedCheck(const Actor& actor) {
     (void)appliance_->store()->checks.Add(
         actor, appliance_->WebStatus().sensor.serial,
         TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
   }
   [[nodiscard]] bool IsRunning() const {
-    const web::ApplianceState phase = appliance_->state().phase;
-    return phase == web::ApplianceState::kScanning || phase == web::ApplianceState::kWorking;
+    const ApplianceState phase = appliance_->state().phase;
+    return phase == ApplianceState::kScanning || phase == ApplianceState::kWorking;
   }
 
-  static inline const web::Actor kTester{.user = "tester", .address = ""};
+  static inline const Actor kTester{.user = "tester", .address = ""};
 
   EventLoop loop_;  // first: blocks signals before any thread starts
   TempFolder folder_;

@@ -15,18 +15,18 @@ namespace {
 using ApplianceRestartTest = testing::ApplianceTest;
 
 /// What RestartSystem() answers, on the loop.
-web::Change Restarted(WebServices& services) {
-  web::Change answer{.result = web::ChangeResult::kFailed, .message = "none", .id = {}, .file = {}};
+Change Restarted(WebServices& services) {
+  Change answer{.result = ChangeResult::kFailed, .message = "none", .id = {}, .file = {}};
   services.updates().RestartSystem({.user = "erik", .address = {}},
-                                   [&](const web::Change& change) { answer = change; });
+                                   [&](const Change& change) { answer = change; });
   return answer;
 }
 
 /// What InstallUpdate() answers at once about a bundle that is not there, on the loop.
-web::Change Installed(WebServices& services) {
-  const auto answer = std::make_shared<web::Change>();  // it may also come later
+Change Installed(WebServices& services) {
+  const auto answer = std::make_shared<Change>();  // it may also come later
   services.updates().InstallUpdate({.user = "erik", .address = {}}, "plumb-9.raucb",
-                                   [answer](const web::Change& change) { *answer = change; });
+                                   [answer](const Change& change) { *answer = change; });
   return *answer;
 }
 
@@ -35,18 +35,18 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedUnderAScan) {
     MakeReady();
     On([&] {
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
-      ASSERT_EQ(appliance_->state().phase, web::ApplianceState::kScanning);
-      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kConflict);
+      ASSERT_EQ(appliance_->state().phase, ApplianceState::kScanning);
+      EXPECT_EQ(Restarted(*services_).result, ChangeResult::kConflict);
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
-      ASSERT_EQ(appliance_->state().phase, web::ApplianceState::kWorking);
-      const web::Change answer = Restarted(*services_);
-      EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+      ASSERT_EQ(appliance_->state().phase, ApplianceState::kWorking);
+      const Change answer = Restarted(*services_);
+      EXPECT_EQ(answer.result, ChangeResult::kConflict);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
       EXPECT_EQ(restart_->num_asked, 0);
     });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     On([&] {
-      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kDone);
+      EXPECT_EQ(Restarted(*services_).result, ChangeResult::kDone);
       EXPECT_EQ(restart_->num_asked, 1);
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester),
                   ::testing::HasSubstr("being restarted"));
@@ -57,12 +57,12 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedUnderAScan) {
 }
 
 /// The final answer of ResetToFactory(). It writes in the background, not on the loop.
-web::Change AskedToReset(WebServices& services, EventLoop& loop, web::FactoryReset kind) {
-  auto answered = std::make_shared<std::promise<web::Change>>();
+Change AskedToReset(WebServices& services, EventLoop& loop, FactoryReset kind) {
+  auto answered = std::make_shared<std::promise<Change>>();
   loop.Post("test", [&services, answered, kind] {
     services.updates().ResetToFactory(
         {.user = "erik", .address = {}}, kind,
-        [answered](const web::Change& change) { answered->set_value(change); });
+        [answered](const Change& change) { answered->set_value(change); });
   });
   return answered->get_future().get();
 }
@@ -74,27 +74,24 @@ TEST_F(ApplianceRestartTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
       return std::filesystem::exists(folder_ / "state" / kFactoryResetFile);
     };
     On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
-    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
-              web::ChangeResult::kConflict)
+    EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).result, ChangeResult::kConflict)
         << "a scan runs";
     EXPECT_FALSE(is_noted());
     On([&] { EXPECT_EQ(appliance_->Cancel(kTester), ""); });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     restart_->failure = "the machine cannot be restarted from here: no";
-    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).message, restart_->failure);
+    EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).message, restart_->failure);
     EXPECT_FALSE(is_noted()) << "nothing is reset where the machine does not restart";
     restart_->failure.clear();
-    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
-              web::ChangeResult::kDone);
+    EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).result, ChangeResult::kDone);
     EXPECT_TRUE(is_noted());
     On([&] {
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester),
                   ::testing::HasSubstr("being restarted"));
       const std::string patient = appliance_->store()->patients.Add(kTester, "P-1", "");
-      web::Change answer;
-      services_->services().patients.OpenPatient(
-          kTester, patient, web::ScanPurpose::kReference, "", "",
-          [&](const web::Change& change) { answer = change; });
+      Change answer;
+      services_->services().patients.OpenPatient(kTester, patient, ScanPurpose::kReference, "", "",
+                                                 [&](const Change& change) { answer = change; });
       EXPECT_THAT(answer.message, ::testing::HasSubstr("being restarted"));
     });
   });
@@ -104,8 +101,7 @@ TEST_F(ApplianceRestartTest, AMachineThatDoesNotGoDownIsUsableAgainAndIsNotReset
   Play([&] {
     MakeReady();
     restart_->stays_up_after = std::chrono::milliseconds(50);
-    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
-              web::ChangeResult::kDone);
+    EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).result, ChangeResult::kDone);
     EXPECT_TRUE(
         Becomes([&] { return !std::filesystem::exists(folder_ / "state" / kFactoryResetFile); }));
     On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
@@ -120,10 +116,10 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedInASessionAndAFailedRestart
   Play([&] {
     MakeReady();
     On([&] {
-      appliance_->OpenSession("1", "p", web::ScanPurpose::kReference, "",
+      appliance_->OpenSession("1", "p", ScanPurpose::kReference, "",
                               {.user = "tess", .address = {}});
-      const web::Change answer = Restarted(*services_);
-      EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+      const Change answer = Restarted(*services_);
+      EXPECT_EQ(answer.result, ChangeResult::kConflict);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("session of a patient is open"));
       EXPECT_EQ(restart_->num_asked, 0);
       EXPECT_THAT(Installed(*services_).message,
@@ -131,11 +127,11 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedInASessionAndAFailedRestart
       EXPECT_EQ(appliance_->CloseSession({.user = "tess", .address = {}}), "");
       EXPECT_THAT(Installed(*services_).message, ::testing::Not(::testing::HasSubstr("session")));
       restart_->failure = "the machine cannot be restarted from here: no";
-      const web::Change failed = Restarted(*services_);
-      EXPECT_EQ(failed.result, web::ChangeResult::kFailed);
+      const Change failed = Restarted(*services_);
+      EXPECT_EQ(failed.result, ChangeResult::kFailed);
       EXPECT_EQ(failed.message, restart_->failure);
       restart_->failure.clear();
-      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kDone) << "asked again";
+      EXPECT_EQ(Restarted(*services_).result, ChangeResult::kDone) << "asked again";
       EXPECT_EQ(restart_->num_asked, 2);
     });
   });

@@ -69,8 +69,8 @@ TEST_F(ApplianceSpaceTest, FourFifthsOfTheDiskAreToldByPageStatusAndLight) {
       EXPECT_TRUE(warns());
       EXPECT_EQ(appliance_->StatusJson()["light"], "ready_disk_nearly_full");
       EXPECT_THAT(appliance_->StatusJson()["warnings"].dump(), HasSubstr("80 % full"));
-      EXPECT_EQ(appliance_->state().phase, web::ApplianceState::kReady);
-      EXPECT_TRUE(appliance_->Health().ok);
+      EXPECT_EQ(appliance_->state().phase, ApplianceState::kReady);
+      EXPECT_TRUE(appliance_->health().ok);
     });
     SetUsed(75'999);
     EXPECT_TRUE(IsLit("ready")) << "and that it is over";
@@ -89,8 +89,8 @@ TEST_F(ApplianceSpaceTest, OneByteTooLittleIsAFaultAndNoReadiness) {
     SetAvailable(kScanBytes - 1);
     EXPECT_TRUE(IsLit("fault"));
     On([&] {
-      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kFault);
-      EXPECT_EQ(appliance_->WebStatus().fault_kind, web::FaultKind::kStorage);
+      EXPECT_EQ(appliance_->WebStatus().state, ApplianceState::kFault);
+      EXPECT_EQ(appliance_->WebStatus().fault_kind, FaultKind::kStorage);
       EXPECT_THAT(appliance_->WebStatus().fault, HasSubstr("the disk is full: 24 MB are free"));
       EXPECT_THAT(appliance_->StatusLine(), HasSubstr("the disk is full"));
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester), HasSubstr("the disk is full"));
@@ -108,7 +108,7 @@ TEST_F(ApplianceSpaceTest, ARecordingNeedsItsOwnRoomAndADailyCheckHasNone) {
   parts_.config.appliance.scan_limit_s = 60;
   Play([&] {
     MakeReady();
-    const auto reason = [&] { return appliance_->Health().reason; };
+    const auto reason = [&] { return appliance_->health().reason; };
     SetAvailable(kScanBytes + kRecordingBytes);
     On([&] { EXPECT_EQ(reason(), ""); });
     SetAvailable(kScanBytes + kRecordingBytes - 1);

@@ -63,11 +63,11 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
     file.seekp(100);  // behind the header
     file << std::string(fs::file_size(entry.path()), 'x');
   }
-  EXPECT_EQ(appliance.WebStatus().state, web::ApplianceState::kNoSensor);
+  EXPECT_EQ(appliance.WebStatus().state, ApplianceState::kNoSensor);
   RunFor(around.loop, std::chrono::milliseconds(300));
   EXPECT_THAT(appliance.storage_fault(), HasSubstr("damaged")) << "and it is not tried again";
   EXPECT_FALSE(appliance.WebStatus().fault.empty());
-  EXPECT_FALSE(appliance.Health().ok);
+  EXPECT_FALSE(appliance.health().ok);
 }
 
 /// Until `done`, or for a minute: a backup gives way to all else that the machine does.
@@ -189,7 +189,7 @@ TEST(ApplianceStorage, ADatabaseTooLargeForTheCheckAtTheStartIsCheckedWhileItWor
     if (is_damaged) {
       EXPECT_TRUE(RunUntil(around.loop, is_found));
       EXPECT_THAT(appliance.storage_fault(), HasSubstr("is damaged"));
-      EXPECT_FALSE(appliance.Health().ok);
+      EXPECT_FALSE(appliance.health().ok);
       continue;
     }
     RunFor(around.loop, std::chrono::milliseconds(1500));
@@ -209,7 +209,7 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
   Surroundings around;
   {
     Store store(around.config.appliance.state);
-    web::Settings settings;
+    Settings settings;
     settings.idle_logout_min = 7;
     store.settings.Change({.user = "anna", .address = {}}, settings);
   }
@@ -230,14 +230,14 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
               HasSubstr("what is stored cannot be read: the stored settings cannot be read: "))
       << "the page goes by this sentence";
   // A complete set replaces them.
-  web::Settings entered;
+  Settings entered;
   entered.idle_logout_min = 9;
-  std::optional<web::Change> changed;
+  std::optional<Change> changed;
   const auto settings = MakeWebSettings(access);
   settings->ChangeSettings({.user = "anna", .address = {}}, entered,
-                           [&](const web::Change& change) { changed = change; });
+                           [&](const Change& change) { changed = change; });
   EXPECT_TRUE(RunUntil(another, [&] { return changed.has_value(); }));
-  EXPECT_EQ(changed->result, web::ChangeResult::kDone);
+  EXPECT_EQ(changed->result, ChangeResult::kDone);
   EXPECT_EQ(settings->GetSettings().idle_logout_min, 9);
 }
 
@@ -352,7 +352,7 @@ class StorageRetryTest : public testing::ApplianceTest {
     On([&] { fault = appliance_->storage_fault(); });
     return fault;
   }
-  [[nodiscard]] std::vector<web::AuditEntry> Recoveries() const {
+  [[nodiscard]] std::vector<AuditEntry> Recoveries() const {
     return appliance_->store()->audit.Find({0, 100, "storage.recovered"});
   }
   /// Waits until several attempts to leave safe mode have failed.
@@ -375,16 +375,16 @@ TEST_F(StorageRetryTest, SafeModeEndsWhenWhatIsStoredCanBeReadAgainAndNotBefore)
     LetItTryInVain();
     On([&] {
       EXPECT_EQ(appliance_->storage_fault(), fault);
-      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kFault);
-      EXPECT_FALSE(appliance_->Health().ok);
+      EXPECT_EQ(appliance_->WebStatus().state, ApplianceState::kFault);
+      EXPECT_FALSE(appliance_->health().ok);
       EXPECT_EQ(Recoveries().size(), 0U);
     });
     direct.Execute("ALTER TABLE away RENAME TO checks");
     ASSERT_TRUE(Becomes([&] { return appliance_->storage_fault().empty(); }));
     On([&] {
-      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kReady);
+      EXPECT_EQ(appliance_->WebStatus().state, ApplianceState::kReady);
       EXPECT_EQ(appliance_->WebStatus().fault, "");
-      EXPECT_TRUE(appliance_->Health().ok) << appliance_->Health().reason;
+      EXPECT_TRUE(appliance_->health().ok) << appliance_->health().reason;
       ASSERT_EQ(Recoveries().size(), 1U);
       EXPECT_EQ(Recoveries()[0].detail, fault);
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "") << "scans go on";
@@ -402,14 +402,12 @@ std::string StoreSmallScan(Store& store, const std::string& patient) {
   fs::create_directory(store.folders.Staging(id) / "scene");
   WriteWholeFile(store.folders.Staging(id) / "scene" / "scene.json", std::string_view("{}"));
   store.scans.Finish(
-      id,
-      {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}, .swept_area_m2 = 0});
+      id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}, .swept_area_m2 = 0});
   return id;
 }
 
 /// Three scans of a patient, whose folder is then moved. Returns the patient.
-std::string StoreAndHideScans(const web::Actor& tester, const fs::path& state,
-                              const fs::path& away) {
+std::string StoreAndHideScans(const Actor& tester, const fs::path& state, const fs::path& away) {
   std::string patient;
   {
     Store store(state);
@@ -436,8 +434,8 @@ TEST_F(StorageRetryTest, AStoreThatCouldNotBeOpenedIsOpenedWhenItsScansAreThere)
       EXPECT_EQ(appliance_->store()->scans.List(patient, 10).size(), 3U);
       EXPECT_NE(appliance_->store()->patients.Add(kTester, "B", ""), "");
       EXPECT_EQ(Recoveries().size(), 1U);
-      EXPECT_TRUE(appliance_->Health().ok) << appliance_->Health().reason;
-      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kNoSensor);
+      EXPECT_TRUE(appliance_->health().ok) << appliance_->health().reason;
+      EXPECT_EQ(appliance_->WebStatus().state, ApplianceState::kNoSensor);
     });
   });
 }

@@ -26,10 +26,9 @@ namespace plumb {
 namespace {
 
 using testing::ApplianceTest;
-using web::DailyCheck;
 
-web::Scan ScanOf(web::DailyCheck check) {
-  web::Scan scan;
+Scan ScanOf(DailyCheck check) {
+  Scan scan;
   scan.id = "1";
   scan.daily_check = check;
   return scan;
@@ -40,7 +39,7 @@ TEST_F(ApplianceTest, AWorkerIsNotAliveWhileADriverDoesNotComeBackFromOpening) {
   Play([&] {
     bus_.Plug("A");
     EXPECT_TRUE(Becomes([&] { return !appliance_->WorkersAreAlive(); }));
-    On([&] { EXPECT_FALSE(appliance_->Health().ok); });
+    On([&] { EXPECT_FALSE(appliance_->health().ok); });
     LetOpen();
     EXPECT_TRUE(Becomes([&] {
       bus_.GiveFrame();
@@ -55,10 +54,10 @@ TEST_F(ApplianceTest, AWorkerIsNotAliveWhileAResultIsComputedWithoutProgress) {
     MakeReady();
     On([&] {
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
-      EXPECT_EQ(appliance_->state().phase, web::ApplianceState::kScanning);
+      EXPECT_EQ(appliance_->state().phase, ApplianceState::kScanning);
       EXPECT_TRUE(appliance_->WorkersAreAlive()) << "it waits for frames";
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
-      EXPECT_EQ(appliance_->state().phase, web::ApplianceState::kWorking);
+      EXPECT_EQ(appliance_->state().phase, ApplianceState::kWorking);
       EXPECT_FALSE(appliance_->WorkersAreAlive());
     });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
@@ -67,40 +66,40 @@ TEST_F(ApplianceTest, AWorkerIsNotAliveWhileAResultIsComputedWithoutProgress) {
 }
 
 TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) {
-  const web::Actor actor{.user = "tester", .address = {}};
+  const Actor actor{.user = "tester", .address = {}};
   parts_.demo_patient.clear();
   parts_.config.appliance.warm_up_min = 0;
   Play([&] {
     MakeReady();
-    std::promise<web::Change> added, wiped;
+    std::promise<Change> added, wiped;
     On([&] {
       services_->services().patients.AddPatient(
-          actor, "P1", "", [&](const web::Change& change) { added.set_value(change); });
+          actor, "P1", "", [&](const Change& change) { added.set_value(change); });
     });
     const std::string id = added.get_future().get().id;
-    std::promise<web::Change> opened;
+    std::promise<Change> opened;
     On([&] {
       AddPassedCheck(actor);
       services_->services().patients.OpenPatient(
-          actor, id, web::ScanPurpose::kReference, "", "",
-          [&](const web::Change& change) { opened.set_value(change); });
+          actor, id, ScanPurpose::kReference, "", "",
+          [&](const Change& change) { opened.set_value(change); });
     });
-    EXPECT_EQ(opened.get_future().get().result, web::ChangeResult::kDone);
+    EXPECT_EQ(opened.get_future().get().result, ChangeResult::kDone);
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().patient_id, id);
       EXPECT_EQ(appliance_->OpenCheck(actor), "");
       services_->services().patients.WipePatient(
-          actor, id, [&](const web::Change& change) { wiped.set_value(change); });
-      EXPECT_EQ(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck)
+          actor, id, [&](const Change& change) { wiped.set_value(change); });
+      EXPECT_EQ(appliance_->WebStatus().next_purpose, ScanPurpose::kDailyCheck)
           << "the check stays open";
     });
-    EXPECT_EQ(wiped.get_future().get().result, web::ChangeResult::kDone);
+    EXPECT_EQ(wiped.get_future().get().result, ChangeResult::kDone);
     On([&] {
       for (int i = 0; i < 2; ++i) EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
     });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     On([&] {
-      EXPECT_NE(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck);
+      EXPECT_NE(appliance_->WebStatus().next_purpose, ScanPurpose::kDailyCheck);
       EXPECT_EQ(appliance_->WebStatus().patient_id, "");
     });
   });
@@ -109,28 +108,28 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
 TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClosed) {
   parts_.demo_patient.clear();
   parts_.config.appliance.warm_up_min = 0;
-  const web::Actor tess{.user = "tess", .address = {}};
+  const Actor tess{.user = "tess", .address = {}};
   Play([&] {
     MakeReady();
-    std::promise<web::Change> first;
-    web::Change second, closed;
+    std::promise<Change> first;
+    Change second, closed;
     std::string patient;
     On([&] {
       patient = appliance_->store()->patients.Add(tess, "A", "");
       const std::string other = appliance_->store()->patients.Add(tess, "B", "");
       AddPassedCheck(tess);
       auto& service = services_->services().patients;
-      service.OpenPatient(tess, patient, web::ScanPurpose::kReference, "", "",
-                          [&](const web::Change& change) { first.set_value(change); });
-      service.OpenPatient(tess, other, web::ScanPurpose::kReference, "", "",
-                          [&](const web::Change& change) { second = change; });
-      service.CloseSession(tess, "", [&](const web::Change& change) { closed = change; });
+      service.OpenPatient(tess, patient, ScanPurpose::kReference, "", "",
+                          [&](const Change& change) { first.set_value(change); });
+      service.OpenPatient(tess, other, ScanPurpose::kReference, "", "",
+                          [&](const Change& change) { second = change; });
+      service.CloseSession(tess, "", [&](const Change& change) { closed = change; });
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
                   ::testing::HasSubstr("a patient is being opened"));
     });
-    EXPECT_EQ(first.get_future().get().result, web::ChangeResult::kDone);
-    for (const web::Change& refused : {second, closed}) {
-      EXPECT_EQ(refused.result, web::ChangeResult::kConflict);
+    EXPECT_EQ(first.get_future().get().result, ChangeResult::kDone);
+    for (const Change& refused : {second, closed}) {
+      EXPECT_EQ(refused.result, ChangeResult::kConflict);
       EXPECT_EQ(refused.message, "a patient is being opened: try again in a moment");
     }
     On([&] {
@@ -145,27 +144,27 @@ TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClose
 TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
   parts_.demo_patient.clear();
   parts_.config.appliance.warm_up_min = 0;
-  const web::Actor tess{.user = "tess", .address = {}};
+  const Actor tess{.user = "tess", .address = {}};
   Play([&] {
     MakeReady();
-    std::promise<web::Change> opened, refused, wiped;
+    std::promise<Change> opened, refused, wiped;
     std::string patient, running;
     On([&] {
       patient = appliance_->store()->patients.Add(tess, "A", "");
       AddPassedCheck(tess);
       services_->services().patients.OpenPatient(
-          tess, patient, web::ScanPurpose::kReference, "", "",
-          [&](const web::Change& change) { opened.set_value(change); });
+          tess, patient, ScanPurpose::kReference, "", "",
+          [&](const Change& change) { opened.set_value(change); });
     });
-    EXPECT_EQ(opened.get_future().get().result, web::ChangeResult::kDone);
+    EXPECT_EQ(opened.get_future().get().result, ChangeResult::kDone);
     On([&] {
       running = appliance_->store()->scans.Begin({.patient_id = patient,
                                                   .reference_id = {},
-                                                  .purpose = web::ScanPurpose::kReference,
+                                                  .purpose = ScanPurpose::kReference,
                                                   .sensor_serial = "A",
                                                   .reason = {}});
       services_->services().patients.WipePatient(
-          tess, patient, [&](const web::Change& change) { refused.set_value(change); });
+          tess, patient, [&](const Change& change) { refused.set_value(change); });
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
                   ::testing::HasSubstr("data is being removed"));
       EXPECT_THAT(appliance_->CloseSession(tess), ::testing::HasSubstr("data is being removed"));
@@ -175,14 +174,14 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
     On([&] {
       ASSERT_TRUE(appliance_->WebStatus().session) << "nothing was removed";
       EXPECT_EQ(appliance_->open_patient(), patient);
-      appliance_->store()->scans.Finish(running, {.outcome = web::ScanOutcome::kCancelled,
+      appliance_->store()->scans.Finish(running, {.outcome = ScanOutcome::kCancelled,
                                                   .failure = "discarded",
                                                   .result_json = {},
                                                   .swept_area_m2 = 0.0});
       services_->services().patients.WipePatient(
-          tess, patient, [&](const web::Change& change) { wiped.set_value(change); });
+          tess, patient, [&](const Change& change) { wiped.set_value(change); });
     });
-    EXPECT_EQ(wiped.get_future().get().result, web::ChangeResult::kDone);
+    EXPECT_EQ(wiped.get_future().get().result, ChangeResult::kDone);
     On([&] {
       EXPECT_FALSE(appliance_->WebStatus().session);
       EXPECT_EQ(appliance_->open_patient(), "");
@@ -205,14 +204,13 @@ TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVe
       std::string bytes = ReadTextFile(cloud, 1000);
       bytes[3] = static_cast<char>(bytes[3] ^ 1);
       WriteWholeFile(cloud, bytes);
-      const std::string session =
-          store.treatments.Open(kTester, patient, web::ScanPurpose::kFraction);
-      appliance_->OpenSession(session, patient, web::ScanPurpose::kFraction, "", kTester);
+      const std::string session = store.treatments.Open(kTester, patient, ScanPurpose::kFraction);
+      appliance_->OpenSession(session, patient, ScanPurpose::kFraction, "", kTester);
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
     });
     EXPECT_TRUE(Becomes([&] {
       bus_.GiveFrame();
-      return appliance_->state().phase == web::ApplianceState::kFault;
+      return appliance_->state().phase == ApplianceState::kFault;
     }));
     On([&] {
       EXPECT_THAT(
@@ -220,8 +218,8 @@ TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVe
           ::testing::HasSubstr("the patient's reference cannot be used: scene/cloud.ply has "
                                "been changed since it was stored"));
       EXPECT_TRUE(appliance_->StatusJson()["last_result"].is_null());
-      const web::Scan failed = appliance_->store()->scans.List(patient, 1)[0];
-      EXPECT_EQ(failed.outcome, web::ScanOutcome::kFailed);
+      const Scan failed = appliance_->store()->scans.List(patient, 1)[0];
+      EXPECT_EQ(failed.outcome, ScanOutcome::kFailed);
       EXPECT_FALSE(failed.result);
     });
   });
@@ -230,23 +228,22 @@ TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVe
 TEST_F(ApplianceTest, ASurfaceIsPackedOnceAndAFailureIsNotKept) {
   Play([&] {
     MakeReady();
-    const auto mesh = [&](const web::Scan& scan) { return scan.folder / "scene/mesh.ply"; };
-    const auto packed = [&](const web::Scan& scan) {
+    const auto mesh = [&](const Scan& scan) { return scan.folder / "scene/mesh.ply"; };
+    const auto packed = [&](const Scan& scan) {
       return services_->services().scans.CompactMap(scan.id, "mesh");
     };
-    std::vector<web::Scan> scans;
+    std::vector<Scan> scans;
     On([&] {
       Store& store = *appliance_->store();
       const std::string patient = store.patients.Add(kTester, "P-1", "");
       for (int i = 0; i < 3; ++i) {
         const std::string id = store.scans.Begin({.patient_id = patient,
                                                   .reference_id = {},
-                                                  .purpose = web::ScanPurpose::kFraction,
+                                                  .purpose = ScanPurpose::kFraction,
                                                   .sensor_serial = "A",
                                                   .reason = {}});
         std::filesystem::create_directory(store.folders.Staging(id) / "scene");
-        store.scans.Finish(id,
-                           {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}});
+        store.scans.Finish(id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}});
         scans.push_back(store.scans.Find(id).value());
       }
     });
@@ -255,7 +252,7 @@ TEST_F(ApplianceTest, ASurfaceIsPackedOnceAndAFailureIsNotKept) {
     triangle.normals.assign(3, Eigen::Vector3f::UnitZ());
     triangle.triangles = {{0, 1, 2}};
     EXPECT_FALSE(packed(scans[0])) << "it has none yet";
-    for (const web::Scan& scan : scans) {
+    for (const Scan& scan : scans) {
       triangle.vertices[0].z() += 0.1F;
       WriteMeshPly(mesh(scan), triangle);
       EXPECT_EQ(packed(scan), CompactMesh(triangle));
@@ -276,23 +273,23 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
   parts_.config.appliance.warm_up_min = 0;
   Play([&] {
     MakeReady();
-    const web::Actor tess = {.user = "tess", .address = {}};
-    web::Change answer;
-    const web::Done keep = [&](const web::Change& change) { answer = change; };
+    const Actor tess = {.user = "tess", .address = {}};
+    Change answer;
+    const Done keep = [&](const Change& change) { answer = change; };
     std::string patient;
     On([&] {
       patient = appliance_->store()->patients.Add(tess, "P-1", "");
       EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("daily check"));
-      services_->services().patients.OpenPatient(tess, patient, web::ScanPurpose::kReference, "",
-                                                 "", keep);
-      EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+      services_->services().patients.OpenPatient(tess, patient, ScanPurpose::kReference, "", "",
+                                                 keep);
+      EXPECT_EQ(answer.result, ChangeResult::kConflict);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
       services_->services().references.ApproveReference(tess, "1", 1, "", keep);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
       services_->services().references.AddReference(tess, "1", "", keep);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
       // A session that was open since yesterday.
-      appliance_->OpenSession("1", patient, web::ScanPurpose::kReference, "", tess);
+      appliance_->OpenSession("1", patient, ScanPurpose::kReference, "", tess);
       (void)appliance_->Press(ButtonPress::kShort, kTester);
     });
     EXPECT_TRUE(Becomes([&] {
@@ -312,7 +309,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
             TakenCheck{{.status = status, .items = {}, .reasons = {}}});
       };
       check(MarkerCheckStatus::kFailed);
-      const web::Json status = web::ToJson(appliance_->WebStatus(), web::WallClock::now());
+      const web::Json status = web::ToJson(appliance_->WebStatus(), WallClock::now());
       EXPECT_TRUE(status["check_overdue"]);
       EXPECT_TRUE(status["check_failed"]);
       EXPECT_EQ(appliance_->Checks().today, DailyCheck::kFailed);
@@ -325,8 +322,8 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
                   ::testing::HasSubstr("after a failed daily check"));
       (void)appliance_->CloseSession(tess);
       (void)appliance_->Press(ButtonPress::kShort, kTester);  // acknowledges the fault
-      services_->services().patients.OpenPatient(tess, patient, web::ScanPurpose::kReference, "",
-                                                 "", keep);
+      services_->services().patients.OpenPatient(tess, patient, ScanPurpose::kReference, "", "",
+                                                 keep);
     });
     EXPECT_TRUE(Becomes([&] { return appliance_->WebStatus().session.has_value(); }));
   });
@@ -335,7 +332,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
 TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
   parts_.demo_patient.clear();
   parts_.config.appliance.warm_up_min = 0;
-  const web::Actor tess{.user = "tess", .address = {}};
+  const Actor tess{.user = "tess", .address = {}};
   // "code number kind" of an action's newest entry.
   const auto logged = [&](const std::string& action) {
     const auto entries = appliance_->store()->audit.Find({0, 1, action});
@@ -348,11 +345,11 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
     MakeReady();
     web::ApplianceService& service = services_->services().appliance;
     const auto scan = [&](const std::string& kind) {
-      On([&] { service.StartSweep(tess, [](const web::Change&) {}); });
+      On([&] { service.StartSweep(tess, [](const Change&) {}); });
       EXPECT_TRUE(Becomes([&] { return logged("scan.start") == kind; })) << kind;
       On([&] {  // both before its end can arrive
-        service.EndSweep(tess, [](const web::Change&) {});
-        service.Cancel(tess, [](const web::Change&) {});
+        service.EndSweep(tess, [](const Change&) {});
+        service.Cancel(tess, [](const Change&) {});
       });
       EXPECT_TRUE(Becomes([&] { return logged("scan.end") == kind; })) << kind;
       EXPECT_TRUE(Becomes([&] { return logged("cancel") == kind; })) << kind;
@@ -367,9 +364,8 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
           tess, appliance_->WebStatus().sensor.serial,
           TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
       const std::string patient = store.patients.Add(tess, "P-1", "");
-      const std::string session =
-          store.treatments.Open(tess, patient, web::ScanPurpose::kReference);
-      appliance_->OpenSession(session, patient, web::ScanPurpose::kReference, "", tess);
+      const std::string session = store.treatments.Open(tess, patient, ScanPurpose::kReference);
+      appliance_->OpenSession(session, patient, ScanPurpose::kReference, "", tess);
     });
     scan("P-1 0 reference");
   });
@@ -402,7 +398,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
   // "who action: code number, detail" of each entry about scans, the oldest first.
   const auto logged = [&] {
     std::vector<std::string> lines;
-    for (const web::AuditEntry& entry : appliance_->store()->audit.Find({0, 100, ""})) {
+    for (const AuditEntry& entry : appliance_->store()->audit.Find({0, 100, ""})) {
       if (!entry.action.starts_with("scan.") && entry.action != "cancel" &&
           entry.action != "press" && entry.action != "session.close")
         continue;
@@ -417,7 +413,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
   Play([&] {
     MakeReady();
     web::ApplianceService& service = services_->services().appliance;
-    const auto page = [&] { service.Press(kTester, [](const web::Change&) {}); };
+    const auto page = [&] { service.Press(kTester, [](const Change&) {}); };
     std::vector<std::string> expected;
     const auto expect = [&](const std::vector<std::string>& lines) {
       expected.insert(expected.end(), lines.begin(), lines.end());
@@ -436,13 +432,12 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
     On([&] {
       Store& store = *appliance_->store();
       patient = store.patients.Add(kTester, "P-1", "");
-      const std::string session =
-          store.treatments.Open(kTester, patient, web::ScanPurpose::kReference);
-      appliance_->OpenSession(session, patient, web::ScanPurpose::kReference, "", kTester);
+      const std::string session = store.treatments.Open(kTester, patient, ScanPurpose::kReference);
+      appliance_->OpenSession(session, patient, ScanPurpose::kReference, "", kTester);
       page();  // without a check of the day the scan cannot begin
     });
     expect({"tester scan.start: P-1 0, reference"});
-    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == web::ApplianceState::kFault; }));
+    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ApplianceState::kFault; }));
     On([&] {
       page();
       (void)appliance_->store()->checks.Add(
@@ -455,7 +450,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
     });
     expect({"tester press: , ready", "tester scan.start: P-1 0, reference",
             "tester scan.end: P-1 0, reference", "button cancel: P-1 0, reference"});
-    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == web::ApplianceState::kReady; }));
+    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ApplianceState::kReady; }));
     On([&] { button.press(ButtonPress::kLong); });
     expect({"button session.close: P-1 0, "});
   });
@@ -466,12 +461,12 @@ TEST_F(ApplianceTest, ASessionWithoutScansClosesByItself) {
   parts_.config.appliance.session_idle_min = 0.3 / 60;
   Play([&] {
     MakeReady();
-    const web::Actor tess = {.user = "tess", .address = {}};
+    const Actor tess = {.user = "tess", .address = {}};
     On([&] {
       const std::string patient = appliance_->store()->patients.Add(tess, "P-1", "");
       const std::string session =
-          appliance_->store()->treatments.Open(tess, patient, web::ScanPurpose::kReference);
-      appliance_->OpenSession(session, patient, web::ScanPurpose::kReference, "", tess);
+          appliance_->store()->treatments.Open(tess, patient, ScanPurpose::kReference);
+      appliance_->OpenSession(session, patient, ScanPurpose::kReference, "", tess);
       EXPECT_TRUE(appliance_->WebStatus().session.has_value());
     });
     EXPECT_TRUE(Becomes([&] { return !appliance_->WebStatus().session.has_value(); }));
@@ -492,7 +487,7 @@ TEST_F(ApplianceTest, AColdSensorTakesNoReference) {
                   ::testing::HasSubstr("the sensor is still warming up"));
       EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("15 min"));
       // What was scanned long ago is judged by how warm the sensor was then.
-      web::Scan scan = ScanOf(DailyCheck::kPassed);
+      Scan scan = ScanOf(DailyCheck::kPassed);
       scan.sensor_on_s = 899;
       EXPECT_THAT(appliance_->WhyNoReference(scan),
                   ::testing::HasSubstr("scan the reference again"));
@@ -513,7 +508,7 @@ TEST_F(ApplianceTest, TheConfiguredWarmUpIsInThePagesStatus) {
   Play([&] {
     MakeReady();
     const auto shown_s = [&] {
-      return web::ToJson(appliance_->WebStatus(), web::WallClock::now())["sensor"]["warm_up_s"];
+      return web::ToJson(appliance_->WebStatus(), WallClock::now())["sensor"]["warm_up_s"];
     };
     On([&] {
       EXPECT_EQ(shown_s(), 1200);
@@ -562,7 +557,7 @@ TEST_F(ApplianceTest, TheProvisionedDisplayIsPairedWhenItsStoreOpens) {
   WriteWholeFile(folder_ / "state" / "provisioned-display", std::string(64, 'a') + " Room 1\n");
   Play([&] {
     On([&] {
-      const std::vector<web::Display> paired = appliance_->store()->displays.List();
+      const std::vector<Display> paired = appliance_->store()->displays.List();
       ASSERT_EQ(paired.size(), 1U);
       EXPECT_EQ(paired[0].name, "Room 1");
       EXPECT_EQ(paired[0].token_hash, std::string(64, 'a'));

@@ -37,7 +37,7 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
     return std::any_of(warnings.begin(), warnings.end(),
                        [&](const std::string& warning) { return warning.starts_with(begin); });
   }
-  [[nodiscard]] std::vector<web::AuditEntry> Backups() const {
+  [[nodiscard]] std::vector<AuditEntry> Backups() const {
     return appliance_->store()->audit.Find({0, 100, "backup.make"});
   }
   /// Like Becomes(), but leaves the processor to a backup, which gives way to everything else.
@@ -62,7 +62,7 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
     std::vector<std::string> scans;
     for (int i = 0; i < 3; ++i) scans.push_back(testing::StoreScan(store, patient));
     (void)testing::PlanAndApprove(store, store.references.Add(testing::kAnna, scans[0], "", {}));
-    web::Settings settings = store.settings.Get();
+    Settings settings = store.settings.Get();
     settings.retention_days = retention_days;
     store.settings.Change(testing::kAnna, settings);
     return scans;
@@ -70,7 +70,7 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   /// Numbers of the stored scans, the oldest first. On the loop's thread.
   [[nodiscard]] std::vector<std::string> Stored() const {
     std::vector<std::string> ids;
-    for (const web::Scan& scan : appliance_->store()->scans.List("", 100)) ids.push_back(scan.id);
+    for (const Scan& scan : appliance_->store()->scans.List("", 100)) ids.push_back(scan.id);
     std::sort(ids.begin(), ids.end());
     return ids;
   }
@@ -130,17 +130,17 @@ TEST_F(ApplianceUpkeepTest, ABackupFromThePageEndsTheWarningOfAFailedOne) {
   Play([&] {
     ASSERT_TRUE(Comes([&] { return Warns("The last backup failed: "); }));
     const auto press = [&] {
-      const auto made = std::make_shared<std::promise<web::Change>>();
+      const auto made = std::make_shared<std::promise<Change>>();
       On([&] {
         services_->services().maintenance.MakeBackup(
-            kTester, [made](const web::Change& change) { made->set_value(change); });
+            kTester, [made](const Change& change) { made->set_value(change); });
       });
       return made->get_future().get();
     };
-    EXPECT_EQ(press().result, web::ChangeResult::kFailed);
+    EXPECT_EQ(press().result, ChangeResult::kFailed);
     fs::remove(folder_ / "disk");
     fs::create_directory(folder_ / "disk");
-    EXPECT_EQ(press().result, web::ChangeResult::kDone);
+    EXPECT_EQ(press().result, ChangeResult::kDone);
     On([&] {
       ASSERT_EQ(Backups().size(), 1U);
       EXPECT_EQ(Backups()[0].user, kTester.user);

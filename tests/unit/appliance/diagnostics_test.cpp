@@ -22,13 +22,13 @@ TEST(DiagnosticsTest, HoldHowTheApplianceDoesAndNothingOfPatientsOrAccounts) {
                                    {"vertical_mm", 8.57},
                                    {"reasons", {"the left arm moved"}},
                                    {"frames", 301}}}};
-  web::AuditEntry entry;
+  AuditEntry entry;
   entry.number = 12;
   entry.user = "anna";
   entry.action = "patient.add";
   entry.subject = "PAT-0042";
   entry.detail = "left breast";
-  web::Health health;
+  Health health;
   health.ok = false;
   health.reason = "the disk is full";
   const std::string text = DiagnosticsText(status, health, "turns 5", {entry});
@@ -50,7 +50,7 @@ TEST(DiagnosticsTest, FreeTextsSayWhatIsWrongWithoutNumbersAndPaths) {
       "the scan failed: the patient's reference cannot be used: scene/cloud.ply is missing in "
       "/srv/anna-miller/scans/000778; put a backup of the scan's files in their place";
   const std::string backup = "The last backup failed: cannot write /mnt/p4711/plumb-5/plumb.db";
-  web::Health health;
+  Health health;
   health.ok = false;
   health.reason = "storage: " + missing;
   const std::string text = DiagnosticsText({{"state", "fault"},

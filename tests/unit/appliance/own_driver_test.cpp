@@ -207,12 +207,12 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReferenceAndItsNoiseWithTh
     return does;
   };
   const auto has_ended = [&] {
-    const web::ApplianceState phase = appliance.state().phase;
-    return phase == web::ApplianceState::kWorking || phase == web::ApplianceState::kResult;
+    const ApplianceState phase = appliance.state().phase;
+    return phase == ApplianceState::kWorking || phase == ApplianceState::kResult;
   };
   nlohmann::json status;
   std::jthread person([&] {
-    EXPECT_TRUE(becomes([&] { return appliance.state().phase == web::ApplianceState::kReady; }));
+    EXPECT_TRUE(becomes([&] { return appliance.state().phase == ApplianceState::kReady; }));
     on_loop([&] { EXPECT_EQ(appliance.StartSweep({.user = "tester", .address = {}}), ""); });
     // If frames are processed slowly, as under a sanitizer, the sweep may end by itself first.
     EXPECT_TRUE(becomes([&] {
@@ -223,7 +223,7 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReferenceAndItsNoiseWithTh
       if (has_ended()) return;
       EXPECT_EQ(appliance.EndSweep({.user = "tester", .address = {}}), "");
     });
-    EXPECT_TRUE(becomes([&] { return appliance.state().phase == web::ApplianceState::kResult; }));
+    EXPECT_TRUE(becomes([&] { return appliance.state().phase == ApplianceState::kResult; }));
     on_loop([&] { status = appliance.StatusJson(); });
     loop.Quit(0);
   });

@@ -16,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 using testing::MessageOf;
 
-web::ReferencePlan UnlikeTheDefaults() {
+ReferencePlan UnlikeTheDefaults() {
   return {.region_m = {{0.11, 0.12}, {0.51, 0.13}, {0.52, 0.43}, {0.14, 0.44}},
           .isocentre_m = {{0.31, -0.22, 0.07}},
           .tolerance = {.shift_mm = 7.5, .rotation_deg = 2.25},
@@ -45,7 +45,7 @@ CompareOptions UnlikeThePlan() {
 }
 
 TEST(PlanOptionsTest, EveryFieldOfThePlanReachesTheComparison) {
-  web::ReferencePlan plan = UnlikeTheDefaults();
+  ReferencePlan plan = UnlikeTheDefaults();
   // A field that is added to the plan does not compile here until it has a line below.
   const auto& [region_m, isocentre_m, tolerance, posture, couch_markers] = plan;
   const auto& [shift_mm, rotation_deg] = tolerance;
@@ -79,7 +79,7 @@ TEST(PlanOptionsTest, WhatIsTheRoomsStaysAsConfigured) {
 }
 
 TEST(PlanOptionsTest, WhatThePlanLeavesOpenIsNotFilledFromTheRoom) {
-  const CompareOptions options = CompareOptionsFor(web::ReferencePlan{}, UnlikeThePlan());
+  const CompareOptions options = CompareOptionsFor(ReferencePlan{}, UnlikeThePlan());
   EXPECT_TRUE(options.region_polygon_m.empty());
   EXPECT_FALSE(options.isocentre_m);
   EXPECT_EQ(options.marker_kind, MarkerKind::kRoom);
@@ -108,8 +108,8 @@ TEST(PlanOptionsTest, EachPostureIsItsOwn) {
 }
 
 TEST(PlanOptionsTest, APlanThatMakesNoSenseIsRefusedWithItsField) {
-  const auto complaint = [](const std::function<void(web::ReferencePlan&)>& spoil) {
-    web::ReferencePlan plan = UnlikeTheDefaults();
+  const auto complaint = [](const std::function<void(ReferencePlan&)>& spoil) {
+    ReferencePlan plan = UnlikeTheDefaults();
     spoil(plan);
     return MessageOf<DataError>([&] { (void)CompareOptionsFor(plan, {}); });
   };

@@ -138,7 +138,7 @@ TEST_F(ProvisioningTest, ADisplayIsKeptByNameAndHashForTheOwnerAloneAndItsKeyIsN
   EXPECT_EQ(Read(DisplayWithKey(kKey + "\r\n")).display->token_hash, given.display->token_hash);
   EXPECT_FALSE(ProvisionedDisplay(folder_ / "state"));
   Apply(given);
-  const std::optional<web::Display> kept = ProvisionedDisplay(folder_ / "state");
+  const std::optional<Display> kept = ProvisionedDisplay(folder_ / "state");
   ASSERT_TRUE(kept);
   EXPECT_EQ(kept->name, "Room 1");
   EXPECT_EQ(kept->token_hash, given.display->token_hash);

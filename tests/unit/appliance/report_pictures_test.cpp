@@ -126,7 +126,7 @@ TEST_F(ReportPicturesTest, AreLeftOutWhereAFileIsMissingOrOfAnotherSize) {
 TEST_F(ReportPicturesTest, OfAReferenceShowTheRegionAndTheIsocentre) {
   const PictureWords& words = WordsOf(Language::kSpanish).pictures;
   const SideWords& sides = WordsOf(Language::kSpanish).sides;
-  web::ReferencePlan plan;
+  ReferencePlan plan;
   const std::vector<cv::Mat> whole = ReferencePictures(reference_, plan, {}, words, sides).pictures;
   ASSERT_THAT(whole, SizeIs(1));
   plan.region_m = {{-0.2, -0.1}, {0.2, -0.1}, {0.2, 0.15}, {-0.2, 0.15}};

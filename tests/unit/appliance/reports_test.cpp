@@ -16,21 +16,21 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
-using web::DailyCheck;
 using web::Language;
 
-const web::Actor kAnna{.user = "anna", .address = {}};
-const web::Actor kBob{.user = "bob", .address = {}};
-const web::Actor kClara{.user = "clara", .address = {}};
+const Actor kAnna{.user = "anna", .address = {}};
+const Actor kBob{.user = "bob", .address = {}};
+const Actor kClara{.user = "clara", .address = {}};
 
 class ReportsTest : public ::testing::Test {
  protected:
-  std::string Scan(const std::string& reference, const std::string& result, DailyCheck check = {},
-                   std::optional<double> sensor_on_s = {}, const std::string& result_file = {}) {
+  std::string AddScan(const std::string& reference, const std::string& result,
+                      DailyCheck check = {}, std::optional<double> sensor_on_s = {},
+                      const std::string& result_file = {}) {
     const std::string id = store_.scans.Begin(
         {.patient_id = patient_,
          .reference_id = reference,
-         .purpose = reference.empty() ? web::ScanPurpose::kReference : web::ScanPurpose::kFraction,
+         .purpose = reference.empty() ? ScanPurpose::kReference : ScanPurpose::kFraction,
          .sensor_serial = "S1",
          .reason = "",
          .sensor_on_s = sensor_on_s,
@@ -42,13 +42,12 @@ class ReportsTest : public ::testing::Test {
       std::filesystem::create_directories(store_.folders.Staging(id) / "result");
       WriteWholeFile(store_.folders.Staging(id) / "result/result.json", result_file);
     }
-    store_.scans.Finish(id,
-                        {.outcome = web::ScanOutcome::kDone, .failure = "", .result_json = result});
+    store_.scans.Finish(id, {.outcome = ScanOutcome::kDone, .failure = "", .result_json = result});
     return id;
   }
   std::string Approved() {
-    const std::string id = store_.references.Add(kAnna, Scan("", ""), "first", {});
-    web::ReferencePlan plan;
+    const std::string id = store_.references.Add(kAnna, AddScan("", ""), "first", {});
+    ReferencePlan plan;
     plan.region_m = {{0, 0}, {0.5, 0}, {0.5, 0.4}, {0, 0.4}};
     plan.isocentre_m = {{0.45, 0.35, 0.12}};
     plan.tolerance = {.shift_mm = 2.5, .rotation_deg = 1};
@@ -86,8 +85,8 @@ TEST_F(ReportsTest, AReasonThatIsNoUtf8EndsNoReport) {
   const auto report_of_failure = [&](const std::string& reason) {
     const std::string id = store_.scans.Begin(
         {.patient_id = patient_, .reference_id = {}, .sensor_serial = "S1", .reason = ""});
-    store_.scans.Finish(
-        id, {.outcome = web::ScanOutcome::kFailed, .failure = reason, .result_json = {}});
+    store_.scans.Finish(id,
+                        {.outcome = ScanOutcome::kFailed, .failure = reason, .result_json = {}});
     return ScanReportPdf(sources_, *store_.scans.Find(id), Language::kEnglish).size();
   };
   const std::size_t usual = report_of_failure("cannot write /data/senal: no space");
@@ -98,8 +97,8 @@ TEST_F(ReportsTest, AReasonThatIsNoUtf8EndsNoReport) {
 }
 
 TEST_F(ReportsTest, AScanIsToldInTheLanguageThatIsAskedFor) {
-  const std::string id = Scan(Approved(), kMove, DailyCheck::kOverdue);
-  const web::Scan scan = *store_.scans.Find(id);
+  const std::string id = AddScan(Approved(), kMove, DailyCheck::kOverdue);
+  const Scan scan = *store_.scans.Find(id);
   const ScanReport english = DescribeScan(sources_, scan, Language::kEnglish);
   const ScanReport spanish = DescribeScan(sources_, scan, Language::kSpanish);
   EXPECT_EQ(english.verdict, "MOVE");
@@ -128,7 +127,7 @@ TEST_F(ReportsTest, AScanIsToldInTheLanguageThatIsAskedFor) {
 
 TEST_F(ReportsTest, ASensorThatWasOnForLessThanTheConfiguredTimeIsACaution) {
   const auto cautions = [&](double sensor_on_s) {
-    const std::string id = Scan("", "", DailyCheck::kPassed, sensor_on_s);
+    const std::string id = AddScan("", "", DailyCheck::kPassed, sensor_on_s);
     return DescribeScan(sources_, *store_.scans.Find(id), Language::kEnglish).cautions;
   };
   // 20 min are configured.
@@ -137,9 +136,9 @@ TEST_F(ReportsTest, ASensorThatWasOnForLessThanTheConfiguredTimeIsACaution) {
 }
 
 TEST_F(ReportsTest, EachIgnoredMarkerIsACaution) {
-  const std::string id = Scan(Approved(), kMove, DailyCheck::kPassed, {},
-                              R"({"alignment":{"markers_rejected":{"7":0.0121,"31":0.0306}}})");
-  const web::Scan scan = *store_.scans.Find(id);
+  const std::string id = AddScan(Approved(), kMove, DailyCheck::kPassed, {},
+                                 R"({"alignment":{"markers_rejected":{"7":0.0121,"31":0.0306}}})");
+  const Scan scan = *store_.scans.Find(id);
   EXPECT_THAT(NotesOf(sources_, scan, Language::kEnglish).cautions,
               ::testing::IsSupersetOf({"Marker 7 was ignored: it moved 12 mm.",
                                        "Marker 31 was ignored: it moved 31 mm."}));
@@ -148,9 +147,9 @@ TEST_F(ReportsTest, EachIgnoredMarkerIsACaution) {
 TEST_F(ReportsTest, WithoutAKnownRoomTheNumbersAreNamedAfterThePatientAndNotTheCouch) {
   const auto names_in = [&](const std::string& body, Language language = Language::kEnglish) {
     const std::string id =
-        Scan(Approved(), kMove, DailyCheck::kPassed, {},
-             R"({"motion":{"weak_directions":[{"name":"lateral"}]},"body":)" + body + "}");
-    const web::Scan scan = *store_.scans.Find(id);
+        AddScan(Approved(), kMove, DailyCheck::kPassed, {},
+                R"({"motion":{"weak_directions":[{"name":"lateral"}]},"body":)" + body + "}");
+    const Scan scan = *store_.scans.Find(id);
     const web::ResultNotes notes = NotesOf(sources_, scan, language);
     const ScanReport report = DescribeScan(sources_, scan, language);
     EXPECT_EQ(report.cautions, notes.cautions);
@@ -181,7 +180,7 @@ TEST_F(ReportsTest, WithoutAKnownRoomTheNumbersAreNamedAfterThePatientAndNotTheC
 }
 
 TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {
-  const std::string id = Scan(
+  const std::string id = AddScan(
       Approved(),
       R"({"verdict":"no_answer","reasons":["the current scan covers 81.5 % of the region, at least 90 % are needed; sweep all of it"],
           "correction":{"vertical_mm":-8.04,"longitudinal_mm":0.4,"lateral_mm":0.0,"pitch_deg":0.0,"roll_deg":0.0,"yaw_deg":0.0}})");
@@ -195,7 +194,7 @@ TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {
 }
 
 TEST_F(ReportsTest, AScanForAReferenceNamesThePlanThatWasMadeOfItAndWhoApprovedIt) {
-  const std::string loose = Scan("", "");
+  const std::string loose = AddScan("", "");
   EXPECT_EQ(ValueOf(DescribeScan(sources_, *store_.scans.Find(loose), Language::kEnglish).identity,
                     "Approved by"),
             "nothing");
@@ -206,7 +205,7 @@ TEST_F(ReportsTest, AScanForAReferenceNamesThePlanThatWasMadeOfItAndWhoApprovedI
   EXPECT_THAT(before, Not(HasSubstr("clara")));
   EXPECT_NE(before, "nothing");
   const std::string approved = Approved();
-  const web::Scan scan = *store_.scans.Find(store_.references.Find(approved)->scan_id);
+  const Scan scan = *store_.scans.Find(store_.references.Find(approved)->scan_id);
   const ScanReport report = DescribeScan(sources_, scan, Language::kEnglish);
   EXPECT_THAT(ValueOf(report.identity, "Approved by"), HasSubstr("clara, 20"));
   EXPECT_EQ(ValueOf(report.identity, "Plan"), "head first, supine, markers fixed to the room");
@@ -218,7 +217,7 @@ TEST_F(ReportsTest, AScanForAReferenceNamesThePlanThatWasMadeOfItAndWhoApprovedI
 }
 
 TEST_F(ReportsTest, ThePictureOfAPlanThatNamesSidesAsksWhetherThePatientLiesSo) {
-  const web::Scan scan = *store_.scans.Find(store_.references.Find(Approved())->scan_id);
+  const Scan scan = *store_.scans.Find(store_.references.Find(Approved())->scan_id);
   WriteScene(test::MakeSyntheticScene({}), scan.folder / "scene");
   const ScanReport unknown = DescribeScan(sources_, scan, Language::kEnglish);
   EXPECT_THAT(unknown.pictures, SizeIs(1));
@@ -235,7 +234,7 @@ TEST_F(ReportsTest, ThePictureOfAPlanThatNamesSidesAsksWhetherThePatientLiesSo) 
 }
 
 TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
-  const std::string id = Scan(Approved(), kMove);
+  const std::string id = AddScan(Approved(), kMove);
   store_.scans.Accept(kAnna, id, "the arm cannot be moved");
   const CourseReport course =
       DescribeCourse(sources_, *store_.patients.Find(patient_), Language::kSpanish);
@@ -248,7 +247,7 @@ TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
   EXPECT_EQ(course.rows[1].values[0]->u95, 1.06);
   std::string unsure = kMove;
   unsure.replace(unsure.find("move"), 4, "unsure");
-  const std::string unsure_id = Scan(Approved(), unsure);
+  const std::string unsure_id = AddScan(Approved(), unsure);
   store_.scans.Accept(kAnna, unsure_id, "as yesterday");
   EXPECT_THAT(DescribeCourse(sources_, *store_.patients.Find(patient_), Language::kEnglish)
                   .rows.back()
@@ -256,7 +255,7 @@ TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
               HasSubstr("although not surely within tolerance by anna"));
   EXPECT_THAT(ValueOf(course.identity, "Aprobado por"), HasSubstr("clara"));
   EXPECT_EQ(ValueOf(course.identity, "** Control diario"), "nothing");
-  const std::string failed = Scan("", "", DailyCheck::kFailed);
+  const std::string failed = AddScan("", "", DailyCheck::kFailed);
   EXPECT_THAT(DescribeScan(sources_, *store_.scans.Find(failed), Language::kEnglish).cautions,
               ::testing::Contains("The daily check had failed before this scan."));
   const CourseReport marked =

@@ -13,8 +13,6 @@ namespace {
 using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
-using web::ApplianceState;
-using web::FaultKind;
 using enum ApplianceState;
 using E = ScanEvent;
 using A = ScanAction;

@@ -8,8 +8,6 @@
 namespace plumb {
 namespace {
 
-using web::SweepAdvice;
-
 constexpr Intrinsics kCamera{
     .width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 159.5, .cy = 119.5};
 constexpr double kFrame_s = 1.0 / 30;

@@ -147,7 +147,7 @@ TEST_F(BackupArchiveTest, WhatIsRestoredIsByteIdentical) {
   EXPECT_EQ(report.bytes, made.bytes);
   EXPECT_EQ(FilesOf(restored()), before);
   Store store(restored());
-  for (const web::Scan& scan : store.scans.List(patient_, 100))
+  for (const Scan& scan : store.scans.List(patient_, 100))
     EXPECT_EQ(store.integrity.Check(scan.id, false), "");
   ASSERT_EQ(store.audit.Find({0, 10, "backup.restore"}).size(), 1U);
   EXPECT_THAT(store.audit.Find({0, 10, "backup.restore"})[0].detail,

@@ -78,7 +78,7 @@ TEST_F(BackupTest, WhatIsRestoredIsByteIdentical) {
   Store store(restored());
   EXPECT_EQ(store.recovery().lost_scans + store.recovery().foreign_folders, 0);
   EXPECT_EQ(store.references.Approved(patient_)->scan_id, reference_);
-  for (const web::Scan& scan : store.scans.List(patient_, 100))
+  for (const Scan& scan : store.scans.List(patient_, 100))
     EXPECT_EQ(store.integrity.Check(scan.id, false), "");
   EXPECT_EQ(store.audit.FirstBroken(), std::nullopt);
 }
@@ -95,8 +95,8 @@ TEST_F(BackupTest, IsMadeWhileScansGoOnAndHoldsOneMoment) {
     EXPECT_EQ(RestoreBackup(backup(), target).scans, made.scans);
     Store copy(target);
     EXPECT_EQ(copy.recovery().lost_scans + copy.recovery().foreign_folders, 0);
-    for (const web::Scan& scan : copy.scans.List(patient_, 1000)) {
-      if (scan.outcome != web::ScanOutcome::kDone) continue;
+    for (const Scan& scan : copy.scans.List(patient_, 1000)) {
+      if (scan.outcome != ScanOutcome::kDone) continue;
       EXPECT_EQ(copy.integrity.Check(scan.id, false), "") << scan.id;
     }
   }

@@ -16,7 +16,6 @@ using ::testing::HasSubstr;
 using testing::kAnna;
 using testing::MessageOf;
 using ::testing::SizeIs;
-using web::FactoryReset;
 
 class FactoryResetTest : public testing::StoreTest {
  protected:
@@ -32,14 +31,14 @@ class FactoryResetTest : public testing::StoreTest {
   std::string Use() {
     const auto store = Open();
     store->users.Add(kAnna, {.name = "anna",
-                             .role = web::Role::kEngineer,
+                             .role = Role::kEngineer,
                              .password_hash = "h",
                              .disabled = false,
                              .created_at = {}});
     (void)store->displays.Add(
         kAnna,
         {.id = {}, .name = "wall", .token_hash = "token", .paired_at = {}, .paired_by = "anna"});
-    web::Settings settings;
+    Settings settings;
     settings.idle_logout_min = 99;
     store->settings.Change(kAnna, settings);
     const std::string patient = store->patients.Add(kAnna, "P-1", "thorax");
@@ -65,7 +64,7 @@ TEST_F(FactoryResetTest, KeepingTheRecordsRemovesPeopleSettingsAndKeys) {
   const auto store = Open();
   EXPECT_THAT(store->users.List(), SizeIs(0));
   EXPECT_THAT(store->displays.List(), SizeIs(0));
-  EXPECT_EQ(store->settings.Get().idle_logout_min, web::Settings{}.idle_logout_min);
+  EXPECT_EQ(store->settings.Get().idle_logout_min, Settings{}.idle_logout_min);
   EXPECT_TRUE(store->patients.Find(patient));
   EXPECT_TRUE(fs::exists(store->folders.Scan(scan_) / "scene" / "scene.json"));
   EXPECT_EQ(store->audit.Find({0, 1, "system."}).at(0).user, kAnna.user);

@@ -86,7 +86,7 @@ class FailingDiskTest : public ::testing::Test {
     for (const std::string& scan : finished) {
       const auto found = store.scans.Find(scan);
       ASSERT_TRUE(found) << scan;
-      EXPECT_EQ(found->outcome, web::ScanOutcome::kDone);
+      EXPECT_EQ(found->outcome, ScanOutcome::kDone);
       EXPECT_EQ(found->failure, "");
       EXPECT_EQ(store.integrity.Check(scan, false), "");
     }
@@ -334,7 +334,7 @@ TEST(DamagedDatabaseTest, IsOpenedOrRefusedAndNoScanIsDeleted) {
       Store store(state);
       ++opened;
       try {
-        for (const web::Patient& patient : store.patients.List()) {
+        for (const Patient& patient : store.patients.List()) {
           (void)store.references.List(patient.id);
           (void)store.scans.List(patient.id, 100);
           (void)store.references.Approved(patient.id);

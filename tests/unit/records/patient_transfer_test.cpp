@@ -38,17 +38,17 @@ class PatientTransferTest : public ::testing::Test {
     const std::string other = store.patients.Add(kAnna, "OTHER", "");
     (void)StoreScan(store, other);
     patient_ = store.patients.Add(kAnna, "P-7", "thorax");
-    const std::string session = store.treatments.Open(kAnna, patient_, web::ScanPurpose::kFraction);
+    const std::string session = store.treatments.Open(kAnna, patient_, ScanPurpose::kFraction);
     reference_ = StoreScan(store, patient_);
     const std::string draft = store.references.Add(kAnna, reference_, "first", plan_);
     (void)PlanAndApprove(store, draft);
     NewScan begun = testing::Begun(patient_);
     begun.reference_id = draft;
     begun.session_id = session;
-    begun.purpose = web::ScanPurpose::kFraction;
+    begun.purpose = ScanPurpose::kFraction;
     scan_ = store.scans.Begin(begun);
     testing::FillScan(store.folders.Staging(scan_));
-    store.scans.Finish(scan_, {.outcome = web::ScanOutcome::kDone,
+    store.scans.Finish(scan_, {.outcome = ScanOutcome::kDone,
                                .failure = {},
                                .result_json = R"({"verdict":"in_tolerance"})",
                                .swept_area_m2 = 0.5});
@@ -57,7 +57,7 @@ class PatientTransferTest : public ::testing::Test {
     store.scans.Accept(kAnna, scan_);
     const std::string failed = store.scans.Begin(testing::Begun(patient_));
     store.scans.Finish(
-        failed, {.outcome = web::ScanOutcome::kFailed, .failure = "no marker", .result_json = {}});
+        failed, {.outcome = ScanOutcome::kFailed, .failure = "no marker", .result_json = {}});
     store.treatments.CloseAll(kAnna);
     Store there(this->there());
     for (const char* code : {"A", "B", "C"}) (void)there.patients.Add(kAnna, code, "");
@@ -101,8 +101,8 @@ class PatientTransferTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  const web::ReferencePlan plan_ = [] {
-    web::ReferencePlan plan;
+  const ReferencePlan plan_ = [] {
+    ReferencePlan plan;
     plan.region_m = {{0.1, 0.2}, {0.3, 0.2}, {0.3, 0.5}};
     return plan;
   }();
@@ -120,7 +120,7 @@ TEST_F(PatientTransferTest, ComesWithEverythingAndByteIdenticalFiles) {
   EXPECT_FALSE(imported.was_there);
   {
     Store store(here());
-    const web::AuditEntry entry = store.audit.Find({0, 1}).at(0);
+    const AuditEntry entry = store.audit.Find({0, 1}).at(0);
     EXPECT_EQ(entry.user + " " + entry.action + " " + entry.subject,
               "command line patient.export " + patient_);
     EXPECT_EQ(entry.detail, "P-7 to " + out().string() + ": 3 scans, 1 references, 0 problems");

@@ -14,8 +14,8 @@
 
 namespace plumb::testing {
 
-inline const web::Actor kAnna{.user = "anna", .address = "::1"};
-inline const web::Actor kBert{.user = "bert", .address = "::1"};
+inline const Actor kAnna{.user = "anna", .address = "::1"};
+inline const Actor kBert{.user = "bert", .address = "::1"};
 
 /// What a compared scan leaves.
 inline constexpr const char* kScanFiles[] = {
@@ -43,7 +43,7 @@ inline std::string StoreScan(
     const std::function<void(const std::filesystem::path&)>& fill = FillScan) {
   const std::string id = store.scans.Begin(Begun(patient));
   fill(store.folders.Staging(id));
-  store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
+  store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
                           .failure = {},
                           .result_json = R"({"verdict":"in_tolerance"})",
                           .swept_area_m2 = 1.0});

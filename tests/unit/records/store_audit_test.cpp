@@ -23,7 +23,7 @@ TEST_F(StoreTest, TheLogNamesWhatPeopleKnow) {
   EXPECT_EQ(About(*store, "patient.add"), "patient P-2 0");
   const std::string reference = ApprovedReference(*store, patient);
   EXPECT_EQ(About(*store, "reference.approve"), "reference P-2 1");
-  const std::string session = store->treatments.Open(kAnna, patient, web::ScanPurpose::kFraction);
+  const std::string session = store->treatments.Open(kAnna, patient, ScanPurpose::kFraction);
   EXPECT_EQ(About(*store, "session.open"), "session P-2 1");
   for (const char* action : {"scan.start", "scan.end", "cancel"}) {
     store->audit.Log(kBert, action, session, "fraction");
@@ -49,21 +49,20 @@ TEST_F(StoreTest, TheLogNamesWhatPeopleKnow) {
   store->removal.RemoveScan(kBert, unassigned, "by mistake");
   EXPECT_EQ(About(*store, "scan.remove"), "scan gone  0");
 
-  web::Display screen;
+  Display screen;
   screen.name = "couch side";
   screen.token_hash = "a";
   const std::string display = store->displays.Add(kAnna, screen);
   EXPECT_EQ(About(*store, "display.pair"), "its own name: couch side");
   store->displays.Remove(kAnna, display);
   EXPECT_EQ(About(*store, "display.remove"), "its own name: couch side");
-  EXPECT_EQ(RefusalOf([&] { store->displays.Remove(kAnna, display); }),
-            web::ChangeResult::kNotFound);
+  EXPECT_EQ(RefusalOf([&] { store->displays.Remove(kAnna, display); }), ChangeResult::kNotFound);
 }
 
 TEST_F(StoreTest, TheLogKeepsNoCodeOfAPatientWhoseDataWasDeleted) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "P-2", "");
-  store->treatments.Open(kAnna, patient, web::ScanPurpose::kReference);
+  store->treatments.Open(kAnna, patient, ScanPurpose::kReference);
   store->treatments.CloseAll(kAnna);
   store->removal.WipePatient(kBert, patient);
   for (const char* action : {"patient.add", "patient.wipe"})

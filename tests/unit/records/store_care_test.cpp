@@ -21,7 +21,6 @@ using testing::kAnna;
 using testing::kBert;
 using testing::MessageOf;
 using testing::StoreScan;
-using web::ChangeResult;
 
 class StoreCareTest : public ::testing::Test {
  protected:
@@ -59,17 +58,16 @@ TEST_F(StoreCareTest, AScanIsRemovedForAReasonAndAReferenceIsNot) {
   EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kDone);
   EXPECT_FALSE(store_->scans.Find(scan));
   EXPECT_FALSE(fs::exists(store_->folders.Scan(scan)));
-  const web::AuditEntry logged = store_->audit.Find({0, 1}).at(0);
+  const AuditEntry logged = store_->audit.Find({0, 1}).at(0);
   EXPECT_EQ(logged.user + " " + logged.action + " " + logged.subject + ": " + logged.detail,
             "bert scan.remove " + scan + ": blurred");
   EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kNotFound);
 }
 
-class FailedSweepTest : public StoreCareTest,
-                        public ::testing::WithParamInterface<web::ScanOutcome> {};
+class FailedSweepTest : public StoreCareTest, public ::testing::WithParamInterface<ScanOutcome> {};
 
 TEST_P(FailedSweepTest, KeepsACompleteRecordingOfOneThatFailed) {
-  const bool is_kept = GetParam() == web::ScanOutcome::kFailed;
+  const bool is_kept = GetParam() == ScanOutcome::kFailed;
   for (const bool is_complete : {true, false}) {
     const std::string id = store_->scans.Begin(testing::Begun(patient_));
     testing::FillScan(store_->folders.Staging(id));
@@ -96,8 +94,7 @@ TEST_P(FailedSweepTest, KeepsACompleteRecordingOfOneThatFailed) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Outcomes, FailedSweepTest,
-                         ::testing::Values(web::ScanOutcome::kFailed,
-                                           web::ScanOutcome::kCancelled));
+                         ::testing::Values(ScanOutcome::kFailed, ScanOutcome::kCancelled));
 
 TEST_F(StoreCareTest, ADatabaseThatAnotherHoldsIsWaitedForWithinTheLimit) {
   store_.reset();
@@ -159,13 +156,13 @@ TEST_F(StoreCareTest, EveryFieldOfAPlanComesBackAsItWasStored) {
   const std::string scan = StoreScan(*store_, patient_);
   for (const char* posture : {"HFP", "FFS", "FFP", "HFS"}) {
     for (const bool couch_markers : {true, false}) {
-      const web::ReferencePlan plan{.region_m = {{0.25, -0.5}, {1.5, 0.75}, {-1, 2}},
-                                    .isocentre_m = {{0.125, -0.25, 0.5}},
-                                    .tolerance = {.shift_mm = 7.5, .rotation_deg = 2.25},
-                                    .posture = posture,
-                                    .couch_markers = couch_markers};
+      const ReferencePlan plan{.region_m = {{0.25, -0.5}, {1.5, 0.75}, {-1, 2}},
+                               .isocentre_m = {{0.125, -0.25, 0.5}},
+                               .tolerance = {.shift_mm = 7.5, .rotation_deg = 2.25},
+                               .posture = posture,
+                               .couch_markers = couch_markers};
       const std::string id = store_->references.Add(kAnna, scan, "", plan);
-      const web::ReferencePlan stored = store_->references.Find(id)->plan;
+      const ReferencePlan stored = store_->references.Find(id)->plan;
       EXPECT_EQ(stored.region_m, plan.region_m);
       EXPECT_EQ(stored.isocentre_m, plan.isocentre_m);
       EXPECT_EQ(stored.tolerance.shift_mm, 7.5);
@@ -180,7 +177,7 @@ TEST_F(StoreCareTest, AStoredPlanThatCannotBeReadIsAnErrorAndNoDefault) {
   const std::string scan = StoreScan(*store_, patient_);
   const std::string id = store_->references.Add(kAnna, scan, "", {});
   const std::string good = PlanJson({});
-  EXPECT_EQ(ParsePlan(good).tolerance.shift_mm, web::ReferencePlan{}.tolerance.shift_mm);
+  EXPECT_EQ(ParsePlan(good).tolerance.shift_mm, ReferencePlan{}.tolerance.shift_mm);
   for (
       const char* bad :
       {"", "null", "[]", "{", "{}",
@@ -204,7 +201,7 @@ TEST_F(StoreCareTest, AStoredPlanThatCannotBeReadIsAnErrorAndNoDefault) {
 }
 
 TEST_F(StoreCareTest, StoredSettingsThatCannotBeReadAreAnErrorAndOlderOnesAreNot) {
-  web::Settings settings;
+  Settings settings;
   settings.retention_days = 7;
   store_->settings.Change(kAnna, settings);
   const std::string good = SettingsJson(settings);
@@ -223,13 +220,13 @@ TEST_F(StoreCareTest, StoredSettingsThatCannotBeReadAreAnErrorAndOlderOnesAreNot
   store(
       R"({"shift_tolerance_mm":4,"rotation_tolerance_deg":1,"posture":"FFS","couch_markers":true})");
   EXPECT_EQ(store_->settings.Get().tolerance.shift_mm, 4);
-  EXPECT_EQ(store_->settings.Get().idle_logout_min, web::Settings{}.idle_logout_min);
+  EXPECT_EQ(store_->settings.Get().idle_logout_min, Settings{}.idle_logout_min);
   store(good);
   EXPECT_EQ(store_->settings.Get().retention_days, 7);
 }
 
 TEST_F(StoreCareTest, TheLogTellsWhichSettingsWereChangedBeforeAndAfter) {
-  web::Settings settings;
+  Settings settings;
   store_->settings.Change(kAnna, settings);
   settings.retention_days = 7;
   settings.posture = "FFS";
@@ -248,7 +245,7 @@ TEST_F(StoreCareTest, AStoredResultThatCannotBeReadIsAnErrorAndMissingNumbersAre
   const auto with = [](const std::string& correction) {
     return R"({"verdict":"move","correction":)" + correction + "}";
   };
-  const web::ResultSummary couch = SummaryOf(with("{\"vertical_mm\":null," + angles + "}"));
+  const ResultSummary couch = SummaryOf(with("{\"vertical_mm\":null," + angles + "}"));
   EXPECT_EQ(couch.correction->vertical_mm, std::nullopt) << "markers on the couch show no shift";
   EXPECT_EQ(couch.correction->yaw_deg, 3.0);
   EXPECT_FALSE(couch.u95);
@@ -268,7 +265,7 @@ TEST_F(StoreCareTest, AStoredResultThatCannotBeReadIsAnErrorAndMissingNumbersAre
 
 TEST_F(StoreCareTest, AStoredNameThatIsNoneOfOursIsAnErrorAndAnAccountOfSuchARoleIsClosed) {
   store_->users.Add(kAnna, {.name = "erik",
-                            .role = web::Role::kEngineer,
+                            .role = Role::kEngineer,
                             .password_hash = "x",
                             .disabled = false,
                             .created_at = {}});
@@ -291,7 +288,7 @@ TEST_F(StoreCareTest, APlanThatCannotBeReadHidesNoOtherOfThePatient) {
   store_.reset();
   Execute("UPDATE refs SET plan = '{' WHERE id = " + second);
   store_ = std::make_unique<Store>(state());
-  const std::vector<web::Reference> references = store_->references.List(patient_);
+  const std::vector<Reference> references = store_->references.List(patient_);
   ASSERT_EQ(references.size(), 2U);
   EXPECT_EQ(references[0].id, second);
   EXPECT_THAT(references[0].unreadable, HasSubstr("cannot be read"));
@@ -308,14 +305,14 @@ TEST_F(StoreCareTest, AScanThatCannotBeReadHidesNoOtherOfThePatient) {
       "UPDATE scans SET purpose = 'other' WHERE id = 3; UPDATE scans SET outcome = 'other', "
       "started_at = 9000000000000000000 WHERE id = 4");
   for (const std::string& of : {patient_, std::string()}) {
-    const std::vector<web::Scan> listed = store_->scans.List(of, 10);
+    const std::vector<Scan> listed = store_->scans.List(of, 10);
     ASSERT_EQ(listed.size(), 4U);
     EXPECT_EQ(listed[3].id, scans[0]);
     EXPECT_TRUE(listed[3].result);
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(listed[i].id, scans[3 - i]);
       EXPECT_EQ(listed[i].patient_id, patient_);
-      EXPECT_EQ(listed[i].outcome, web::ScanOutcome::kFailed);
+      EXPECT_EQ(listed[i].outcome, ScanOutcome::kFailed);
       EXPECT_FALSE(listed[i].result);
       EXPECT_THAT(listed[i].failure, HasSubstr("stored"));
       EXPECT_THROW((void)store_->scans.Find(listed[i].id), DataError) << "never acted on";
@@ -327,7 +324,7 @@ TEST_F(StoreCareTest, AScanThatCannotBeReadHidesNoOtherOfThePatient) {
 TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
   for (const char* bad : {"", "[]", "{}", R"({"status":1})", R"({"status":"passed","items":[1]})",
                           R"({"status":"passed","reasons":7})"}) {
-    const web::CheckRecord record = CheckIn(bad);
+    const CheckRecord record = CheckIn(bad);
     EXPECT_EQ(record.status, "failed") << bad;
     EXPECT_THAT(record.reasons, ::testing::ElementsAre(HasSubstr("cannot be read"))) << bad;
   }

@@ -13,8 +13,6 @@ using testing::kAnna;
 using testing::kBert;
 using ::testing::SizeIs;
 using testing::StoreTest;
-using web::ChangeResult;
-using web::DailyCheck;
 
 /// What a check that ended in `status` stores after seeing the markers 1 to n in a row.
 TakenCheck CheckWith(int n, MarkerCheckStatus status) {
@@ -36,12 +34,12 @@ TEST_F(StoreTest, ACheckWithAStampOfTheFutureCountsForNoDay) {
       .Execute(
           "INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (9000000000000000, "
           "'anna', 'S1', 'passed', '{}')");
-  EXPECT_EQ(store->checks.StateSince(web::WallClock::now()), DailyCheck::kOverdue);
+  EXPECT_EQ(store->checks.StateSince(WallClock::now()), DailyCheck::kOverdue);
 }
 
 TEST_F(StoreTest, TheNewestCheckOfTheDayAndSensorDecides) {
   const auto store = Open();
-  const auto since = web::WallClock::now() - std::chrono::seconds(1);
+  const auto since = WallClock::now() - std::chrono::seconds(1);
   const auto add = [&](const char* serial, MarkerCheckStatus status) {
     store->checks.Add(kAnna, serial, CheckWith(4, status));
   };
@@ -69,12 +67,12 @@ TEST_F(StoreTest, ACheckOfYesterdayDecidesNothingToday) {
   const auto store = Open();
   const auto at = [&](std::chrono::hours ago, const char* status) {
     const auto time = std::chrono::duration_cast<std::chrono::microseconds>(
-        (web::WallClock::now() - ago).time_since_epoch());
+        (WallClock::now() - ago).time_since_epoch());
     Database(database(), Database::Access::kReadWrite)
         .Execute("INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (" +
                  std::to_string(time.count()) + ", 'anna', 'S1', '" + status + "', '{}')");
   };
-  const auto midnight = web::WallClock::now() - std::chrono::hours(3);
+  const auto midnight = WallClock::now() - std::chrono::hours(3);
   const auto today = [&] { return store->checks.StateSince(midnight, "S1"); };
   at(std::chrono::hours(4), "failed");
   EXPECT_EQ(today(), DailyCheck::kOverdue) << "a failure of yesterday";
@@ -92,9 +90,9 @@ TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) 
                                                .reference_id = "",
                                                .sensor_serial = serial,
                                                .reason = "",
-                                               .daily_check = web::DailyCheck::kOverdue});
+                                               .daily_check = DailyCheck::kOverdue});
     store->scans.Finish(
-        id, {.outcome = web::ScanOutcome::kFailed, .failure = "of this test", .result_json = ""});
+        id, {.outcome = ScanOutcome::kFailed, .failure = "of this test", .result_json = ""});
     return id;
   };
   const std::string early = scan("S1");
@@ -140,7 +138,7 @@ TEST_F(StoreTest, TheFirstCheckAfterAScanRefutesItIfItFailed) {
                                .reference_id = "",
                                .sensor_serial = serial,
                                .reason = "",
-                               .daily_check = web::DailyCheck::kPassed});
+                               .daily_check = DailyCheck::kPassed});
   };
   const auto check = [&](const char* serial, MarkerCheckStatus status) {
     store->checks.Add(kAnna, serial, CheckWith(4, status));
@@ -164,7 +162,7 @@ TEST_F(StoreTest, TheFirstCheckAfterAScanRefutesItIfItFailed) {
 }
 
 TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
-  const auto before = web::WallClock::now() - std::chrono::seconds(1);
+  const auto before = WallClock::now() - std::chrono::seconds(1);
   {
     const auto store = Open();
     EXPECT_FALSE(store->checks.Baseline());
@@ -177,7 +175,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
     store->checks.Add(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kPassed));
   }
   const auto store = Open();
-  const std::vector<web::CheckRecord> checks = store->checks.List(10);
+  const std::vector<CheckRecord> checks = store->checks.List(10);
   ASSERT_THAT(checks, SizeIs(2));
   EXPECT_EQ(checks[0].status, "passed");
   EXPECT_EQ(checks[0].user, "anna");
@@ -188,7 +186,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_EQ(checks[0].items[0].note, "marker 2");
   EXPECT_EQ(checks[1].reasons, std::vector<std::string>{"because"});
   EXPECT_EQ(store->checks.StateSince(before), DailyCheck::kPassed);
-  EXPECT_EQ(store->checks.StateSince(web::WallClock::now() + std::chrono::hours(1)),
+  EXPECT_EQ(store->checks.StateSince(WallClock::now() + std::chrono::hours(1)),
             DailyCheck::kOverdue);
   EXPECT_EQ(store->checks.StateSince(before, "S1"), DailyCheck::kPassed);
   EXPECT_EQ(store->checks.StateSince(before, "S2"), DailyCheck::kOverdue) << "of another unit";
@@ -203,7 +201,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_NEAR(markers->markers.at(3).corners[0].x(), 0.9 - 0.052, 1e-12);
   EXPECT_EQ(markers->markers.at(3).num_views, 9);
   std::vector<std::string> actions;
-  for (const web::AuditEntry& entry : store->audit.Find({0, 10}))
+  for (const AuditEntry& entry : store->audit.Find({0, 10}))
     actions.push_back(entry.user + " " + entry.action + " " + entry.detail);
   EXPECT_THAT(actions,
               ::testing::IsSupersetOf({"anna check.done passed", "anna check.done no_baseline",

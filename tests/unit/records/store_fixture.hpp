@@ -37,7 +37,7 @@ class StoreTest : public ::testing::Test {
                                               .sensor_serial = "S1",
                                               .reason = {}});
     FillStaging(store, id);
-    store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
+    store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
                             .failure = {},
                             .result_json = result,
                             .swept_area_m2 = 2.5});
@@ -48,14 +48,14 @@ class StoreTest : public ::testing::Test {
                                    store.references.Add(kAnna, Scan(store, patient), "first", {}));
   }
   template <typename Call>
-  static web::ChangeResult RefusalOf(const Call& call) {
+  static ChangeResult RefusalOf(const Call& call) {
     try {
       call();
     } catch (const StoreRefusal& refusal) {
       EXPECT_STRNE(refusal.what(), "");
       return refusal.result();
     }
-    return web::ChangeResult::kDone;
+    return ChangeResult::kDone;
   }
   [[nodiscard]] std::filesystem::path database() const { return folder_ / "state" / "plumb.db"; }
 

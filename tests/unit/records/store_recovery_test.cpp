@@ -46,7 +46,7 @@ class StoreRecoveryTest : public ::testing::Test {
   }
   static std::vector<std::string> Actions(Store& store) {
     std::vector<std::string> actions;
-    for (const web::AuditEntry& entry : store.audit.Find({0, 1000}))
+    for (const AuditEntry& entry : store.audit.Find({0, 1000}))
       actions.push_back(entry.action + " " + entry.subject + ": " + entry.detail);
     return actions;
   }
@@ -128,7 +128,7 @@ TEST_F(StoreRecoveryTest, NoDamageToAFileOfAScanMakesAStartDeleteAnything) {
           ASSERT_TRUE(scan);
           EXPECT_TRUE(scan->folder.empty()) << "what cannot be seen whole is not shown";
           EXPECT_THAT(scan->failure, HasSubstr(file));
-          EXPECT_EQ(scan->outcome, web::ScanOutcome::kDone);
+          EXPECT_EQ(scan->outcome, ScanOutcome::kDone);
           EXPECT_TRUE(scan->result) << "its numbers are in the database";
           EXPECT_THAT(Actions(store), Contains(StartsWith("scan.unavailable " + damaged.hit)));
           if (start == 0 && damage == Damage::kAbsentOnce) break;
@@ -180,7 +180,7 @@ TEST_F(StoreRecoveryTest, NoDamageToAFileOfAStagingFolderHoldsItBack) {
       EXPECT_EQ(store.recovery().orphaned_folders, 1);
       EXPECT_EQ(store.recovery().lost_scans, 0);
       EXPECT_FALSE(fs::exists(store.folders.Staging(id)));
-      EXPECT_EQ(store.scans.Find(id)->outcome, web::ScanOutcome::kFailed);
+      EXPECT_EQ(store.scans.Find(id)->outcome, ScanOutcome::kFailed);
       EXPECT_FALSE(store.scans.Find(done)->folder.empty());
       EXPECT_THAT(Actions(store), Contains(StartsWith("folder.remove .staging-" + id)));
       ++rounds;
@@ -284,7 +284,7 @@ TEST_F(StoreRecoveryTest, WithoutTheFolderOfScansItIsSafeModeAndNothingIsChanged
     EXPECT_FALSE(fs::exists(state() / "scans"));
     const auto readable = Store::OpenReadable(state());
     EXPECT_EQ(Actions(*readable).size(), entries);
-    EXPECT_EQ(readable->scans.Find("5")->outcome, web::ScanOutcome::kRunning);
+    EXPECT_EQ(readable->scans.Find("5")->outcome, ScanOutcome::kRunning);
   }
   fs::rename(folder_ / "disk", state() / "scans");
   const auto store = Open();
@@ -482,7 +482,7 @@ TEST_F(StoreRecoveryTest, ACompleteFolderOfAScanThatNoRowKnowsToHaveEndedIsSetAs
   EXPECT_EQ(store->recovery().foreign_folders, 1);
   EXPECT_FALSE(fs::exists(store->folders.Scan(id)));
   EXPECT_TRUE(fs::exists(state() / "set-aside" / (id + "-interrupted") / "scene" / "scene.json"));
-  EXPECT_EQ(store->scans.Find(id)->outcome, web::ScanOutcome::kFailed);
+  EXPECT_EQ(store->scans.Find(id)->outcome, ScanOutcome::kFailed);
   // Where scans/ is a disk of its own; or a second one of this number.
   const fs::path on_disk = store->folders.scans() / "set-aside" / (id + "-interrupted-2");
   fs::create_directories(on_disk.parent_path());

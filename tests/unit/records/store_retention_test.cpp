@@ -77,7 +77,7 @@ TEST_F(StoreTest, AScanWhoseRowTheDiskRefusesIsNoneAndLeavesNothing) {
                                                                .reason = {}});
                   FillStaging(*store, scan);
                   const std::string large(400'000, ' ');  // does not fit
-                  EXPECT_THROW(store->scans.Finish(scan, {.outcome = web::ScanOutcome::kDone,
+                  EXPECT_THROW(store->scans.Finish(scan, {.outcome = ScanOutcome::kDone,
                                                           .failure = {},
                                                           .result_json = "{}" + large,
                                                           .swept_area_m2 = 0}),
@@ -99,7 +99,7 @@ TEST_F(StoreTest, AScanThatCouldNotBeEndedHasFailedWhenTheNextBegins) {
       .patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}, .reason = {}};
   const std::string lost = store->scans.Begin(scan);
   (void)store->scans.Begin(scan);
-  EXPECT_EQ(store->scans.Find(lost)->outcome, web::ScanOutcome::kFailed);
+  EXPECT_EQ(store->scans.Find(lost)->outcome, ScanOutcome::kFailed);
 }
 
 TEST_F(StoreTest, TheQuotaTakesRecordingsFirstThenOldScansAndNeverReferences) {

@@ -19,9 +19,8 @@ using ::testing::IsEmpty;
 using testing::MarkersOfRoom;
 using testing::SceneFromRoom;
 using ::testing::SizeIs;
-using web::ChangeResult;
 
-const web::Actor kEve{.user = "eve", .address = "::1"};
+const Actor kEve{.user = "eve", .address = "::1"};
 class StoreRoomTest : public ::testing::Test {
  protected:
   void Scan(double off_m = 0, const std::string& serial = "S1") {
@@ -37,7 +36,7 @@ class StoreRoomTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  web::WallClock::time_point since_ = web::WallClock::now() - std::chrono::hours(1);
+  WallClock::time_point since_ = WallClock::now() - std::chrono::hours(1);
   std::unique_ptr<Store> store_ = std::make_unique<Store>(folder_ / "state");
 };
 
@@ -68,7 +67,7 @@ TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_TRUE(room->fit.T_iec_reference.isApprox(
       Pose(Eigen::Translation3d(-0.0002, 0, 0)) * SceneFromRoom().inverse(), 1e-6));
   std::vector<std::string> lines;
-  for (const web::AuditEntry& entry : store_->audit.Find({0, 10}))
+  for (const AuditEntry& entry : store_->audit.Find({0, 10}))
     lines.push_back(entry.user + " " + entry.action + " " + entry.subject + " " + entry.detail);
   EXPECT_THAT(lines, Contains("eve room.calibrate 1 scans differ by 0.60 mm and 0.00 deg, sha256 " +
                               candidate.digest));
@@ -90,7 +89,7 @@ TEST_F(StoreRoomTest, ScansThatDifferAreNotSigned) {
 TEST_F(StoreRoomTest, OnlyScansOfThisSensorAndTimeCount) {
   Scan(), Scan(), Scan(0, "S2");
   EXPECT_THAT(Candidate().scans, SizeIs(2));
-  EXPECT_THAT(store_->room.Candidate("S1", web::WallClock::now() + std::chrono::hours(1)).scans,
+  EXPECT_THAT(store_->room.Candidate("S1", WallClock::now() + std::chrono::hours(1)).scans,
               IsEmpty());
 }
 

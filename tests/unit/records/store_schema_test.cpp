@@ -135,7 +135,7 @@ TEST_F(StoreTest, WhenAResultOfTheSchemaBeforeWasAcceptedIsTakenFromTheLog) {
     accepted = Scan(*store, patient, reference, kResult);
     store->scans.Accept(kAnna, accepted, "the swelling is known");
   }
-  const web::AuditEntry logged = Open()->audit.Find({0, 1, "scan.accept"}).at(0);
+  const AuditEntry logged = Open()->audit.Find({0, 1, "scan.accept"}).at(0);
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(

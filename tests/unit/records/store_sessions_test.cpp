@@ -15,11 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::SizeIs;
-using web::ChangeResult;
-using web::ScanPurpose;
 
-const web::Actor kAnna{.user = "anna", .address = "::1"};
-const web::Actor kBert{.user = "bert", .address = "::1"};
+const Actor kAnna{.user = "anna", .address = "::1"};
+const Actor kBert{.user = "bert", .address = "::1"};
 
 class StoreSessionsTest : public ::testing::Test {
  protected:
@@ -32,10 +30,10 @@ class StoreSessionsTest : public ::testing::Test {
                                               .reason = {},
                                               .session_id = session,
                                               .sensor_on_s = 90.0,
-                                              .daily_check = web::DailyCheck::kFailed});
+                                              .daily_check = DailyCheck::kFailed});
     fs::create_directories(store.folders.Staging(id) / "scene");
     WriteWholeFile(store.folders.Staging(id) / "scene" / "scene.json", std::string_view("{}"));
-    store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
+    store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
                             .failure = {},
                             .result_json = result,
                             .swept_area_m2 = 1.0});
@@ -85,7 +83,7 @@ TEST_F(StoreSessionsTest, FractionNumbersCountSessionsNotScans) {
   EXPECT_EQ(store.scans.Find(right)->fraction, 1);
   EXPECT_EQ(store.scans.Find(right)->session_id, first);
   EXPECT_EQ(store.scans.Find(right)->sensor_on_s, 90.0);
-  EXPECT_EQ(store.scans.Find(right)->daily_check, web::DailyCheck::kFailed);
+  EXPECT_EQ(store.scans.Find(right)->daily_check, DailyCheck::kFailed);
   (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
   EXPECT_EQ(store.treatments.Opened()->fraction, 2);
   (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
@@ -114,7 +112,7 @@ TEST_F(StoreSessionsTest, ADiscardedScanHasNoResultAndIsNotAFraction) {
   Store store(folder_ / "state");
   const std::string patient = store.patients.Add(kAnna, "P-1", "");
   const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
-  for (const web::ScanOutcome outcome : {web::ScanOutcome::kCancelled, web::ScanOutcome::kFailed}) {
+  for (const ScanOutcome outcome : {ScanOutcome::kCancelled, ScanOutcome::kFailed}) {
     const std::string id = store.scans.Begin({.patient_id = patient,
                                               .reference_id = {},
                                               .purpose = ScanPurpose::kFraction,
@@ -158,7 +156,7 @@ TEST_F(StoreSessionsTest, SiteAndNoteAreChangedAndTheirTextIsNotInTheLog) {
   Store store(folder_ / "state");
   EXPECT_EQ(store.patients.Find(patient)->site, "thorax");
   EXPECT_EQ(store.patients.Find(patient)->note, "arms up, knee rest");
-  const web::AuditEntry entry = store.audit.Find({0, 1}).at(0);
+  const AuditEntry entry = store.audit.Find({0, 1}).at(0);
   EXPECT_EQ(entry.action, "patient.change");
   EXPECT_EQ(entry.user, "bert");
   EXPECT_EQ((entry.subject + entry.detail).find("knee"), std::string::npos);
@@ -215,7 +213,7 @@ TEST_F(StoreSessionsTest, WhatIsSignedIsWhatIsStored) {
   EXPECT_EQ(store.patients.Find(patient)->draft_reference_id, reference);
   const std::string digest = store.references.Find(reference)->digest;
   EXPECT_EQ(digest.size(), 64U);
-  web::ReferencePlan wider;
+  ReferencePlan wider;
   wider.tolerance.shift_mm = 5;
   (void)store.references.Plan(kAnna, reference, 1, wider);
   EXPECT_EQ(store.references.Waiting()[0].planned_by, "anna");
@@ -245,8 +243,7 @@ TEST_F(StoreSessionsTest, PairedScreensStayOverARestart) {
 }
 
 TEST_F(StoreSessionsTest, AProvisionedScreenIsPairedOnceForEachKey) {
-  web::Display display{
-      .id = {}, .name = "Room 1", .token_hash = "ab", .paired_at = {}, .paired_by = {}};
+  Display display{.id = {}, .name = "Room 1", .token_hash = "ab", .paired_at = {}, .paired_by = {}};
   {
     Store store(folder_ / "state");
     EXPECT_TRUE(store.displays.AddProvisioned(display));
@@ -281,19 +278,19 @@ TEST_F(StoreSessionsTest, AProvisionedScreenIsPairedOnceForEachKey) {
 TEST_F(StoreSessionsTest, AProvisionedScreenThatHasNoPlaceIsPairedOnceThereIsOne) {
   Store store(folder_ / "state");
   const auto screen = [](std::size_t number) {
-    return web::Display{.id = {},
-                        .name = "screen",
-                        .token_hash = std::to_string(number),
-                        .paired_at = {},
-                        .paired_by = {}};
+    return Display{.id = {},
+                   .name = "screen",
+                   .token_hash = std::to_string(number),
+                   .paired_at = {},
+                   .paired_by = {}};
   };
-  for (std::size_t i = 0; i < web::kMaxDisplays; ++i) (void)store.displays.Add(kAnna, screen(i));
-  const web::Display last = screen(web::kMaxDisplays);
+  for (std::size_t i = 0; i < kMaxDisplays; ++i) (void)store.displays.Add(kAnna, screen(i));
+  const Display last = screen(kMaxDisplays);
   EXPECT_EQ(RefusalOf([&] { (void)store.displays.AddProvisioned(last); }), ChangeResult::kConflict);
-  EXPECT_THAT(store.displays.List(), SizeIs(web::kMaxDisplays));
+  EXPECT_THAT(store.displays.List(), SizeIs(kMaxDisplays));
   store.displays.Remove(kAnna, "1");
   EXPECT_TRUE(store.displays.AddProvisioned(last));
-  EXPECT_THAT(store.displays.List(), SizeIs(web::kMaxDisplays));
+  EXPECT_THAT(store.displays.List(), SizeIs(kMaxDisplays));
 }
 
 }  // namespace

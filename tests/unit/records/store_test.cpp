@@ -18,7 +18,6 @@ using testing::kResult;
 using testing::MessageOf;
 using ::testing::SizeIs;
 using testing::StoreTest;
-using web::ChangeResult;
 
 TEST_F(StoreTest, KeepsEverythingOverARestart) {
   std::string patient, scan;
@@ -40,7 +39,7 @@ TEST_F(StoreTest, KeepsEverythingOverARestart) {
   EXPECT_EQ(found->accepted_by, "anna");
   EXPECT_EQ(found->accepted_reason, "the swelling is known");
   ASSERT_TRUE(found->accepted_at);
-  EXPECT_LT(web::WallClock::now() - *found->accepted_at, std::chrono::minutes(1));
+  EXPECT_LT(WallClock::now() - *found->accepted_at, std::chrono::minutes(1));
   EXPECT_EQ(found->result->verdict, "move");
   EXPECT_EQ(found->result->correction->vertical_mm, 6.5);
   EXPECT_EQ(found->result->correction->longitudinal_mm, std::nullopt);
@@ -66,7 +65,7 @@ TEST_F(StoreTest, AScanThatWasRunningAtACrashHasFailedAndLeavesNothing) {
   }
   const auto store = Open();
   EXPECT_EQ(store->recovery().interrupted_scans, 1);
-  EXPECT_EQ(store->scans.Find(id)->outcome, web::ScanOutcome::kFailed);
+  EXPECT_EQ(store->scans.Find(id)->outcome, ScanOutcome::kFailed);
   EXPECT_THAT(store->scans.Find(id)->failure, HasSubstr("interrupted"));
   EXPECT_TRUE(fs::is_empty(folder_ / "state" / "scans"));
 }
@@ -146,7 +145,7 @@ TEST_F(StoreTest, AnApprovedReferenceIsNeverChangedButPlannedAnew) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
   const std::string first = ApprovedReference(*store, patient);
-  web::ReferencePlan plan;
+  ReferencePlan plan;
   plan.region_m = {{0, 0}, {1, 0}, {1, 1}};
   plan.isocentre_m = {0.1, 0.2, 0.3};
   const std::string second = store->references.Plan(kAnna, first, 2, plan);
@@ -252,37 +251,33 @@ TEST_F(StoreTest, TheAuditLogOnlyGrows) {
 TEST_F(StoreTest, TheLastEnabledEngineerStays) {
   const auto store = Open();
   store->users.Add(
-      kAnna,
-      {.name = "anna", .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+      kAnna, {.name = "anna", .role = Role::kEngineer, .password_hash = "x", .created_at = {}});
   EXPECT_EQ(RefusalOf([&] {
               store->users.Add(kAnna, {.name = "anna", .password_hash = "y", .created_at = {}});
             }),
             ChangeResult::kConflict);
   EXPECT_EQ(RefusalOf([&] {
               store->users.Change(kAnna, {.name = "anna",
-                                          .role = web::Role::kTechnician,
+                                          .role = Role::kTechnician,
                                           .disabled = {},
                                           .password_hash = {},
                                           .expected_hash = {}});
             }),
             ChangeResult::kConflict);
-  EXPECT_EQ(store->users.Find("anna")->role, web::Role::kEngineer)
-      << "a refused change is rolled back";
+  EXPECT_EQ(store->users.Find("anna")->role, Role::kEngineer) << "a refused change is rolled back";
   store->users.Add(
-      kAnna,
-      {.name = "bert", .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+      kAnna, {.name = "bert", .role = Role::kEngineer, .password_hash = "x", .created_at = {}});
   store->users.Change(
       kBert,
       {.name = "anna", .role = {}, .disabled = true, .password_hash = {}, .expected_hash = {}});
   EXPECT_TRUE(store->users.Find("anna")->disabled);
-  EXPECT_EQ(store->users.Find("anna")->role, web::Role::kEngineer);
+  EXPECT_EQ(store->users.Find("anna")->role, Role::kEngineer);
 }
 
 void AddTwoEngineers(Store& store) {
   for (const char* name : {"anna", "bert"})
     store.users.Add(
-        kAnna,
-        {.name = name, .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+        kAnna, {.name = name, .role = Role::kEngineer, .password_hash = "x", .created_at = {}});
 }
 
 TEST_F(StoreTest, WhatAPersonChoseOfThePageStays) {
@@ -304,16 +299,16 @@ TEST_F(StoreTest, WhatAPersonChoseOfThePageStays) {
 TEST_F(StoreTest, APasswordChangedMeanwhileDoesNotUndoWhatWasDoneToTheAccount) {
   const auto store = Open();
   AddTwoEngineers(*store);
-  const web::UserChange password{
+  const UserChange password{
       .name = "bert", .role = {}, .disabled = {}, .password_hash = "y", .expected_hash = "x"};
   store->users.Change(kAnna, {.name = "bert",
-                              .role = web::Role::kTechnician,
+                              .role = Role::kTechnician,
                               .disabled = {},
                               .password_hash = {},
                               .expected_hash = {}});
   EXPECT_EQ(store->audit.Find({0, 1}).at(0).detail, "role engineer > technician");
   store->users.Change(kBert, password);
-  EXPECT_EQ(store->users.Find("bert")->role, web::Role::kTechnician);
+  EXPECT_EQ(store->users.Find("bert")->role, Role::kTechnician);
   EXPECT_EQ(RefusalOf([&] { store->users.Change(kBert, password); }), ChangeResult::kConflict)
       << "not the password that was asked for";
   store->users.Change(
@@ -344,7 +339,7 @@ TEST_F(StoreTest, OnlyAScanWithAnAnswerIsAccepted) {
   EXPECT_EQ(RefusalOf([&] { store->scans.Accept(kAnna, moved, "why"); }), ChangeResult::kConflict)
       << "there is a newer one";
   store->scans.Accept(kAnna, newer, "why");
-  const web::AuditEntry logged = store->audit.Find({0, 1}).at(0);
+  const AuditEntry logged = store->audit.Find({0, 1}).at(0);
   EXPECT_EQ(logged.action, "scan.accept_outside");
   EXPECT_THAT(logged.detail, HasSubstr("move, vertical +6.50 mm, lateral -1.00 mm"));
   EXPECT_THAT(logged.detail, HasSubstr("reason: why"));
@@ -406,7 +401,7 @@ TEST_F(StoreTest, ATemplateIsOfOneSiteWhateverItsCaseAndIsLogged) {
   }
   const auto store = Open();
   ASSERT_THAT(store->templates.List(), SizeIs(1));
-  const web::PlanTemplate stored = store->templates.List().at(0);
+  const PlanTemplate stored = store->templates.List().at(0);
   EXPECT_EQ(stored.site, "thorax");
   EXPECT_EQ(stored.width_mm, 320);
   EXPECT_EQ(stored.height_mm, 410);

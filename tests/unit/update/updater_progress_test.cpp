@@ -12,7 +12,6 @@ namespace {
 using testing::FakeRauc;
 using ::testing::HasSubstr;
 using testing::UpdaterTest;
-using web::ChangeResult;
 
 /// The updater's clock is the test's.
 class StandstillTest : public UpdaterTest {

@@ -12,7 +12,6 @@ namespace {
 using testing::FakeRauc;
 using ::testing::HasSubstr;
 using testing::UpdaterTest;
-using web::ChangeResult;
 
 /// One installs 9.0 from system A; the test then simulates a restart of the machine.
 class RollBackTest : public UpdaterTest {

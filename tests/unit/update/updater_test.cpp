@@ -20,7 +20,6 @@ namespace fs = std::filesystem;
 using testing::FakeRauc;
 using ::testing::HasSubstr;
 using testing::UpdaterTest;
-using web::ChangeResult;
 
 TEST_F(UpdaterTest, WithoutABusItSaysThatThereIsNoInstaller) {
   RunBesideLoop([&] {
@@ -65,7 +64,7 @@ TEST_F(UpdaterTest, ABundleOfAStrangersKeyIsRefusedInRaucsWords) {
     rauc.refuses_signature = true;
     Start();
     WaitForRauc();
-    const web::Change answer = Install("plumb-9.0.raucb");
+    const Change answer = Install("plumb-9.0.raucb");
     EXPECT_EQ(answer.result, ChangeResult::kInvalid);
     EXPECT_THAT(answer.message, HasSubstr("signature verification failed"));
     EXPECT_EQ(StatusNow().failure, answer.message);
@@ -92,7 +91,7 @@ TEST_F(UpdaterTest, AVersionThatCannotBeComparedIsRefused) {
     rauc.version = "9.0-rc1";
     Start();
     WaitForRauc();
-    const web::Change answer = Install("plumb-9.0.raucb");
+    const Change answer = Install("plumb-9.0.raucb");
     EXPECT_EQ(answer.result, ChangeResult::kInvalid);
     EXPECT_THAT(answer.message, HasSubstr("holds version '9.0-rc1': expected numbers"));
     EXPECT_EQ(rauc.installed(), "");
@@ -102,7 +101,7 @@ TEST_F(UpdaterTest, AVersionThatCannotBeComparedIsRefused) {
 TEST_F(UpdaterTest, AScanThatBeganWhileTheBundleWasLookedAtGoesFirst) {
   blocking_reason_ = "a scan is running";
   PlayWithRauc([&](FakeRauc& rauc) {
-    const web::Change answer = Install("plumb-9.0.raucb");
+    const Change answer = Install("plumb-9.0.raucb");
     EXPECT_EQ(answer.result, ChangeResult::kConflict);
     EXPECT_EQ(answer.message, blocking_reason_);
     EXPECT_EQ(rauc.installed(), "");
@@ -169,7 +168,7 @@ TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
   PlayWithRauc([&](FakeRauc&) {
     EXPECT_FALSE(fs::exists(folder_ / "updates" / ".upload-left")) << "of a run before";
     const auto add = [&](const std::string& from, const std::string& name) {
-      web::Change change;
+      Change change;
       On([&] { change = updater_->Add(folder_ / "updates" / from, name); });
       return change;
     };
@@ -177,7 +176,7 @@ TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
     EXPECT_EQ(add(".upload-1", "b.raucb").result, ChangeResult::kDone);
     EXPECT_THAT(StatusNow().bundles, ::testing::ElementsAre("b.raucb", "plumb-9.0.raucb"));
     WriteBundle(".upload-2", "GIF8");
-    const web::Change picture = add(".upload-2", "picture.raucb");
+    const Change picture = add(".upload-2", "picture.raucb");
     EXPECT_EQ(picture.result, ChangeResult::kInvalid);
     EXPECT_EQ(picture.message, "picture.raucb is not a bundle: expected a squashfs image");
     for (const char* name : {"c.raucb", "d.raucb", "e.raucb"}) {

@@ -35,7 +35,7 @@ TEST_F(AccountsTest, FirstStartGivesASetupCodeThatMakesOneEngineer) {
           .status,
       409);
   ASSERT_EQ(service_.users.size(), 1U);
-  EXPECT_EQ(service_.users[0].role, web::Role::kEngineer);
+  EXPECT_EQ(service_.users[0].role, Role::kEngineer);
   EXPECT_THAT(service_.users[0].password_hash, HasSubstr("$argon2id$"));
   loop_->Do([&] { EXPECT_FALSE(server_->setup_code().has_value()); });
 }
@@ -64,7 +64,7 @@ TEST_F(AccountsTest, WhereNoAccountCanBeSeenTheReasonIsShownAndNobodyMakesTheFir
   loop_->Do([&] {
     service_.accounts_fault.clear();
     service_.users.push_back({.name = "engineer",
-                              .role = web::Role::kEngineer,
+                              .role = Role::kEngineer,
                               .password_hash = "of nobody",
                               .created_at = {}});
   });

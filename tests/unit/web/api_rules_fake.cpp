@@ -30,10 +30,10 @@ class FakeRuledAppliance : public RuledAppliance {
     return server_->setup_code().value_or("");
   }
   std::string StoreScan(const std::string& patient_id) override {
-    web::Scan scan;
+    Scan scan;
     scan.patient_id = patient_id;
-    scan.outcome = web::ScanOutcome::kDone;
-    scan.finished_at = web::WallClock::now();
+    scan.outcome = ScanOutcome::kDone;
+    scan.finished_at = WallClock::now();
     loop_->Do([&] {
       scan.id = fmt::format("s{}", ++num_scans_);
       service_.scans.push_back(scan);
@@ -41,7 +41,7 @@ class FakeRuledAppliance : public RuledAppliance {
     return scan.id;
   }
   std::string PassDailyCheck(const std::string& user) override {
-    web::CheckRecord check;
+    CheckRecord check;
     check.user = user;
     check.status = "passed";
     check.num_markers = 6;
@@ -58,7 +58,7 @@ class FakeRuledAppliance : public RuledAppliance {
   void LearnProfile() override {
     loop_->Do([&] {
       auto& versions = service_.profiles.versions;
-      web::SensorProfileVersion learned;
+      SensorProfileVersion learned;
       learned.version = static_cast<int>(versions.size()) + 1;
       learned.cause = "learned";
       learned.num_sweeps = 4;

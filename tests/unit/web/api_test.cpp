@@ -158,11 +158,11 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
 
 TEST_F(ApiTest, AReferenceStatesWhereTheRoomLiesOnItsOwnMaps) {
   HttpClient physicist = LoggedIn("physicist");
-  web::Reference reference;
+  Reference reference;
   reference.id = "r7";
   loop_->Do([&] {
     service_.references.push_back(reference);
-    service_.room_of_references = web::RoomOnMap{{-1, 0}, {0, 1}, true};
+    service_.room_of_references = RoomOnMap{{-1, 0}, {0, 1}, true};
   });
   const nlohmann::json turned = {
       {"gantry_xy", {-1.0, 0.0}}, {"right_xy", {0.0, 1.0}}, {"known", true}};
@@ -229,9 +229,9 @@ class FilesTest : public ApiTest {
     std::filesystem::create_symlink(folder_ / "secret", folder_ / "scan/result/overlay.png");
     std::filesystem::create_directories(folder_ / "scan/result/error_map.png");
     loop_->Do([&] {
-      web::Scan scan;
+      Scan scan;
       scan.id = "s1";
-      scan.outcome = web::ScanOutcome::kDone;
+      scan.outcome = ScanOutcome::kDone;
       scan.folder = folder_ / "scan";
       service_.scans.push_back(scan);
     });

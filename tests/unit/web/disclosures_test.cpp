@@ -44,10 +44,10 @@ const std::set<std::string> kWithoutPatients = {
 class DisclosuresTest : public WebTest {
  protected:
   void SetUp() override {
-    web::Scan scan;
+    Scan scan;
     scan.id = "s1";
     scan.patient_id = "p1";
-    scan.outcome = web::ScanOutcome::kDone;
+    scan.outcome = ScanOutcome::kDone;
     scan.folder = folder_.path();
     std::filesystem::create_directories(scan.folder / "result");
     std::ofstream(scan.folder / "result/result.json") << "{}";

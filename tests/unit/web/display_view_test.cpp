@@ -23,11 +23,11 @@ class DisplayViewTest : public WebTest {
     SetUpAccounts();
     loop_->Do([&] {
       for (const std::string number : {"2", "1"}) {
-        web::Patient& patient = service_.patients.emplace_back();
+        Patient& patient = service_.patients.emplace_back();
         patient.id = "p" + number;
         patient.code = "PX-" + number;
         patient.approved_reference_id = "r" + number;
-        web::Reference& reference = service_.references.emplace_back();
+        Reference& reference = service_.references.emplace_back();
         reference.id = "r" + number;
         reference.patient_id = patient.id;
         reference.scan_id = AddScan(number + "0", patient.id, "").id;
@@ -48,15 +48,15 @@ class DisplayViewTest : public WebTest {
     technician_ = std::make_unique<HttpClient>(LoggedIn("technician"));
   }
 
-  web::Scan& AddScan(const std::string& number, const std::string& patient,
-                     const std::string& reference) {
-    web::Scan& scan = service_.scans.emplace_back();
+  Scan& AddScan(const std::string& number, const std::string& patient,
+                const std::string& reference) {
+    Scan& scan = service_.scans.emplace_back();
     scan.id = "s" + number;
     scan.patient_id = patient;
     scan.reference_id = reference;
     scan.session_id = "t" + patient.substr(1);
-    scan.outcome = web::ScanOutcome::kDone;
-    scan.started_at = scan.finished_at.emplace(web::WallClock::now());
+    scan.outcome = ScanOutcome::kDone;
+    scan.started_at = scan.finished_at.emplace(WallClock::now());
     scan.folder = folder_.path() / scan.id;
     for (const char* file : {"scene/scene.json", "scene/mesh.ply", "result/result.json"}) {
       std::filesystem::create_directories((scan.folder / file).parent_path());
@@ -67,7 +67,7 @@ class DisplayViewTest : public WebTest {
   }
 
   void Open(const std::string& patient, const std::string& session) {
-    web::TreatmentSession& open = service_.status.session.emplace();
+    TreatmentSession& open = service_.status.session.emplace();
     open.id = session;
     open.patient_id = patient;
   }
@@ -139,7 +139,7 @@ TEST_F(DisplayViewTest, ThePageWithoutScriptShowsTheLastResultInItsOwnSessionOnl
   loop_->Do([&] {
     service_.scans.push_back(*service_.FindScan("s1"));
     service_.scans.back().id = "s3";
-    service_.scans.back().outcome = web::ScanOutcome::kFailed;
+    service_.scans.back().outcome = ScanOutcome::kFailed;
     service_.scans.back().failure = "tracking was lost";
   });
   EXPECT_THAT(page(), HasSubstr("racking was lost"));

@@ -7,8 +7,8 @@
 #include <set>
 
 #include "tests/unit/web/web_fixture.hpp"
+#include "web/model/limits.hpp"
 #include "web/security/password_rules.hpp"
-#include "web/service/limits.hpp"
 
 namespace plumb::test {
 namespace {
@@ -63,12 +63,12 @@ std::set<double> Stated(const std::string& text, const std::string& name, const 
 
 TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
   const std::string page = TextOf("/web/assets/limits.js"), api = TextOf("/web/openapi.yaml");
-  for (const auto& [name, limits] : {std::pair{"shift_tolerance_mm", web::kShiftTolerance_mm},
-                                     {"rotation_tolerance_deg", web::kRotationTolerance_deg},
-                                     {"auto_stop_s", web::kAutoStop_s},
-                                     {"scan_limit_s", web::kScanLimit_s},
-                                     {"retention_days", web::kRetention_days},
-                                     {"idle_logout_min", web::kIdleLogout_min}}) {
+  for (const auto& [name, limits] : {std::pair{"shift_tolerance_mm", kShiftTolerance_mm},
+                                     {"rotation_tolerance_deg", kRotationTolerance_deg},
+                                     {"auto_stop_s", kAutoStop_s},
+                                     {"scan_limit_s", kScanLimit_s},
+                                     {"retention_days", kRetention_days},
+                                     {"idle_logout_min", kIdleLogout_min}}) {
     const auto [least, most] = limits.entered;
     EXPECT_THAT(Stated(page, name, "min"), ElementsAre(least)) << name;
     EXPECT_THAT(Stated(page, name, "max"), ElementsAre(most)) << name;
@@ -76,17 +76,17 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
     EXPECT_THAT(Stated(api, name, "maximum"), ElementsAre(most)) << name;
     EXPECT_TRUE(limits.stored.Holds(least) && limits.stored.Holds(most)) << name;
   }
-  for (const auto& [of_page, of_api, most] : {std::tuple{"kName", "name", web::kMaxName},
-                                              {"kSite", "site", web::kMaxSite},
-                                              {"kNote", "note", web::kMaxNote},
-                                              {"kReason", "reason", web::kMaxReason},
+  for (const auto& [of_page, of_api, most] : {std::tuple{"kName", "name", kMaxName},
+                                              {"kSite", "site", kMaxSite},
+                                              {"kNote", "note", kMaxNote},
+                                              {"kReason", "reason", kMaxReason},
                                               {"kPassword", "password", web::kMaxPassword},
                                               {"kNewPassword", "password", web::kMaxPassword}}) {
     EXPECT_THAT(Stated(page, of_page, "maxlength"), ElementsAre(most)) << of_page;
     EXPECT_THAT(Stated(api, of_api, "maxLength"), ElementsAre(most)) << of_api;
   }
-  EXPECT_THAT(Stated(page, "kReason", "minlength"), ElementsAre(web::kMinReason));
-  EXPECT_THAT(Stated(api, "reason", "minLength"), ElementsAre(web::kMinReason));
+  EXPECT_THAT(Stated(page, "kReason", "minlength"), ElementsAre(kMinReason));
+  EXPECT_THAT(Stated(api, "reason", "minLength"), ElementsAre(kMinReason));
   EXPECT_THAT(Stated(page, "kNewPassword", "minlength"), ElementsAre(web::kMinPassword));
   EXPECT_THAT(Stated(api, "password", "minLength"), ElementsAre(web::kMinPassword));
 }
@@ -94,7 +94,7 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
 TEST(LimitsTest, ThePageOffersThePosturesOfTheServer) {
   const std::string page = TextOf("/web/assets/strings/en.js");
   std::string listed;
-  for (const std::string_view posture : web::kPostures) {
+  for (const std::string_view posture : kPostures) {
     EXPECT_THAT(page, HasSubstr(std::string(posture) + ": '"));
     listed += (listed.empty() ? "" : ", ") + std::string(posture);
   }

@@ -204,14 +204,14 @@ TEST_F(LockoutTest, AFactoryResetIsForAnEngineerWithThePassword) {
   EXPECT_EQ(reset(engineer, "everything", kPassword), 400);
   HttpClient physicist = LoggedIn("physicist");
   EXPECT_EQ(reset(physicist, "wipe", kPassword), 403);
-  service_.status.session = web::TreatmentSession{};
+  service_.status.session = TreatmentSession{};
   EXPECT_EQ(reset(engineer, "wipe", kPassword), 409);
   EXPECT_FALSE(service_.factory_reset);
   service_.status.session.reset();
   EXPECT_EQ(reset(engineer, "keep_records", kPassword), 200);
-  EXPECT_EQ(service_.factory_reset, web::FactoryReset::kKeepRecords);
+  EXPECT_EQ(service_.factory_reset, FactoryReset::kKeepRecords);
   EXPECT_EQ(reset(engineer, "wipe", kPassword), 200);
-  EXPECT_EQ(service_.factory_reset, web::FactoryReset::kWipe);
+  EXPECT_EQ(service_.factory_reset, FactoryReset::kWipe);
 }
 
 TEST_F(LockoutTest, TheRoomsCalibrationIsSignedByAPhysicistOrAnEngineerWithThePassword) {
@@ -226,7 +226,7 @@ TEST_F(LockoutTest, TheRoomsCalibrationIsSignedByAPhysicistOrAnEngineerWithThePa
   };
   EXPECT_EQ(room()["versions"].size(), 0U);
   EXPECT_TRUE(room()["shift_mm"].is_null());
-  web::CheckRecord check;
+  CheckRecord check;
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(sign(physicist, std::string(64, 'a'), kPassword), 409) << i << " scans";
     service_.SeeBoard(check);
@@ -256,7 +256,7 @@ TEST_F(LockoutTest, TheRoomsCalibrationIsSignedByAPhysicistOrAnEngineerWithThePa
 
 TEST_F(LockoutTest, ASensorProfileIsSeenByAllAndChangedByAnEngineerWithThePassword) {
   const auto version = [](int number, int sweeps) {
-    web::SensorProfileVersion one;
+    SensorProfileVersion one;
     one.version = number;
     one.cause = "learned";
     one.num_sweeps = sweeps;

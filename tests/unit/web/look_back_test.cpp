@@ -12,7 +12,7 @@ using std::chrono::seconds;
 
 class LookBackTest : public testing::Test {
  protected:
-  void Add(web::WallClock::time_point time, const std::string& user, const std::string& action) {
+  void Add(WallClock::time_point time, const std::string& user, const std::string& action) {
     service_.audit.push_back({.number = static_cast<std::int64_t>(service_.audit.size()) + 1,
                               .time = time,
                               .user = user,
@@ -22,7 +22,7 @@ class LookBackTest : public testing::Test {
                               .detail = {}});
   }
 
-  const web::WallClock::time_point begun_ = web::WallClock::now();
+  const WallClock::time_point begun_ = WallClock::now();
   FakeAppliance service_;
 };
 
@@ -44,7 +44,7 @@ TEST_F(LookBackTest, TellsTheLogInBeforeThisOneAndWhatFailedSince) {
 TEST_F(LookBackTest, OneThatIsAsOldAsTheSessionIsItsOwn) {
   Add(begun_ - seconds(1), "anna", "login");
   Add(begun_, "anna", "login");
-  const auto before = [&](web::WallClock::time_point time) {
+  const auto before = [&](WallClock::time_point time) {
     return web::LoginsBefore(service_, "anna", time).last;
   };
   ASSERT_TRUE(before(begun_));

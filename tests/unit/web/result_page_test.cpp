@@ -23,18 +23,18 @@ class ResultPageTest : public WebTest {
   }
   /// A scan in tolerance that ended so long ago, by both clocks. A completed one is the last result
   /// that the status names.
-  void Add(const std::string& id, seconds age, web::ScanOutcome outcome = web::ScanOutcome::kDone) {
+  void Add(const std::string& id, seconds age, ScanOutcome outcome = ScanOutcome::kDone) {
     loop_->Do([&] {
-      web::Scan scan;
+      Scan scan;
       scan.id = id;
       scan.outcome = outcome;
-      scan.failure = outcome == web::ScanOutcome::kFailed ? "tracking was lost" : "";
-      scan.started_at = web::WallClock::now() - age - seconds(20);
-      scan.finished_at = web::WallClock::now() - age;
-      scan.result = web::ResultSummary{};
+      scan.failure = outcome == ScanOutcome::kFailed ? "tracking was lost" : "";
+      scan.started_at = WallClock::now() - age - seconds(20);
+      scan.finished_at = WallClock::now() - age;
+      scan.result = ResultSummary{};
       scan.result->verdict = "in_tolerance";
       service_.scans.push_back(scan);
-      if (outcome != web::ScanOutcome::kDone) return;
+      if (outcome != ScanOutcome::kDone) return;
       scan.age_s = static_cast<double>(age.count());
       service_.status.last_result = scan;
     });
@@ -54,9 +54,9 @@ TEST_F(ResultPageTest, AFreshResultIsNotOld) {
 TEST_F(ResultPageTest, WhatIsToBeKnownStandsBesideTheVerdict) {
   Add("s1", seconds(10));
   EXPECT_THAT(Page(), Not(HasSubstr("overdue")));
-  loop_->Do([&] { service_.scans.back().daily_check = web::DailyCheck::kOverdue; });
+  loop_->Do([&] { service_.scans.back().daily_check = DailyCheck::kOverdue; });
   EXPECT_THAT(Page(), HasSubstr("<p class=\"caution\">The daily check was overdue at this scan."));
-  loop_->Do([&] { service_.scans.back().daily_check = web::DailyCheck::kFailed; });
+  loop_->Do([&] { service_.scans.back().daily_check = DailyCheck::kFailed; });
   EXPECT_THAT(Page(), AllOf(HasSubstr("<p class=\"caution\">The daily check had failed before"),
                             Not(HasSubstr("overdue"))));
 }
@@ -137,7 +137,7 @@ TEST_F(ResultPageTest, OnlyTheResultOfThePatientWhoseSessionIsOpenIsNotOld) {
 
 TEST_F(ResultPageTest, AfterAScanThatFailedTheOneBeforeItIsOld) {
   Add("s1", seconds(30));
-  Add("s2", seconds(5), web::ScanOutcome::kFailed);
+  Add("s2", seconds(5), ScanOutcome::kFailed);
   EXPECT_THAT(Page(), HasSubstr("from before it"));
   EXPECT_THAT(Page(), HasSubstr(kOld));
   EXPECT_THAT(client_->Get("/result?scan=s1").body,
@@ -154,7 +154,7 @@ TEST_F(ResultPageTest, WhileAScanRunsTheOneBeforeItIsOld) {
 TEST_F(ResultPageTest, ItSpeaksTheBrowsersLanguageOrTheOneThatIsAskedFor) {
   Add("s1", seconds(90));
   loop_->Do([&] {
-    web::ResultSummary& result = *service_.scans.back().result;
+    ResultSummary& result = *service_.scans.back().result;
     result.verdict = "move";
     result.correction.emplace().vertical_mm = -8.04;
     result.u95.emplace().vertical_mm = 0.9;
@@ -195,7 +195,7 @@ TEST_F(ResultPageTest, ItSpeaksTheBrowsersLanguageOrTheOneThatIsAskedFor) {
 TEST_F(ResultPageTest, WhatIsNotSurelyWithinAsksForAnotherScan) {
   Add("s1", seconds(30));
   loop_->Do([&] {
-    web::ResultSummary& result = *service_.scans.back().result;
+    ResultSummary& result = *service_.scans.back().result;
     result.verdict = "unsure";
     result.correction.emplace().vertical_mm = 2.8;
     result.correction->longitudinal_mm = 0.5;

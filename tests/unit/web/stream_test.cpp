@@ -25,7 +25,7 @@ TEST_F(StreamTest, BeginsWithTheStateAndFollowsIt) {
   const HttpClient client = LoggedIn("technician");
   HttpConnection stream = OpenStream(client);
   EXPECT_THAT(stream.ReadUntil("\n\n"), HasSubstr("text/event-stream"));
-  loop_->Do([&] { service_.Press({"technician", ""}, [](const web::Change&) {}); });
+  loop_->Do([&] { service_.Press({"technician", ""}, [](const Change&) {}); });
   EXPECT_FALSE(stream.ReadUntil("\"state\":\"scanning\"").empty());
   loop_->Do([&] { service_.Unplug(); });
   EXPECT_FALSE(stream.ReadUntil("\"state\":\"no_sensor\"").empty());

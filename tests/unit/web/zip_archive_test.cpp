@@ -69,19 +69,19 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   std::filesystem::create_directories(folder.path() / "result");
   std::ofstream(folder.path() / "result/result.json") << "{\"verdict\": \"move\"}";
   std::ofstream(folder.path() / "result/error_map.png") << "PNG";  // no overlay: it was removed
-  web::Patient patient;
+  Patient patient;
   patient.id = "p1";
   patient.code = "P-0042";
   service_.patients.push_back(patient);
-  web::Scan scan;
+  Scan scan;
   scan.id = "s7";
   scan.patient_id = "p1";
-  scan.outcome = web::ScanOutcome::kDone;
+  scan.outcome = ScanOutcome::kDone;
   scan.folder = folder.path();
-  scan.result = web::ResultSummary{};
+  scan.result = ResultSummary{};
   scan.result->verdict = "move";
   scan.result->correction.emplace().vertical_mm = -8.25;
-  scan.daily_check = web::DailyCheck::kFailed;
+  scan.daily_check = DailyCheck::kFailed;
   scan.accepted_by = "anna";
   scan.accepted_reason = "=cmd|'/C calc'!A0, \"really\"";
   service_.scans.push_back(scan);

@@ -1,11 +1,11 @@
-// The answer to a change requested by the web.
+// The answer to a requested change.
 #pragma once
 
 #include <filesystem>
 #include <functional>
 #include <string>
 
-namespace plumb::web {
+namespace plumb {
 
 enum class ChangeResult {
   kDone,
@@ -27,4 +27,4 @@ struct Change {
 /// Called exactly once, on the loop thread: during the request or later.
 using Done = std::function<void(const Change&)>;
 
-}  // namespace plumb::web
+}  // namespace plumb

@@ -1,13 +1,26 @@
-// The settings one by one, and a change of some of them.
+// The settings, one by one, and a change of some of them.
 #pragma once
 
 #include <optional>
 #include <string>
 
-#include "web/service/limits.hpp"
-#include "web/service/service_types.hpp"
+#include "web/model/change.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/reference.hpp"
 
-namespace plumb::web {
+namespace plumb {
+
+/// Within the limits of limits.hpp.
+struct Settings {
+  Tolerance tolerance;          ///< For new references.
+  std::string posture = "HFS";  ///< For new references.
+  bool couch_markers = false;   ///< For new references.
+  double auto_stop_s = 10.0;    ///< Time without new coverage.
+  double scan_limit_s = 60.0;
+  bool keep_recordings = false;  ///< Keep the raw frames of scans, with colour.
+  int retention_days = 0;        ///< Older scans are removed; 0: never. References are kept.
+  int idle_logout_min = 15;
+};
 
 /// Calls visit(name, change, value, limits) for each of them, or without limits where it has none.
 /// The names are those of the interface, of the store and of the log.
@@ -80,4 +93,7 @@ template <typename Json>
   return json;
 }
 
-}  // namespace plumb::web
+/// What it keeps.
+enum class FactoryReset { kKeepRecords, kWipe };
+
+}  // namespace plumb

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <string_view>
 
-namespace plumb::web {
+namespace plumb {
 
 struct Range {
   double least = 0.0, most = 0.0;
@@ -41,4 +41,4 @@ inline constexpr std::array<std::string_view, 4> kPostures = {"HFS", "HFP", "FFS
   return std::find(kPostures.begin(), kPostures.end(), text) != kPostures.end();
 }
 
-}  // namespace plumb::web
+}  // namespace plumb

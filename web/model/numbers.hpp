@@ -5,7 +5,7 @@
 #include <optional>
 #include <string_view>
 
-namespace plumb::web {
+namespace plumb {
 
 /// Read back from a result; the method's own are CouchNumbers.
 struct ReportedNumbers {
@@ -43,4 +43,4 @@ inline constexpr std::array<NumberAxis, 6> kNumberAxes = {{
     {"yaw", "yaw_deg", "deg", &ReportedNumbers::yaw_deg},
 }};
 
-}  // namespace plumb::web
+}  // namespace plumb

@@ -1,0 +1,40 @@
+// Entries of the audit log.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "web/model/wall_clock.hpp"
+
+namespace plumb {
+
+/// What people know of an entry's subject, as the records are now.
+struct AuditSubject {
+  std::string kind;          ///< "patient", "session", "scan", "reference" or "check".
+  bool exists = false;       ///< False: it was deleted since.
+  std::string patient_code;  ///< Empty: none.
+  int number = 0;            ///< Of a session its fraction, of a reference its version; 0: none.
+  std::optional<WallClock::time_point> time = {};  ///< Of a check.
+};
+
+struct AuditEntry {
+  std::int64_t number = 0;  ///< Assigned by the store; increases.
+  WallClock::time_point time;
+  std::string user;
+  std::string address;
+  std::string action;   ///< "login", "reference.approve".
+  std::string subject;  ///< Id of the changed object.
+  std::string detail;
+  std::optional<AuditSubject> about = {};  ///< Of the subject; nothing: its id is what people know.
+};
+
+/// Selection of entries.
+struct AuditQuery {
+  std::int64_t before = 0;  ///< Only entries older than this number; 0: from the newest one.
+  int limit = 100;
+  std::string actions = {};  ///< Prefix of their actions; empty: all.
+  bool views = true;         ///< Include views of patient data.
+};
+
+}  // namespace plumb

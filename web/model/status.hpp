@@ -1,0 +1,134 @@
+// The state of the appliance.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "algo/base/names.hpp"
+#include "web/model/check.hpp"
+#include "web/model/patient.hpp"
+#include "web/model/reference.hpp"
+#include "web/model/scan.hpp"
+
+namespace plumb {
+
+// The names of the values are in names.hpp.
+enum class ApplianceState { kNoSensor, kReady, kScanning, kWorking, kResult, kFault };
+template <>
+inline constexpr auto kNamesOf<ApplianceState> = NamesUpTo<ApplianceState::kFault>(
+    {"no_sensor", "ready", "scanning", "working", "result", "fault"});
+
+/// The reason why the appliance cannot scan, or will not be able to once the running scan has
+/// ended.
+enum class FaultKind {
+  kNone,
+  kSensor,   ///< The sensor is attached and does not work; ends when it works or is unplugged.
+  kScan,     ///< The last scan failed; ends when somebody acknowledges it by a press.
+  kStorage,  ///< Nothing can be stored; ends when the storage works again.
+};
+template <>
+inline constexpr auto kNamesOf<FaultKind> = NamesUpTo<FaultKind::kStorage>({"none", "sensor",
+                                                                            "scan", "storage"});
+
+/// What the person who sweeps should do.
+enum class SweepAdvice {
+  kNone,
+  kSlower,
+  kCloser,
+  kFarther,
+  kTrackingLost,
+  kNoMarkers,
+  kComputerTooSlow,  ///< Images are lost because they cannot be processed in time.
+};
+template <>
+inline constexpr auto kNamesOf<SweepAdvice> = NamesUpTo<SweepAdvice::kComputerTooSlow>(
+    {"none", "slower", "closer", "farther", "tracking_lost", "no_markers", "computer_too_slow"});
+
+struct SensorStatus {
+  bool present = false;
+  std::string serial;
+  std::string name;
+  double frames_per_second = 0.0;
+  double powered_s = 0.0;  ///< Time since it was attached, for warm-up.
+  double warm_up_s = 0.0;  ///< Time that it must have been on before a reference scan.
+};
+
+/// The running or processed scan.
+struct LiveScan {
+  std::string id;
+  std::string patient_id;
+  ScanPurpose purpose = ScanPurpose::kFraction;
+  double elapsed_s = 0.0;
+  /// 0..1 of the region of the reference (otherwise of the surface seen recently); not set if
+  /// unknown.
+  std::optional<double> coverage;
+  double without_new_surface_s = 0.0;  ///< Time since new surface was last seen.
+  SweepAdvice guidance = SweepAdvice::kNone;
+  std::int64_t keyframes = 0;
+  std::int64_t frames = 0;
+  std::int64_t frames_tracked = 0;
+  std::int64_t frames_dropped = 0;
+  std::string step;            ///< "tracking", then the steps of the reconstructor.
+  double step_fraction = 0.0;  ///< 0..1
+};
+
+struct StorageStatus {
+  std::int64_t free_bytes = 0;
+  std::int64_t total_bytes = 0;
+  bool writable = true;
+  std::vector<std::string> warnings = {};  ///< Sentences for people: nearly full, no backup.
+};
+
+/// Directions of the room on maps (x, y of a reference marker's frame): to the gantry, and to the
+/// right of a person facing it.
+struct RoomOnMap {
+  std::array<double, 2> gantry_xy = {0, 1}, right_xy = {1, 0};
+  bool is_known = false;  ///< False: the marker's axes are shown in place of the room's.
+};
+
+struct Status {
+  ApplianceState state = ApplianceState::kNoSensor;
+  std::string fault;  ///< In words, in state kFault.
+  FaultKind fault_kind = FaultKind::kNone;
+  SensorStatus sensor;
+  StorageStatus storage;
+  std::string light;       ///< Name of the shown pattern: "ready", "too_fast".
+  std::string patient_id;  ///< Patient of the next scan; empty if there is none.
+  ScanPurpose next_purpose = ScanPurpose::kFraction;
+  int scans_today = 0;                      ///< Of the open patient; counts rescans.
+  std::optional<TreatmentSession> session;  ///< The open session.
+  RoomOnMap room;  ///< In the reference marker's frame as it lay when the room was calibrated.
+  /// References that wait for a plan or an approval; at most 20.
+  std::vector<WaitingReference> waiting;
+  std::optional<LiveScan> scan;  ///< Set in states scanning and working.
+  std::optional<CheckRecord> last_check;
+  DailyCheck daily_check = DailyCheck::kOverdue;  ///< Of today.
+  /// Why no reference may be scanned or approved now, with the next step; empty if it may.
+  std::string reference_block = {};
+  std::optional<Scan> last_result;  ///< The newest finished scan since the start.
+  std::string version;
+  std::vector<std::string> warnings;  ///< About the set-up of the appliance.
+  std::string rolled_back;            ///< As in UpdateStatus.
+};
+
+struct UpdateStatus {
+  bool supported = false;  ///< False: not an appliance image.
+  std::string message;     ///< Why not, or the present activity.
+  std::string slot;
+  bool installing = false;
+  double fraction = 0.0;
+  std::vector<std::string> bundles;  ///< Names of bundles on attached media.
+  bool restart_needed = false;       ///< An update is installed and starts at the next restart.
+  std::string failure;      ///< Why the last attempt was refused or failed; empty if it succeeded.
+  std::string rolled_back;  ///< A sentence if the machine has gone back to the previous system.
+};
+
+struct Health {
+  bool ok = true;
+  std::string reason;
+};
+
+}  // namespace plumb
