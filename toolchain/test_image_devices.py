@@ -25,8 +25,8 @@ class UsbUnit:
         self.socket.connect(path)
         self.asked = []  # control requests from the guest: (type, request, value)
         self.configuration = 0
-        # The first packet of each side has a short identifier; its capabilities decide the length of
-        # those that follow.
+        # The first packet of each side has a short identifier; its capabilities decide the length
+        # of those that follow.
         self.socket.sendall(struct.pack("<III64sI", self.HELLO, 68, 0, b"plumb test", self.CAPABILITIES))
         kind, length, _ = struct.unpack("<III", self._receive(12))
         self._receive(length)

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The list of known vulnerabilities: from the list of packages of a root file system, and a small export of the tracker with every state that it knows.
+# The list of known vulnerabilities: from the list of packages of a root file system, and a small
+# export of the tracker with every state that it knows.
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"
 source=$(cd "$(dirname "$0")/../.." && pwd)

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Reads back from every ELF file below FOLDER what the build asked for. One line a file; exit code 1 if anything is missing.
+# Reads back from every ELF file below FOLDER what the build asked for. One line a file; exit code 1
+# if anything is missing.
 #   hardening.sh FOLDER
 # Copies of Debian's own libraries are Debian's responsibility: they are listed but not checked.
 set -euo pipefail
@@ -24,7 +25,8 @@ while IFS= read -r -d '' file; do
   case "$name" in */bin/*) has "$symbols" '__[a-z]+_chk@' || missing+=(fortify)
     has "$symbols" '__glibcxx_assert_fail' || missing+=("the checks of the standard library") ;; esac
   has "$notes" 'Build ID' || missing+=("a build id")
-  # The code is made for CET. The note that says so of a whole program is lost to Debian 12's start files (crti.o), which lack it.
+  # The code is made for CET. The note that says so of a whole program is lost to Debian 12's start
+  # files (crti.o), which lack it.
   if has "$header" 'X86-64'; then
     [ "$(grep -aoP '\xf3\x0f\x1e\xfa' "$file" | wc -l)" -ge 50 ] || missing+=("the landing pads of CET (endbr64)")
   fi

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Runs inside the container that install_in_container.sh boots: the life of the packages under apt and dpkg. One line a check; then off.
+# Runs inside the container that install_in_container.sh boots: the life of the packages under apt
+# and dpkg. One line a check; then off.
 exec >/checks/log 2>&1 </dev/null
 export DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8
 check() { # NAME EXPECTED FOUND
@@ -62,7 +63,8 @@ check "another account may not restart the machine" "*uthentication required*" \
   "$(setpriv --reuid nobody --regid nogroup --clear-groups busctl call org.freedesktop.login1 /org/freedesktop/login1 org.freedesktop.login1.Manager Reboot b false 2>&1)"
 journalctl -u plumbd --no-pager >/checks/journal
 echo "CHECKS DONE"
-# The real logind and polkit, with the rule of the package: install_in_container.sh sees whether the machine restarts.
+# The real logind and polkit, with the rule of the package: install_in_container.sh sees whether the
+# machine restarts.
 plumb update --restart
 sleep 30
 systemctl poweroff --force

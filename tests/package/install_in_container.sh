@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Installs the packages with apt into a clean Debian that runs in systemd-nspawn, changes the configuration, upgrades, removes and purges them.
+# Installs the packages with apt into a clean Debian that runs in systemd-nspawn, changes the
+# configuration, upgrades, removes and purges them.
 #   install_in_container.sh MADE WORK_FOLDER      MADE: by make_packages.sh
-# WORK_FOLDER keeps the Debian and what apt fetched for the next time. Exit code 77: it cannot run here, and the last line says why.
+# WORK_FOLDER keeps the Debian and what apt fetched for the next time. Exit code 77: it cannot run
+# here, and the last line says why.
 set -euo pipefail
 made=$(realpath "$1") here=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$2"

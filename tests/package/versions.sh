@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Which versions toolchain/image and toolchain/bundle accept. Nothing is built: each call has another
-# mistake, which is found after that of the version.
+# Which versions toolchain/image and toolchain/bundle accept. Nothing is built: each call has
+# another mistake, which is found after that of the version.
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"
 source=$(cd "$(dirname "$0")/../.." && pwd)

@@ -1,5 +1,5 @@
-# For test scripts to source: how a test says that it cannot run here. ctest counts 77 as skipped, and
-# toolchain/test lists the reasons at its end.
+# For test scripts to source: how a test says that it cannot run here. ctest counts 77 as skipped,
+# and toolchain/test lists the reasons at its end.
 
 # This machine does not permit it.
 skip() { # REASON

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# A factory reset outside the image: the command line asks for it, the unit's script and plumbd carry it out at the next start.
+# A factory reset outside the image: the command line asks for it, the unit's script and plumbd
+# carry it out at the next start.
 #   factory_reset.sh BUILD_FOLDER
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The health gate with programs of the test's own around it: only a healthy system is marked, each fault has its sentence, and only a release that has
-# never been good is left.
+# The health gate with programs of the test's own around it: only a healthy system is marked, each
+# fault has its sentence, and only a release that has never been good is left.
 #   health_gate.sh BUILD_FOLDER      plumb of the build does the self test
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"

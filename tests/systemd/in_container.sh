@@ -1,5 +1,6 @@
 #!/bin/sh
-# Runs inside the container that unit_in_container.sh boots: the installed service from its start to its stop. One line a check; then off.
+# Runs inside the container that unit_in_container.sh boots: the installed service from its start to
+# its stop. One line a check; then off.
 exec >/checks/log 2>&1  # of the machine outside; the console is hung up when somebody may log in
 plumb() { /usr/local/bin/plumb --control /run/plumb/control.sock "$@"; }
 show() { systemctl show plumbd.service -p "$1" --value; }

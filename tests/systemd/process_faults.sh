@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The real plumbd, without a sensor: a configuration with a mistake, a crash, a limit of the size of files.
+# The real plumbd, without a sensor: a configuration with a mistake, a crash, a limit of the size of
+# files.
 #   process_faults.sh BUILD_FOLDER
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# What happens around plumbd's lives, with programs of the test's own in place of systemctl, systemd-run and sleep: pauses, counting, restarts of the machine, the light.
+# What happens around plumbd's lives, with programs of the test's own in place of systemctl,
+# systemd-run and sleep: pauses, counting, restarts of the machine, the light.
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"
 watch=$(cd "$(dirname "$0")/../../systemd" && pwd)/service-watch

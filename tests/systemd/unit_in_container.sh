@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Installs a build into a small Debian and boots it in systemd-nspawn: plumbd.service with its whole sandbox, on the virtual sensor.
+# Installs a build into a small Debian and boots it in systemd-nspawn: plumbd.service with its whole
+# sandbox, on the virtual sensor.
 #   unit_in_container.sh BUILD_FOLDER WORK_FOLDER
-# WORK_FOLDER keeps the Debian for the next time. Exit code 77: it cannot run here, and the last line says why.
+# WORK_FOLDER keeps the Debian for the next time. Exit code 77: it cannot run here, and the last
+# line says why.
 set -euo pipefail
 build=$(realpath "$1") source=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$2"
@@ -27,7 +29,8 @@ fi
 DESTDIR=$root cmake --install "$build" >/dev/null
 DESTDIR=$root cmake --install "$build" --component virtual_sensor >/dev/null
 install -m 755 "$source/in_container.sh" "$root/usr/local/bin/plumb-checks"
-# The virtual sensor instead of a real one, and a watchdog that need not be waited for half a minute; the sandbox stays as it is.
+# The virtual sensor instead of a real one, and a watchdog that need not be waited for half a
+# minute; the sandbox stays as it is.
 mkdir -p "$root/etc/systemd/system/plumbd.service.d" "$root/etc/systemd/system/multi-user.target.wants"
 cat >"$root/etc/systemd/system/plumbd.service.d/test.conf" <<'UNIT'
 [Service]

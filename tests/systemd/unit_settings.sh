@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A unit's provisioning file, from the data partition and from a stick, through plumbd --provision to what systemd reads; its recovery; and the
-# appliance's screen.
+# A unit's provisioning file, from the data partition and from a stick, through plumbd --provision
+# to what systemd reads; its recovery; and the appliance's screen.
 #   unit_settings.sh BUILD_FOLDER
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"
@@ -150,7 +150,8 @@ printf '#!/bin/sh\n' >bin/plumb
 "$source/systemd/burn-in" >out
 check "one that passes says so" '^burn-in of 1 minutes: passed' "$(cat data/provision/burn-in.txt)"
 
-# Recovery: nothing happens to a unit whose plumbd works (here: another process holds the folder), and each file counts once.
+# Recovery: nothing happens to a unit whose plumbd works (here: another process holds the folder),
+# and each file counts once.
 printf '[recovery]\nlost_scans = 3\n' >stick/plumb-recovery.toml
 : >asked
 exec 9<state

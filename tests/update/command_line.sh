@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# `plumb update` with the real plumbd and RAUC itself, on a bus and a machine made of files: a good bundle, each bad one with its own sentence, the
-# restart, and a machine that starts the previous system.
+# `plumb update` with the real plumbd and RAUC itself, on a bus and a machine made of files: a good
+# bundle, each bad one with its own sentence, the restart, and a machine that starts the previous
+# system.
 #   command_line.sh BUILD_FOLDER
 set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A machine for RAUC made of files, its certificate authority, the one that takes over from it and a stranger's, and bundles good and bad. Keys live in
-# FOLDER alone.
+# A machine for RAUC made of files, its certificate authority, the one that takes over from it and a
+# stranger's, and bundles good and bad. Keys live in FOLDER alone.
 #   make_bundles.sh FOLDER
 set -euo pipefail
 source=$(cd "$(dirname "$0")/../.." && pwd)
