@@ -9,6 +9,17 @@
 namespace plumb {
 namespace {
 
+// half range of the search about the support's normal; 60 deg are required
+constexpr double kMaxYaw_rad = 1.6;
+// 5 deg, or 26 mm at the end of a torso, which is well within reach of the refinement
+constexpr double kYawStep_rad = 0.0873;
+// largest distance of the centroids, which missing parts move apart
+constexpr double kMaxOffset_m = 0.165;
+constexpr double kOffsetStep_m = 0.03;
+// upper limit of one difference; body against floor costs as much
+constexpr double kHeightLimit_m = 0.04;
+constexpr std::size_t kMaxSamples = 1500;  // cells of the reference body that are compared
+constexpr std::size_t kNumStarts = 6;
 // cost of an unmeasured cell as a fraction of the limit, because missing data is weak evidence
 constexpr float kUnknownShare = 0.7F;
 constexpr double kDistinctYaw_rad = 0.21;  // 12 deg
@@ -82,8 +93,7 @@ double SupportHeightAt(const Body& body, const Eigen::Vector2d& xy) {
 
 }  // namespace
 
-std::vector<Pose> MotionStarts(const Body& reference, const Body& current,
-                               const MotionStartOptions& options) {
+std::vector<Pose> MotionStarts(const Body& reference, const Body& current) {
   const std::vector<BodyCell> all_reference = BodyCells(reference);
   const std::vector<BodyCell> all_current = BodyCells(current);
   if (all_reference.empty() || all_current.empty()) return {};
@@ -94,11 +104,11 @@ std::vector<Pose> MotionStarts(const Body& reference, const Body& current,
       (reference.grid.step * reference.grid.step) / (current.grid.step * current.grid.step);
 
   std::vector<BodyCell> samples;
-  const std::size_t stride = all_reference.size() / options.max_samples + 1;
+  const std::size_t stride = all_reference.size() / kMaxSamples + 1;
   for (std::size_t i = 0; i < all_reference.size(); i += stride)
     samples.push_back(all_reference[i]);
   const std::vector<float> map = SearchMap(current);
-  const float limit = static_cast<float>(options.height_limit_m);
+  const float limit = static_cast<float>(kHeightLimit_m);
 
   const auto cost_of = [&](const std::vector<Eigen::Vector2d>& turned,
                            const Eigen::Vector2d& shift) {
@@ -116,16 +126,16 @@ std::vector<Pose> MotionStarts(const Body& reference, const Body& current,
     }
     const double count = static_cast<double>(samples.size());
     const double uncovered = std::max(0.0, 1.0 - static_cast<double>(hits) / count * area_ratio);
-    return static_cast<double>(sum) / count + uncovered * options.height_limit_m;
+    return static_cast<double>(sum) / count + uncovered * kHeightLimit_m;
   };
 
-  const int yaw_steps = static_cast<int>(options.max_yaw_rad / options.yaw_step_rad);
-  const int shift_steps = static_cast<int>(options.max_offset_m / options.offset_step_m);
+  const int yaw_steps = static_cast<int>(kMaxYaw_rad / kYawStep_rad);
+  const int shift_steps = static_cast<int>(kMaxOffset_m / kOffsetStep_m);
   const std::size_t per_yaw =
       static_cast<std::size_t>((2 * shift_steps + 1) * (2 * shift_steps + 1));
   std::vector<Candidate> candidates(static_cast<std::size_t>(2 * yaw_steps + 1) * per_yaw);
   tbb::parallel_for(-yaw_steps, yaw_steps + 1, [&](int k) {
-    const double yaw = k * options.yaw_step_rad;
+    const double yaw = k * kYawStep_rad;
     const Eigen::Rotation2Dd R(yaw);
     std::vector<Eigen::Vector2d> turned;
     for (const BodyCell& cell : samples)
@@ -133,7 +143,7 @@ std::vector<Pose> MotionStarts(const Body& reference, const Body& current,
     std::size_t slot = static_cast<std::size_t>(k + yaw_steps) * per_yaw;
     for (int iy = -shift_steps; iy <= shift_steps; ++iy) {
       for (int ix = -shift_steps; ix <= shift_steps; ++ix) {
-        const Eigen::Vector2d offset(ix * options.offset_step_m, iy * options.offset_step_m);
+        const Eigen::Vector2d offset(ix * kOffsetStep_m, iy * kOffsetStep_m);
         candidates[slot++] = {cost_of(turned, offset), yaw, offset};
       }
     }
@@ -143,7 +153,7 @@ std::vector<Pose> MotionStarts(const Body& reference, const Body& current,
 
   std::vector<Candidate> kept;
   for (const Candidate& candidate : candidates) {
-    if (kept.size() >= options.num_starts) break;
+    if (kept.size() >= kNumStarts) break;
     const bool known = std::any_of(kept.begin(), kept.end(), [&](const Candidate& other) {
       return std::abs(other.yaw_rad - candidate.yaw_rad) < kDistinctYaw_rad &&
              (other.offset - candidate.offset).norm() < kDistinctShift_m;

@@ -14,6 +14,14 @@ namespace {
 constexpr double kSegmentationSpacing_m = 0.01;
 constexpr double kSegmentationSmoothing_m = 0.03;
 
+// Surfaces higher than this above the support are body: above the noise, below a wrist.
+constexpr double kMinHeight_m = 0.025;
+constexpr double kMaxHeight_m = 0.6;   // higher surfaces are stands, hands or the gantry
+constexpr double kBodyCell_m = 0.015;  // of the map of the body's outline
+// largest tilt of a support against the frame's z axis; a marker may lie on a wedge
+constexpr double kMaxTilt_rad = 0.35;
+constexpr double kMinSupportArea_m2 = 0.08;  // no part of a body has a flat area as large as this
+
 constexpr int kMaxPlanes = 6;
 constexpr double kHistogramBin_m = 0.01;
 constexpr double kCoarsePlaneBand_m =
@@ -78,8 +86,8 @@ double ModeHeight(const Surface& scene, const std::vector<std::size_t>& candidat
   return low + (static_cast<double>(best) - 0.5) * kHistogramBin_m;
 }
 
-std::vector<FoundPlane> HorizontalPlanes(const Surface& scene, const BodyOptions& options) {
-  const double cos_tilt = std::cos(options.max_tilt_rad);
+std::vector<FoundPlane> HorizontalPlanes(const Surface& scene) {
+  const double cos_tilt = std::cos(kMaxTilt_rad);
   std::vector<std::size_t> left;
   for (std::size_t i = 0; i < scene.size(); ++i) {
     if (scene.normals[i].z() > cos_tilt) left.push_back(i);
@@ -87,7 +95,7 @@ std::vector<FoundPlane> HorizontalPlanes(const Surface& scene, const BodyOptions
   const double area_per_sample = scene.spacing_m * scene.spacing_m;
   std::vector<FoundPlane> planes;
   for (int round = 0; round < 2 * kMaxPlanes && planes.size() < kMaxPlanes; ++round) {
-    if (static_cast<double>(left.size()) * area_per_sample < options.min_support_area_m2) break;
+    if (static_cast<double>(left.size()) * area_per_sample < kMinSupportArea_m2) break;
     FoundPlane found;
     found.plane.offset_m = ModeHeight(scene, left);
     bool fitted = true;
@@ -110,8 +118,7 @@ std::vector<FoundPlane> HorizontalPlanes(const Surface& scene, const BodyOptions
     if (rest.size() == left.size()) break;
     left = std::move(rest);
     const bool level = found.plane.normal.z() > cos_tilt;
-    if (level &&
-        static_cast<double>(found.members.size()) * area_per_sample >= options.min_support_area_m2)
+    if (level && static_cast<double>(found.members.size()) * area_per_sample >= kMinSupportArea_m2)
       planes.push_back(std::move(found));
   }
   return planes;
@@ -119,8 +126,7 @@ std::vector<FoundPlane> HorizontalPlanes(const Surface& scene, const BodyOptions
 
 // The highest plane that carries nearly as much as any other: the couch rather than the floor.
 std::optional<SupportPlane> ChooseSupport(const Surface& scene,
-                                          const std::vector<FoundPlane>& planes,
-                                          const BodyOptions& options) {
+                                          const std::vector<FoundPlane>& planes) {
   std::vector<std::uint8_t> flat(scene.size(), 0);
   for (const FoundPlane& found : planes) {
     for (const std::size_t i : found.members) flat[i] = 1;
@@ -129,8 +135,7 @@ std::optional<SupportPlane> ChooseSupport(const Surface& scene,
   for (std::size_t k = 0; k < planes.size(); ++k) {
     for (std::size_t i = 0; i < scene.size(); ++i) {
       const double height = planes[k].plane.Height(scene.points[i].cast<double>());
-      if (flat[i] == 0 && height > options.min_height_m && height < options.max_height_m)
-        ++carried[k];
+      if (flat[i] == 0 && height > kMinHeight_m && height < kMaxHeight_m) ++carried[k];
     }
   }
   if (planes.empty()) return std::nullopt;
@@ -239,12 +244,12 @@ bool Body::Contains(const Eigen::Vector3d& p) const {
   return cell && cells[*cell] == kBody && HighEnough(p);
 }
 
-Body FindBody(const Surface& scene, const BodyOptions& options) {
+Body FindBody(const Surface& scene) {
   Body body;
-  body.min_height_m = options.min_height_m;
-  body.max_height_m = options.max_height_m;
-  body.support = ChooseSupport(scene, HorizontalPlanes(scene, options), options);
-  body.grid = GridAround(scene, options.cell_m);
+  body.min_height_m = kMinHeight_m;
+  body.max_height_m = kMaxHeight_m;
+  body.support = ChooseSupport(scene, HorizontalPlanes(scene));
+  body.grid = GridAround(scene, kBodyCell_m);
   body.cells.assign(body.grid.num_cells(), Body::kUnknown);
   body.height_m.assign(body.grid.num_cells(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < scene.size(); ++i) {
@@ -254,7 +259,7 @@ Body FindBody(const Surface& scene, const BodyOptions& options) {
     const double height = body.support ? body.support->Height(p) : p.z();
     body.cells[*cell] = std::max<std::uint8_t>(body.cells[*cell],
                                                body.HighEnough(p) ? Body::kBody : Body::kMeasured);
-    if (body.support && height >= options.max_height_m) continue;
+    if (body.support && height >= kMaxHeight_m) continue;
     if (!(body.height_m[*cell] >= height)) body.height_m[*cell] = static_cast<float>(height);
   }
   KeepLargestComponent(body);

@@ -22,16 +22,6 @@ struct SupportPlane {
   [[nodiscard]] double Height(const Eigen::Vector3d& p) const { return normal.dot(p) - offset_m; }
 };
 
-struct BodyOptions {
-  /// Surfaces higher than this above the support are body: above the noise, below a wrist.
-  double min_height_m = 0.025;
-  double max_height_m = 0.6;  ///< Higher surfaces are stands, hands or the gantry.
-  double cell_m = 0.015;      ///< Cell size of the map of the body's outline.
-  double max_tilt_rad =
-      0.35;  ///< Largest tilt of a support against the frame's z axis; a marker may lie on a wedge.
-  double min_support_area_m2 = 0.08;  ///< No part of a body has a flat area as large as this.
-};
-
 /// A body on its support, in the frame of the surface in which it was found.
 struct Body {
   enum Cell : std::uint8_t { kUnknown = 0, kMeasured = 1, kBody = 2 };
@@ -49,10 +39,10 @@ struct Body {
 };
 
 /// Finds the large near-horizontal planes, takes the highest that carries nearly as much as any
-/// other, and the largest connected part above it. The z axis of the frame points up to within
-/// `options.max_tilt_rad`.
+/// other, and the largest connected part above it. The z axis of the frame points up to within 20
+/// deg.
 /// @param scene  The whole scene with a point spacing of about 1 cm.
-[[nodiscard]] Body FindBody(const Surface& scene, const BodyOptions& options = {});
+[[nodiscard]] Body FindBody(const Surface& scene);
 
 /// Finds the body in a scene's full cloud with normals, as every comparison does.
 [[nodiscard]] Body FindBody(const PointCloud& scene_cloud);

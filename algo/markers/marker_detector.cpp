@@ -124,12 +124,8 @@ struct MarkerDetector::Impl {
     observation.id = marker.id;
     observation.corners = marker.corners;
     observation.sigma_px.fill(kUnrefinedSigma_px);
-    if (!options.refine_corners) return observation;
     const MarkerPattern pattern{dictionary.Code(marker.id), dictionary.bits_per_side()};
-    CornerRefinementOptions refinement;
-    refinement.linear_light = options.linear_light;
-    refinement.intrinsics = options.intrinsics;
-    if (const auto refined = RefineCorners(gray, marker.corners, pattern, refinement)) {
+    if (const auto refined = RefineCorners(gray, marker.corners, pattern)) {
       observation.corners = refined->corners;
       observation.sigma_px = refined->sigma_px;
     }

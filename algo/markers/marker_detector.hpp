@@ -7,7 +7,6 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "algo/base/intrinsics.hpp"
 #include "algo/types/marker.hpp"
 #include "algo/types/marker_dictionary.hpp"
 
@@ -18,11 +17,6 @@ struct MarkerDetectorOptions {
   double min_side_px = 14.0;  ///< Markers with a shorter mean side are not reported; >= 8.
   double border_px =
       1.0;  ///< A marker with a corner nearer than this to the border is left out; >= 0.
-  bool refine_corners = true;  ///< False: the corners as detected, accurate to about half a pixel.
-  bool linear_light =
-      true;  ///< Invert the sRGB tone curve for the refinement; see CornerRefinementOptions.
-  std::optional<Intrinsics> intrinsics = std::nullopt;  ///< If given, the refinement allows for the
-                                                        ///< bow that the lens puts on the sides.
 };
 
 /// Detections in one image.

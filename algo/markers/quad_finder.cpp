@@ -125,10 +125,6 @@ bool Plausible(const ImageCorners& corners, const cv::Size& size,
 
 }  // namespace
 
-std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const QuadFinderOptions& options) {
-  return FindDarkQuads(gray, {0, 0, gray.cols, gray.rows}, options);
-}
-
 std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const cv::Rect& part,
                                         const QuadFinderOptions& options) {
   cv::Mat dark;

@@ -19,16 +19,14 @@ struct QuadFinderOptions {
   int min_darkness = 7;  ///< Grey levels below the local mean from which a pixel counts as dark.
 };
 
-/// Outlines of dark regions that consist of four straight sides, each fitted as a line; corners are
-/// accurate to about half a pixel on sharp images. Clockwise as seen (image y down), starting at
-/// any corner. May contain the same square more than once.
+/// Outlines of dark regions within a part of the image that consist of four straight sides, each
+/// fitted as a line; corners are accurate to about half a pixel on sharp images. Clockwise as seen
+/// (image y down), starting at any corner, in coordinates of the whole image. May contain the same
+/// square more than once. Squares that are more than half a window inside the part are found as in
+/// the whole image.
 /// @param gray  CV_8UC1.
-/// Thread-safe and deterministic.
-[[nodiscard]] std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray,
-                                                      const QuadFinderOptions& options);
-/// The same within a part of the image. Squares that are more than half a window inside the part
-/// are found as in the whole image. Corners are in coordinates of the whole image.
 /// @param part  Inside the image, not empty.
+/// Thread-safe and deterministic.
 [[nodiscard]] std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const cv::Rect& part,
                                                       const QuadFinderOptions& options);
 

@@ -103,28 +103,6 @@ void MoveTo(const Pose& T_refined_world, const Points& original, Points& moved) 
     moved[i] = (R * original[i].cast<double>() + t).cast<float>();
 }
 
-/// Mean of rotations (chordal) about the mean of the clouds' centroids, and mean displacement of
-/// the centroids.
-Pose MeanMotion(const std::vector<Pose>& T_refined_world, const std::vector<Points>& clouds) {
-  Eigen::Matrix3d sum_of_rotations = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  Eigen::Vector3d moved_centre = Eigen::Vector3d::Zero();
-  for (std::size_t j = 0; j < clouds.size(); ++j) {
-    Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
-    for (const Eigen::Vector3f& p : clouds[j]) centroid += p.cast<double>();
-    centroid /= static_cast<double>(clouds[j].size());
-    sum_of_rotations += T_refined_world[j].linear();
-    centre += centroid;
-    moved_centre += T_refined_world[j] * centroid;
-  }
-  const double count = static_cast<double>(clouds.size());
-  Pose mean = Pose::Identity();
-  mean.linear() = sum_of_rotations / count;
-  mean = Orthonormalised(mean);
-  mean.translation() = moved_centre / count - mean.linear() * (centre / count);
-  return mean;
-}
-
 }  // namespace
 
 GlobalIcpResult RefinePoses(std::span<const PointCloud> clouds_in_world,
@@ -167,14 +145,8 @@ GlobalIcpResult RefinePoses(std::span<const PointCloud> clouds_in_world,
       num_pairs += step.num_pairs;
     }
     result.rms_per_iteration.push_back(num_pairs > 0 ? std::sqrt(sum_squared / num_pairs) : 0.0);
-    result.pairs_per_iteration.push_back(num_pairs);
     radius -= radius_step;
     if (progress) progress(static_cast<double>(iteration + 1) / options.num_iterations);
-  }
-
-  if (options.remove_mean_motion) {
-    const Pose T_world_mean = MeanMotion(result.T_refined_world, original).inverse();
-    for (Pose& T : result.T_refined_world) T = T_world_mean * T;
   }
   return result;
 }

@@ -21,9 +21,6 @@ struct GlobalIcpOptions {
   double subsample_spacing =
       2 * kCentimetre;  ///< sigma: Poisson-disk spacing; 0 keeps every point.
   unsigned seed = 1;    ///< Seed of the random subsampling.
-  /// Removes the mean motion of all clouds from the result. Paper: off, so that all clouds may
-  /// drift together. Relative poses are the same either way.
-  bool remove_mean_motion = false;
 };
 
 /// The result of one call of RefinePoses(), for logs, benchmarks and the result page.
@@ -32,8 +29,7 @@ struct GlobalIcpResult {
   /// pose of keyframe j is T_refined_world[j] * T_world_camera[j].
   std::vector<Pose> T_refined_world;
   std::vector<double>
-      rms_per_iteration;  ///< Point-to-point residual before the motion of each iteration, metres.
-  std::vector<int> pairs_per_iteration;  ///< Summed over all clouds.
+      rms_per_iteration;   ///< Point-to-point residual before the motion of each iteration, metres.
   bool cancelled = false;  ///< Stopped early: poses are those of the last whole iteration.
 };
 

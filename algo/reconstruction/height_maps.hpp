@@ -34,15 +34,11 @@ struct HeightMapOptions {
 /// the mean z of the points within the band below the cloud's highest point there, then the mean
 /// over the clouds that contain the cell. Points outside the crop and points that are not finite
 /// are ignored.
-/// @param clouds_in_marker  One per keyframe, in the reference marker's frame (z out of the print).
-/// @throws std::invalid_argument as HeightMapOptions::Grid(), or if the band is not positive.
+/// @param clouds  One per keyframe.
+/// @param T_marker_cloud  One per cloud, into the reference marker's frame (z out of the print).
+/// @throws std::invalid_argument as HeightMapOptions::Grid(), if the band is not positive, or if
+///         the number of poses differs from the number of clouds.
 /// Deterministic on any number of threads.
-[[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker,
-                                       const HeightMapOptions& options = {});
-
-/// The same for clouds that are transformed during the calculation: p_marker = T_marker_cloud[j] *
-/// p. Avoids a copy of the clouds.
-/// @throws std::invalid_argument also if the number of poses differs from the number of clouds.
 [[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds,
                                        std::span<const Pose> T_marker_cloud,
                                        const HeightMapOptions& options = {});
@@ -59,14 +55,7 @@ struct RobustHeightMapOptions {
   int min_views = 2;  ///< Number of views that must agree on a cell (at most the number available).
   /// Square metres; smaller isolated patches are removed as speckles.
   double min_patch_area = 4e-4;
-  bool with_colors = true;
   std::stop_token stop = {};  ///< Polled; see CheckStop().
-};
-
-/// A height map, with an optional colour for each cell (black where the map is empty).
-struct ColoredHeightMap {
-  HeightMap map;
-  std::vector<Color> colors;  ///< Empty, or one per cell of the map's grid.
 };
 
 /// The top surface as all views together show it.
@@ -81,9 +70,7 @@ struct ColoredHeightMap {
 /// @param views_in_marker  Prepared views whose "world" is the reference marker's frame.
 /// @throws std::invalid_argument if an option is out of range.
 /// Deterministic on any number of threads.
-[[nodiscard]] ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
-                                               const RobustHeightMapOptions& options = {});
-[[nodiscard]] ColoredHeightMap RobustHeightMap(std::span<const DepthView> views_in_marker,
-                                               const RobustHeightMapOptions& options = {});
+[[nodiscard]] HeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
+                                        const RobustHeightMapOptions& options = {});
 
 }  // namespace plumb

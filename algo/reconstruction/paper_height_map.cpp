@@ -41,12 +41,6 @@ GridShape HeightMapOptions::Grid() const {
   return grid;
 }
 
-HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker,
-                         const HeightMapOptions& options) {
-  return PaperHeightMap(clouds_in_marker,
-                        std::vector<Pose>(clouds_in_marker.size(), Pose::Identity()), options);
-}
-
 HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pose> T_marker_cloud,
                          const HeightMapOptions& options) {
   if (clouds.size() != T_marker_cloud.size())

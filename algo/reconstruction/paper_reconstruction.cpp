@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kSingleViewSigma = 0.01;  // metres; error of the mean of a single window
 constexpr double kMinSigma = 5e-4;
+constexpr int kDepthWindow_px = 11;  // s, at 640 columns
 
 /// Sums over the views of one corner.
 struct CornerSums {
@@ -72,8 +73,8 @@ std::vector<PointCloud> KeyframeClouds(std::span<const Keyframe> keyframes) {
   return clouds;
 }
 
-MarkerMap AverageMarkers(std::span<const Keyframe> keyframes, std::span<const Pose> T_refined_world,
-                         int depth_window_px) {
+MarkerMap AverageMarkers(std::span<const Keyframe> keyframes,
+                         std::span<const Pose> T_refined_world) {
   if (keyframes.size() != T_refined_world.size())
     throw std::invalid_argument(fmt::format("marker map: {} poses for {} keyframes",
                                             T_refined_world.size(), keyframes.size()));
@@ -83,7 +84,7 @@ MarkerMap AverageMarkers(std::span<const Keyframe> keyframes, std::span<const Po
     const Pose T_refined_camera = T_refined_world[j] * keyframes[j].view.T_world_camera;
     for (const MarkerObservation& seen : keyframes[j].markers) {
       const auto positions =
-          PaperCornerPositions(seen, keyframes[j].view, *rays[j], depth_window_px);
+          PaperCornerPositions(seen, keyframes[j].view, *rays[j], kDepthWindow_px);
       for (std::size_t k = 0; k < 4; ++k) {
         if (!positions[k]) continue;
         const Eigen::Vector3d p = T_refined_camera * *positions[k];
@@ -137,8 +138,7 @@ PaperReconstruction ReconstructAsPublished(
   result.T_refined_world = std::move(icp.T_refined_world);
   result.icp_rms_m = std::move(icp.rms_per_iteration);
   enter("markers");
-  result.markers_in_world =
-      AverageMarkers(keyframes, result.T_refined_world, options.depth_window_px);
+  result.markers_in_world = AverageMarkers(keyframes, result.T_refined_world);
   if (options.reference_marker)
     result.T_marker_world =
         ReferenceFrame(result.markers_in_world, *options.reference_marker, options.marker_length_m);

@@ -23,7 +23,6 @@ namespace plumb {
 struct PaperOptions {
   GlobalIcpOptions icp;
   HeightMapOptions height_map;
-  int depth_window_px = 11;             ///< s, at 640 columns.
   double marker_length_m = 0.0;         ///< l; required: the room's, see CornersInMarkerFrame().
   std::optional<int> reference_marker;  ///< Id of the reference marker.
 };
@@ -39,8 +38,7 @@ struct PaperOptions {
 /// the square root of the number of views (1 cm for a single view).
 /// @param T_refined_world  One per keyframe, from RefinePoses().
 [[nodiscard]] MarkerMap AverageMarkers(std::span<const Keyframe> keyframes,
-                                       std::span<const Pose> T_refined_world,
-                                       int depth_window_px = 11);
+                                       std::span<const Pose> T_refined_world);
 
 /// T_marker_world of the given marker by the rigid fit of its four corners; nothing if the map does
 /// not contain it or its corners determine no pose.

@@ -316,10 +316,7 @@ struct Reconstructor::Impl {
     view_options.stop = stop;
     const std::vector<ViewSurface> surfaces = PrepareCorrectedViews(
         map, info.intrinsics, joint.calibration, SceneFromWorld(info, map), view_options);
-    SurfaceCloudOptions cloud_options;
-    cloud_options.with_colors = options.keep_color;
-    cloud_options.stop = stop;
-    scene.cloud = MergeSurface(surfaces, cloud_options);
+    scene.cloud = MergeSurface(surfaces, {.with_colors = options.keep_color, .stop = stop});
     if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, median_depths_m));
     scene.timings_s["clouds"] = Now() - stage;
 
@@ -332,11 +329,8 @@ struct Reconstructor::Impl {
 
     report(0.8, "height map");
     stage = Now();
-    RobustHeightMapOptions map_options;
-    map_options.stop = stop;
-    map_options.with_colors = false;  // The mesh takes its colours from the cloud.
     if (scene.frame == SceneFrame::kReferenceMarker)
-      KeepHeightMap(RobustHeightMap(surfaces, map_options).map, scene);
+      KeepHeightMap(RobustHeightMap(surfaces, {.stop = stop}), scene);
     scene.timings_s["height_map"] = Now() - stage;
   }
 

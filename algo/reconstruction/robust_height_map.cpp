@@ -320,15 +320,14 @@ void DropSpeckles(CoarseMap& map, float max_step, std::size_t min_cells) {
 class MapFiller {
  public:
   MapFiller(std::span<const ViewSurface> views, const CoarseMap& coarse,
-            const RobustHeightMapOptions& options, ColoredHeightMap& result)
-      : views_(views),
-        coarse_(coarse),
+            const RobustHeightMapOptions& options, HeightMap& map)
+      : coarse_(coarse),
         options_(options),
         band_(static_cast<float>(options.top_surface_band)),
         max_step_(kMaxMeanSlope * static_cast<float>(2.0 * options.cell_size)),
         min_views_(std::min(options.min_views, static_cast<int>(views.size()))),
         fusion_(views, {.with_normals = false, .max_views = kMaxViews}),
-        result_(result) {}
+        map_(map) {}
 
   void Fill() {
     const int tile_rows = (coarse_.grid.height + kTile - 1) / kTile;
@@ -338,7 +337,7 @@ class MapFiller {
       for (int column = 0; column < tile_columns; ++column) FillTile(row, column, true);
     });
     // Written to another array, so that cells do not depend on the order of processing.
-    nodes_ = result_.map.z;
+    nodes_ = map_.z;
     tbb::parallel_for(0, tile_rows, [&](int row) {
       CheckStop(options_.stop);
       for (int column = 0; column < tile_columns; ++column) FillTile(row, column, false);
@@ -347,7 +346,7 @@ class MapFiller {
 
  private:
   [[nodiscard]] std::size_t Index(int row, int column) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(result_.map.grid.width) +
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(map_.grid.width) +
            static_cast<std::size_t>(column);
   }
   [[nodiscard]] const TopPlane& PlaneAt(int row, int column) const {
@@ -380,7 +379,7 @@ class MapFiller {
 
   void FillCoarseCell(int coarse_row, int coarse_column, std::span<const std::uint16_t> near,
                       bool is_node_pass) {
-    const GridShape& grid = result_.map.grid;
+    const GridShape& grid = map_.grid;
     for (int row = coarse_row * kCoarse; row < std::min((coarse_row + 1) * kCoarse, grid.height);
          ++row) {
       for (int column = coarse_column * kCoarse;
@@ -399,8 +398,7 @@ class MapFiller {
     const int row_after = row + row % 2;
     const int column_before = column - column % 2;
     const int column_after = column + column % 2;
-    if (row_after >= result_.map.grid.height || column_after >= result_.map.grid.width)
-      return false;
+    if (row_after >= map_.grid.height || column_after >= map_.grid.width) return false;
     const std::array<std::size_t, 4> around = {
         Index(row_before, column_before), Index(row_before, column_after),
         Index(row_after, column_before), Index(row_after, column_after)};
@@ -414,20 +412,12 @@ class MapFiller {
       sum += nodes_[i];
     }
     if (highest - lowest > max_step_) return false;
-    const std::size_t i = Index(row, column);
-    result_.map.z[i] = 0.25F * sum;
-    if (!result_.colors.empty()) {
-      for (std::size_t channel = 0; channel < 3; ++channel) {
-        unsigned total = 2;
-        for (const std::size_t k : around) total += result_.colors[k][channel];
-        result_.colors[i][channel] = static_cast<std::uint8_t>(total / 4);
-      }
-    }
+    map_.z[Index(row, column)] = 0.25F * sum;
     return true;
   }
 
   void Measure(int row, int column, const TopPlane& plane, std::span<const std::uint16_t> near) {
-    const GridShape& grid = result_.map.grid;
+    const GridShape& grid = map_.grid;
     Eigen::Vector3f seed(static_cast<float>(grid.x_centre(column)),
                          static_cast<float>(grid.y_centre(row)), plane.point.z());
     const Eigen::Vector3f& n = plane.normal;
@@ -441,44 +431,35 @@ class MapFiller {
     if (!(std::abs(rise) <= band_ && seed.z() + rise >= options_.z_min &&
           seed.z() + rise <= options_.z_max))
       return;
-    result_.map.z[Index(row, column)] = seed.z() + rise;
-    if (!result_.colors.empty())
-      result_.colors[Index(row, column)] =
-          views_[fused.best_view.value()].ColorAt(fused.best_pixel);
+    map_.z[Index(row, column)] = seed.z() + rise;
   }
 
-  std::span<const ViewSurface> views_;
   const CoarseMap& coarse_;
   const RobustHeightMapOptions& options_;
   float band_;
   float max_step_;
   int min_views_;
   ViewFusion fusion_;
-  ColoredHeightMap& result_;
+  HeightMap& map_;
   std::vector<float> nodes_;
 };
 
 }  // namespace
 
-ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
-                                 const RobustHeightMapOptions& options) {
+HeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
+                          const RobustHeightMapOptions& options) {
   if (!(options.cell_size > 0.0 && options.max_extent > 0.0 && options.max_extent <= 20.0 &&
         options.z_min < options.z_max && options.top_surface_band > 0.0 && options.min_views >= 1 &&
         options.min_patch_area >= 0.0))
     throw std::invalid_argument("robust height map: an option is out of range");
   std::optional<GridShape> grid = options.grid;
   if (!grid) grid = GridAroundData(views_in_marker, options);
-  ColoredHeightMap result;
-  if (!grid) return result;
+  if (!grid) return HeightMap();
   if (!(grid->width > 0 && grid->height > 0 && grid->step > 0.0 &&
         static_cast<double>(grid->width) * grid->height <= kMaxCells))
     throw std::invalid_argument("robust height map: grid out of range");
-  result.map = HeightMap(*grid);
-  bool with_colors = options.with_colors;
-  for (const ViewSurface& view : views_in_marker)
-    with_colors = with_colors && !view.color_rgb.empty();
-  if (with_colors) result.colors.assign(grid->num_cells(), Color{0, 0, 0});
-  if (views_in_marker.empty()) return result;
+  HeightMap map(*grid);
+  if (views_in_marker.empty()) return map;
 
   CoarseMap coarse = FindTops(views_in_marker, *grid, options);
   CheckStop(options.stop);
@@ -487,13 +468,8 @@ ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
       coarse, static_cast<float>(options.top_surface_band),
       static_cast<std::size_t>(options.min_patch_area / (coarse.grid.step * coarse.grid.step)));
   CheckStop(options.stop);
-  MapFiller(views_in_marker, coarse, options, result).Fill();
-  return result;
-}
-
-ColoredHeightMap RobustHeightMap(std::span<const DepthView> views_in_marker,
-                                 const RobustHeightMapOptions& options) {
-  return RobustHeightMap(PrepareViews(views_in_marker), options);
+  MapFiller(views_in_marker, coarse, options, map).Fill();
+  return map;
 }
 
 }  // namespace plumb

@@ -324,8 +324,4 @@ PointCloud MergeSurface(std::span<const ViewSurface> views, const SurfaceCloudOp
   return MergeVoxels(moved, with_colors);
 }
 
-PointCloud MergeSurface(std::span<const DepthView> views, const SurfaceCloudOptions& options) {
-  return MergeSurface(PrepareViews(views), options);
-}
-
 }  // namespace plumb

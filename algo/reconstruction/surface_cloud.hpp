@@ -34,10 +34,6 @@ struct SurfaceCloudOptions {
 ///         usable pixel.
 /// @throws std::invalid_argument if an option is out of range or a view's images do not fit its
 ///         intrinsics; Interrupted on a stop request.
-[[nodiscard]] PointCloud MergeSurface(std::span<const DepthView> views,
-                                      const SurfaceCloudOptions& options = {});
-
-/// The same from prepared views, for callers that also make a height map from them.
 [[nodiscard]] PointCloud MergeSurface(std::span<const ViewSurface> views,
                                       const SurfaceCloudOptions& options = {});
 

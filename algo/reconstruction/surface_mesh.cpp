@@ -15,6 +15,9 @@ namespace plumb {
 namespace {
 
 constexpr std::uint32_t kNoVertex = 0xFFFFFFFFU;
+// Triangles with a steeper edge are steps between surfaces and are left out.
+constexpr double kMaxSlope_deg = 80.0;
+constexpr double kStepMargin_m = 0.003;  // what noise may add to an edge of that slope
 
 /// Builds the mesh row by row; a vertex is created by the first triangle that uses it.
 class GridMesher {
@@ -22,9 +25,9 @@ class GridMesher {
   GridMesher(const HeightMap& map, std::span<const Color> colors, const SurfaceMeshOptions& options)
       : map_(map), colors_(colors), decimation_(options.decimation) {
     const double run = map.grid.step * options.decimation;
-    const double slope = std::tan(options.max_slope_deg * kDegree);
-    max_step_ = static_cast<float>(run * slope + options.step_margin_m);
-    max_diagonal_step_ = static_cast<float>(std::sqrt(2.0) * run * slope + options.step_margin_m);
+    const double slope = std::tan(kMaxSlope_deg * kDegree);
+    max_step_ = static_cast<float>(run * slope + kStepMargin_m);
+    max_diagonal_step_ = static_cast<float>(std::sqrt(2.0) * run * slope + kStepMargin_m);
     columns_ = (map.grid.width + decimation_ - 1) / decimation_;
     rows_ = (map.grid.height + decimation_ - 1) / decimation_;
     vertex_of_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_),
@@ -117,9 +120,7 @@ class GridMesher {
 
 TriangleMesh MeshOfHeightMap(const HeightMap& map, std::span<const Color> colors,
                              const SurfaceMeshOptions& options) {
-  if (options.decimation < 1 || !(options.max_slope_deg > 0.0 && options.max_slope_deg < 90.0) ||
-      !(options.step_margin_m >= 0.0))
-    throw std::invalid_argument("surface mesh: decimation, slope or step margin out of range");
+  if (options.decimation < 1) throw std::invalid_argument("surface mesh: decimation out of range");
   if (!colors.empty() && colors.size() != map.grid.num_cells())
     throw std::invalid_argument("surface mesh: the numbers of cells and colours differ");
   return GridMesher(map, colors, options).Build();

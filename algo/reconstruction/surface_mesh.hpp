@@ -11,9 +11,6 @@ namespace plumb {
 
 struct SurfaceMeshOptions {
   int decimation = 1;  ///< Every n-th row and column becomes a vertex; >= 1.
-  /// Triangles with a steeper edge are steps between surfaces and are left out; in (0, 90).
-  double max_slope_deg = 80.0;
-  double step_margin_m = 0.003;  ///< Height difference that noise may add to an edge of that slope.
 };
 
 /// Mesh of the valid cells' centres in the map's frame: two triangles (or one, where a corner is
@@ -21,7 +18,8 @@ struct SurfaceMeshOptions {
 /// from +z. Vertices without a triangle are left out; normals are the area-weighted mean of the
 /// surrounding triangles.
 /// @param colors  Empty, or one per cell.
-/// @throws std::invalid_argument if an option is out of range or the number of colours differs from
+/// @throws std::invalid_argument if the decimation is out of range or the number of colours differs
+/// from
 ///         the number of cells.
 [[nodiscard]] TriangleMesh MeshOfHeightMap(const HeightMap& map, std::span<const Color> colors = {},
                                            const SurfaceMeshOptions& options = {});

@@ -58,8 +58,6 @@ class ViewFusion {
   [[nodiscard]] std::optional<float> Distance(std::size_t view, const Eigen::Vector3f& p_world,
                                               const Eigen::Vector3f& n_world) const;
 
-  [[nodiscard]] std::size_t num_views() const { return cameras_.size(); }
-
  private:
   /// A seed seen in a view, between two working pixels each way.
   struct Seen {

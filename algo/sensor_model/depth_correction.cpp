@@ -34,9 +34,8 @@ void ForEachCell(int image_width, int image_height, int window_px, const Visit& 
 
 DepthCorrection::DepthCorrection(const CalibrationModel& calibration, int image_width,
                                  int image_height, int window_px)
-    : width_(image_width / window_px),
-      height_(image_height / window_px),
-      cells_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {
+    : cells_(static_cast<std::size_t>(image_width / window_px) *
+             static_cast<std::size_t>(image_height / window_px)) {
   const auto& d = calibration.depth;
   const Eigen::Map<const Terms> terms(d.data() + kDepthField);
   ForEachCell(image_width, image_height, window_px,

@@ -19,8 +19,6 @@ class DepthCorrection {
     const Cell& c = cells_[cell];
     return z_m * (1.0 + c.factor + c.growth * FieldGrowth(z_m)) + c.offset_m;
   }
-  [[nodiscard]] int width() const { return width_; }
-  [[nodiscard]] int height() const { return height_; }
 
  private:
   struct Cell {
@@ -28,8 +26,6 @@ class DepthCorrection {
     double growth = 0;
     double offset_m = 0;
   };
-  int width_;
-  int height_;
   std::vector<Cell> cells_;
 };
 

@@ -107,7 +107,6 @@ BundleSummary Solver::Run() {
   double cost = problem_.Cost(state);
   summary.initial_cost = summary.final_cost = cost;
   if (!std::isfinite(cost) || problem_.size() == 0) return summary;
-  summary.usable = true;
   double damping = options_.initial_damping;
   bool linearised = false;
   while (summary.num_iterations < options_.max_iterations && damping < kLargestDamping) {

@@ -88,7 +88,6 @@ struct BundlePosterior {
 };
 
 struct BundleSummary {
-  bool usable = false;
   int num_iterations = 0;
   double initial_cost = 0;
   double final_cost = 0;

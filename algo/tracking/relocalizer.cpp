@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <random>
 
 #include <opencv2/calib3d.hpp>
@@ -226,14 +225,6 @@ std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
     if (best->num_inliers >= kBeyondDoubt) break;
   }
   return best;
-}
-
-std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
-                                                   const Intrinsics& intrinsics,
-                                                   const DescribedFeatures& features) {
-  std::vector<int> newest_first(map.keyframes.size());
-  std::iota(newest_first.rbegin(), newest_first.rend(), 0);
-  return RelocalizeByFeatures(map, intrinsics, features, newest_first);
 }
 
 }  // namespace plumb

@@ -30,10 +30,6 @@ struct Relocalization {
                                                                  const Intrinsics& intrinsics,
                                                                  const DescribedFeatures& features,
                                                                  const std::vector<int>& keyframes);
-/// The same with all keyframes of the map, the newest first.
-[[nodiscard]] std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
-                                                                 const Intrinsics& intrinsics,
-                                                                 const DescribedFeatures& features);
 
 /// Pose of one marker in the camera frame from its four corners. A square has two candidate poses;
 /// the depth on it decides between them, or a clear difference in reprojection error. Returns

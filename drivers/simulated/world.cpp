@@ -58,7 +58,7 @@ MarkerCorners CornersOf(const Board& board) {
 }
 
 World::World(const Room& room, std::shared_ptr<const DistanceGrid> body, const Pose& T_world_body)
-    : room_(room), body_(std::move(body)), T_world_body_(T_world_body) {
+    : room_(room), body_(std::move(body)) {
   if (!body_ || !room_.support_texture || !room_.skin_texture)
     throw std::invalid_argument("world needs a body and its textures");
   if (room_.boards.size() > 250)

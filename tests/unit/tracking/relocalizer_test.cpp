@@ -170,9 +170,10 @@ TEST(RelocalizeByFeatures, FindsTheKeyframeAndThePose) {
     keyframe.descriptors = features.descriptors;
     map.keyframes.push_back(keyframe);
   }
+  const std::vector<int> all = {2, 1, 0};
   const Pose T_motion = PoseFromTwist((Vector6d() << 0, 0, 0.35, 0.08, -0.05, 0).finished());
   const auto found =
-      RelocalizeByFeatures(map, k, DescribeFeatures(Photo(Texture(2), k, T_motion), depth, k));
+      RelocalizeByFeatures(map, k, DescribeFeatures(Photo(Texture(2), k, T_motion), depth, k), all);
   ASSERT_TRUE(found.has_value());
   EXPECT_EQ(found->keyframe, 1);
   const Pose error = (map.keyframes[1].T_world_color * T_motion).inverse() * found->T_world_color;
@@ -181,12 +182,12 @@ TEST(RelocalizeByFeatures, FindsTheKeyframeAndThePose) {
   EXPECT_LT(error.translation().norm(), 0.003);
   EXPECT_LT(RotationAngle(error), 0.004);
   EXPECT_FALSE(
-      RelocalizeByFeatures(map, k, DescribeFeatures(Photo(Texture(9), k, T_motion), depth, k))
+      RelocalizeByFeatures(map, k, DescribeFeatures(Photo(Texture(9), k, T_motion), depth, k), all)
           .has_value())
       << "never seen";
-  EXPECT_FALSE(
-      RelocalizeByFeatures(map, k, DescribeFeatures(cv::Mat::zeros(480, 640, CV_8UC1), depth, k))
-          .has_value())
+  EXPECT_FALSE(RelocalizeByFeatures(
+                   map, k, DescribeFeatures(cv::Mat::zeros(480, 640, CV_8UC1), depth, k), all)
+                   .has_value())
       << "black";
 }
 
