@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "algo/markers/corner_refinement.hpp"
-#include "algo/markers/marker_decoder.hpp"
 #include "algo/markers/quad_finder.hpp"
 
 namespace plumb {
@@ -114,67 +113,55 @@ std::vector<cv::Rect> PartsAround(const std::vector<ImageCorners>& expected, con
 
 }  // namespace
 
-struct MarkerDetector::Impl {
-  MarkerDetectorOptions options;
-  MarkerDictionary dictionary;
-  MarkerDecoder decoder;
-
-  [[nodiscard]] MarkerObservation Refined(const cv::Mat& gray, const DecodedMarker& marker) const {
-    MarkerObservation observation;
-    observation.id = marker.id;
-    observation.corners = marker.corners;
-    observation.sigma_px.fill(kUnrefinedSigma_px);
-    const MarkerPattern pattern{dictionary.Code(marker.id), dictionary.bits_per_side()};
-    if (const auto refined = RefineCorners(gray, marker.corners, pattern)) {
-      observation.corners = refined->corners;
-      observation.sigma_px = refined->sigma_px;
-    }
-    return observation;
-  }
-
-  [[nodiscard]] MarkerDetection DetectIn(const cv::Mat& gray,
-                                         const std::vector<cv::Rect>& parts) const {
-    std::vector<DecodedMarker> decoded;
-    for (const cv::Rect& part : parts) {
-      for (const ImageCorners& quad : FindDarkQuads(
-               gray, part, {.min_side_px = options.min_side_px, .border_px = options.border_px})) {
-        if (const std::optional<DecodedMarker> marker = decoder.Decode(gray, quad))
-          AddDistinct(*marker, decoded);
-      }
-    }
-    std::vector<MarkerObservation> found;
-    for (const DecodedMarker& marker : decoded) found.push_back(Refined(gray, marker));
-    return WithoutDuplicates(std::move(found));
-  }
-};
-
 MarkerDetector::MarkerDetector(const MarkerDictionary& dictionary,
-                               const MarkerDetectorOptions& options) {
+                               const MarkerDetectorOptions& options)
+    : options_(options),
+      dictionary_(dictionary),
+      // Less than the dictionary's whole distance: allowing fewer wrong bits gives fewer false
+      // markers.
+      decoder_(dictionary, static_cast<int>(0.6 * dictionary.max_correction_bits())) {
   if (!(options.min_side_px >= 8))
     throw std::invalid_argument(
         fmt::format("min_side_px must be at least 8, got {}", options.min_side_px));
   if (!(options.border_px >= 0))
     throw std::invalid_argument(
         fmt::format("border_px must not be negative, got {}", options.border_px));
-  // Less than the dictionary's whole distance: allowing fewer wrong bits gives fewer false markers.
-  const int max_wrong_bits = static_cast<int>(0.6 * dictionary.max_correction_bits());
-  impl_.reset(new Impl{options, dictionary, MarkerDecoder(dictionary, max_wrong_bits)});
 }
 
-MarkerDetector::~MarkerDetector() = default;
-MarkerDetector::MarkerDetector(MarkerDetector&&) noexcept = default;
-MarkerDetector& MarkerDetector::operator=(MarkerDetector&&) noexcept = default;
+MarkerObservation MarkerDetector::Refined(const cv::Mat& gray, const DecodedMarker& marker) const {
+  const MarkerPattern pattern{dictionary_.Code(marker.id), dictionary_.bits_per_side()};
+  if (const auto refined = RefineCorners(gray, marker.corners, pattern))
+    return {marker.id, refined->corners, refined->sigma_px};
+  MarkerObservation observation{marker.id, marker.corners, {}};
+  observation.sigma_px.fill(kUnrefinedSigma_px);
+  return observation;
+}
+
+MarkerDetection MarkerDetector::DetectIn(const cv::Mat& gray,
+                                         const std::vector<cv::Rect>& parts) const {
+  std::vector<DecodedMarker> decoded;
+  for (const cv::Rect& part : parts) {
+    for (const ImageCorners& quad : FindDarkQuads(
+             gray, part, {.min_side_px = options_.min_side_px, .border_px = options_.border_px})) {
+      if (const std::optional<DecodedMarker> marker = decoder_.Decode(gray, quad))
+        AddDistinct(*marker, decoded);
+    }
+  }
+  std::vector<MarkerObservation> found;
+  for (const DecodedMarker& marker : decoded) found.push_back(Refined(gray, marker));
+  return WithoutDuplicates(std::move(found));
+}
 
 MarkerDetection MarkerDetector::Detect(const cv::Mat& gray_or_rgb) const {
   const cv::Mat gray = ToGray(gray_or_rgb);
-  return impl_->DetectIn(gray, {{0, 0, gray.cols, gray.rows}});
+  return DetectIn(gray, {{0, 0, gray.cols, gray.rows}});
 }
 
 MarkerDetection MarkerDetector::DetectNear(const cv::Mat& gray,
                                            const std::vector<ImageCorners>& expected) const {
   // Detect() reports what is wrong.
   if (gray.empty() || gray.type() != CV_8UC1) return Detect(gray);
-  return impl_->DetectIn(gray, PartsAround(expected, gray.size()));
+  return DetectIn(gray, PartsAround(expected, gray.size()));
 }
 
 }  // namespace plumb

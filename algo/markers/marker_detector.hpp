@@ -1,12 +1,11 @@
 // Finds square fiducial markers in an image, with sub-pixel corners.
 #pragma once
 
-#include <memory>
-#include <optional>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
 
+#include "algo/markers/marker_decoder.hpp"
 #include "algo/types/marker.hpp"
 #include "algo/types/marker_dictionary.hpp"
 
@@ -33,9 +32,6 @@ class MarkerDetector {
   /// @throws std::invalid_argument if an option is out of range.
   explicit MarkerDetector(const MarkerDictionary& dictionary,
                           const MarkerDetectorOptions& options = {});
-  ~MarkerDetector();
-  MarkerDetector(MarkerDetector&&) noexcept;
-  MarkerDetector& operator=(MarkerDetector&&) noexcept;
 
   /// Markers in an image, CV_8UC1 or CV_8UC3 (red, green, blue). Corners are in pixels, centres at
   /// integers, in detector order, as seen (distorted). Markers that are partly covered or cut by
@@ -51,8 +47,13 @@ class MarkerDetector {
                                            const std::vector<ImageCorners>& expected) const;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  [[nodiscard]] MarkerObservation Refined(const cv::Mat& gray, const DecodedMarker& marker) const;
+  [[nodiscard]] MarkerDetection DetectIn(const cv::Mat& gray,
+                                         const std::vector<cv::Rect>& parts) const;
+
+  MarkerDetectorOptions options_;
+  MarkerDictionary dictionary_;
+  MarkerDecoder decoder_;
 };
 
 }  // namespace plumb

@@ -11,7 +11,6 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/statistics.hpp"
-#include "algo/tracking/tracker_impl.hpp"
 
 namespace plumb {
 namespace {
@@ -43,20 +42,20 @@ double UsualSpacing(std::span<const TrackedFrame> frames) {
   return TakeMedian(spacings_s);
 }
 
-Tracker::Impl::Impl(const StreamInfo& stream, const TrackerOptions& tracker_options)
-    : info(stream),
-      options(tracker_options),
-      dense_maker(stream.intrinsics),
-      followed_points(stream.intrinsics, stream.depth_noise, map) {
-  if (const std::optional<std::string> fault = FaultOf(info.depth_noise))
+Tracker::Tracker(const StreamInfo& info, const TrackerOptions& options)
+    : info_(info),
+      options_(options),
+      dense_maker_(info.intrinsics),
+      followed_points_(info.intrinsics, info.depth_noise, map_) {
+  if (const std::optional<std::string> fault = FaultOf(info_.depth_noise))
     throw DataError(fmt::format(
         "the depth noise stated for the sensor cannot be used: {}; correct what states it",
         *fault));
-  if (options.use_markers) detector.emplace(MarkerDictionary::ByName(info.marker_dictionary));
+  if (options_.use_markers) detector_.emplace(MarkerDictionary::ByName(info_.marker_dictionary));
 }
 
-Tracker::Impl::FrameData Tracker::Impl::Prepare(const Frame& frame) const {
-  const Intrinsics& k = info.intrinsics;
+Tracker::FrameData Tracker::Prepare(const Frame& frame) const {
+  const Intrinsics& k = info_.intrinsics;
   for (const cv::Mat* image : {&frame.color_rgb, &frame.depth_m})
     if (image->cols != k.width || image->rows != k.height)
       throw std::invalid_argument(
@@ -64,56 +63,56 @@ Tracker::Impl::FrameData Tracker::Impl::Prepare(const Frame& frame) const {
                       image->cols, image->rows, k.width, k.height));
   FrameData prepared;
   cv::cvtColor(frame.color_rgb, prepared.image.gray, cv::COLOR_RGB2GRAY);
-  prepared.image.pyramid = followed_points.PyramidOf(prepared.image.gray);
-  prepared.dense = dense_maker.MakeForPose(frame.depth_m);
+  prepared.image.pyramid = followed_points_.PyramidOf(prepared.image.gray);
+  prepared.dense = dense_maker_.MakeForPose(frame.depth_m);
   FindMarkers(frame, prepared);
   return prepared;
 }
 
 // While tracking, only markers of the map take part in the pose, and their approximate positions
 // are known. New ones are searched in keyframes.
-void Tracker::Impl::FindMarkers(const Frame& frame, FrameData& prepared) const {
-  if (!detector) return;
-  if (lost || map.keyframes.empty() || NeedsKeyframe(PredictedPose(frame))) {
+void Tracker::FindMarkers(const Frame& frame, FrameData& prepared) const {
+  if (!detector_) return;
+  if (lost_ || map_.keyframes.empty() || NeedsKeyframe(PredictedPose(frame))) {
     FindAllMarkers(prepared);
     return;
   }
   const Pose T_camera_world = PredictedPose(frame).inverse();
-  const MarkerCorners in_marker = CornersInMarkerFrame(info.marker_length_m);
+  const MarkerCorners in_marker = CornersInMarkerFrame(info_.marker_length_m);
   std::vector<ImageCorners> expected;
-  for (const auto& [id, marker] : map.markers) {
+  for (const auto& [id, marker] : map_.markers) {
     const Pose T_camera_marker = T_camera_world * marker.T_world_marker;
     ImageCorners corners;
     bool in_front = true;
     for (std::size_t i = 0; i < 4; ++i) {
       const Eigen::Vector3d p = T_camera_marker * in_marker[i];
       in_front = in_front && p.z() > 0.1;
-      if (in_front) corners[i] = Project(info.intrinsics, p);
+      if (in_front) corners[i] = Project(info_.intrinsics, p);
     }
     if (in_front) expected.push_back(corners);
   }
-  prepared.markers = detector->DetectNear(prepared.image.gray, expected).markers;
+  prepared.markers = detector_->DetectNear(prepared.image.gray, expected).markers;
 }
 
-void Tracker::Impl::FindAllMarkers(FrameData& prepared) const {
-  if (!detector || prepared.has_all_markers) return;
-  prepared.markers = detector->Detect(prepared.image.gray).markers;
+void Tracker::FindAllMarkers(FrameData& prepared) const {
+  if (!detector_ || prepared.has_all_markers) return;
+  prepared.markers = detector_->Detect(prepared.image.gray).markers;
   prepared.has_all_markers = true;
 }
 
 // Predicted with the velocity of the last frame.
-Pose Tracker::Impl::PredictedPose(const Frame& frame) const {
-  return PoseAfter(T_world_last, velocity, std::min(frame.color_time_s - last_time_s, 0.3));
+Pose Tracker::PredictedPose(const Frame& frame) const {
+  return PoseAfter(T_world_last_, velocity_, std::min(frame.color_time_s - last_time_s_, 0.3));
 }
 
-TrackedFrame Tracker::Impl::Track(const Frame& frame, bool fewer_keypoints) {
+TrackedFrame Tracker::Track(const Frame& frame, bool fewer_keypoints) {
   FrameData prepared = Prepare(frame);
   TrackedFrame result;
   result.frame_index = frame.index;
   result.color_time_s = frame.color_time_s;
   result.depth_time_s = frame.depth_time_s;
   result.fewer_keypoints = fewer_keypoints;
-  if (map.keyframes.empty()) {
+  if (map_.keyframes.empty()) {
     // A map that starts with an empty image could never be found again.
     if (ShowsSomething(prepared)) {
       MakeKeyframe(frame, prepared, Pose::Identity(), result);
@@ -121,52 +120,52 @@ TrackedFrame Tracker::Impl::Track(const Frame& frame, bool fewer_keypoints) {
     }
   } else {
     std::optional<PoseEstimate> estimate;
-    if (!lost) estimate = FollowFrame(frame, prepared, result);
+    if (!lost_) estimate = FollowFrame(frame, prepared, result);
     if (!estimate) estimate = Relocalize(frame, prepared, result);
     if (estimate) {
       Accept(frame, prepared, *estimate, result);
     } else {
-      lost = true;
-      followed_points.SetPoints({});
+      lost_ = true;
+      followed_points_.SetPoints({});
     }
   }
-  last_pyramid = std::move(prepared.image.pyramid);
-  frames.push_back(result);
+  last_pyramid_ = std::move(prepared.image.pyramid);
+  frames_.push_back(result);
   return result;
 }
 
-bool Tracker::Impl::ShowsSomething(const FrameData& prepared) {
+bool Tracker::ShowsSomething(const FrameData& prepared) {
   return !prepared.markers.empty() ||
          std::any_of(prepared.dense.z_m.begin(), prepared.dense.z_m.end(),
                      [](float z) { return z > 0; });
 }
 
-double Tracker::Impl::SigmaPx() const { return info.intrinsics.width / 640.0; }
+double Tracker::SigmaPx() const { return info_.intrinsics.width / 640.0; }
 
-void Tracker::Impl::AddMarkerPoints(const std::vector<MarkerObservation>& markers,
-                                    std::vector<PosePoint>& points) const {
-  const MarkerCorners in_marker = CornersInMarkerFrame(info.marker_length_m);
+void Tracker::AddMarkerPoints(const std::vector<MarkerObservation>& markers,
+                              std::vector<PosePoint>& points) const {
+  const MarkerCorners in_marker = CornersInMarkerFrame(info_.marker_length_m);
   for (const MarkerObservation& m : markers) {
-    const auto known = map.markers.find(m.id);
-    if (known == map.markers.end()) continue;
+    const auto known = map_.markers.find(m.id);
+    if (known == map_.markers.end()) continue;
     for (std::size_t i = 0; i < 4; ++i) {
       PosePoint point;
       point.p_world = known->second.T_world_marker * in_marker[i];
-      point.ideal = Undistort(info.intrinsics, m.corners[i]);
+      point.ideal = Undistort(info_.intrinsics, m.corners[i]);
       // Half a pixel for the error of the map and the rolling shutter, in addition to the
       // detector's.
-      point.sigma = std::hypot(m.sigma_px[i], 0.5 * SigmaPx()) / info.intrinsics.fx;
+      point.sigma = std::hypot(m.sigma_px[i], 0.5 * SigmaPx()) / info_.intrinsics.fx;
       points.push_back(point);
     }
   }
 }
 
-PoseProblem Tracker::Impl::MakeProblem(const FrameData& prepared, double dt_depth_s) const {
+PoseProblem Tracker::MakeProblem(const FrameData& prepared, double dt_depth_s) const {
   PoseProblem problem;
-  problem.intrinsics = info.intrinsics;
-  problem.depth_noise = info.depth_noise;
-  problem.T_color_depth = PoseFromTwist(velocity * dt_depth_s);
-  if (options.use_dense) {
+  problem.intrinsics = info_.intrinsics;
+  problem.depth_noise = info_.depth_noise;
+  problem.T_color_depth = PoseFromTwist(velocity_ * dt_depth_s);
+  if (options_.use_dense) {
     const MapKeyframe& keyframe = ReferenceKeyframe();
     problem.dense_frame = &prepared.dense;
     problem.dense_target = &keyframe.dense;
@@ -175,7 +174,7 @@ PoseProblem Tracker::Impl::MakeProblem(const FrameData& prepared, double dt_dept
   return problem;
 }
 
-Pose Tracker::Impl::DepthPose(const MapKeyframe& keyframe) {
+Pose Tracker::DepthPose(const MapKeyframe& keyframe) {
   return PoseAfter(keyframe.T_world_color, keyframe.velocity_per_s,
                    keyframe.data.depth_time_s - keyframe.data.color_time_s);
 }
@@ -183,18 +182,17 @@ Pose Tracker::Impl::DepthPose(const MapKeyframe& keyframe) {
 // The time since an earlier image, but at least half of the usual spacing. If stamps are made on
 // arrival, two images may be stamped within a millisecond, and dividing their motion by that would
 // give an absurd velocity.
-double Tracker::Impl::PlausibleStep_s(double step_s) const {
+double Tracker::PlausibleStep_s(double step_s) const {
   constexpr std::size_t kRecent = 16, kLeast = 4;
-  if (frames.size() < kLeast) return step_s;
+  if (frames_.size() < kLeast) return step_s;
   const std::span<const TrackedFrame> recent =
-      std::span(frames).last(std::min(kRecent, frames.size()));
+      std::span(frames_).last(std::min(kRecent, frames_.size()));
   return std::max(step_s, kLeastOfUsualSpacing * UsualSpacing(recent));
 }
 
 // True if the estimate is reliable: enough inliers, all six directions constrained, and a
 // plausible speed for a hand.
-bool Tracker::Impl::Plausible(const PoseEstimate& estimate, std::size_t num_points,
-                              double dt_s) const {
+bool Tracker::Plausible(const PoseEstimate& estimate, std::size_t num_points, double dt_s) const {
   const PointSupport support = SupportOf(estimate, num_points);
   const bool by_depth =
       estimate.num_dense > 600 && estimate.dense_overlap > 0.4 && estimate.dense_rms_m < 0.012;
@@ -206,16 +204,15 @@ bool Tracker::Impl::Plausible(const PoseEstimate& estimate, std::size_t num_poin
   const double translation_m =
       std::sqrt(std::max(0.0, covariance.bottomRightCorner<3, 3>().trace()));
   if (!(rotation_rad < 0.02) || !(translation_m < 0.02)) return false;
-  const Pose T_last_now = T_world_last.inverse() * estimate.T_world_camera;
+  const Pose T_last_now = T_world_last_.inverse() * estimate.T_world_camera;
   const double dt = std::clamp(dt_s, 0.02, 1.0);
-  return lost || (T_last_now.translation().norm() < kMaxSpeed * dt + 0.02 &&
-                  RotationAngle(T_last_now) < kMaxTurn * dt + 0.03);
+  return lost_ || (T_last_now.translation().norm() < kMaxSpeed * dt + 0.02 &&
+                   RotationAngle(T_last_now) < kMaxTurn * dt + 0.03);
 }
 
-std::optional<PoseEstimate> Tracker::Impl::FollowFrame(const Frame& frame,
-                                                       const FrameData& prepared,
-                                                       TrackedFrame& result) {
-  const double dt = PlausibleStep_s(frame.color_time_s - last_time_s);
+std::optional<PoseEstimate> Tracker::FollowFrame(const Frame& frame, const FrameData& prepared,
+                                                 TrackedFrame& result) {
+  const double dt = PlausibleStep_s(frame.color_time_s - last_time_s_);
   const double dt_depth = frame.depth_time_s - frame.color_time_s;
   struct Attempt {
     PoseEstimate estimate;
@@ -225,15 +222,15 @@ std::optional<PoseEstimate> Tracker::Impl::FollowFrame(const Frame& frame,
   std::optional<Attempt> best;
   // Starts from constant velocity; if that fails (a jerk), from the last pose. Depth alone
   // can also fit at a wrong pose, so it decides only if neither start finds the points.
-  const std::array<Pose, 2> guesses = {PredictedPose(frame), T_world_last};
+  const std::array<Pose, 2> guesses = {PredictedPose(frame), T_world_last_};
   for (const Pose& T_guess : guesses) {
     Attempt attempt;
     PoseProblem problem = MakeProblem(prepared, dt_depth);
     AddMarkerPoints(prepared.markers, problem.points);
     attempt.num_corners = problem.points.size();
-    if (options.use_keypoints)
-      followed_points.Follow(last_pyramid, prepared.image, frame.depth_m, T_guess, attempt.followed,
-                             problem.points);
+    if (options_.use_keypoints)
+      followed_points_.Follow(last_pyramid_, prepared.image, frame.depth_m, T_guess,
+                              attempt.followed, problem.points);
     attempt.estimate = OptimizePose(problem, T_guess);
     if (!Plausible(attempt.estimate, problem.points.size(), dt)) continue;
     const bool is_supported = SupportOf(attempt.estimate, problem.points.size()).is_enough();
@@ -243,28 +240,28 @@ std::optional<PoseEstimate> Tracker::Impl::FollowFrame(const Frame& frame,
   if (!best) return std::nullopt;
   std::vector<ActivePoint> agreeing;
   for (std::size_t i = 0; i < best->followed.size(); ++i) {
-    Landmark& landmark = map.landmarks[static_cast<std::size_t>(best->followed[i].landmark)];
+    Landmark& landmark = map_.landmarks[static_cast<std::size_t>(best->followed[i].landmark)];
     if (best->estimate.inlier[best->num_corners + i]) {
       agreeing.push_back(best->followed[i]);
     } else if (++landmark.num_rejections > 3 && landmark.num_observations < 3) {
       landmark.usable = false;
     }
   }
-  followed_points.SetPoints(std::move(agreeing));
-  result.num_keypoints = static_cast<int>(followed_points.points().size());
+  followed_points_.SetPoints(std::move(agreeing));
+  result.num_keypoints = static_cast<int>(followed_points_.points().size());
   result.num_markers = CountMarkers(prepared.markers, best->estimate);
   return std::move(best->estimate);
 }
 
 // Marks the markers whose corners all agree with the pose. Their points come first in the
 // estimate, as AddMarkerPoints() adds them.
-int Tracker::Impl::CountMarkers(const std::vector<MarkerObservation>& markers,
-                                const PoseEstimate& estimate) {
+int Tracker::CountMarkers(const std::vector<MarkerObservation>& markers,
+                          const PoseEstimate& estimate) {
   int count = 0;
   std::size_t i = 0;
   for (const MarkerObservation& m : markers) {
-    const auto known = map.markers.find(m.id);
-    if (known == map.markers.end()) continue;
+    const auto known = map_.markers.find(m.id);
+    if (known == map_.markers.end()) continue;
     if (estimate.inlier[i] && estimate.inlier[i + 1] && estimate.inlier[i + 2] &&
         estimate.inlier[i + 3]) {
       ++known->second.num_frames;
@@ -275,85 +272,76 @@ int Tracker::Impl::CountMarkers(const std::vector<MarkerObservation>& markers,
   return count;
 }
 
-std::optional<PoseEstimate> Tracker::Impl::Relocalize(const Frame& frame, FrameData& prepared,
-                                                      TrackedFrame& result) {
-  lost = true;
-  velocity.setZero();
+std::optional<PoseEstimate> Tracker::Relocalize(const Frame& frame, FrameData& prepared,
+                                                TrackedFrame& result) {
+  lost_ = true;
+  velocity_.setZero();
   FindAllMarkers(prepared);
   std::optional<Relocalization> found = RelocalizeByMarkers(
-      map, info.intrinsics, info.marker_length_m, prepared.markers, frame.depth_m);
+      map_, info_.intrinsics, info_.marker_length_m, prepared.markers, frame.depth_m);
   std::optional<DescribedFeatures> features;
   for (int attempt = 0; attempt < 2; ++attempt) {
-    if (!found && options.use_keypoints && !features) {
-      features = DescribeFeatures(prepared.image.gray, frame.depth_m, info.intrinsics);
+    if (!found && options_.use_keypoints && !features) {
+      features = DescribeFeatures(prepared.image.gray, frame.depth_m, info_.intrinsics);
       found = FindAmongKeyframes(*features);
     }
     if (!found) return std::nullopt;
-    reference = found->keyframe;
+    reference_ = found->keyframe;
     PoseProblem problem = MakeProblem(prepared, 0.0);
     AddMarkerPoints(prepared.markers, problem.points);
-    followed_points.SetPoints({});
-    followed_points.Reassociate(prepared.image, frame.depth_m, found->T_world_color,
-                                KeyframesNear(found->T_world_color, map.keyframes.size()),
-                                problem.points);
+    followed_points_.SetPoints({});
+    followed_points_.Reassociate(prepared.image, frame.depth_m, found->T_world_color,
+                                 KeyframesNear(found->T_world_color, map_.keyframes.size()),
+                                 problem.points);
     PoseEstimate estimate = OptimizePose(problem, found->T_world_color);
     if (Plausible(estimate, problem.points.size(), 1.0)) {
       result.num_markers = CountMarkers(prepared.markers, estimate);
-      result.num_keypoints = static_cast<int>(followed_points.points().size());
-      keyframe_wanted = true;
+      result.num_keypoints = static_cast<int>(followed_points_.points().size());
+      keyframe_wanted_ = true;
       return estimate;
     }
     found.reset();
   }
-  followed_points.SetPoints({});
+  followed_points_.SetPoints({});
   return std::nullopt;
 }
 
-void Tracker::Impl::Accept(const Frame& frame, FrameData& prepared, const PoseEstimate& estimate,
-                           TrackedFrame& result) {
-  const double dt = PlausibleStep_s(frame.color_time_s - last_time_s);
-  if (!lost && dt > 0)
-    velocity = TwistFromPose(T_world_last.inverse() * estimate.T_world_camera) / dt;
+void Tracker::Accept(const Frame& frame, FrameData& prepared, const PoseEstimate& estimate,
+                     TrackedFrame& result) {
+  const double dt = PlausibleStep_s(frame.color_time_s - last_time_s_);
+  if (!lost_ && dt > 0)
+    velocity_ = TwistFromPose(T_world_last_.inverse() * estimate.T_world_camera) / dt;
   result.tracked = true;
-  result.velocity_per_s = velocity;
+  result.velocity_per_s = velocity_;
   RefreshKeyframeVelocity(frame, estimate.T_world_camera);
-  lost = false;
-  T_world_last = estimate.T_world_camera;
-  last_time_s = frame.color_time_s;
-  if (keyframe_wanted || NeedsKeyframe(estimate.T_world_camera)) {
+  lost_ = false;
+  T_world_last_ = estimate.T_world_camera;
+  last_time_s_ = frame.color_time_s;
+  if (keyframe_wanted_ || NeedsKeyframe(estimate.T_world_camera)) {
     MakeKeyframe(frame, prepared, estimate.T_world_camera, result);
   } else {
-    result.reference_keyframe = reference;
+    result.reference_keyframe = reference_;
     result.T_reference_color =
         ReferenceKeyframe().T_world_color.inverse() * estimate.T_world_camera;
   }
 }
 
 // The frame after a keyframe gives that keyframe a velocity by central differences.
-void Tracker::Impl::RefreshKeyframeVelocity(const Frame& frame, const Pose& T_world_now) {
-  if (frames.empty() || lost) return;
-  const std::optional<int> last = frames.back().keyframe;
+void Tracker::RefreshKeyframeVelocity(const Frame& frame, const Pose& T_world_now) {
+  if (frames_.empty() || lost_) return;
+  const std::optional<int> last = frames_.back().keyframe;
   if (!last) return;
-  MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(*last)];
+  MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(*last)];
   const double dt_after = PlausibleStep_s(frame.color_time_s - keyframe.data.color_time_s);
   if (dt_after <= 0) return;
   const Vector6d after = TwistFromPose(keyframe.T_world_color.inverse() * T_world_now) / dt_after;
   keyframe.velocity_per_s = *last == 0 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));
-  frames.back().velocity_per_s = keyframe.velocity_per_s;
+  frames_.back().velocity_per_s = keyframe.velocity_per_s;
 }
 
-Tracker::Tracker(const StreamInfo& info, const TrackerOptions& options)
-    : impl_(std::make_unique<Impl>(info, options)) {}
-Tracker::~Tracker() = default;
-TrackedFrame Tracker::Track(const Frame& frame, bool fewer_keypoints) {
-  return impl_->Track(frame, fewer_keypoints);
-}
-const TrackingMap& Tracker::map() const { return impl_->map; }
-TrackingMap Tracker::TakeMap() { return std::move(impl_->map); }
-const std::vector<TrackedFrame>& Tracker::frames() const { return impl_->frames; }
 Pose Tracker::T_world_color(const TrackedFrame& frame) const {
   const auto keyframe = static_cast<std::size_t>(frame.reference_keyframe.value());
-  return impl_->map.keyframes.at(keyframe).T_world_color * frame.T_reference_color;
+  return map_.keyframes.at(keyframe).T_world_color * frame.T_reference_color;
 }
 
 }  // namespace plumb

@@ -4,12 +4,19 @@
 
 #include <cstddef>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "algo/markers/marker_detector.hpp"
+#include "algo/tracking/dense_view.hpp"
+#include "algo/tracking/followed_points.hpp"
+#include "algo/tracking/keyframe_link.hpp"
+#include "algo/tracking/keypoints.hpp"
 #include "algo/tracking/map.hpp"
+#include "algo/tracking/pose_optimizer.hpp"
+#include "algo/tracking/relocalizer.hpp"
 #include "algo/types/frame.hpp"
 
 namespace plumb {
@@ -67,7 +74,8 @@ class Tracker {
   /// @param info  Intrinsics, depth noise, marker dictionary and marker length.
   /// @throws DataError if the dictionary is unknown or the depth noise impossible.
   Tracker(const StreamInfo& info, const TrackerOptions& options);
-  ~Tracker();
+  Tracker(const Tracker&) = delete;  // The points refer to the map.
+  Tracker& operator=(const Tracker&) = delete;
 
   /// The frame's images are shared by reference count and kept for keyframes.
   /// @param fewer_keypoints  For a computer that is too slow: from each keyframe on, only one
@@ -75,16 +83,86 @@ class Tracker {
   ///         were followed until then.
   TrackedFrame Track(const Frame& frame, bool fewer_keypoints = false);
 
-  [[nodiscard]] const TrackingMap& map() const;
+  [[nodiscard]] const TrackingMap& map() const { return map_; }
   /// The map, for refinement after the last frame.
-  [[nodiscard]] TrackingMap TakeMap();
-  [[nodiscard]] const std::vector<TrackedFrame>& frames() const;
+  [[nodiscard]] TrackingMap TakeMap() { return std::move(map_); }
+  [[nodiscard]] const std::vector<TrackedFrame>& frames() const { return frames_; }
   /// Live estimate of a tracked frame; the world is the first keyframe's colour camera.
   [[nodiscard]] Pose T_world_color(const TrackedFrame& frame) const;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  // Data computed from one frame's images before its pose is known.
+  struct FrameData {
+    GrayImage image;
+    DenseView dense;  // Used for the pose only.
+    std::vector<MarkerObservation> markers;
+    bool has_all_markers = false;  // False: only markers near expected positions were searched.
+  };
+
+  // A frame and its pose (tracker.cpp).
+  FrameData Prepare(const Frame& frame) const;
+  void FindMarkers(const Frame& frame, FrameData& prepared) const;
+  void FindAllMarkers(FrameData& prepared) const;
+  // Only where there is one.
+  [[nodiscard]] const MapKeyframe& ReferenceKeyframe() const {
+    return map_.keyframes[static_cast<std::size_t>(reference_.value())];
+  }
+  [[nodiscard]] Pose PredictedPose(const Frame& frame) const;
+  static bool ShowsSomething(const FrameData& prepared);
+  [[nodiscard]] double SigmaPx() const;
+  void AddMarkerPoints(const std::vector<MarkerObservation>& markers,
+                       std::vector<PosePoint>& points) const;
+  PoseProblem MakeProblem(const FrameData& prepared, double dt_depth_s) const;
+  static Pose DepthPose(const MapKeyframe& keyframe);
+  [[nodiscard]] double PlausibleStep_s(double step_s) const;
+  [[nodiscard]] bool Plausible(const PoseEstimate& estimate, std::size_t num_points,
+                               double dt_s) const;
+  std::optional<PoseEstimate> FollowFrame(const Frame& frame, const FrameData& prepared,
+                                          TrackedFrame& result);
+  int CountMarkers(const std::vector<MarkerObservation>& markers, const PoseEstimate& estimate);
+  std::optional<PoseEstimate> Relocalize(const Frame& frame, FrameData& prepared,
+                                         TrackedFrame& result);
+  void Accept(const Frame& frame, FrameData& prepared, const PoseEstimate& estimate,
+              TrackedFrame& result);
+  void RefreshKeyframeVelocity(const Frame& frame, const Pose& T_world_now);
+
+  // Keyframes and loops (tracker_keyframes.cpp).
+  [[nodiscard]] bool NeedsKeyframe(const Pose& T_world_color) const;
+  [[nodiscard]] std::vector<std::size_t> KeyframesNear(const Pose& T_world_color,
+                                                       std::size_t count) const;
+  void MakeKeyframe(const Frame& frame, FrameData& prepared, const Pose& T_world_color,
+                    TrackedFrame& result);
+  void Describe(int index);
+  std::optional<Relocalization> FindAmongKeyframes(const DescribedFeatures& features);
+  void CloseLoop(const FrameData& prepared, int index);
+  std::optional<Pose> EstimatePoseFromKeyframe(int older, const Pose& T_world_guess,
+                                               const FrameData& prepared,
+                                               const MapKeyframe& newest);
+  void AssociateKeyframe(const FrameData& prepared, const cv::Mat& depth_m,
+                         const Pose& T_world_color, MapKeyframe& keyframe);
+  void AddNewMarkers(const cv::Mat& depth_m, const MapKeyframe& keyframe);
+  void AdjustLocally(int index);
+
+  StreamInfo info_;
+  TrackerOptions options_;
+  DenseViewMaker dense_maker_;
+  std::optional<MarkerDetector> detector_;
+
+  TrackingMap map_;
+  std::vector<TrackedFrame> frames_;
+
+  Pyramid last_pyramid_;
+  FollowedPoints followed_points_;
+  std::optional<int> reference_;     // Keyframe against which frames are tracked.
+  std::size_t reference_count_ = 0;  // Active points when that keyframe was created.
+  Pose T_world_last_ = Pose::Identity();
+  double last_time_s_ = 0;
+  Vector6d velocity_ = Vector6d::Zero();
+  bool lost_ = true;
+  bool keyframe_wanted_ = false;  // Set after a relocalisation.
+  std::vector<KeyframeLink> loops_;
+  int num_unlike_ = 0;  // Consecutive keyframes that matched no older one.
+  int loop_pause_ = 0;  // Keyframes left to skip before the next comparison with older ones.
 };
 
 }  // namespace plumb

@@ -7,7 +7,7 @@
 #include "algo/tracking/local_bundle.hpp"
 #include "algo/tracking/loop_closer.hpp"
 #include "algo/tracking/map_budget.hpp"
-#include "algo/tracking/tracker_impl.hpp"
+#include "algo/tracking/tracker.hpp"
 
 namespace plumb {
 namespace {
@@ -45,30 +45,30 @@ cv::Mat MiddlesOfBlocks(const cv::Mat& rgb, int block) {
 
 }  // namespace
 
-bool Tracker::Impl::NeedsKeyframe(const Pose& T_world_color) const {
+bool Tracker::NeedsKeyframe(const Pose& T_world_color) const {
   const MapKeyframe& keyframe = ReferenceKeyframe();
   const Pose T_keyframe_now = keyframe.T_world_color.inverse() * T_world_color;
   if (T_keyframe_now.translation().norm() >
-      options.keyframe_distance * std::clamp(keyframe.median_depth_m, 0.4, 3.0))
+      options_.keyframe_distance * std::clamp(keyframe.median_depth_m, 0.4, 3.0))
     return true;
-  if (RotationAngle(T_keyframe_now) > options.keyframe_angle_rad) return true;
-  return options.use_keypoints &&
-         static_cast<double>(followed_points.points().size()) <
-             options.min_tracked_share * static_cast<double>(reference_count) &&
+  if (RotationAngle(T_keyframe_now) > options_.keyframe_angle_rad) return true;
+  return options_.use_keypoints &&
+         static_cast<double>(followed_points_.points().size()) <
+             options_.min_tracked_share * static_cast<double>(reference_count_) &&
          (T_keyframe_now.translation().norm() > 0.01 || RotationAngle(T_keyframe_now) > 0.01 ||
-          followed_points.points().size() < 30);
+          followed_points_.points().size() < 30);
 }
 
 // The nearest by pose of the first `count` keyframes with a similar view. The reference is
 // excluded while it is being tracked.
-std::vector<std::size_t> Tracker::Impl::KeyframesNear(const Pose& T_world_color,
-                                                      std::size_t count) const {
+std::vector<std::size_t> Tracker::KeyframesNear(const Pose& T_world_color,
+                                                std::size_t count) const {
   std::vector<std::pair<double, std::size_t>> near;
   for (std::size_t k = 0; k < count; ++k) {
-    if (!lost && static_cast<int>(k) == reference) continue;
-    if (map.keyframes[k].gray.empty()) continue;
-    const Pose T = map.keyframes[k].T_world_color.inverse() * T_world_color;
-    const double depth = std::clamp(map.keyframes[k].median_depth_m, 0.4, 3.0);
+    if (!lost_ && static_cast<int>(k) == reference_) continue;
+    if (map_.keyframes[k].gray.empty()) continue;
+    const Pose T = map_.keyframes[k].T_world_color.inverse() * T_world_color;
+    const double depth = std::clamp(map_.keyframes[k].median_depth_m, 0.4, 3.0);
     const double distance = T.translation().norm() / depth + RotationAngle(T);
     if (distance < 0.7) near.emplace_back(distance, k);
   }
@@ -79,60 +79,60 @@ std::vector<std::size_t> Tracker::Impl::KeyframesNear(const Pose& T_world_color,
   return result;
 }
 
-void Tracker::Impl::MakeKeyframe(const Frame& frame, FrameData& prepared, const Pose& T_world_color,
-                                 TrackedFrame& result) {
+void Tracker::MakeKeyframe(const Frame& frame, FrameData& prepared, const Pose& T_world_color,
+                           TrackedFrame& result) {
   FindAllMarkers(prepared);
   MapKeyframe keyframe;
   keyframe.data.frame_index = frame.index;
   keyframe.data.color_time_s = frame.color_time_s;
   keyframe.data.depth_time_s = frame.depth_time_s;
-  keyframe.data.view.intrinsics = info.intrinsics;
+  keyframe.data.view.intrinsics = info_.intrinsics;
   keyframe.data.view.depth_m = frame.depth_m;
-  if (options.keep_color)
-    keyframe.data.view.color_rgb = MiddlesOfBlocks(frame.color_rgb, options.color_block);
+  if (options_.keep_color)
+    keyframe.data.view.color_rgb = MiddlesOfBlocks(frame.color_rgb, options_.color_block);
   keyframe.data.markers = prepared.markers;
   keyframe.T_world_color = T_world_color;
-  keyframe.velocity_per_s = velocity;
-  keyframe.dense = dense_maker.Make(frame.depth_m);
+  keyframe.velocity_per_s = velocity_;
+  keyframe.dense = dense_maker_.Make(frame.depth_m);
   keyframe.median_depth_m = MedianDepth(keyframe.dense);
   keyframe.gray = prepared.image.gray;
-  const int index = static_cast<int>(map.keyframes.size());
-  if (options.use_keypoints) {
+  const int index = static_cast<int>(map_.keyframes.size());
+  if (options_.use_keypoints) {
     AssociateKeyframe(prepared, frame.depth_m, T_world_color, keyframe);
-    if (result.fewer_keypoints) followed_points.KeepOnePerCell();
-    followed_points.AddCorners(prepared.image, frame.depth_m, index, result.fewer_keypoints,
-                               keyframe);
-    followed_points.KeepPyramid(static_cast<std::size_t>(index), prepared.image.pyramid);
+    if (result.fewer_keypoints) followed_points_.KeepOnePerCell();
+    followed_points_.AddCorners(prepared.image, frame.depth_m, index, result.fewer_keypoints,
+                                keyframe);
+    followed_points_.KeepPyramid(static_cast<std::size_t>(index), prepared.image.pyramid);
   }
   AddNewMarkers(frame.depth_m, keyframe);
-  if (reference) {
-    result.previous_keyframe = reference;
+  if (reference_) {
+    result.previous_keyframe = reference_;
     result.T_previous_color = ReferenceKeyframe().T_world_color.inverse() * T_world_color;
   }
-  keyframe.previous = reference;
+  keyframe.previous = reference_;
   keyframe.T_previous_color = result.T_previous_color;
-  map.keyframes.push_back(std::move(keyframe));
-  reference = index;
-  keyframe_wanted = false;
-  lost = false;
+  map_.keyframes.push_back(std::move(keyframe));
+  reference_ = index;
+  keyframe_wanted_ = false;
+  lost_ = false;
   AdjustLocally(index);
-  if (options.use_keypoints) CloseLoop(prepared, index);
-  BoundImages(options.max_images, map);
-  reference_count = followed_points.points().size();
-  const Pose T_adjusted = map.keyframes.back().T_world_color;
-  T_world_last = T_adjusted;
-  last_time_s = frame.color_time_s;
+  if (options_.use_keypoints) CloseLoop(prepared, index);
+  BoundImages(options_.max_images, map_);
+  reference_count_ = followed_points_.points().size();
+  const Pose T_adjusted = map_.keyframes.back().T_world_color;
+  T_world_last_ = T_adjusted;
+  last_time_s_ = frame.color_time_s;
   result.keyframe = index;
   result.reference_keyframe = index;
   result.T_reference_color = Pose::Identity();
 }
 
 // Features cost as much as tracking a frame, and most keyframes are never compared by them.
-void Tracker::Impl::Describe(int index) {
-  MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(index)];
+void Tracker::Describe(int index) {
+  MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(index)];
   if (!keyframe.descriptors.empty() || keyframe.gray.empty()) return;
   DescribedFeatures features =
-      DescribeFeatures(keyframe.gray, keyframe.data.view.depth_m, info.intrinsics);
+      DescribeFeatures(keyframe.gray, keyframe.data.view.depth_m, info_.intrinsics);
   keyframe.features_px = std::move(features.pixels);
   keyframe.features_camera = std::move(features.in_camera);
   keyframe.descriptors = features.descriptors;
@@ -140,11 +140,11 @@ void Tracker::Impl::Describe(int index) {
 
 // Compares the features of all keyframes, the newest first, and describes them only as far as
 // needed.
-std::optional<Relocalization> Tracker::Impl::FindAmongKeyframes(const DescribedFeatures& features) {
+std::optional<Relocalization> Tracker::FindAmongKeyframes(const DescribedFeatures& features) {
   std::optional<Relocalization> best;
-  for (int k = static_cast<int>(map.keyframes.size()) - 1; k >= 0; --k) {
+  for (int k = static_cast<int>(map_.keyframes.size()) - 1; k >= 0; --k) {
     Describe(k);
-    const auto found = RelocalizeByFeatures(map, info.intrinsics, features, {k});
+    const auto found = RelocalizeByFeatures(map_, info_.intrinsics, features, {k});
     if (!found || (best && found->num_inliers <= best->num_inliers)) continue;
     best = found;
     if (best->num_inliers >= kBeyondDoubt) break;
@@ -154,65 +154,66 @@ std::optional<Relocalization> Tracker::Impl::FindAmongKeyframes(const DescribedF
 
 // Loop closure at a place seen long ago: if the map has drifted since, the loop error is
 // distributed, and the old landmarks are tracked again.
-void Tracker::Impl::CloseLoop(const FrameData& prepared, int index) {
-  if (loop_pause > 0) {
-    --loop_pause;
+void Tracker::CloseLoop(const FrameData& prepared, int index) {
+  if (loop_pause_ > 0) {
+    --loop_pause_;
     return;
   }
-  const std::vector<int> candidates = LoopCandidates(map);
+  const std::vector<int> candidates = LoopCandidates(map_);
   if (candidates.empty()) return;
   for (const int k : candidates) Describe(k);
   Describe(index);
-  const MapKeyframe& newest = map.keyframes.back();
+  const MapKeyframe& newest = map_.keyframes.back();
   const auto found = RelocalizeByFeatures(
-      map, info.intrinsics, {newest.features_px, newest.features_camera, newest.descriptors},
+      map_, info_.intrinsics, {newest.features_px, newest.features_camera, newest.descriptors},
       candidates);
-  num_unlike = found ? 0 : num_unlike + 1;
-  loop_pause = std::min(num_unlike, kLongestLoopPause);
+  num_unlike_ = found ? 0 : num_unlike_ + 1;
+  loop_pause_ = std::min(num_unlike_, kLongestLoopPause);
   if (!found || found->num_inliers < kLoopInliers) return;
   const std::optional<Pose> T_world_seen =
       EstimatePoseFromKeyframe(found->keyframe, found->T_world_color, prepared, newest);
   if (!T_world_seen) return;
   const Pose T_drift = newest.T_world_color.inverse() * *T_world_seen;
-  const DriftBound bound = LargestDrift(map, found->keyframe);
+  const DriftBound bound = LargestDrift(map_, found->keyframe);
   if (T_drift.translation().norm() > bound.translation_m ||
       RotationAngle(T_drift) > bound.rotation_rad)
     return;
   if (T_drift.translation().norm() > kDriftFollowed_m ||
       RotationAngle(T_drift) > kDriftFollowed_rad) {
     const Pose& T_world_old =
-        map.keyframes[static_cast<std::size_t>(found->keyframe)].T_world_color;
-    loops.push_back({found->keyframe, index, T_world_old.inverse() * *T_world_seen});
-    DistributeLoopError(loops, map);
+        map_.keyframes[static_cast<std::size_t>(found->keyframe)].T_world_color;
+    loops_.push_back({found->keyframe, index, T_world_old.inverse() * *T_world_seen});
+    DistributeLoopError(loops_, map_);
   }
 
-  MapKeyframe& keyframe = map.keyframes.back();
-  const std::size_t known = followed_points.points().size();
+  MapKeyframe& keyframe = map_.keyframes.back();
+  const std::size_t known = followed_points_.points().size();
   std::vector<PosePoint> points;
-  followed_points.Reassociate(prepared.image, keyframe.data.view.depth_m, keyframe.T_world_color,
-                              KeyframesNear(keyframe.T_world_color, map.keyframes.size()), points);
-  followed_points.Observe(points, known, keyframe);
+  followed_points_.Reassociate(prepared.image, keyframe.data.view.depth_m, keyframe.T_world_color,
+                               KeyframesNear(keyframe.T_world_color, map_.keyframes.size()),
+                               points);
+  followed_points_.Observe(points, known, keyframe);
   AdjustLocally(index);
 }
 
 // Pose of the newest keyframe from an older keyframe's neighbourhood alone (landmarks and depth).
 // Nothing if they do not agree well.
-std::optional<Pose> Tracker::Impl::EstimatePoseFromKeyframe(int older, const Pose& T_world_guess,
-                                                            const FrameData& prepared,
-                                                            const MapKeyframe& newest) {
-  const std::vector<ActivePoint> followed = followed_points.points();
-  followed_points.SetPoints({});
-  const std::optional<int> followed_reference = std::exchange(reference, older);
+std::optional<Pose> Tracker::EstimatePoseFromKeyframe(int older, const Pose& T_world_guess,
+                                                      const FrameData& prepared,
+                                                      const MapKeyframe& newest) {
+  const std::vector<ActivePoint> followed = followed_points_.points();
+  followed_points_.SetPoints({});
+  const std::optional<int> followed_reference = std::exchange(reference_, older);
   PoseProblem problem = MakeProblem(prepared, newest.data.depth_time_s - newest.data.color_time_s);
-  reference.reset();  // No landmark is left.
-  followed_points.Reassociate(prepared.image, newest.data.view.depth_m, T_world_guess,
-                              KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4),
-                              problem.points);
+  reference_.reset();  // No landmark is left.
+  followed_points_.Reassociate(prepared.image, newest.data.view.depth_m, T_world_guess,
+                               KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4),
+                               problem.points);
   const PoseEstimate estimate = OptimizePose(problem, T_world_guess);
-  followed_points.SetPoints(followed);
-  reference = followed_reference;
+  followed_points_.SetPoints(followed);
+  reference_ = followed_reference;
   const bool by_depth =
-      !options.use_dense || (estimate.num_dense > 300 && estimate.dense_rms_m < 0.015);
+      !options_.use_dense || (estimate.num_dense > 300 && estimate.dense_rms_m < 0.015);
   if (estimate.num_inliers < kLoopInliers ||
       2 * estimate.num_inliers < static_cast<int>(problem.points.size()) || !by_depth)
     return std::nullopt;
@@ -221,40 +222,40 @@ std::optional<Pose> Tracker::Impl::EstimatePoseFromKeyframe(int older, const Pos
 
 // Observations in a new keyframe: tracked landmarks and rediscovered landmarks of older
 // keyframes.
-void Tracker::Impl::AssociateKeyframe(const FrameData& prepared, const cv::Mat& depth_m,
-                                      const Pose& T_world_color, MapKeyframe& keyframe) {
-  const std::size_t followed = followed_points.points().size();
+void Tracker::AssociateKeyframe(const FrameData& prepared, const cv::Mat& depth_m,
+                                const Pose& T_world_color, MapKeyframe& keyframe) {
+  const std::size_t followed = followed_points_.points().size();
   std::vector<PosePoint> found;
-  followed_points.Reassociate(prepared.image, depth_m, T_world_color,
-                              KeyframesNear(T_world_color, map.keyframes.size()), found);
+  followed_points_.Reassociate(prepared.image, depth_m, T_world_color,
+                               KeyframesNear(T_world_color, map_.keyframes.size()), found);
   for (std::size_t i = 0; i < followed; ++i)
-    followed_points.AddObservation(followed_points.points()[i], keyframe);
-  followed_points.Observe(found, followed, keyframe);
+    followed_points_.AddObservation(followed_points_.points()[i], keyframe);
+  followed_points_.Observe(found, followed, keyframe);
 }
 
-void Tracker::Impl::AddNewMarkers(const cv::Mat& depth_m, const MapKeyframe& keyframe) {
+void Tracker::AddNewMarkers(const cv::Mat& depth_m, const MapKeyframe& keyframe) {
   for (const MarkerObservation& m : keyframe.data.markers) {
-    auto known = map.markers.find(m.id);
-    if (known == map.markers.end()) {
+    auto known = map_.markers.find(m.id);
+    if (known == map_.markers.end()) {
       const auto T_camera_marker =
-          MarkerPoseInCamera(info.intrinsics, info.marker_length_m, m, depth_m);
+          MarkerPoseInCamera(info_.intrinsics, info_.marker_length_m, m, depth_m);
       if (!T_camera_marker) continue;
-      known = map.markers.emplace(m.id, MapMarker{keyframe.T_world_color * *T_camera_marker, 0, 1})
+      known = map_.markers.emplace(m.id, MapMarker{keyframe.T_world_color * *T_camera_marker, 0, 1})
                   .first;
     }
     ++known->second.num_views;
   }
 }
 
-void Tracker::Impl::AdjustLocally(int index) {
+void Tracker::AdjustLocally(int index) {
   if (index == 0) return;
   LocalBundleOptions bundle;
-  bundle.marker_length_m = info.marker_length_m;
-  bundle.depth_noise = info.depth_noise;
-  for (int k = std::max(1, index + 1 - options.local_keyframes); k <= index; ++k)
-    if (IsConstrained(map, map.keyframes[static_cast<std::size_t>(k)]))
+  bundle.marker_length_m = info_.marker_length_m;
+  bundle.depth_noise = info_.depth_noise;
+  for (int k = std::max(1, index + 1 - options_.local_keyframes); k <= index; ++k)
+    if (IsConstrained(map_, map_.keyframes[static_cast<std::size_t>(k)]))
       bundle.free_keyframes.push_back(k);
-  AdjustLocalMap(info.intrinsics, bundle, map);
+  AdjustLocalMap(info_.intrinsics, bundle, map_);
 }
 
 }  // namespace plumb
