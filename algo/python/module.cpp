@@ -48,7 +48,7 @@ std::function<void(double, std::string_view)> Forwarded(const ProgressCall& call
 
 Scene Reconstruct(const std::filesystem::path& recording, const std::string& preset,
                   const ProgressCall& progress) {
-  const std::unique_ptr<TumRecording> source = TumRecording::Open(recording);
+  const std::unique_ptr<FrameSource> source = OpenTumRecording(recording);
   ScanRunnerOptions options;
   options.reconstructor.preset = ParsePreset(preset);
   std::stop_source stop;
@@ -85,7 +85,7 @@ py::object Evaluate(const std::filesystem::path& folder, const std::string& pres
   EvaluateOptions options;
   options.compare.preset = ParsePreset(preset);
   options.get_scene = [&](const std::string& name) {
-    const auto source = TumRecording::Open(suite.recordings.at(name));
+    const auto source = OpenTumRecording(suite.recordings.at(name));
     ScanRunnerOptions run;
     run.reconstructor.preset = options.compare.preset;
     return RunScan(*source, run);
@@ -107,7 +107,7 @@ py::object Evaluate(const std::filesystem::path& folder, const std::string& pres
 class RecordingIterator {
  public:
   explicit RecordingIterator(const std::filesystem::path& folder)
-      : source_(TumRecording::Open(folder)) {}
+      : source_(OpenTumRecording(folder)) {}
   Frame Next() {
     std::optional<Frame> frame;
     {
@@ -120,7 +120,7 @@ class RecordingIterator {
   [[nodiscard]] const StreamInfo& info() const { return source_->info(); }
 
  private:
-  std::unique_ptr<TumRecording> source_;
+  std::unique_ptr<FrameSource> source_;
 };
 
 void AddErrors(py::module_& module) {

@@ -49,7 +49,7 @@ std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
   if (markers.dictionary) defaults.marker_dictionary = *markers.dictionary;
   if (markers.length_m) defaults.marker_length_m = *markers.length_m;
   defaults.reference_marker = markers.reference;
-  if (std::filesystem::is_directory(path, error)) return TumRecording::Open(path, defaults);
+  if (std::filesystem::is_directory(path, error)) return OpenTumRecording(path, defaults);
   if (const RecordingKind* kind = BuiltInSensors().KindWithExtension(path.extension().string()))
     return kind->Open(path, defaults);
   // Whatever its name, its contents may be a recording.

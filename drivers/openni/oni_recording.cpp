@@ -128,36 +128,32 @@ class Reader {
   int descriptor_ = -1;
 };
 
-}  // namespace
+class OniRecording : public FrameSource {
+ public:
+  OniRecording(fs::path file, const std::optional<std::string>& side_car,
+               const RecordingDefaults& defaults)
+      : file_(std::move(file)),
+        side_car_(side_car),
+        reader_(ReaderProgram(), file_, ParseOniBegin(side_car_.value_or(""))) {
+    ReadCamera(ReadHeader(), defaults);
+  }
+  [[nodiscard]] const StreamInfo& info() const override { return info_; }
+  [[nodiscard]] std::optional<Frame> Next() override;
 
-struct OniRecording::Impl {
-  Impl(fs::path path, const std::optional<std::string>& side_car_text, const fs::path& program)
-      : file(std::move(path)),
-        side_car(side_car_text),
-        reader(program, file, ParseOniBegin(side_car.value_or(""))) {}
-
-  fs::path file;
-  std::optional<std::string> side_car;  ///< Text of the side-car.
-  Reader reader;
-  StreamInfo info;
-  std::int64_t next_index = 0;
-  double last_color_s = -1.0;
-  double last_depth_s = -1.0;
-  bool finished = false;
-
+ private:
   [[noreturn]] void Fail(const std::string& why) {
-    finished = true;
+    finished_ = true;
     throw DataError(
         fmt::format("recording {} is damaged or not an .oni recording that Plumb can use: {}",
-                    file.string(), why));
+                    file_.string(), why));
   }
 
   void Read(void* data, std::size_t size) {
-    switch (reader.Read(data, size)) {
+    switch (reader_.Read(data, size)) {
       case Reader::Got::kAll:
         return;
       case Reader::Got::kEnd:
-        Fail(reader.Reap());
+        Fail(reader_.Reap());
       case Reader::Got::kSilence:
         Fail(fmt::format("OpenNI2 delivered nothing for {} s", kPatience.count()));
     }
@@ -191,70 +187,92 @@ struct OniRecording::Impl {
 
   void ReadCamera(const oni::Header& header, const RecordingDefaults& defaults);
   Frame ReadFrame();
+
+  fs::path file_;
+  std::optional<std::string> side_car_;  ///< Text of the side-car.
+  Reader reader_;
+  StreamInfo info_;
+  std::int64_t next_index_ = 0;
+  double last_color_s_ = -1.0;
+  double last_depth_s_ = -1.0;
+  bool finished_ = false;
 };
 
-void OniRecording::Impl::ReadCamera(const oni::Header& header, const RecordingDefaults& defaults) {
-  info.marker_dictionary = defaults.marker_dictionary;
-  info.marker_length_m = defaults.marker_length_m;
-  info.reference_marker = defaults.reference_marker;
-  info.num_frames = header.num_frames;
-  const fs::path side_car_file = OniSideCar(file);
+void OniRecording::ReadCamera(const oni::Header& header, const RecordingDefaults& defaults) {
+  info_.marker_dictionary = defaults.marker_dictionary;
+  info_.marker_length_m = defaults.marker_length_m;
+  info_.reference_marker = defaults.reference_marker;
+  info_.num_frames = header.num_frames;
+  const fs::path side_car_file = OniSideCar(file_);
   bool markers_known = false;
-  if (side_car) {
-    const CameraFile camera = ParseCameraFile(*side_car, side_car_file.string());
+  if (side_car_) {
+    const CameraFile camera = ParseCameraFile(*side_car_, side_car_file.string());
     if (camera.color.width != header.width || camera.color.height != header.height) {
       throw DataError(fmt::format("{} is for images of {}x{}, the recording has {}x{}",
                                   side_car_file.string(), camera.color.width, camera.color.height,
                                   header.width, header.height));
     }
-    info.intrinsics = camera.color;
-    info.depth_noise = camera.depth_noise.value_or(DepthNoise());
-    info.marker_dictionary = camera.marker_dictionary.value_or(info.marker_dictionary);
-    info.marker_length_m = camera.marker_length_m.value_or(info.marker_length_m);
-    if (camera.reference_marker) info.reference_marker = camera.reference_marker;
-    info.warnings = camera.warnings;
+    info_.intrinsics = camera.color;
+    info_.depth_noise = camera.depth_noise.value_or(DepthNoise());
+    info_.marker_dictionary = camera.marker_dictionary.value_or(info_.marker_dictionary);
+    info_.marker_length_m = camera.marker_length_m.value_or(info_.marker_length_m);
+    if (camera.reference_marker) info_.reference_marker = camera.reference_marker;
+    info_.warnings = camera.warnings;
     markers_known = camera.marker_dictionary && camera.marker_length_m;
   } else {
-    info.intrinsics = Resized(Intrinsics{}, header.width, header.height);
+    info_.intrinsics = Resized(Intrinsics{}, header.width, header.height);
     if (header.horizontal_fov_rad > 0.2F && header.horizontal_fov_rad < 2.5F)
-      info.intrinsics.fx = info.intrinsics.fy =
+      info_.intrinsics.fx = info_.intrinsics.fy =
           0.5 * header.width / std::tan(0.5 * header.horizontal_fov_rad);
-    info.intrinsics_assumed = true;
-    info.warnings.push_back(
+    info_.intrinsics_assumed = true;
+    info_.warnings.push_back(
         fmt::format("no {}: nominal focal length of {:.1f} pixels, no distortion and depth "
                     "registered to colour assumed",
-                    side_car_file.filename().string(), info.intrinsics.fx));
+                    side_car_file.filename().string(), info_.intrinsics.fx));
   }
   if (!markers_known) {
-    info.warnings.push_back(
+    info_.warnings.push_back(
         fmt::format("the recording does not state its markers: assumed {} with a side of {} m",
-                    info.marker_dictionary, info.marker_length_m));
+                    info_.marker_dictionary, info_.marker_length_m));
   }
 }
 
-Frame OniRecording::Impl::ReadFrame() {
+Frame OniRecording::ReadFrame() {
   const auto stamps = Read<oni::FrameStamps>();
   Frame frame;
-  frame.index = next_index++;
+  frame.index = next_index_++;
   frame.color_time_s = 1e-6 * static_cast<double>(stamps.color_us);
   frame.depth_time_s = 1e-6 * static_cast<double>(stamps.depth_us);
-  if (frame.color_time_s <= last_color_s || frame.depth_time_s <= last_depth_s)
+  if (frame.color_time_s <= last_color_s_ || frame.depth_time_s <= last_depth_s_)
     Fail("its stamps do not increase");
-  last_color_s = frame.color_time_s;
-  last_depth_s = frame.depth_time_s;
-  frame.color_rgb.create(info.intrinsics.height, info.intrinsics.width, CV_8UC3);
+  last_color_s_ = frame.color_time_s;
+  last_depth_s_ = frame.depth_time_s;
+  frame.color_rgb.create(info_.intrinsics.height, info_.intrinsics.width, CV_8UC3);
   Read(frame.color_rgb.data, frame.color_rgb.total() * frame.color_rgb.elemSize());
-  cv::Mat depth_mm(info.intrinsics.height, info.intrinsics.width, CV_16UC1);
+  cv::Mat depth_mm(info_.intrinsics.height, info_.intrinsics.width, CV_16UC1);
   Read(depth_mm.data, depth_mm.total() * depth_mm.elemSize());
   depth_mm.convertTo(frame.depth_m, CV_32F, 1e-3);
   return frame;
 }
 
-OniRecording::OniRecording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-OniRecording::~OniRecording() = default;
+std::optional<Frame> OniRecording::Next() {
+  if (finished_) return std::nullopt;
+  switch (Read<oni::Kind>()) {
+    case oni::Kind::kFrame:
+      return ReadFrame();
+    case oni::Kind::kEnd:
+      finished_ = true;
+      return std::nullopt;
+    case oni::Kind::kError:
+      FailWithReaderError();
+  }
+  Fail("its reader has another version");
+}
 
-std::unique_ptr<OniRecording> OniRecording::Open(const fs::path& file,
-                                                 const RecordingDefaults& defaults) {
+}  // namespace
+
+std::unique_ptr<FrameSource> OpenOniRecording(const fs::path& file,
+                                              const RecordingDefaults& defaults) {
   std::error_code error;
   if (!fs::exists(file, error))
     throw DataError(
@@ -267,26 +285,7 @@ std::unique_ptr<OniRecording> OniRecording::Open(const fs::path& file,
   std::optional<std::string> side_car;
   if (const fs::path name = OniSideCar(file); fs::exists(fs::symlink_status(name, error)))
     side_car = ReadTextFile(name, kMaxCameraBytes);
-  auto impl = std::make_unique<Impl>(fs::absolute(file), side_car, ReaderProgram());
-  const oni::Header header = impl->ReadHeader();
-  impl->ReadCamera(header, defaults);
-  return std::unique_ptr<OniRecording>(new OniRecording(std::move(impl)));
-}
-
-const StreamInfo& OniRecording::info() const { return impl_->info; }
-
-std::optional<Frame> OniRecording::Next() {
-  if (impl_->finished) return std::nullopt;
-  switch (impl_->Read<oni::Kind>()) {
-    case oni::Kind::kFrame:
-      return impl_->ReadFrame();
-    case oni::Kind::kEnd:
-      impl_->finished = true;
-      return std::nullopt;
-    case oni::Kind::kError:
-      impl_->FailWithReaderError();
-  }
-  impl_->Fail("its reader has another version");
+  return std::make_unique<OniRecording>(fs::absolute(file), side_car, defaults);
 }
 
 }  // namespace plumb

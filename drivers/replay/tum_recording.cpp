@@ -125,30 +125,34 @@ void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics
                   what, file.string(), image.cols, image.rows, camera.width, camera.height));
 }
 
-}  // namespace
+class TumRecording : public FrameSource {
+ public:
+  TumRecording(const fs::path& folder, const RecordingDefaults& defaults);
+  [[nodiscard]] const StreamInfo& info() const override { return info_; }
+  [[nodiscard]] std::optional<Frame> Next() override;
 
-struct TumRecording::Impl {
-  StreamInfo info;
-  std::vector<FramePlan> plans;
-  double depth_scale = 5000.0;
-  Intrinsics depth_intrinsics;
-  std::optional<DepthRegistration> registration;
-
-  // Shared with the decoding thread.
-  std::mutex mutex;
-  std::condition_variable_any changed;
-  std::deque<Decoded> queue;
-  bool finished = false;  ///< The thread will not add more frames.
-  std::jthread thread;    ///< Last member: joined before the others are destroyed.
-
+ private:
   void FindFrames(const fs::path& folder, double least_max_gap_s);
   void ReadCamera(const fs::path& folder, const RecordingDefaults& defaults);
   void SearchDepthCamera();
   [[nodiscard]] Decoded Decode(std::size_t i) const;
   void DecodeAll(const std::stop_token& stop);
+
+  StreamInfo info_;
+  std::vector<FramePlan> plans_;
+  double depth_scale_ = 5000.0;
+  Intrinsics depth_intrinsics_;
+  std::optional<DepthRegistration> registration_;
+
+  // Shared with the decoding thread.
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::deque<Decoded> queue_;
+  bool finished_ = false;  ///< The thread will not add more frames.
+  std::jthread thread_;    ///< Last member: joined before the others are destroyed.
 };
 
-void TumRecording::Impl::FindFrames(const fs::path& folder, double least_max_gap_s) {
+void TumRecording::FindFrames(const fs::path& folder, double least_max_gap_s) {
   const fs::path color_index = folder / "rgb.txt";
   const fs::path depth_index = folder / "depth.txt";
   const std::vector<IndexEntry> color = ReadIndex(color_index);
@@ -166,62 +170,62 @@ void TumRecording::Impl::FindFrames(const fs::path& folder, double least_max_gap
                     depth.size(), max_gap_s * 1e3, kMinFrames));
   }
   const fs::path canonical_folder = fs::canonical(folder);
-  plans.reserve(pairs.size());
+  plans_.reserve(pairs.size());
   for (const IndexPair& pair : pairs) {
     const IndexEntry& c = color[pair.color];
     const IndexEntry& d = depth[pair.depth];
-    plans.push_back({Resolve(canonical_folder, color_index, c),
-                     Resolve(canonical_folder, depth_index, d), c.time_s, d.time_s});
+    plans_.push_back({Resolve(canonical_folder, color_index, c),
+                      Resolve(canonical_folder, depth_index, d), c.time_s, d.time_s});
   }
   const auto num_unmatched_color = std::ssize(color) - std::ssize(pairs);
   const auto num_unmatched_depth = std::ssize(depth) - std::ssize(pairs);
   if (num_unmatched_color > 0 || num_unmatched_depth > 0) {
-    info.warnings.push_back(fmt::format(
+    info_.warnings.push_back(fmt::format(
         "{} of {} colour and {} of {} depth images have no partner within {:.0f} ms "
         "and are left out",
         num_unmatched_color, color.size(), num_unmatched_depth, depth.size(), max_gap_s * 1e3));
   }
-  info.num_frames = std::ssize(plans);
+  info_.num_frames = std::ssize(plans_);
 }
 
-void TumRecording::Impl::ReadCamera(const fs::path& folder, const RecordingDefaults& defaults) {
+void TumRecording::ReadCamera(const fs::path& folder, const RecordingDefaults& defaults) {
   const fs::path file = folder / "camera.yaml";
   const bool given = fs::exists(fs::symlink_status(file));
   const CameraFile camera =
       given ? ParseCameraFile(ReadTextFile(file, kMaxCameraBytes), file.string())
-            : AssumedCamera(plans.front().color_file);
-  info.intrinsics = camera.color;
-  info.intrinsics_assumed = !given;
-  info.depth_noise = camera.depth_noise.value_or(DepthNoise());
-  info.marker_dictionary = camera.marker_dictionary.value_or(defaults.marker_dictionary);
-  info.marker_length_m = camera.marker_length_m.value_or(defaults.marker_length_m);
-  info.reference_marker =
+            : AssumedCamera(plans_.front().color_file);
+  info_.intrinsics = camera.color;
+  info_.intrinsics_assumed = !given;
+  info_.depth_noise = camera.depth_noise.value_or(DepthNoise());
+  info_.marker_dictionary = camera.marker_dictionary.value_or(defaults.marker_dictionary);
+  info_.marker_length_m = camera.marker_length_m.value_or(defaults.marker_length_m);
+  info_.reference_marker =
       camera.reference_marker ? camera.reference_marker : defaults.reference_marker;
-  info.warnings.insert(info.warnings.end(), camera.warnings.begin(), camera.warnings.end());
+  info_.warnings.insert(info_.warnings.end(), camera.warnings.begin(), camera.warnings.end());
   if (!camera.marker_dictionary || !camera.marker_length_m) {
-    info.warnings.push_back(
+    info_.warnings.push_back(
         fmt::format("the recording does not state its markers: assumed {} with a side of {} m",
-                    info.marker_dictionary, info.marker_length_m));
+                    info_.marker_dictionary, info_.marker_length_m));
   }
-  depth_scale = camera.depth_scale;
-  depth_intrinsics = camera.depth_camera ? camera.depth_camera->intrinsics : camera.color;
+  depth_scale_ = camera.depth_scale;
+  depth_intrinsics_ = camera.depth_camera ? camera.depth_camera->intrinsics : camera.color;
   if (camera.depth_camera)
-    registration.emplace(depth_intrinsics, camera.color, camera.depth_camera->T_color_depth);
+    registration_.emplace(depth_intrinsics_, camera.color, camera.depth_camera->T_color_depth);
   if (camera.depth_camera_unknown) SearchDepthCamera();
 }
 
-void TumRecording::Impl::SearchDepthCamera() {
+void TumRecording::SearchDepthCamera() {
   std::vector<ImagePair> pairs;
-  const std::size_t every = plans.size() / kSearchedPairs + 1;
-  for (std::size_t i = 0; i < plans.size(); i += every) {
+  const std::size_t every = plans_.size() / kSearchedPairs + 1;
+  for (std::size_t i = 0; i < plans_.size(); i += every) {
     const Frame frame = Decode(i).frame;
     pairs.push_back({frame.color_rgb, frame.depth_m});
   }
-  const std::optional<FoundDepthCamera> found = FindDepthCamera(pairs, info.intrinsics);
+  const std::optional<FoundDepthCamera> found = FindDepthCamera(pairs, info_.intrinsics);
   if (!found) return;
   const DepthCamera& depth = found->camera;
-  registration.emplace(depth.intrinsics, info.intrinsics, depth.T_color_depth);
-  info.warnings.push_back(fmt::format(
+  registration_.emplace(depth.intrinsics, info_.intrinsics, depth.T_color_depth);
+  info_.warnings.push_back(fmt::format(
       "edges of the depth images lie on those of the colour images if they are from a camera of "
       "focal length {:.0f} px, {:.0f} mm beside the colour camera: depth is registered with that "
       "estimate; state depth_camera_matrix, depth_distortion_coefficients and T_color_depth in "
@@ -229,23 +233,23 @@ void TumRecording::Impl::SearchDepthCamera() {
       depth.intrinsics.fx, 1e3 * depth.T_color_depth.translation().x()));
 }
 
-Decoded TumRecording::Impl::Decode(std::size_t i) const {
-  const FramePlan& plan = plans[i];
+Decoded TumRecording::Decode(std::size_t i) const {
+  const FramePlan& plan = plans_[i];
   Decoded decoded;
   decoded.frame.index = static_cast<std::int64_t>(i);
   decoded.frame.color_time_s = plan.color_time_s;
   decoded.frame.depth_time_s = plan.depth_time_s;
   decoded.frame.color_rgb = ReadColorImage(plan.color_file);
-  CheckImageSize(plan.color_file, decoded.frame.color_rgb, info.intrinsics, "colour");
+  CheckImageSize(plan.color_file, decoded.frame.color_rgb, info_.intrinsics, "colour");
   const cv::Mat depth_units = ReadDepthImage(plan.depth_file);
-  CheckImageSize(plan.depth_file, depth_units, depth_intrinsics, "depth");
-  decoded.frame.depth_m = ToMetres(depth_units, depth_scale);
-  if (registration) decoded.frame.depth_m = registration->Register(decoded.frame.depth_m);
+  CheckImageSize(plan.depth_file, depth_units, depth_intrinsics_, "depth");
+  decoded.frame.depth_m = ToMetres(depth_units, depth_scale_);
+  if (registration_) decoded.frame.depth_m = registration_->Register(decoded.frame.depth_m);
   return decoded;
 }
 
-void TumRecording::Impl::DecodeAll(const std::stop_token& stop) {
-  for (std::size_t i = 0; i < plans.size(); ++i) {
+void TumRecording::DecodeAll(const std::stop_token& stop) {
+  for (std::size_t i = 0; i < plans_.size(); ++i) {
     Decoded decoded;
     try {
       decoded = Decode(i);
@@ -253,21 +257,44 @@ void TumRecording::Impl::DecodeAll(const std::stop_token& stop) {
       decoded.error = std::current_exception();
     }
     const bool failed = decoded.error != nullptr;
-    std::unique_lock lock(mutex);
-    if (!changed.wait(lock, stop, [this] { return queue.size() < kReadAhead; })) return;
-    queue.push_back(std::move(decoded));
-    finished = failed || i + 1 == plans.size();
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait(lock, stop, [this] { return queue_.size() < kReadAhead; })) return;
+    queue_.push_back(std::move(decoded));
+    finished_ = failed || i + 1 == plans_.size();
     lock.unlock();
-    changed.notify_all();
+    changed_.notify_all();
     if (failed) return;
   }
 }
 
-TumRecording::TumRecording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-TumRecording::~TumRecording() = default;
+TumRecording::TumRecording(const fs::path& folder, const RecordingDefaults& defaults) {
+  try {
+    FindFrames(folder, defaults.max_stamp_gap_s);
+    ReadCamera(folder, defaults);
+  } catch (const fs::filesystem_error& failure) {
+    throw DataError(
+        fmt::format("recording {} cannot be read: {}", folder.string(), failure.what()));
+  }
+}
 
-std::unique_ptr<TumRecording> TumRecording::Open(const fs::path& folder,
-                                                 const RecordingDefaults& defaults) {
+std::optional<Frame> TumRecording::Next() {
+  if (!thread_.joinable())
+    thread_ = std::jthread([this](const std::stop_token& stop) { DecodeAll(stop); });
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return !queue_.empty() || finished_; });
+  if (queue_.empty()) return std::nullopt;
+  Decoded decoded = std::move(queue_.front());
+  queue_.pop_front();
+  lock.unlock();
+  changed_.notify_all();
+  if (decoded.error) std::rethrow_exception(decoded.error);
+  return std::move(decoded.frame);
+}
+
+}  // namespace
+
+std::unique_ptr<FrameSource> OpenTumRecording(const fs::path& folder,
+                                              const RecordingDefaults& defaults) {
   if (!(defaults.max_stamp_gap_s > 0 && defaults.marker_length_m > 0 &&
         MarkerDictionary::Find(defaults.marker_dictionary))) {
     throw std::invalid_argument("RecordingDefaults: gap, marker length or dictionary out of range");
@@ -278,32 +305,7 @@ std::unique_ptr<TumRecording> TumRecording::Open(const fs::path& folder,
                                 folder.string(),
                                 fs::exists(folder, error) ? "no folder" : "missing"));
   }
-  auto impl = std::make_unique<Impl>();
-  try {
-    impl->FindFrames(folder, defaults.max_stamp_gap_s);
-    impl->ReadCamera(folder, defaults);
-  } catch (const fs::filesystem_error& failure) {
-    throw DataError(
-        fmt::format("recording {} cannot be read: {}", folder.string(), failure.what()));
-  }
-  return std::unique_ptr<TumRecording>(new TumRecording(std::move(impl)));
-}
-
-const StreamInfo& TumRecording::info() const { return impl_->info; }
-
-std::optional<Frame> TumRecording::Next() {
-  Impl& impl = *impl_;
-  if (!impl.thread.joinable())
-    impl.thread = std::jthread([&impl](const std::stop_token& stop) { impl.DecodeAll(stop); });
-  std::unique_lock lock(impl.mutex);
-  impl.changed.wait(lock, [&impl] { return !impl.queue.empty() || impl.finished; });
-  if (impl.queue.empty()) return std::nullopt;
-  Decoded decoded = std::move(impl.queue.front());
-  impl.queue.pop_front();
-  lock.unlock();
-  impl.changed.notify_all();
-  if (decoded.error) std::rethrow_exception(decoded.error);
-  return std::move(decoded.frame);
+  return std::make_unique<TumRecording>(folder, defaults);
 }
 
 bool IsTumRecording(const fs::path& folder) {

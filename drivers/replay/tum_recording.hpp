@@ -30,29 +30,16 @@ struct RecordingDefaults {
 ///
 /// Depth of 65535 units also means "nothing measured" (saturated). Depth that is not registered is
 /// registered here, see DepthRegistration.
-class TumRecording : public FrameSource {
- public:
-  /// Reads the index and camera.yaml and finds every image, without decoding any (except the first
-  /// colour image if camera.yaml is missing; TUM's published intrinsics are then assumed, scaled to
-  /// its size).
-  /// @throws DataError if anything is missing, damaged or contradictory, or there are fewer than
-  ///         two frames.
-  /// @throws std::invalid_argument if the defaults are invalid.
-  [[nodiscard]] static std::unique_ptr<TumRecording> Open(const std::filesystem::path& folder,
-                                                          const RecordingDefaults& defaults = {});
-
-  ~TumRecording() override;
-  [[nodiscard]] const StreamInfo& info() const override;
-
-  /// @throws DataError for an image that is damaged or of another size than the camera; no frames
-  ///         follow.
-  [[nodiscard]] std::optional<Frame> Next() override;
-
- private:
-  struct Impl;
-  explicit TumRecording(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
-};
+///
+/// Opening reads the index and camera.yaml and finds every image, without decoding any (except the
+/// first colour image if camera.yaml is missing; TUM's published intrinsics are then assumed,
+/// scaled to its size). Next() throws DataError for an image that is damaged or of another size
+/// than the camera; no frames follow.
+/// @throws DataError if anything is missing, damaged or contradictory, or there are fewer than two
+///         frames.
+/// @throws std::invalid_argument if the defaults are invalid.
+[[nodiscard]] std::unique_ptr<FrameSource> OpenTumRecording(const std::filesystem::path& folder,
+                                                            const RecordingDefaults& defaults = {});
 
 /// True if the folder looks like a recording: it contains rgb.txt or depth.txt.
 [[nodiscard]] bool IsTumRecording(const std::filesystem::path& folder);

@@ -1,4 +1,4 @@
-// Writes recordings in the TUM RGB-D layout that TumRecording reads.
+// Writes recordings in the TUM RGB-D layout that OpenTumRecording() reads.
 #pragma once
 
 #include <cstdint>

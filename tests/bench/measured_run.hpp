@@ -38,7 +38,7 @@ struct Recorded {
 };
 
 inline Recorded Load(const std::filesystem::path& recording) {
-  const auto source = TumRecording::Open(recording);
+  const auto source = OpenTumRecording(recording);
   Recorded recorded;
   while (std::optional<Frame> frame = source->Next()) recorded.frames.push_back(std::move(*frame));
   recorded.info = source->info();

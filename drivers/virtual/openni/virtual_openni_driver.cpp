@@ -64,7 +64,7 @@ class OniKind : public RecordingKind {
   [[nodiscard]] bool IsOne(const fs::path& file) const override { return IsOniFile(file); }
   [[nodiscard]] std::unique_ptr<FrameSource> Open(
       const fs::path& file, const RecordingDefaults& defaults) const override {
-    return OniRecording::Open(file, defaults);
+    return OpenOniRecording(file, defaults);
   }
   [[nodiscard]] std::vector<double> DepthStamps(const fs::path& file) const override {
     const std::optional<OniFileSummary> summary = SummariseOniFile(file);

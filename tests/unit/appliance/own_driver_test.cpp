@@ -161,7 +161,7 @@ class OwnDriverTest : public ::testing::Test {
 /// The surface of a recording if its sensor has this noise.
 std::vector<Eigen::Vector3f> Surface(const std::filesystem::path& recording,
                                      const std::optional<DepthNoise>& noise) {
-  const auto source = TumRecording::Open(recording);
+  const auto source = OpenTumRecording(recording);
   StreamInfo info = source->info();
   info.depth_noise = noise.value_or(info.depth_noise);
   Reconstructor reconstructor(info, {});
@@ -236,7 +236,7 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReferenceAndItsNoiseWithTh
   EXPECT_TRUE(std::filesystem::exists(scan / "scene" / "scene.json"));
   const std::filesystem::path recording = scan / "recording";
   ASSERT_TRUE(std::filesystem::exists(recording));
-  EXPECT_EQ(TumRecording::Open(recording)->info().depth_noise, kItsNoise);
+  EXPECT_EQ(OpenTumRecording(recording)->info().depth_noise, kItsNoise);
   const auto replayed = Surface(recording, {});
   EXPECT_EQ(replayed, Surface(recording, kItsNoise));
   EXPECT_NE(replayed, Surface(recording, DepthNoise())) << "what the driver states has no effect";

@@ -56,7 +56,7 @@ const fs::path& Recording() {
 
 std::vector<std::uint8_t> Bytes() { return ReadWholeFile(Recording(), std::size_t{1} << 30); }
 
-std::vector<Frame> ReadAll(OniRecording& recording) {
+std::vector<Frame> ReadAll(FrameSource& recording) {
   std::vector<Frame> frames;
   while (auto frame = recording.Next()) frames.push_back(std::move(*frame));
   return frames;
@@ -64,7 +64,7 @@ std::vector<Frame> ReadAll(OniRecording& recording) {
 
 TEST(OniTest, ComesBackAsItWasWritten) {
   const auto source = Source();
-  const auto recording = OniRecording::Open(Recording());
+  const auto recording = OpenOniRecording(Recording());
   EXPECT_EQ(recording->info().intrinsics, source->info().intrinsics);
   EXPECT_EQ(recording->info().marker_dictionary, source->info().marker_dictionary);
   EXPECT_EQ(recording->info().reference_marker, source->info().reference_marker);
@@ -117,7 +117,7 @@ TEST(OniTest, LeavesNothingBesideTheFileAndItsSideCar) {
 TEST(OniTest, WithoutSideCarTheCameraIsNominalAndThatIsSaid) {
   const TempFolder folder;
   fs::copy_file(Recording(), folder / "foreign.oni");
-  const auto recording = OniRecording::Open(folder / "foreign.oni");
+  const auto recording = OpenOniRecording(folder / "foreign.oni");
   EXPECT_TRUE(recording->info().intrinsics_assumed);
   EXPECT_NEAR(recording->info().intrinsics.fx, 570.34 / 2, 0.2);
   EXPECT_THAT(recording->info().warnings, ::testing::Contains(HasSubstr("no foreign.oni.yaml")));
@@ -126,13 +126,13 @@ TEST(OniTest, WithoutSideCarTheCameraIsNominalAndThatIsSaid) {
 
 TEST(OniTest, WhatIsNoOniFileIsRefused) {
   const TempFolder folder;
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "none.oni"); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenOniRecording(folder / "none.oni"); }),
               HasSubstr("found nothing"));
   WriteWholeFile(folder / "text.oni", std::string_view("hello"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "text.oni"); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenOniRecording(folder / "text.oni"); }),
               HasSubstr("does not begin with NI10"));
   WriteWholeFile(folder / "short.oni", std::string_view("NI10"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "short.oni"); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenOniRecording(folder / "short.oni"); }),
               HasSubstr("short.oni"));
 }
 
@@ -145,7 +145,7 @@ TEST(OniTest, DamagedFilesAreDataErrorsOrShorter) {
   const auto read = [&](const std::vector<std::uint8_t>& bytes) {
     WriteWholeFile(folder / "bad.oni", std::span(bytes));
     try {
-      const auto recording = OniRecording::Open(folder / "bad.oni");
+      const auto recording = OpenOniRecording(folder / "bad.oni");
       EXPECT_LE(ReadAll(*recording).size(), static_cast<std::size_t>(kFrames));
     } catch (const DataError&) {
       ++refused;
@@ -179,8 +179,8 @@ int CountReaders() {
 }
 
 TEST(OniTest, MayBeReadOnAnotherThreadThanItWasOpenedOnAndLeavesNoProcess) {
-  std::unique_ptr<OniRecording> recording;
-  std::thread([&] { recording = OniRecording::Open(Recording()); }).join();
+  std::unique_ptr<FrameSource> recording;
+  std::thread([&] { recording = OpenOniRecording(Recording()); }).join();
   EXPECT_TRUE(recording->Next());
   EXPECT_EQ(CountReaders(), 1);
   recording.reset();  // in the middle
@@ -203,7 +203,7 @@ TEST(OniTest, RecordsALiveSensorWithItsStamps) {
   EXPECT_GE(written.color_us.size(), 10U);
   EXPECT_THAT(ReadTextFile(folder / "live.oni.yaml", 4096),
               HasSubstr("sensor_serial: \"VIRTUAL-0001\""));
-  const auto recording = OniRecording::Open(folder / "live.oni");
+  const auto recording = OpenOniRecording(folder / "live.oni");
   EXPECT_FALSE(recording->info().intrinsics_assumed);
   int found = 0;
   for (const Frame& frame : ReadAll(*recording)) {
@@ -330,8 +330,8 @@ TEST(OniTest, TheDepthNoiseOfTheSideCarComesBack) {
   StreamInfo info = Source()->info();
   info.depth_noise.constant_m = 0.004;
   WriteWholeFile(OniSideCar(file), CameraFileText(info, 1000.0));
-  EXPECT_EQ(OniRecording::Open(file)->info().depth_noise, info.depth_noise);
-  EXPECT_EQ(OniRecording::Open(Recording())->info().depth_noise, DepthNoise());
+  EXPECT_EQ(OpenOniRecording(file)->info().depth_noise, info.depth_noise);
+  EXPECT_EQ(OpenOniRecording(Recording())->info().depth_noise, DepthNoise());
 }
 
 }  // namespace

@@ -146,7 +146,7 @@ void WriteUnregistered(const std::filesystem::path& folder, const std::vector<Im
 
 /// Share of the first frame's measured pixels within 1 % of what the colour camera would see.
 double ShareInPlace(const std::filesystem::path& folder, std::vector<std::string>& warnings) {
-  const auto source = TumRecording::Open(folder);
+  const auto source = OpenTumRecording(folder);
   warnings = source->info().warnings;
   const cv::Mat depth_m = source->Next()->depth_m;
   const cv::Mat expected_m = Images(SameAsColor(), 1)[0].depth_m;

@@ -68,7 +68,7 @@ class TumRecordingTest : public ::testing::Test {
   /// The message of the refusal, by Open() or while the frames are read.
   [[nodiscard]] std::string Refusal() const {
     return MessageOf<DataError>([&] {
-      const auto source = TumRecording::Open(recording_);
+      const auto source = OpenTumRecording(recording_);
       while (source->Next()) {
       }
     });
@@ -86,7 +86,7 @@ class TumRecordingTest : public ::testing::Test {
 };
 
 TEST_F(TumRecordingTest, GivesBackWhatWasWritten) {
-  const auto source = TumRecording::Open(recording_);
+  const auto source = OpenTumRecording(recording_);
   EXPECT_EQ(source->info().intrinsics, SmallCamera().intrinsics);
   EXPECT_FALSE(source->info().intrinsics_assumed);
   EXPECT_EQ(source->info().marker_dictionary, "DICT_5X5_100");
@@ -112,7 +112,7 @@ TEST_F(TumRecordingTest, GivesBackWhatWasWritten) {
 
 TEST_F(TumRecordingTest, StoppingEarlyEndsTheThread) {
   for (int frames = 0; frames < 3; ++frames) {
-    const auto source = TumRecording::Open(recording_);
+    const auto source = OpenTumRecording(recording_);
     for (int i = 0; i < frames; ++i) EXPECT_TRUE(source->Next());
   }
 }
@@ -122,7 +122,7 @@ TEST_F(TumRecordingTest, ReadsJpegColour) {
   TumWriter writer(jpeg, SmallCamera(), {.jpeg_quality = 95});
   for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i + 4));
   writer.Finish();
-  const auto frame = TumRecording::Open(jpeg)->Next();
+  const auto frame = OpenTumRecording(jpeg)->Next();
   ASSERT_TRUE(frame);
   // Flat grey 40 41 42: JPEG's colour transform rounds by at most 2.
   EXPECT_LE(cv::norm(frame->color_rgb, NumberedFrame(4).color_rgb, cv::NORM_INF), 2);
@@ -133,7 +133,7 @@ TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
   const std::size_t line = index.find("1000.106");  // frame 3
   index.erase(line, index.find('\n', line) + 1 - line);
   WriteWholeFile(recording_ / "depth.txt", index);
-  const auto source = TumRecording::Open(recording_);
+  const auto source = OpenTumRecording(recording_);
   EXPECT_EQ(source->info().num_frames, kNumFrames - 1);
   EXPECT_THAT(source->info().warnings,
               Contains(HasSubstr("1 of 12 colour and 0 of 11 depth images")));
@@ -144,8 +144,8 @@ TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
 }
 
 // A recording with a given frame rate whose depth stamps are later by the given time.
-std::unique_ptr<TumRecording> OpenWithOffset(const fs::path& folder, double rate_hz,
-                                             double offset_s) {
+std::unique_ptr<FrameSource> OpenWithOffset(const fs::path& folder, double rate_hz,
+                                            double offset_s) {
   TumWriter writer(folder, SmallCamera(), {.jpeg_quality = 0});
   for (int i = 0; i < kNumFrames; ++i) {
     Frame frame = NumberedFrame(i);
@@ -154,7 +154,7 @@ std::unique_ptr<TumRecording> OpenWithOffset(const fs::path& folder, double rate
     writer.Add(frame);
   }
   writer.Finish();
-  return TumRecording::Open(folder);
+  return OpenTumRecording(folder);
 }
 
 TEST_F(TumRecordingTest, SlowStreamsPairWithTheirNearestWhateverTheirOffset) {
@@ -176,7 +176,7 @@ TEST_F(TumRecordingTest, SlowStreamsDoNotPairAcrossALostImage) {
   ASSERT_NE(line, std::string::npos);
   index.erase(line, index.find('\n', line) + 1 - line);
   WriteWholeFile(slow / "depth.txt", index);
-  const auto source = TumRecording::Open(slow);
+  const auto source = OpenTumRecording(slow);
   EXPECT_EQ(source->info().num_frames, kNumFrames - 1);
   while (const auto frame = source->Next())
     EXPECT_NEAR(frame->depth_time_s - frame->color_time_s, 0.005, 2e-6);
@@ -184,7 +184,7 @@ TEST_F(TumRecordingTest, SlowStreamsDoNotPairAcrossALostImage) {
 
 TEST_F(TumRecordingTest, WithoutCameraFileTumsCameraIsAssumedAtTheImagesSize) {
   fs::remove(recording_ / "camera.yaml");
-  const auto source = TumRecording::Open(
+  const auto source = OpenTumRecording(
       recording_,
       {.marker_dictionary = "DICT_4X4_50", .marker_length_m = 0.1, .reference_marker = 9});
   EXPECT_TRUE(source->info().intrinsics_assumed);
@@ -203,7 +203,7 @@ TEST_F(TumRecordingTest, WithoutCameraFileOtherShapesNeedOne) {
   for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i, 80, 48));
   writer.Finish();
   fs::remove(wide / "camera.yaml");
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(wide); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenTumRecording(wide); }),
               AllOf(HasSubstr("80x48"), HasSubstr("add camera.yaml")));
 }
 
@@ -216,7 +216,7 @@ TEST_F(TumRecordingTest, UnregisteredDepthIsRegistered) {
       "depth_distortion_coefficients: [ 0.01, -0.02, 0.001, 0, 0 ]\n"
       "T_color_depth: [ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.25, 0, 0, 0, 1 ]");
   WriteWholeFile(recording_ / "camera.yaml", text);
-  const auto frame = TumRecording::Open(recording_)->Next();
+  const auto frame = OpenTumRecording(recording_)->Next();
   ASSERT_TRUE(frame);
   EXPECT_NEAR(frame->depth_m.at<float>(24, 32), 0.75F,
               1e-4);  // 0.5 m before a depth camera that stands 0.25 m in front
@@ -224,18 +224,18 @@ TEST_F(TumRecordingTest, UnregisteredDepthIsRegistered) {
 
 TEST_F(TumRecordingTest, SaturatedDepthIsNothing) {
   WritePng(DepthFile(0), cv::Mat(48, 64, CV_16UC1, cv::Scalar(65535)));
-  const auto source = TumRecording::Open(recording_);
+  const auto source = OpenTumRecording(recording_);
   EXPECT_EQ(cv::countNonZero(source->Next()->depth_m), 0);
 }
 
 // ---- bad input: each is refused with the file, what was found and what is expected
 
 TEST_F(TumRecordingTest, MissingFolderAndAFileInItsPlaceAreNamed) {
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(folder_ / "none"); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenTumRecording(folder_ / "none"); }),
               AllOf(HasSubstr("none"), HasSubstr("missing")));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(recording_ / "rgb.txt"); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenTumRecording(recording_ / "rgb.txt"); }),
               HasSubstr("no folder"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(folder_.path()); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenTumRecording(folder_.path()); }),
               HasSubstr("rgb.txt is missing"));
 }
 
@@ -251,14 +251,14 @@ TEST_F(TumRecordingTest, EmptyIndexIsNamed) {
 
 TEST_F(TumRecordingTest, MissingImageIsNamedBeforeAnyWork) {
   fs::remove(ColorFile(7));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(recording_); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenTumRecording(recording_); }),
               AllOf(HasSubstr(ColorFile(7).filename()), HasSubstr("rgb.txt"),
                     HasSubstr("cannot be found")));
 }
 
 TEST_F(TumRecordingTest, TruncatedImageIsNamedAfterTheGoodFrames) {
   fs::resize_file(DepthFile(7), fs::file_size(DepthFile(7)) / 2);
-  const auto source = TumRecording::Open(recording_);
+  const auto source = OpenTumRecording(recording_);
   for (int i = 0; i < 7; ++i) EXPECT_TRUE(source->Next());
   EXPECT_THAT(MessageOf<DataError>([&] { (void)source->Next(); }),
               AllOf(HasSubstr(DepthFile(7).filename()), HasSubstr("damaged")));
@@ -302,7 +302,7 @@ TEST_F(TumRecordingTest, LinksOutOfTheFolderAreNamed) {
   fs::remove(ColorFile(5));
   fs::copy_file(ColorFile(4), recording_ / "kept.png");
   fs::create_symlink("../kept.png", ColorFile(5));  // a link inside the folder is fine
-  EXPECT_EQ(TumRecording::Open(recording_)->info().num_frames, kNumFrames);
+  EXPECT_EQ(OpenTumRecording(recording_)->info().num_frames, kNumFrames);
 }
 
 TEST_F(TumRecordingTest, AFolderWhoseNameBeginsTheSameIsOutside) {
@@ -367,7 +367,7 @@ TEST_F(TumRecordingTest, DepthBeyondSixteenBitsIsWrittenAsNothing) {
 }
 
 TEST_F(TumRecordingTest, TheSensorsDepthNoiseComesBackToTheBit) {
-  EXPECT_EQ(TumRecording::Open(recording_)->info().depth_noise, DepthNoise());
+  EXPECT_EQ(OpenTumRecording(recording_)->info().depth_noise, DepthNoise());
   EXPECT_EQ(ReadTextFile(recording_ / "camera.yaml", 1 << 16).find("depth_noise"),
             std::string::npos)
       << "recordings of structured light stay as they were";
@@ -380,7 +380,7 @@ TEST_F(TumRecordingTest, TheSensorsDepthNoiseComesBackToTheBit) {
     TumWriter writer(folder, info, {.jpeg_quality = 0});
     for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i));
     writer.Finish();
-    EXPECT_EQ(TumRecording::Open(folder)->info().depth_noise, info.depth_noise);
+    EXPECT_EQ(OpenTumRecording(folder)->info().depth_noise, info.depth_noise);
     fs::remove_all(folder);
   }
 }
