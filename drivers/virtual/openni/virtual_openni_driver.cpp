@@ -32,7 +32,7 @@ class VirtualOpenNiSetup : public SensorSetup {
   [[nodiscard]] std::unique_ptr<SensorProvider> MakeProvider() const override {
     return std::make_unique<OpenNiProvider>(options_);
   }
-  void BeforeScan() const override { sensor_.Rewind(); }
+  void BeforeScan() const override { (void)sensor_.Command("rewind"); }
   std::string Command(const std::string& command) const override {
     return sensor_.Command(command);
   }

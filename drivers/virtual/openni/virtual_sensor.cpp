@@ -22,10 +22,8 @@ fs::path FindVirtualSensorRuntime() {
 
 VirtualSensor::VirtualSensor(const VirtualSensorOptions& options, const std::stop_token& stop,
                              const SetUpProgress& progress)
-    : runtime_library_(options.runtime.empty() ? FindVirtualSensorRuntime() : options.runtime),
-      frames_(options.frames) {
+    : runtime_library_(options.runtime.empty() ? FindVirtualSensorRuntime() : options.runtime) {
   const RenderedScenes rendered = RenderScenes(options, stop, progress);
-  scenes_ = rendered.names;
   session_ = std::make_unique<VirtualSession>(
       VirtualSession::Contents{options.serial, options.plugged, rendered.caches, rendered.camera});
 }

@@ -6,7 +6,6 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "drivers/virtual/openni/virtual_session.hpp"
 #include "drivers/virtual/virtual_scenes.hpp"
@@ -25,11 +24,11 @@ namespace plumb {
 ///
 /// Only one may exist in a process at a time. The constructor sets an environment variable that the
 /// plug-in reads: create it before other threads start, and destroy it after the provider and its
-/// sensors. Command() and its shorthands may be called from any thread, wait for the plug-in's
-/// answer for at most a second, and throw DeviceError if there is none or the command is refused.
+/// sensors. Command() may be called from any thread, waits for the plug-in's answer for at most a
+/// second, and throws DeviceError if there is none or the command is refused.
 ///
-/// Frames of the virtual camera: it is static at the beginning of the current scene; Rewind() plays
-/// the sweep once from its start and then holds the last view. NextScene() goes to the next scene
+/// Frames of the virtual camera: it is static at the beginning of the current scene; "rewind" plays
+/// the sweep once from its start and then holds the last view. "next-scene" goes to the next scene
 /// (after the last comes the first) and is static at its beginning. Stamps always increase, and
 /// within a sweep they are those of the simulator.
 class VirtualSensor {
@@ -47,30 +46,16 @@ class VirtualSensor {
   [[nodiscard]] const std::filesystem::path& calibration_folder() const {
     return session_->calibration_folder();
   }
-  /// Names of the scenes in the order in which NextScene() shows them.
-  [[nodiscard]] const std::vector<std::string>& scenes() const { return scenes_; }
-  [[nodiscard]] int frames() const { return frames_; }
-  /// Socket of the plug-in; each datagram holds one command, and the answer goes to the sender.
-  [[nodiscard]] const std::filesystem::path& socket() const { return session_->socket(); }
 
   /// Sends one line as listed in drivers/virtual/README.md and returns the answer without its
   /// leading "ok".
   std::string Command(std::string_view command) const { return session_->Command(command); }
 
-  void Plug() const { (void)Command("plug"); }
-  void Unplug() const { (void)Command("unplug"); }
-  void Stall() const { (void)Command("stall"); }    ///< No frames arrive, and nothing is reported.
-  void Resume() const { (void)Command("resume"); }  ///< Ends a stall and an error.
-  void Error() const { (void)Command("error"); }  ///< The driver reports a failure and frames stop.
-  void NextScene() const { (void)Command("next-scene"); }
-  void Rewind() const { (void)Command("rewind"); }
   /// The driver finishes its current command and stops listening: for OpenNiOptions::before_stop.
   void Quit() const noexcept;
 
  private:
   std::filesystem::path runtime_library_;
-  std::vector<std::string> scenes_;
-  int frames_ = 0;
   std::unique_ptr<const VirtualSession> session_;
 };
 

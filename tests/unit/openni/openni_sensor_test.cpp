@@ -21,6 +21,7 @@
 namespace plumb {
 namespace {
 
+using testing::CommandedSensor;
 using testing::Eventually;
 using ::testing::HasSubstr;
 using testing::MessageOf;
@@ -218,7 +219,8 @@ TEST(OpenNiSensorTest, LateImagesAreKept) {
 
 TEST(OpenNiSensorTest, NextSceneShowsAnotherBodyAndHoldsStill) {
   VirtualRig rig;
-  ASSERT_EQ(rig.sensor.scenes(), (std::vector<std::string>{"reference", "moved"}));
+  ASSERT_EQ(RenderScenes(SmallVirtualSensor()).names,
+            (std::vector<std::string>{"reference", "moved"}));
   const auto sensor = rig.provider.Open("");
   const Frame first = sensor->Next().value();
   rig.sensor.NextScene();
@@ -251,7 +253,7 @@ TEST(OpenNiSensorTest, ADamagedCalibrationIsRefusedByName) {
 }
 
 TEST(OpenNiSensorTest, TheSensorMayOutliveItsProvider) {
-  VirtualSensor virtual_sensor(SmallVirtualSensor());
+  CommandedSensor virtual_sensor(SmallVirtualSensor());
   OpenNiOptions options;
   options.library = virtual_sensor.runtime_library();
   auto provider = std::make_unique<OpenNiProvider>(options);
@@ -263,7 +265,7 @@ TEST(OpenNiSensorTest, TheSensorMayOutliveItsProvider) {
 }
 
 TEST(OpenNiSensorTest, TheLibraryStopsWhileUnitsComeAndGo) {
-  const VirtualSensor virtual_sensor(SmallVirtualSensor());
+  const CommandedSensor virtual_sensor(SmallVirtualSensor());
   for (int round = 0; round < 10; ++round) {
     std::atomic<bool> closing = false;
     std::atomic<int> toggles = 0;
@@ -320,7 +322,7 @@ TEST(VirtualSensorTest, RendersAgainWhatTheCacheHoldsNoMore) {
 }
 
 TEST(VirtualSensorTest, CommandsFailClearly) {
-  const VirtualSensor alone(SmallVirtualSensor());
+  const CommandedSensor alone(SmallVirtualSensor());
   EXPECT_THAT(MessageOf<DeviceError>([&] { alone.Plug(); }), HasSubstr("does not listen"));
   OpenNiOptions options;
   options.library = alone.runtime_library();

@@ -23,6 +23,18 @@ namespace plumb::testing {
   return options;
 }
 
+/// The virtual sensor with a function for each command.
+struct CommandedSensor : VirtualSensor {
+  using VirtualSensor::VirtualSensor;
+  void Plug() const { (void)Command("plug"); }
+  void Unplug() const { (void)Command("unplug"); }
+  void Stall() const { (void)Command("stall"); }    ///< No frames arrive, and nothing is reported.
+  void Resume() const { (void)Command("resume"); }  ///< Ends a stall and an error.
+  void Error() const { (void)Command("error"); }  ///< The driver reports a failure and frames stop.
+  void NextScene() const { (void)Command("next-scene"); }
+  void Rewind() const { (void)Command("rewind"); }
+};
+
 /// The sensor together with the provider that sees it.
 struct VirtualRig {
   explicit VirtualRig(const VirtualSensorOptions& sensor_options = SmallVirtualSensor(),
@@ -37,7 +49,7 @@ struct VirtualRig {
     return options;
   }
 
-  VirtualSensor sensor;
+  CommandedSensor sensor;
   OpenNiProvider provider;
 };
 
