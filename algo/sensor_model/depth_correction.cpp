@@ -2,8 +2,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "algo/sensor_model/field_polynomials.hpp"
-
 namespace plumb {
 namespace {
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <tuple>
 
-#include "algo/sensor_model/field_polynomials.hpp"
-
 namespace plumb {
 namespace {
 

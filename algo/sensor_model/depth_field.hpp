@@ -46,6 +46,15 @@ using FieldRow = Eigen::Matrix<float, kNumFieldTerms + kNumGrowthTerms, 1>;
 /// The products at CentredCoordinates(): first those of the field, then those of its growth.
 [[nodiscard]] FieldRow FieldProducts(const Eigen::Vector2d& centred);
 
+/// The polynomials in one column and in one row, whose cells share them.
+using FieldAcross = std::array<double, 6>;  ///< T_0(x) to T_5(x)
+using FieldDown = std::array<double, 5>;    ///< T_0(y) to T_4(y)
+/// Of one of the CentredCoordinates().
+[[nodiscard]] FieldAcross PolynomialsAcross(double centred_x);
+[[nodiscard]] FieldDown PolynomialsDown(double centred_y);
+/// The products where the column and the row meet.
+[[nodiscard]] FieldRow FieldProducts(const FieldAcross& across, const FieldDown& down);
+
 /// Factor of the growing terms: depth beyond one metre, in metres. It is clamped at 2 m from the
 /// sensor, because a sweep has hardly any readings beyond.
 [[nodiscard]] double FieldGrowth(double z_m);

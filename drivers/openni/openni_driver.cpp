@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
-#include "drivers/openni/openni_driver_files.hpp"
 #include "drivers/openni/openni_provider.hpp"
 #include "drivers/program_folders.hpp"
 #ifdef PLUMB_WITH_USB

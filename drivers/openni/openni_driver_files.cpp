@@ -1,4 +1,4 @@
-#include "drivers/openni/openni_driver_files.hpp"
+#include "drivers/openni/openni_driver.hpp"
 
 #include <dlfcn.h>
 

@@ -11,7 +11,6 @@
 #include "drivers/simulated/noise_field.hpp"
 #include "drivers/simulated/ps1080.hpp"
 #include "drivers/simulated/random.hpp"
-#include "drivers/simulated/smooth_field.hpp"
 
 namespace plumb::simulated {
 namespace {

@@ -1,5 +1,5 @@
-// Noise with correlated neighbouring pixels, as produced by a sensor that matches windows of
-// pixels.
+// Random functions over an image: noise with correlated neighbouring pixels, as produced by a
+// sensor that matches windows of pixels, and smooth ones.
 #pragma once
 
 #include <cstdint>
@@ -17,5 +17,11 @@ namespace plumb::simulated {
 /// @param sigma_px  Sigma of the filter; 0: white noise.
 [[nodiscard]] std::vector<float> CorrelatedNoise(std::uint64_t seed, int width, int height,
                                                  double sigma_px);
+
+/// A smooth function that low-order polynomials cannot represent: the sum of 24 Gaussian bumps of
+/// random position, width (0.08 to 0.35 of the image's width, log-uniform, different along and
+/// across) and sign, normalised to mean 0 and RMS 1 over the image. Row-major. The shape is the
+/// same at every image size. Pure.
+[[nodiscard]] std::vector<float> SmoothField(std::uint64_t seed, int width, int height);
 
 }  // namespace plumb::simulated

@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <string_view>
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
 #include "drivers/simulated/faults.hpp"
-#include "drivers/simulated/tone_curve.hpp"
 
 namespace plumb::simulated {
 
@@ -32,6 +32,22 @@ struct LensRest {
   double k4 = 0.0;
   bool operator==(const LensRest&) const = default;
 };
+
+/// From linear light to a fraction of the largest code, both 0 to 1, increasing.
+struct ToneCurve {
+  enum class Kind : std::uint8_t { kLinear, kPower, kSrgb, kSShaped };
+  Kind kind = Kind::kSrgb;
+  double gamma = 2.2;   ///< kPower and kSShaped: light^(1/gamma).
+  double contrast = 0;  ///< kSShaped: fraction of a smooth step that is mixed in, below 1.
+
+  [[nodiscard]] double Encode(double light) const;
+};
+
+[[nodiscard]] std::string_view ToString(ToneCurve::Kind kind);
+
+/// A unit's own curve: linear, a power of 1.6 to 2.8, sRGB or S-shaped, each for a quarter of the
+/// units.
+[[nodiscard]] ToneCurve DrawToneCurve(std::uint64_t seed);
 
 /// A unit of the Xtion class with projector, infrared camera and colour camera at different
 /// positions. Lengths in metres, times in seconds.

@@ -1,5 +1,5 @@
 // Drivers of other makers, of which the virtual sensor's plug-in takes the place.
-#include "drivers/openni/openni_driver_files.hpp"
+#include "drivers/openni/openni_driver.hpp"
 
 #include <dlfcn.h>
 

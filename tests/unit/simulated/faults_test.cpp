@@ -12,7 +12,7 @@
 #include "algo/base/units.hpp"
 #include "drivers/simulated/color_camera.hpp"
 #include "drivers/simulated/depth_camera.hpp"
-#include "drivers/simulated/smooth_field.hpp"
+#include "drivers/simulated/noise_field.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 #include "tests/unit/simulated/simulated_support.hpp"
 
