@@ -35,11 +35,11 @@ struct PointSystem {
 // Levenberg-Marquardt on one problem.
 class Solver {
  public:
-  explicit Solver(Problem& problem)
+  explicit Solver(const Problem& problem)
       : problem_(problem),
-        options_(problem.options()),
+        options_(problem.options),
         equations_(problem),
-        points_(problem.num_landmarks()) {}
+        points_(problem.landmarks.size()) {}
 
   BundleSummary Run();
 
@@ -58,7 +58,7 @@ class Solver {
   // task, so every block has exactly one writer.
   void Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const;
 
-  Problem& problem_;
+  const Problem& problem_;
   const BundleOptions& options_;
   Equations equations_;
   std::vector<PointSystem> points_;
@@ -103,10 +103,9 @@ bool Solve(const Eigen::MatrixXd& S, const Eigen::VectorXd& right, Eigen::Vector
 BundleSummary Solver::Run() {
   BundleSummary summary;
   State state = problem_.Start();
-  problem_.DropViewsBehindCameras(state);
   double cost = problem_.Cost(state);
   summary.initial_cost = summary.final_cost = cost;
-  if (!std::isfinite(cost) || problem_.size() == 0) return summary;
+  if (!std::isfinite(cost) || problem_.size == 0) return summary;
   double damping = options_.initial_damping;
   bool linearised = false;
   while (summary.num_iterations < options_.max_iterations && damping < kLargestDamping) {
@@ -140,11 +139,11 @@ void Solver::MakePoint(std::size_t s, double damping) {
   point.g.setZero();
   point.W.clear();
   point.W_calibration.setZero();
-  for (const std::uint32_t i : problem_.ViewsOfLandmark(s)) {
+  for (const std::uint32_t i : problem_.views_of_landmark[s]) {
     const PointRows& view = equations_.rows()[i];
     V.noalias() += view.J_point.transpose() * view.J_point;
     point.g.noalias() += view.J_point.transpose() * view.r;
-    if (const std::optional<int> slot = problem_.PoseSlot(problem_.views()[i].keyframe))
+    if (const std::optional<int> slot = problem_.PoseSlot(problem_.views[i].keyframe))
       point.W.emplace_back(*slot, view.J_camera.transpose() * view.J_point);
     if (options_.calibrate) point.W_calibration += view.CalibrationTimes<3>(view.J_point);
   }
@@ -164,12 +163,12 @@ bool Solver::Step(const State& state, double damping, State& next) {
   Eigen::VectorXd x;
   if (!Solve(S, right, x)) return false;
   next = state;
-  for (std::size_t slot = 0; slot < problem_.free().size(); ++slot) {
-    CameraState& camera = next.cameras[static_cast<std::size_t>(problem_.free()[slot])];
+  for (std::size_t slot = 0; slot < problem_.free.size(); ++slot) {
+    CameraState& camera = next.cameras[static_cast<std::size_t>(problem_.free[slot])];
     camera.twist -= x.segment<6>(kCamera * static_cast<Eigen::Index>(slot));
     camera.Prepare();
   }
-  for (std::size_t m = 0; m < problem_.num_markers(); ++m)
+  for (std::size_t m = 0; m < problem_.markers.size(); ++m)
     next.markers[m] -= x.segment<6>(problem_.MarkerAt(static_cast<int>(m)));
   if (options_.calibrate) MoveCalibration(-x.tail<kCalibrationSize>(), next.calibration);
   tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) {
@@ -186,10 +185,10 @@ bool Solver::Step(const State& state, double damping, State& next) {
 
 void Solver::PinFixed(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
   if (options_.calibrate && options_.fix_centre_and_distortion)
-    Pin(problem_.calibration_at() + kLensAt + QuadraticTerm::kFocal,
+    Pin(problem_.calibration_at + kLensAt + QuadraticTerm::kFocal,
         CalibrationModel::kLensSize - QuadraticTerm::kFocal, S, right);
   if (options_.calibrate && options_.fix_depth_field)
-    Pin(problem_.calibration_at() + kDepthAt + kDepthField, kNumDepthTerms - kDepthField, S, right);
+    Pin(problem_.calibration_at + kDepthAt + kDepthField, kNumDepthTerms - kDepthField, S, right);
 }
 
 void Solver::FindInformation(const State& state, BundleSummary& summary) {
@@ -201,11 +200,10 @@ void Solver::FindInformation(const State& state, BundleSummary& summary) {
   Eliminate(S, right);
   summary.posterior = Posterior(S);
   if (!options_.calibrate) return;
-  const Eigen::MatrixXd poses =
-      S.topLeftCorner(problem_.calibration_at(), problem_.calibration_at());
+  const Eigen::MatrixXd poses = S.topLeftCorner(problem_.calibration_at, problem_.calibration_at);
   const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(poses);
   if (solver.info() != Eigen::Success) return;
-  const Eigen::MatrixXd coupling = S.bottomLeftCorner(kCalibrationSize, problem_.calibration_at());
+  const Eigen::MatrixXd coupling = S.bottomLeftCorner(kCalibrationSize, problem_.calibration_at);
   CalibrationMatrix information =
       S.bottomRightCorner<kCalibrationSize, kCalibrationSize>().selfadjointView<Eigen::Lower>();
   information -= coupling * solver.solve(coupling.transpose());
@@ -219,7 +217,7 @@ BundlePosterior Solver::Posterior(Eigen::MatrixXd S) const {
   PinFixed(S, right);
   const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(S);
   if (solver.info() != Eigen::Success) return posterior;
-  const auto num_markers = static_cast<Eigen::Index>(problem_.num_markers());
+  const auto num_markers = static_cast<Eigen::Index>(problem_.markers.size());
   if (num_markers > 0) {
     const Eigen::Index first = problem_.MarkerAt(0);
     Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(S.rows(), 6 * num_markers);
@@ -231,18 +229,18 @@ BundlePosterior Solver::Posterior(Eigen::MatrixXd S) const {
     posterior.with_calibration = solver.solve(FreeCalibration());
     if (!posterior.with_calibration.allFinite()) return {};
   }
-  for (std::size_t k = 0; k < problem_.num_keyframes(); ++k)
+  for (std::size_t k = 0; k < problem_.pose_slots.size(); ++k)
     posterior.camera_rows.push_back(problem_.CameraAt(static_cast<int>(k)));
-  for (const auto& [id, slot] : problem_.marker_slots())
+  for (const auto& [id, slot] : problem_.markers)
     posterior.marker_rows[id] = problem_.MarkerAt(slot);
   return posterior;
 }
 
 Eigen::MatrixXd Solver::FreeCalibration() const {
-  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(problem_.size(), kCalibrationSize);
+  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(problem_.size, kCalibrationSize);
   unit.bottomRows<kCalibrationSize>().setIdentity();
   if (options_.fix_centre_and_distortion)
-    unit.block(problem_.calibration_at() + kLensAt + QuadraticTerm::kFocal,
+    unit.block(problem_.calibration_at + kLensAt + QuadraticTerm::kFocal,
                kLensAt + QuadraticTerm::kFocal, CalibrationModel::kLensSize - QuadraticTerm::kFocal,
                CalibrationModel::kLensSize - QuadraticTerm::kFocal)
         .setZero();
@@ -252,17 +250,17 @@ Eigen::MatrixXd Solver::FreeCalibration() const {
 }
 
 void Solver::Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
-  tbb::parallel_for(std::size_t{0}, problem_.free().size(), [&](std::size_t slot) {
+  tbb::parallel_for(std::size_t{0}, problem_.free.size(), [&](std::size_t slot) {
     const auto a = kCamera * static_cast<Eigen::Index>(slot);
-    const std::vector<std::uint32_t>& views =
-        problem_.ViewsOfKeyframe(static_cast<std::size_t>(problem_.free()[slot]));
+    const Problem::Indices& views =
+        problem_.views_of_keyframe[static_cast<std::size_t>(problem_.free[slot])];
     // Side by side, so that the product with the calibration is one.
     const auto num_columns = static_cast<Eigen::Index>(options_.calibrate ? 3 * views.size() : 0);
     Eigen::Matrix<double, kCalibrationSize, Eigen::Dynamic> all_W(kCalibrationSize, num_columns);
     Eigen::Matrix<double, kCamera, Eigen::Dynamic> all_WV(kCamera, num_columns);
     Eigen::Index column = 0;
     for (const std::uint32_t i : views) {
-      const PointSystem& point = points_[static_cast<std::size_t>(problem_.views()[i].landmark)];
+      const PointSystem& point = points_[static_cast<std::size_t>(problem_.views[i].landmark)];
       const CameraPoint WV = equations_.rows()[i].J_camera.transpose() *
                              (equations_.rows()[i].J_point * point.V_inverse);
       right.segment<kCamera>(a).noalias() -= WV * point.g;
@@ -276,7 +274,7 @@ void Solver::Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
       column += 3;
     }
     if (options_.calibrate)
-      S.block<kCalibrationSize, kCamera>(problem_.calibration_at(), a).noalias() -=
+      S.block<kCalibrationSize, kCamera>(problem_.calibration_at, a).noalias() -=
           all_W * all_WV.transpose();
   });
   if (!options_.calibrate) return;
@@ -308,7 +306,7 @@ void Solver::Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
 BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options,
                            const std::vector<QuadraticTerm>& terms, TrackingMap& map,
                            CalibrationModel& calibration) {
-  Problem problem(stated, options, terms, map, calibration);
+  const Problem problem(stated, options, terms, map, calibration);
   return Solver(problem).Run();
 }
 

@@ -18,28 +18,30 @@ using CalibrationCamera = Eigen::Matrix<double, kCalibrationSize, kCamera>;
 Equations::Equations(const Problem& problem) : problem_(problem) {}
 
 void Equations::Linearise(const State& state) {
-  rows_.resize(problem_.views().size());
-  corner_rows_.resize(problem_.corners().size());
-  H_ = Eigen::MatrixXd::Zero(problem_.size(), problem_.size());
-  g_ = Eigen::VectorXd::Zero(problem_.size());
-  std::vector<CalibrationMatrix> H_calibration(problem_.num_keyframes(), CalibrationMatrix::Zero());
-  std::vector<CalibrationVector> g_calibration(problem_.num_keyframes(), CalibrationVector::Zero());
-  tbb::parallel_for(std::size_t{0}, problem_.num_keyframes(), [&](std::size_t k) {
+  rows_.resize(problem_.views.size());
+  corner_rows_.resize(problem_.corners.size());
+  H_ = Eigen::MatrixXd::Zero(problem_.size, problem_.size);
+  g_ = Eigen::VectorXd::Zero(problem_.size);
+  std::vector<CalibrationMatrix> H_calibration(problem_.pose_slots.size(),
+                                               CalibrationMatrix::Zero());
+  std::vector<CalibrationVector> g_calibration(problem_.pose_slots.size(),
+                                               CalibrationVector::Zero());
+  tbb::parallel_for(std::size_t{0}, problem_.pose_slots.size(), [&](std::size_t k) {
     LineariseKeyframe(state, k, H_calibration[k], g_calibration[k]);
   });
-  tbb::parallel_for(std::size_t{0}, problem_.num_markers(),
+  tbb::parallel_for(std::size_t{0}, problem_.markers.size(),
                     [&](std::size_t slot) { AddCornersOfMarker(slot); });
-  if (problem_.options().calibrate) {
-    for (std::size_t k = 0; k < problem_.num_keyframes(); ++k) {
+  if (problem_.options.calibrate) {
+    for (std::size_t k = 0; k < problem_.pose_slots.size(); ++k) {
       H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += H_calibration[k];
       g_.tail<kCalibrationSize>() += g_calibration[k];
     }
-    const CalibrationMatrix& prior = problem_.options().prior.information;
+    const CalibrationMatrix& prior = problem_.options.prior.information;
     H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += prior;
     g_.tail<kCalibrationSize>() +=
-        prior * (ToVector(state.calibration) - problem_.options().prior.mean);
+        prior * (ToVector(state.calibration) - problem_.options.prior.mean);
   }
-  const std::vector<QuadraticTerm>& terms = problem_.terms();
+  const std::vector<QuadraticTerm>& terms = problem_.terms;
   std::vector<Problem::TermVector> slopes(terms.size());
   tbb::parallel_for(std::size_t{0}, terms.size(), [&](std::size_t i) {
     slopes[i] = terms[i].H * problem_.TermState(state, terms[i]) + terms[i].g;
@@ -51,11 +53,11 @@ void Equations::LineariseKeyframe(const State& state, std::size_t k,
                                   CalibrationMatrix& H_calibration,
                                   CalibrationVector& g_calibration) {
   const std::optional<Eigen::Index> at = problem_.CameraAt(static_cast<int>(k));
-  const bool calibrate = problem_.options().calibrate;
+  const bool calibrate = problem_.options.calibrate;
   CameraMatrix H = CameraMatrix::Zero();
   CameraVector g = CameraVector::Zero();
   CalibrationCamera H_coupled = CalibrationCamera::Zero();
-  const std::vector<std::uint32_t>& views = problem_.ViewsOfKeyframe(k);
+  const Problem::Indices& views = problem_.views_of_keyframe[k];
   // The depth rows side by side, so that their products are single ones.
   const auto num_rows = static_cast<Eigen::Index>(calibrate ? views.size() : 0);
   Eigen::Matrix<double, CalibrationModel::kDepthSize, Eigen::Dynamic> J_depth(
@@ -63,7 +65,7 @@ void Equations::LineariseKeyframe(const State& state, std::size_t k,
   Eigen::Matrix<double, kCamera, Eigen::Dynamic> J_camera(kCamera, num_rows);
   Eigen::Index row = 0;
   for (const std::uint32_t i : views) {
-    rows_[i] = RowsOf(state, problem_.views()[i]);
+    rows_[i] = RowsOf(state, problem_.views[i]);
     const PointRows& rows = rows_[i];
     if (at) {
       H.noalias() += rows.J_camera.transpose() * rows.J_camera;
@@ -90,10 +92,10 @@ void Equations::LineariseKeyframe(const State& state, std::size_t k,
   if (at) {
     H_.block<kCamera, kCamera>(*at, *at) += H;
     g_.segment<kCamera>(*at) += g;
-    if (calibrate) H_.block<kCalibrationSize, kCamera>(problem_.calibration_at(), *at) += H_coupled;
+    if (calibrate) H_.block<kCalibrationSize, kCamera>(problem_.calibration_at, *at) += H_coupled;
   }
-  for (const std::uint32_t i : problem_.CornersOfKeyframe(k))
-    corner_rows_[i] = RowsOf(state, problem_.corners()[i]);
+  for (const std::uint32_t i : problem_.corners_of_keyframe[k])
+    corner_rows_[i] = RowsOf(state, problem_.corners[i]);
   AddCornersOfKeyframe(k, H_calibration, g_calibration);
 }
 
@@ -103,7 +105,7 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   const Eigen::Vector3d& p_world = state.landmarks[static_cast<std::size_t>(view.landmark)];
   const double row_s = state.calibration.readout_s[0] * view.place.row_share;
   const SeenPoint point = See(camera, p_world, row_s);
-  const SeenPixel seen = ProjectCorrected(problem_.stated(), state.calibration.lens, point.p);
+  const SeenPixel seen = ProjectCorrected(problem_.stated, state.calibration.lens, point.p);
   const Eigen::Vector2d r = (seen.pixel - view.pixel) * problem_.PixelWeight();
   const double w =
       problem_.PixelWeight() * std::sqrt(CauchyWeight(r.squaredNorm(), kKeypointLossScale));
@@ -133,7 +135,7 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   rows.J_camera.row(2) = wz * predicted.J_z * late.J_pose.row(2);
   // The change of the offset with poses and the colour image's readout is of second order.
   rows.J_depth = predicted.J_depth;
-  const double scale = problem_.stated().width / 640.0;
+  const double scale = problem_.stated.width / 640.0;
   rows.J_depth[kDepthShiftX] -= scale * measured.J_offset.x();
   rows.J_depth[kDepthShiftY] -= scale * measured.J_offset.y();
   const double by_time = measured.J_offset * pixel_velocity;
@@ -150,12 +152,12 @@ CornerRows Equations::RowsOf(const State& state, const CornerView& view) const {
   marker_side.Prepare();
   const Pose T_marker0_marker = PoseFromTwist(twist);
   const Pose& T_world_marker0 = problem_.MarkerPose(view.marker);
-  const double share = RowShare(view.pixel.y(), problem_.stated().height);
+  const double share = RowShare(view.pixel.y(), problem_.stated.height);
   const Eigen::Vector3d p_world = T_world_marker0 * (T_marker0_marker * view.in_marker);
   const double row_s = state.calibration.readout_s[0] * share;
   const SeenPoint point =
       See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world, row_s);
-  const SeenPixel seen = ProjectCorrected(problem_.stated(), state.calibration.lens, point.p);
+  const SeenPixel seen = ProjectCorrected(problem_.stated, state.calibration.lens, point.p);
   CornerRows rows;
   rows.r = problem_.CornerResidual(state, view, point.p);
   const double robust = std::sqrt(CauchyWeight(rows.r.squaredNorm(), kCornerLossScale));
@@ -175,32 +177,32 @@ CornerRows Equations::RowsOf(const State& state, const CornerView& view) const {
 void Equations::AddCornersOfKeyframe(std::size_t k, CalibrationMatrix& H_calibration,
                                      CalibrationVector& g_calibration) {
   const std::optional<Eigen::Index> a = problem_.CameraAt(static_cast<int>(k));
-  for (const std::uint32_t i : problem_.CornersOfKeyframe(k)) {
+  for (const std::uint32_t i : problem_.corners_of_keyframe[k]) {
     const CornerRows& rows = corner_rows_[i];
     if (a) {
-      const Eigen::Index m = problem_.MarkerAt(problem_.corners()[i].marker);
+      const Eigen::Index m = problem_.MarkerAt(problem_.corners[i].marker);
       H_.block<kCamera, kCamera>(*a, *a).noalias() += rows.J_camera.transpose() * rows.J_camera;
       H_.block<6, kCamera>(m, *a).noalias() += rows.J_marker.transpose() * rows.J_camera;
       g_.segment<kCamera>(*a).noalias() += rows.J_camera.transpose() * rows.r;
     }
-    if (!problem_.options().calibrate) continue;
+    if (!problem_.options.calibrate) continue;
     H_calibration.topLeftCorner<kSeenByCorners, kSeenByCorners>().noalias() +=
         rows.J_calibration.transpose() * rows.J_calibration;
     g_calibration.head<kSeenByCorners>().noalias() += rows.J_calibration.transpose() * rows.r;
     if (a)
-      H_.block<kSeenByCorners, kCamera>(problem_.calibration_at(), *a).noalias() +=
+      H_.block<kSeenByCorners, kCamera>(problem_.calibration_at, *a).noalias() +=
           rows.J_calibration.transpose() * rows.J_camera;
   }
 }
 
 void Equations::AddCornersOfMarker(std::size_t slot) {
   const Eigen::Index m = problem_.MarkerAt(static_cast<int>(slot));
-  for (const std::uint32_t i : problem_.CornersOfMarker(slot)) {
+  for (const std::uint32_t i : problem_.corners_of_marker[slot]) {
     const CornerRows& rows = corner_rows_[i];
     H_.block<6, 6>(m, m).noalias() += rows.J_marker.transpose() * rows.J_marker;
     g_.segment<6>(m).noalias() += rows.J_marker.transpose() * rows.r;
-    if (problem_.options().calibrate)
-      H_.block<kSeenByCorners, 6>(problem_.calibration_at(), m).noalias() +=
+    if (problem_.options.calibrate)
+      H_.block<kSeenByCorners, 6>(problem_.calibration_at, m).noalias() +=
           rows.J_calibration.transpose() * rows.J_marker;
   }
 }
@@ -213,13 +215,13 @@ void Equations::AddTerm(const QuadraticTerm& term, const Problem::TermVector& sl
   const std::optional<Eigen::Index> a = problem_.CameraAt(term.keyframe_a);
   const std::optional<Eigen::Index> b =
       term.keyframe_b ? problem_.CameraAt(*term.keyframe_b)
-                      : problem_.MarkerAt(problem_.MarkerSlot(term.marker.value()));
-  const Eigen::Index f = problem_.calibration_at() + kLensAt;
-  const Eigen::Index d = problem_.calibration_at() + kDepthAt;
+                      : problem_.MarkerAt(problem_.markers.at(term.marker.value()));
+  const Eigen::Index f = problem_.calibration_at + kLensAt;
+  const Eigen::Index d = problem_.calibration_at + kDepthAt;
   const auto add_pose = [&](Eigen::Index at, Eigen::Index in_term) {
     H_.block<6, 6>(at, at) += term.H.block<6, 6>(in_term, in_term);
     g_.segment<6>(at) += slope.segment<6>(in_term);
-    if (!problem_.options().calibrate) return;
+    if (!problem_.options.calibrate) return;
     H_.block<kFocal, 6>(f, at) += term.H.block<kFocal, 6>(kFocalAt, in_term);
     H_.block<kDepthSize, 6>(d, at) += term.H.block<kDepthSize, 6>(kDepth, in_term);
   };
@@ -232,7 +234,7 @@ void Equations::AddTerm(const QuadraticTerm& term, const Problem::TermVector& sl
       H_.block<6, 6>(*a, *b) += term.H.block<6, 6>(0, 6);
     }
   }
-  if (!problem_.options().calibrate) return;
+  if (!problem_.options.calibrate) return;
   H_.block<kFocal, kFocal>(f, f) += term.H.block<kFocal, kFocal>(kFocalAt, kFocalAt);
   H_.block<kDepthSize, kFocal>(d, f) += term.H.block<kDepthSize, kFocal>(kDepth, kFocalAt);
   H_.block<kDepthSize, kDepthSize>(d, d) += term.H.bottomRightCorner<kDepthSize, kDepthSize>();

@@ -56,7 +56,7 @@ class Equations {
   /// Computes all of the members below.
   void Linearise(const State& state);
 
-  /// One for each of Problem::views().
+  /// One for each of Problem::views.
   [[nodiscard]] const std::vector<PointRows>& rows() const { return rows_; }
   /// Normal equations of poses, markers and calibration, undamped, lower half; landmarks are not
   /// yet eliminated.

@@ -45,25 +45,26 @@ struct State {
 };
 
 /// One problem, which lives for one call of BundleAdjust(). Order of the unknowns: free poses,
-/// markers, calibration; landmarks are eliminated. Keeps references to its inputs. Only
-/// DropViewsBehindCameras() and Write() modify anything; the other members may be called from any
+/// markers, calibration; landmarks are eliminated. Keeps references to its inputs. Only Write()
+/// modifies anything, namely the map and the calibration; the other members may be called from any
 /// thread.
 class Problem {
  public:
   using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
+  using Indices = std::vector<std::uint32_t>;
 
-  Problem(const Intrinsics& stated, const BundleOptions& options,
-          const std::vector<QuadraticTerm>& terms, TrackingMap& map, CalibrationModel& calibration);
+  /// Leaves out observations of points that start behind a camera, where they have no projection.
+  /// Cost() keeps the others in front.
+  Problem(const Intrinsics& stated_camera, const BundleOptions& bundle_options,
+          const std::vector<QuadraticTerm>& quadratic_terms, TrackingMap& map,
+          CalibrationModel& calibration);
 
   [[nodiscard]] State Start() const;
-  /// Drops observations of landmarks that start behind a camera, where they have no projection.
-  /// Cost() keeps the others in front.
-  void DropViewsBehindCameras(const State& state);
   /// 1/2 sum of losses plus the quadratic terms (up to their constant); infinite where a point is
   /// behind its camera.
   [[nodiscard]] double Cost(const State& state) const;
   /// Writes the state into the map and the calibration.
-  void Write(const State& state);
+  void Write(const State& state) const;
 
   [[nodiscard]] double PixelWeight() const;
   /// Time from the colour image's stamp to the depth reading at a row.
@@ -79,69 +80,44 @@ class Problem {
   [[nodiscard]] TermVector TermState(const State& state, const QuadraticTerm& term) const;
   /// The state at the beginning.
   [[nodiscard]] const Pose& MarkerPose(int slot) const;
-  [[nodiscard]] int MarkerSlot(int id) const { return markers_.at(id); }
+  /// Place of a keyframe among the free ones, unless it is fixed.
+  [[nodiscard]] std::optional<int> PoseSlot(int keyframe) const {
+    return pose_slots[static_cast<std::size_t>(keyframe)];
+  }
   /// First unknown of a keyframe, unless it is fixed.
   [[nodiscard]] std::optional<Eigen::Index> CameraAt(int keyframe) const;
-  [[nodiscard]] Eigen::Index MarkerAt(int slot) const { return markers_at_ + 6 * slot; }
-  [[nodiscard]] Eigen::Index calibration_at() const { return calibration_at_; }
-  [[nodiscard]] Eigen::Index size() const { return size_; }
+  [[nodiscard]] Eigen::Index MarkerAt(int slot) const { return markers_at + 6 * slot; }
 
-  [[nodiscard]] const Intrinsics& stated() const { return stated_; }
-  [[nodiscard]] const BundleOptions& options() const { return options_; }
-  [[nodiscard]] const std::vector<QuadraticTerm>& terms() const { return terms_; }
-  [[nodiscard]] const std::vector<PointView>& views() const { return views_; }
-  [[nodiscard]] const std::vector<CornerView>& corners() const { return corners_; }
-  /// Free keyframes, by pose slot.
-  [[nodiscard]] const std::vector<int>& free() const { return free_; }
-  /// Place of a keyframe in free(), unless it is fixed.
-  [[nodiscard]] std::optional<int> PoseSlot(int keyframe) const {
-    return pose_slot_[static_cast<std::size_t>(keyframe)];
-  }
-  [[nodiscard]] std::size_t num_keyframes() const { return pose_slot_.size(); }
-  [[nodiscard]] const std::map<int, int>& marker_slots() const { return markers_; }
-  [[nodiscard]] std::size_t num_markers() const { return markers_.size(); }
-  [[nodiscard]] std::size_t num_landmarks() const { return landmarks_.size(); }
-  /// Indices into views().
-  [[nodiscard]] const std::vector<std::uint32_t>& ViewsOfLandmark(std::size_t slot) const {
-    return views_of_landmark_[slot];
-  }
-  [[nodiscard]] const std::vector<std::uint32_t>& ViewsOfKeyframe(std::size_t keyframe) const {
-    return views_of_keyframe_[keyframe];
-  }
-  /// Indices into corners().
-  [[nodiscard]] const std::vector<std::uint32_t>& CornersOfKeyframe(std::size_t keyframe) const {
-    return corners_of_keyframe_[keyframe];
-  }
-  [[nodiscard]] const std::vector<std::uint32_t>& CornersOfMarker(std::size_t slot) const {
-    return corners_of_marker_[slot];
-  }
+  const Intrinsics& stated;
+  const BundleOptions& options;
+  const std::vector<QuadraticTerm>& terms;
+  std::vector<int> free;                       ///< Free keyframes, by pose slot.
+  std::vector<std::optional<int>> pose_slots;  ///< One per keyframe of the map.
+  std::map<int, int> markers;                  ///< From id to slot.
+  std::vector<int> landmarks;                  ///< Ids by slot.
+  std::vector<PointView> views;
+  std::vector<CornerView> corners;
+  // Indices into `views` and `corners`.
+  std::vector<Indices> views_of_landmark;
+  std::vector<Indices> views_of_keyframe;
+  std::vector<Indices> corners_of_keyframe;
+  std::vector<Indices> corners_of_marker;
+  // First unknowns of their kind, and the number of all.
+  Eigen::Index markers_at = 0;
+  Eigen::Index calibration_at = 0;
+  Eigen::Index size = 0;
 
  private:
   void CollectMarkers();
   void CollectPoints();
+  void DropViewsBehindCameras();
   [[nodiscard]] double PointCost(const State& state, const PointView& view) const;
   [[nodiscard]] double CornerCost(const State& state, const CornerView& view) const;
   [[nodiscard]] Eigen::Vector3d CornerInWorld(const State& state, const CornerView& view) const;
 
-  const Intrinsics& stated_;
-  const BundleOptions& options_;
-  const std::vector<QuadraticTerm>& terms_;
   TrackingMap& map_;
   CalibrationModel& calibration_;
-  std::vector<int> free_;
-  std::vector<std::optional<int>> pose_slot_;  // Per keyframe.
-  std::map<int, int> markers_;                 // From id to slot.
   std::vector<Pose> T_world_marker0_;
-  std::vector<int> landmarks_;  // Ids by slot.
-  std::vector<PointView> views_;
-  std::vector<CornerView> corners_;
-  std::vector<std::vector<std::uint32_t>> views_of_landmark_;
-  std::vector<std::vector<std::uint32_t>> views_of_keyframe_;
-  std::vector<std::vector<std::uint32_t>> corners_of_keyframe_;
-  std::vector<std::vector<std::uint32_t>> corners_of_marker_;
-  Eigen::Index markers_at_ = 0;
-  Eigen::Index calibration_at_ = 0;
-  Eigen::Index size_ = 0;
 };
 
 }  // namespace plumb::bundle
