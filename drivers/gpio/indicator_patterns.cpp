@@ -1,115 +1,71 @@
 #include "drivers/gpio/indicator_patterns.hpp"
 
-#include <array>
-
 namespace plumb {
 namespace {
 
+using namespace std::chrono_literals;
 using std::chrono::milliseconds;
 constexpr std::uint8_t kYellow = kRed | kGreen;
 
-constexpr std::array kOffSteps{IndicatorStep{0, milliseconds(0)}};
-constexpr std::array kNoSensorSteps{IndicatorStep{kRed, milliseconds(150)},
-                                    IndicatorStep{0, milliseconds(1850)}};
-constexpr std::array kReadySteps{IndicatorStep{kGreen, milliseconds(0)}};
-constexpr std::array kScanningSteps{IndicatorStep{kBlue | kBeeper, milliseconds(80)},
-                                    IndicatorStep{kBlue, milliseconds(0)}};
-constexpr std::array kTooFastSteps{IndicatorStep{kYellow | kBeeper, milliseconds(100)},
-                                   IndicatorStep{0, milliseconds(100)}};
-constexpr std::array kTooNearSteps{
-    IndicatorStep{kYellow, milliseconds(100)}, IndicatorStep{0, milliseconds(150)},
-    IndicatorStep{kYellow, milliseconds(100)}, IndicatorStep{0, milliseconds(650)}};
-constexpr std::array kTooFarSteps{
-    IndicatorStep{kYellow, milliseconds(400)}, IndicatorStep{0, milliseconds(150)},
-    IndicatorStep{kYellow, milliseconds(400)}, IndicatorStep{0, milliseconds(650)}};
-constexpr std::array kWorkingSteps{IndicatorStep{kBlue, milliseconds(500)},
-                                   IndicatorStep{0, milliseconds(500)}};
-constexpr std::array kDoneSteps{
-    IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(800)},
-    IndicatorStep{kBlue, milliseconds(1000)}, IndicatorStep{kGreen, milliseconds(1000)}};
-constexpr std::array kInToleranceSteps{
-    IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)},
-    IndicatorStep{0, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)}};
-// Green for the values, yellow for their uncertainty; never green alone.
-constexpr std::array kUnsureSteps{
-    IndicatorStep{kYellow | kBeeper, milliseconds(200)}, IndicatorStep{kYellow, milliseconds(600)},
-    IndicatorStep{kGreen, milliseconds(600)}, IndicatorStep{kYellow, milliseconds(600)}};
-constexpr std::array kMoveSteps{
-    IndicatorStep{kYellow | kBeeper, milliseconds(200)}, IndicatorStep{kYellow, milliseconds(800)},
-    IndicatorStep{0, milliseconds(800)}, IndicatorStep{kYellow, milliseconds(800)}};
-constexpr std::array kNoAnswerSteps{
-    IndicatorStep{kRed | kBeeper, milliseconds(100)}, IndicatorStep{0, milliseconds(100)},
-    IndicatorStep{kRed | kBeeper, milliseconds(100)}, IndicatorStep{kRed, milliseconds(300)},
-    IndicatorStep{0, milliseconds(300)}};
-constexpr std::array kFaultSteps{IndicatorStep{kRed, milliseconds(80)},
-                                 IndicatorStep{0, milliseconds(80)}};
+using enum IndicatorPattern;
+constexpr std::array kPrograms = {
+    IndicatorProgram(kOff, {{0, 0ms}}),
+    IndicatorProgram(kNoSensor, {{kRed, 150ms}, {0, 1850ms}}),
+    IndicatorProgram(kReady, {{kGreen, 0ms}}),
+    IndicatorProgram(kScanning, {{kBlue | kBeeper, 80ms}, {kBlue, 0ms}}),
+    IndicatorProgram(kTooFast, {{kYellow | kBeeper, 100ms}, {0, 100ms}}),
+    IndicatorProgram(kTooNear, {{kYellow, 100ms}, {0, 150ms}, {kYellow, 100ms}, {0, 650ms}}),
+    IndicatorProgram(kTooFar, {{kYellow, 400ms}, {0, 150ms}, {kYellow, 400ms}, {0, 650ms}}),
+    IndicatorProgram(kWorking, {{kBlue, 500ms}, {0, 500ms}}),
+    IndicatorProgram(
+        kDone, {{kGreen | kBeeper, 200ms}, {kGreen, 800ms}, {kBlue, 1000ms}, {kGreen, 1000ms}}, 2),
+    IndicatorProgram(kResultInTolerance,
+                     {{kGreen | kBeeper, 200ms}, {kGreen, 1800ms}, {0, 200ms}, {kGreen, 1800ms}},
+                     2),
+    // Green for the values, yellow for their uncertainty; never green alone.
+    IndicatorProgram(
+        kResultUnsure,
+        {{kYellow | kBeeper, 200ms}, {kYellow, 600ms}, {kGreen, 600ms}, {kYellow, 600ms}}, 2),
+    IndicatorProgram(kResultMove,
+                     {{kYellow | kBeeper, 200ms}, {kYellow, 800ms}, {0, 800ms}, {kYellow, 800ms}},
+                     2),
+    IndicatorProgram(
+        kNoAnswer,
+        {{kRed | kBeeper, 100ms}, {0, 100ms}, {kRed | kBeeper, 100ms}, {kRed, 300ms}, {0, 300ms}},
+        3),
+    IndicatorProgram(kFault, {{kRed, 80ms}, {0, 80ms}}),
+    // Similar to ready, because scans are possible.
+    IndicatorProgram(kReadyRolledBack, {{kGreen, 1500ms}, {kRed, 300ms}}),
+    IndicatorProgram(kReadyDiskNearlyFull,
+                     {{kGreen, 1500ms}, {kYellow, 150ms}, {kGreen, 150ms}, {kYellow, 150ms}}),
+    // Slow, so that it is not mistaken for an error of a running service.
+    IndicatorProgram(kStopped, {{kRed, 1000ms}, {0, 1000ms}}),
+};
 
-// Similar to ready, because scans are possible.
-constexpr std::array kReadyRolledBackSteps{IndicatorStep{kGreen, milliseconds(1500)},
-                                           IndicatorStep{kRed, milliseconds(300)}};
-
-constexpr std::array kReadyDiskNearlyFullSteps{
-    IndicatorStep{kGreen, milliseconds(1500)}, IndicatorStep{kRed | kGreen, milliseconds(150)},
-    IndicatorStep{kGreen, milliseconds(150)}, IndicatorStep{kRed | kGreen, milliseconds(150)}};
-
-// Slow, so that it is not mistaken for an error of a running service.
-constexpr std::array kStoppedSteps{IndicatorStep{kRed, milliseconds(1000)},
-                                   IndicatorStep{0, milliseconds(1000)}};
+constexpr bool IsInOrder() {
+  for (std::size_t i = 0; i < kPrograms.size(); ++i)
+    if (kPrograms[i].pattern != static_cast<IndicatorPattern>(i)) return false;
+  return kPrograms.back().pattern == kStopped;
+}
+static_assert(IsInOrder(), "a program for each pattern, in the order of the enumerators");
 
 constexpr int kMaxCatchUp = 64;  // steps; after a longer delay of the loop the rhythm starts again
 
 }  // namespace
 
-IndicatorProgram ProgramOf(IndicatorPattern pattern) {
-  switch (pattern) {
-    case IndicatorPattern::kOff:
-      return {kOffSteps};
-    case IndicatorPattern::kNoSensor:
-      return {kNoSensorSteps};
-    case IndicatorPattern::kReady:
-      return {kReadySteps};
-    case IndicatorPattern::kScanning:
-      return {kScanningSteps};
-    case IndicatorPattern::kTooFast:
-      return {kTooFastSteps};
-    case IndicatorPattern::kTooNear:
-      return {kTooNearSteps};
-    case IndicatorPattern::kTooFar:
-      return {kTooFarSteps};
-    case IndicatorPattern::kWorking:
-      return {kWorkingSteps};
-    case IndicatorPattern::kDone:
-      return {kDoneSteps, 2};
-    case IndicatorPattern::kResultInTolerance:
-      return {kInToleranceSteps, 2};
-    case IndicatorPattern::kResultUnsure:
-      return {kUnsureSteps, 2};
-    case IndicatorPattern::kResultMove:
-      return {kMoveSteps, 2};
-    case IndicatorPattern::kNoAnswer:
-      return {kNoAnswerSteps, 3};
-    case IndicatorPattern::kFault:
-      return {kFaultSteps};
-    case IndicatorPattern::kReadyRolledBack:
-      return {kReadyRolledBackSteps};
-    case IndicatorPattern::kReadyDiskNearlyFull:
-      return {kReadyDiskNearlyFullSteps};
-    case IndicatorPattern::kStopped:
-      return {kStoppedSteps};
-  }
-  return {kFaultSteps};
+const IndicatorProgram& ProgramOf(IndicatorPattern pattern) {
+  return kPrograms.at(static_cast<std::size_t>(pattern));
 }
 
 void IndicatorPlayer::Show(IndicatorPattern pattern, Clock::time_point now) {
-  if (pattern == pattern_) return;
-  pattern_ = pattern;
-  program_ = ProgramOf(pattern);
+  if (pattern == program_->pattern) return;
+  program_ = &ProgramOf(pattern);
   step_ = 0;
   step_begin_ = now;
 }
 
 std::optional<IndicatorPlayer::Clock::time_point> IndicatorPlayer::deadline() const {
-  const milliseconds length = program_.steps[step_].length;
+  const milliseconds length = program_->steps[step_].length;
   if (length == milliseconds(0)) return std::nullopt;
   return step_begin_ + length;
 }
@@ -117,7 +73,7 @@ std::optional<IndicatorPlayer::Clock::time_point> IndicatorPlayer::deadline() co
 void IndicatorPlayer::OnTime(Clock::time_point now) {
   for (int i = 0; deadline() && *deadline() <= now; ++i) {
     step_begin_ = i < kMaxCatchUp ? *deadline() : now;
-    step_ = step_ + 1 < program_.steps.size() ? step_ + 1 : program_.repeat_from;
+    step_ = step_ + 1 < program_->num_steps ? step_ + 1 : program_->repeat_from;
   }
 }
 

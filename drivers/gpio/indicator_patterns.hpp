@@ -1,10 +1,13 @@
 // The patterns of light and beeper for each state, and their player.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
-#include <span>
 
 #include "drivers/indicator.hpp"
 
@@ -20,12 +23,22 @@ struct IndicatorStep {
 
 /// Steps are played in order; those from `repeat_from` on are repeated.
 struct IndicatorProgram {
-  std::span<const IndicatorStep> steps;
-  std::size_t repeat_from = 0;
+  static constexpr std::size_t kMaxSteps = 5;
+
+  IndicatorPattern pattern;
+  std::array<IndicatorStep, kMaxSteps> steps{};
+  std::size_t num_steps;
+  std::size_t repeat_from;
+
+  consteval IndicatorProgram(IndicatorPattern shown, std::initializer_list<IndicatorStep> played,
+                             std::size_t first_repeated = 0)
+      : pattern(shown), num_steps(played.size()), repeat_from(first_repeated) {
+    std::copy(played.begin(), played.end(), steps.begin());
+  }
 };
 
 /// Patterns also differ in rhythm, so that a lamp of one colour can show them all.
-[[nodiscard]] IndicatorProgram ProgramOf(IndicatorPattern pattern);
+[[nodiscard]] const IndicatorProgram& ProgramOf(IndicatorPattern pattern);
 
 /// Plays the steps of one pattern. Pure: the caller passes the time.
 class IndicatorPlayer {
@@ -35,12 +48,11 @@ class IndicatorPlayer {
   void Show(IndicatorPattern pattern, Clock::time_point now);
   /// Advances to `now`.
   void OnTime(Clock::time_point now);
-  [[nodiscard]] std::uint8_t outputs() const { return program_.steps[step_].outputs; }
+  [[nodiscard]] std::uint8_t outputs() const { return program_->steps[step_].outputs; }
   [[nodiscard]] std::optional<Clock::time_point> deadline() const;
 
  private:
-  IndicatorPattern pattern_ = IndicatorPattern::kOff;
-  IndicatorProgram program_ = ProgramOf(IndicatorPattern::kOff);
+  const IndicatorProgram* program_ = &ProgramOf(IndicatorPattern::kOff);
   std::size_t step_ = 0;
   Clock::time_point step_begin_{};
 };

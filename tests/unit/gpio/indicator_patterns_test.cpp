@@ -11,24 +11,10 @@ namespace {
 using std::chrono::milliseconds;
 using Clock = IndicatorPlayer::Clock;
 
-const std::vector<IndicatorPattern>& AllPatterns() {
-  static const std::vector<IndicatorPattern> patterns{IndicatorPattern::kOff,
-                                                      IndicatorPattern::kNoSensor,
-                                                      IndicatorPattern::kReady,
-                                                      IndicatorPattern::kScanning,
-                                                      IndicatorPattern::kTooFast,
-                                                      IndicatorPattern::kTooNear,
-                                                      IndicatorPattern::kTooFar,
-                                                      IndicatorPattern::kWorking,
-                                                      IndicatorPattern::kResultInTolerance,
-                                                      IndicatorPattern::kResultUnsure,
-                                                      IndicatorPattern::kResultMove,
-                                                      IndicatorPattern::kNoAnswer,
-                                                      IndicatorPattern::kDone,
-                                                      IndicatorPattern::kFault,
-                                                      IndicatorPattern::kReadyRolledBack,
-                                                      IndicatorPattern::kReadyDiskNearlyFull,
-                                                      IndicatorPattern::kStopped};
+std::vector<IndicatorPattern> AllPatterns() {
+  std::vector<IndicatorPattern> patterns;
+  for (int i = 0; i <= static_cast<int>(IndicatorPattern::kStopped); ++i)
+    patterns.push_back(static_cast<IndicatorPattern>(i));
   return patterns;
 }
 
