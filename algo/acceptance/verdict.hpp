@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "algo/base/names.hpp"
+
 namespace plumb {
 
 enum class Verdict : std::uint8_t {
@@ -11,8 +13,8 @@ enum class Verdict : std::uint8_t {
   kMove,      ///< A value lies outside its tolerance.
   kNoAnswer,  ///< A gate refused: the numbers, if any, must not be acted on.
 };
-
-/// "in_tolerance", "unsure", "move", "no_answer".
-[[nodiscard]] const char* Name(Verdict verdict);
+template <>
+inline constexpr auto kNamesOf<Verdict> = NamesUpTo<Verdict::kNoAnswer>({"in_tolerance", "unsure",
+                                                                         "move", "no_answer"});
 
 }  // namespace plumb

@@ -143,31 +143,6 @@ std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind,
 
 }  // namespace
 
-const char* Name(MarkerKind kind) { return kind == MarkerKind::kRoom ? "room" : "couch"; }
-
-const char* Name(PatientPosture posture) {
-  switch (posture) {
-    case PatientPosture::kHeadFirstSupine:
-      return "HFS";
-    case PatientPosture::kHeadFirstProne:
-      return "HFP";
-    case PatientPosture::kFeetFirstSupine:
-      return "FFS";
-    case PatientPosture::kFeetFirstProne:
-      return "FFP";
-  }
-  return "HFS";
-}
-
-std::optional<PatientPosture> PostureNamed(std::string_view name) {
-  for (const PatientPosture posture :
-       {PatientPosture::kHeadFirstSupine, PatientPosture::kHeadFirstProne,
-        PatientPosture::kFeetFirstSupine, PatientPosture::kFeetFirstProne}) {
-    if (name == Name(posture)) return posture;
-  }
-  return std::nullopt;
-}
-
 Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference,
                      const Pose& T_iec_reference) {
   const Pose T_correction = T_iec_reference * T_motion.inverse() * T_iec_reference.inverse();

@@ -4,23 +4,19 @@
 #include <array>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include <Eigen/Core>
 
+#include "algo/base/names.hpp"
 #include "algo/base/pose.hpp"
+#include "algo/base/posture.hpp"
 
 namespace plumb {
 
 /// Whether the markers are fixed to the room or to the couch; stored with the reference.
 enum class MarkerKind { kRoom, kCouch };
-[[nodiscard]] const char* Name(MarkerKind kind);  ///< "room", "couch"
-
-/// Patient orientation: which end points to the gantry and which side is up.
-enum class PatientPosture { kHeadFirstSupine, kHeadFirstProne, kFeetFirstSupine, kFeetFirstProne };
-[[nodiscard]] const char* Name(PatientPosture posture);  ///< "HFS", "HFP", "FFS", "FFP"
-/// Not set: no posture has this name.
-[[nodiscard]] std::optional<PatientPosture> PostureNamed(std::string_view name);
+template <>
+inline constexpr auto kNamesOf<MarkerKind> = NamesUpTo<MarkerKind::kCouch>({"room", "couch"});
 
 /// Directions of the patient's head and left side, unit vectors in the plane (x, y) of the
 /// reference marker.

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/names.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/scene.hpp"
 
@@ -39,7 +40,9 @@ enum class MarkerCheckStatus {
   kFailed,
   kNoBaseline,  ///< Everything else passed, but there is no baseline to compare with.
 };
-[[nodiscard]] const char* Name(MarkerCheckStatus status);  ///< "passed", "failed", "no_baseline"
+template <>
+inline constexpr auto kNamesOf<MarkerCheckStatus> =
+    NamesUpTo<MarkerCheckStatus::kNoBaseline>({"passed", "failed", "no_baseline"});
 
 struct MarkerCheck {
   MarkerCheckStatus status = MarkerCheckStatus::kFailed;

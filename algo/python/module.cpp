@@ -25,8 +25,7 @@ namespace plumb {
 namespace {
 
 Preset ParsePreset(const std::string& name) {
-  if (name == "best") return Preset::kBest;
-  if (name == "paper") return Preset::kPaper;
+  if (const auto preset = Named<Preset>(name)) return *preset;
   throw py::value_error("preset: expected 'best' or 'paper', found '" + name + "'");
 }
 

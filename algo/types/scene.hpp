@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/names.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/marker.hpp"
@@ -16,14 +17,13 @@
 namespace plumb {
 
 enum class Preset { kBest, kPaper };
-[[nodiscard]] inline const char* Name(Preset preset) {
-  return preset == Preset::kBest ? "best" : "paper";
-}
+template <>
+inline constexpr auto kNamesOf<Preset> = NamesUpTo<Preset::kPaper>({"best", "paper"});
 
 enum class SceneFrame { kReferenceMarker, kFirstKeyframe };
-[[nodiscard]] inline const char* Name(SceneFrame frame) {
-  return frame == SceneFrame::kReferenceMarker ? "reference_marker" : "first_keyframe";
-}
+template <>
+inline constexpr auto kNamesOf<SceneFrame> =
+    NamesUpTo<SceneFrame::kFirstKeyframe>({"reference_marker", "first_keyframe"});
 
 /// A camera pose with its time (the depth image's stamp).
 struct StampedPose {

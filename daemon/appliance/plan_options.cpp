@@ -19,7 +19,7 @@ namespace {
 }
 
 PatientPosture PostureOf(std::string_view name) {
-  if (const auto posture = PostureNamed(name)) return *posture;
+  if (const auto posture = Named<PatientPosture>(name)) return *posture;
   Fail(fmt::format("posture: expected HFS, HFP, FFS or FFP, found '{}'", name.substr(0, 20)));
 }
 

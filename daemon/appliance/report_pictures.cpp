@@ -128,7 +128,7 @@ PlanPictures ReferencePictures(const fs::path& scan_folder, const ReferencePlan&
     const Scene scene = SceneWithHeights(scan_folder);
     const HeightMap& heights = *scene.height_map;
     const std::optional<RoomWays> room = room_in ? room_in(scene.markers) : std::nullopt;
-    const std::optional<PatientPosture> posture = PostureNamed(plan.posture);
+    const auto posture = Named<PatientPosture>(plan.posture);
     const std::vector<std::uint8_t> region = PlannedRegion(heights.grid, plan);
     HeightImageOptions options{.region_mask = region, .words = words};
     std::optional<PatientAxes> patient;

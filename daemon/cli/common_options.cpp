@@ -28,9 +28,7 @@ void MethodOptions::AddSensorTo(CLI::App& app) {
 
 Config MethodOptions::Read() const {
   Config config = config_file ? ReadConfig(*config_file) : Config{};
-  if (preset)
-    config.reconstruct.preset = config.compare.preset =
-        *preset == "paper" ? Preset::kPaper : Preset::kBest;
+  if (preset) config.reconstruct.preset = config.compare.preset = Named<Preset>(*preset).value();
   if (profile_file) config.reconstruct.profile = ReadSensorProfile(*profile_file);
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
   return config;

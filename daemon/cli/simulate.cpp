@@ -62,7 +62,7 @@ std::string FaultList() {
 
 int Run(const Options& options, const CommandContext& context) {
   SimulateOptions simulate = options.simulate;
-  simulate.noise = ParseNoiseLevel(options.noise).value_or(simulate.noise);
+  simulate.noise = Named<simulated::NoiseLevel>(options.noise).value_or(simulate.noise);
   simulate.format = options.format == "oni" ? RecordingFormat::kOni : RecordingFormat::kTum;
   if (options.size == "320x240") simulate.width = 320, simulate.height = 240;
   simulated::FaultSet faults = FaultsOf(simulate);

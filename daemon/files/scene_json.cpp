@@ -235,16 +235,12 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
 
   SceneHeader header;
   Scene& scene = header.scene;
-  const std::string preset = root["preset"].Text();
-  if (preset != Name(Preset::kBest) && preset != Name(Preset::kPaper))
-    root["preset"].Fail("is neither best nor paper");
-  scene.preset = preset == Name(Preset::kBest) ? Preset::kBest : Preset::kPaper;
-  const std::string frame = root["frame"].Text();
-  if (frame != Name(SceneFrame::kReferenceMarker) && frame != Name(SceneFrame::kFirstKeyframe)) {
-    root["frame"].Fail("is neither reference_marker nor first_keyframe");
-  }
-  scene.frame = frame == Name(SceneFrame::kReferenceMarker) ? SceneFrame::kReferenceMarker
-                                                            : SceneFrame::kFirstKeyframe;
+  const std::optional<Preset> preset = Named<Preset>(root["preset"].Text());
+  if (!preset) root["preset"].Fail("is neither best nor paper");
+  scene.preset = *preset;
+  const std::optional<SceneFrame> frame = Named<SceneFrame>(root["frame"].Text());
+  if (!frame) root["frame"].Fail("is neither reference_marker nor first_keyframe");
+  scene.frame = *frame;
   ReadMarkerKind(root, scene);
   ReadMarkers(root, scene);
   header.grid = ReadGrid(root["heightmap"]);

@@ -55,10 +55,8 @@ const Json* ObjectIn(const Json& json, const char* key) {
 
 std::string VerdictIn(const Json& json) {
   const auto found = json.find("verdict");
-  for (const Verdict verdict :
-       {Verdict::kInTolerance, Verdict::kUnsure, Verdict::kMove, Verdict::kNoAnswer}) {
-    if (found != json.end() && *found == Name(verdict)) return Name(verdict);
-  }
+  for (const std::string_view verdict : kNamesOf<Verdict>)
+    if (found != json.end() && *found == verdict) return std::string(verdict);
   RefuseResult("it has no verdict that this version knows");
 }
 

@@ -26,9 +26,10 @@ const char* StatusName(OniStatus status) {
       return "no device";
     case ONI_STATUS_TIME_OUT:
       return "time out";
-    default:
-      return "error";
+    case ONI_STATUS_ERROR:
+      break;
   }
+  return "error";
 }
 
 }  // namespace

@@ -103,18 +103,6 @@ FaultSet Up(Since last) {
 
 }  // namespace
 
-std::string_view ToString(NoiseLevel noise) {
-  switch (noise) {
-    case NoiseLevel::kIdeal:
-      return "ideal";
-    case NoiseLevel::kNominal:
-      return "nominal";
-    case NoiseLevel::kHard:
-      return "hard";
-  }
-  return "unknown";
-}
-
 std::span<const FaultEntry, kNumFaults> AllFaults() { return kEntries; }
 
 std::optional<Fault> ParseFault(std::string_view name) {

@@ -11,12 +11,11 @@
 #include <string_view>
 #include <vector>
 
+#include "algo/base/names.hpp"
+
 namespace plumb::simulated {
 
 enum class NoiseLevel { kIdeal, kNominal, kHard };
-
-/// "ideal", "nominal" or "hard".
-[[nodiscard]] std::string_view ToString(NoiseLevel noise);
 
 /// Every fault. `drivers/simulated/README.md` has the ranges and their sources.
 enum class Fault : std::uint8_t {
@@ -92,3 +91,7 @@ class FaultSet {
 [[nodiscard]] FaultSet MildFaults(NoiseLevel level);
 
 }  // namespace plumb::simulated
+
+template <>
+inline constexpr auto plumb::kNamesOf<plumb::simulated::NoiseLevel> =
+    plumb::NamesUpTo<plumb::simulated::NoiseLevel::kHard>({"ideal", "nominal", "hard"});

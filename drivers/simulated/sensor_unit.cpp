@@ -184,20 +184,6 @@ double ToneCurve::Encode(double light) const {
   return root + contrast * (root * root * (3.0 - 2.0 * root) - root);
 }
 
-std::string_view ToString(ToneCurve::Kind kind) {
-  switch (kind) {
-    case ToneCurve::Kind::kLinear:
-      return "linear";
-    case ToneCurve::Kind::kPower:
-      return "power";
-    case ToneCurve::Kind::kSrgb:
-      return "sRGB";
-    case ToneCurve::Kind::kSShaped:
-      return "S-shaped";
-  }
-  return "unknown";
-}
-
 ToneCurve DrawToneCurve(std::uint64_t seed) {
   RandomStream random(seed);
   ToneCurve curve;

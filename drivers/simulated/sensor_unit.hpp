@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <string_view>
 
 #include "algo/base/intrinsics.hpp"
+#include "algo/base/names.hpp"
 #include "algo/base/pose.hpp"
 #include "drivers/simulated/faults.hpp"
 
@@ -42,8 +42,6 @@ struct ToneCurve {
 
   [[nodiscard]] double Encode(double light) const;
 };
-
-[[nodiscard]] std::string_view ToString(ToneCurve::Kind kind);
 
 /// A unit's own curve: linear, a power of 1.6 to 2.8, sRGB or S-shaped, each for a quarter of the
 /// units.
@@ -141,3 +139,8 @@ struct SensorUnit {
 [[nodiscard]] double NguyenLateralSigma(double incidence);
 
 }  // namespace plumb::simulated
+
+template <>
+inline constexpr auto plumb::kNamesOf<plumb::simulated::ToneCurve::Kind> =
+    plumb::NamesUpTo<plumb::simulated::ToneCurve::Kind::kSShaped>({"linear", "power", "sRGB",
+                                                                   "S-shaped"});

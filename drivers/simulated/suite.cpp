@@ -66,12 +66,10 @@ void WriteSuiteFile(const fs::path& folder, const simulated::SuitePlan& plan,
   for (const auto& scene : plan.scenes) scenes.push_back(scene.name);
   nlohmann::json pairs = nlohmann::json::array();
   for (const auto& [reference, current] : plan.pairs) pairs.push_back({reference, current});
-  const nlohmann::json simulated{{"seed", options.seed},
-                                 {"unit", plan.unit.seed},
-                                 {"noise", ToString(options.noise)},
-                                 {"frames", options.frames},
-                                 {"rate_hz", options.rate_hz},
-                                 {"faults", plan.unit.faults.Names()}};
+  const nlohmann::json simulated{
+      {"seed", options.seed},         {"unit", plan.unit.seed},
+      {"noise", Name(options.noise)}, {"frames", options.frames},
+      {"rate_hz", options.rate_hz},   {"faults", plan.unit.faults.Names()}};
   const nlohmann::json suite{
       {"name", plan.name}, {"scenes", scenes}, {"pairs", pairs}, {"simulated", simulated}};
   WriteWholeFile(folder / "suite.json", suite.dump(1));
@@ -94,13 +92,6 @@ simulated::FaultSet FaultsOf(const SimulateOptions& options) {
   if (options.faults) return *options.faults;
   const bool mild = options.suite == "demo" && !options.unit;
   return mild ? simulated::MildFaults(options.noise) : simulated::FaultsOf(options.noise);
-}
-
-std::optional<simulated::NoiseLevel> ParseNoiseLevel(std::string_view name) {
-  if (name == "ideal") return simulated::NoiseLevel::kIdeal;
-  if (name == "nominal") return simulated::NoiseLevel::kNominal;
-  if (name == "hard") return simulated::NoiseLevel::kHard;
-  return std::nullopt;
 }
 
 void SimulateSuite(const SimulateOptions& options, const std::stop_token& stop,

@@ -45,9 +45,6 @@ struct SimulateOptions {
 /// has only the mild ones, like the virtual sensor.
 [[nodiscard]] simulated::FaultSet FaultsOf(const SimulateOptions& options);
 
-/// "ideal", "nominal" or "hard".
-[[nodiscard]] std::optional<simulated::NoiseLevel> ParseNoiseLevel(std::string_view name);
-
 /// Renders a suite into options.out: suite.json, recordings/NAME/ (TUM RGB-D layout) or
 /// recordings/NAME.oni, truth/NAME/. It is written beside the final path and renamed at the end, so
 /// that a failure or a stop leaves nothing behind. The same options give the same bytes on any

@@ -208,9 +208,8 @@ void WriteUnit(const std::filesystem::path& file, const SensorUnit& unit) {
                    {"depth_delay_s", unit.depth_delay_s},
                    {"color_stamp_bias_s", unit.color_stamp_bias_s},
                    {"stamp_jitter_s", unit.stamp_jitter_s}};
-  const json tone{{"kind", ToString(unit.tone.kind)},
-                  {"gamma", unit.tone.gamma},
-                  {"contrast", unit.tone.contrast}};
+  const json tone{
+      {"kind", Name(unit.tone.kind)}, {"gamma", unit.tone.gamma}, {"contrast", unit.tone.contrast}};
   const json written{
       {"unit", unit.seed},
       {"faults", unit.faults.Names()},

@@ -2,10 +2,10 @@
 // its own copy in web/assets/limits.js; a test compares them.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
 #include <string_view>
+
+#include "algo/base/posture.hpp"
 
 namespace plumb {
 
@@ -35,10 +35,10 @@ inline constexpr std::size_t kMaxName = 32, kMaxSite = 64, kMaxNote = 500;
 inline constexpr std::size_t kMinReason = 3, kMaxReason = 200;
 
 /// Head or feet first, supine or prone.
-inline constexpr std::array<std::string_view, 4> kPostures = {"HFS", "HFP", "FFS", "FFP"};
+inline constexpr auto kPostures = kNamesOf<PatientPosture>;
 
 [[nodiscard]] constexpr bool IsPosture(std::string_view text) {
-  return std::find(kPostures.begin(), kPostures.end(), text) != kPostures.end();
+  return Named<PatientPosture>(text).has_value();
 }
 
 }  // namespace plumb

@@ -258,10 +258,10 @@ TEST(AcceptanceTest, ImpossibleLimitsAreTheCallersMistake) {
 }
 
 TEST(AcceptanceTest, EveryVerdictHasItsName) {
-  EXPECT_STREQ(Name(Verdict::kInTolerance), "in_tolerance");
-  EXPECT_STREQ(Name(Verdict::kUnsure), "unsure");
-  EXPECT_STREQ(Name(Verdict::kMove), "move");
-  EXPECT_STREQ(Name(Verdict::kNoAnswer), "no_answer");
+  EXPECT_EQ(Name(Verdict::kInTolerance), "in_tolerance");
+  EXPECT_EQ(Name(Verdict::kUnsure), "unsure");
+  EXPECT_EQ(Name(Verdict::kMove), "move");
+  EXPECT_EQ(Name(Verdict::kNoAnswer), "no_answer");
 }
 
 }  // namespace

@@ -276,7 +276,7 @@ TEST(BodyPartsTest, WithoutARoomTheBodyItselfSaysWhereItsHeadIs) {
 
 TEST(BodyPartsTest, EachPostureHasItsSidesInARoomThatIsTurnedOnTheMap) {
   for (const Case& how : kCases) {
-    EXPECT_EQ(PostureNamed(Name(how.posture)), how.posture);
+    EXPECT_EQ(Named<PatientPosture>(Name(how.posture)), how.posture);
     const Eigen::Rotation2Dd to_map(0.7);
     const PatientAxes sides =
         SidesOf({.gantry = to_map * Eigen::Vector2d(0, 1), .right = to_map * Eigen::Vector2d(1, 0)},
@@ -284,8 +284,8 @@ TEST(BodyPartsTest, EachPostureHasItsSidesInARoomThatIsTurnedOnTheMap) {
     EXPECT_LT((sides.head - to_map * how.head).norm(), 1e-9) << Name(how.posture);
     EXPECT_LT((sides.left - to_map * how.left).norm(), 1e-9) << Name(how.posture);
   }
-  EXPECT_FALSE(PostureNamed("HFDL"));
-  EXPECT_FALSE(PostureNamed(""));
+  EXPECT_FALSE(Named<PatientPosture>("HFDL"));
+  EXPECT_FALSE(Named<PatientPosture>(""));
 }
 
 TEST(BodyPartsTest, WithARoomHeadAndLeftAreGivenTooAndItsAxesWhereThePostureIsNotBelieved) {

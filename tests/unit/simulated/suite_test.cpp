@@ -201,7 +201,7 @@ TEST_F(SuiteTest, RefusesWhatItDoesNotKnow) {
   options.width = 7;
   EXPECT_THROW(SimulateSuite(options), std::invalid_argument);
   EXPECT_TRUE(fs::is_empty(folder_));
-  EXPECT_FALSE(ParseNoiseLevel("loud"));
+  EXPECT_FALSE(Named<simulated::NoiseLevel>("loud"));
 }
 
 TEST(SuitePlanTest, NineHasSeventyTwoPairsAndMarkersThatEverySweepSees) {
