@@ -44,16 +44,17 @@ Color Between(std::span<const Stop> stops, double at) {
   std::size_t next = 1;
   while (next + 1 < stops.size() && stops[next].at < at) ++next;
   const Stop &low = stops[next - 1], &high = stops[next];
-  const double fraction = std::clamp((at - low.at) / (high.at - low.at), 0.0, 1.0);
-  Color color;
-  for (std::size_t i = 0; i < 3; ++i) {
-    color[i] = static_cast<std::uint8_t>(
-        std::lround(low.color[i] + fraction * (high.color[i] - low.color[i])));
-  }
-  return color;
+  return Mix(low.color, high.color, std::clamp((at - low.at) / (high.at - low.at), 0.0, 1.0));
 }
 
 }  // namespace
+
+Color Mix(const Color& a, const Color& b, double fraction_of_b) {
+  Color mixed;
+  for (std::size_t i = 0; i < mixed.size(); ++i)
+    mixed[i] = static_cast<std::uint8_t>(std::lround(a[i] + fraction_of_b * (b[i] - a[i])));
+  return mixed;
+}
 
 ColorScale ColorScale::Signed(double tolerance_m) {
   if (!(tolerance_m > 0) || !std::isfinite(tolerance_m)) {

@@ -13,6 +13,9 @@ inline constexpr Color kHoleColor = {150, 152, 156};
 /// Not measured inside the region; the same colour as on the page (web/assets/maps.js).
 inline constexpr Color kRegionHoleColor = {176, 86, 196};
 
+/// `fraction_of_b` of the way from `a` to `b`, which is from 0 to 1.
+[[nodiscard]] Color Mix(const Color& a, const Color& b, double fraction_of_b);
+
 /// Maps a difference in metres to a colour.
 ///
 /// Signed (the default of Plumb): blue below, orange above, nearly white within the tolerance, with

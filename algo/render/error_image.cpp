@@ -12,13 +12,10 @@
 namespace plumb {
 namespace {
 
-constexpr Color kInk = {33, 37, 41};
-constexpr Color kFaint = {92, 99, 106};
 constexpr Color kRegionHoleDark = {88, 43, 98};
 
 /// Weak shading keeps the legend readable: at most 14 % darker.
 constexpr double kReliefStrength = 0.30;
-constexpr double kPaleOutside = 0.45;  // fraction of white outside the region
 
 /// True for an unmeasured cell of the region that has an unmeasured neighbour there: single cells
 /// are sampling noise of the grid.
@@ -76,32 +73,24 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
           relief.empty()
               ? 1.0
               : 1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
-      double pale = 0.0;
-      if (!options.region_mask.empty()) {
-        const auto width = static_cast<std::size_t>(difference.grid.width);
-        const std::size_t cell = static_cast<std::size_t>(cells.y + row) * width +
-                                 static_cast<std::size_t>(cells.x + column);
-        pale = options.region_mask[cell] != 0 ? 0.0 : kPaleOutside;
-      }
-      for (int channel = 0; channel < 3; ++channel) {
-        const double value = color[static_cast<std::size_t>(channel)] * shade;
-        out[column][channel] =
-            static_cast<std::uint8_t>(std::lround(value + pale * (255.0 - value)));
-      }
+      const auto width = static_cast<std::size_t>(difference.grid.width);
+      const std::size_t cell = static_cast<std::size_t>(cells.y + row) * width +
+                               static_cast<std::size_t>(cells.x + column);
+      out[column] =
+          CellColor(color, shade, !options.region_mask.empty() && options.region_mask[cell] == 0);
     }
   }
   return picture;
 }
 
 std::string LabelOf(const ColorScale::Tick& tick, bool is_tolerance, const PictureWords& words) {
-  std::string label = tick.label;
-  std::replace(label.begin(), label.end(), '.', words.decimal);
+  const std::string label = WithDecimalSign(tick.label, words);
   return is_tolerance ? fmt::format("{}  {}", label, words.tolerance) : label;
 }
 
 void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, bool has_region,
                 bool has_hole, const PictureWords& words) {
-  const double x = area.x, bar_width = 44;
+  const double x = area.x;
   double y = area.y;
   const TextStyle head{.size_px = 18, .color = kInk, .bold = true};
   figure.Text(x, y + 14, scale.is_signed() ? words.error : words.absolute_error, head);
@@ -113,11 +102,8 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
   const double below =
       (scale.is_signed() ? 24 : 0) + 150 + (has_region ? 46 : 0) + (has_hole ? 46 : 0);
   const double height = std::max(180.0, area.y + area.height - y - below);
-  for (int i = 0; i < static_cast<int>(height); ++i) {
-    figure.FillRectangle(x, y + i, bar_width, 1.02,
-                         scale(scale.Difference(1.0 - (i + 0.5) / height)));
-  }
-  figure.FrameRectangle(x, y, bar_width, height, kFaint);
+  DrawColorBar(figure, x, y, height,
+               [&](double position) { return scale(scale.Difference(position)); });
   double last_y = -1e9;
   for (const ColorScale::Tick& tick : scale.Ticks()) {
     const double at = y + (1.0 - scale.Position(tick.difference_m)) * height;
@@ -125,9 +111,7 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
     last_y = at;
     const bool is_tolerance =
         scale.is_signed() && std::abs(std::abs(tick.difference_m) - scale.tolerance_m()) < 1e-12;
-    figure.Line(x + bar_width, at, x + bar_width + 8, at, kInk, is_tolerance ? 2.5 : 1.2);
-    figure.Text(x + bar_width + 14, at + 6, LabelOf(tick, is_tolerance, words),
-                {.size_px = 17, .color = kInk, .bold = is_tolerance});
+    DrawTick(figure, x, at, LabelOf(tick, is_tolerance, words), is_tolerance);
   }
   y += height;
   if (scale.is_signed()) figure.Text(x, y + 22, words.lower, small), y += 24;

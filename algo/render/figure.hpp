@@ -14,11 +14,14 @@
 
 namespace plumb {
 
+inline constexpr Color kInk = {33, 37, 41};
+inline constexpr Color kFaint = {92, 99, 106};
+
 enum class HorizontalAlign { kLeft, kCentre, kRight };
 
 struct TextStyle {
   double size_px = 18;
-  Color color = {33, 37, 41};
+  Color color = kInk;
   bool bold = false;
   HorizontalAlign align = HorizontalAlign::kLeft;
 };

@@ -14,11 +14,8 @@
 namespace plumb {
 namespace {
 
-constexpr Color kInk = {33, 37, 41};
-constexpr Color kFaint = {92, 99, 106};
 // Lightness increases with height, readable in grey and with any colour vision.
 constexpr Color kLow = {34, 74, 120}, kHigh = {240, 226, 168};
-constexpr double kPaleOutside = 0.45;    // fraction of white outside the region
 constexpr double kReliefStrength = 0.6;  // strength of the shading
 
 struct Range {
@@ -38,13 +35,6 @@ Range RangeOf(const HeightMap& heights, std::span<const std::uint8_t> region) {
   return {low, std::max(high, low + 1e-3)};
 }
 
-Color HeightColor(double share) {
-  Color color;
-  for (std::size_t i = 0; i < color.size(); ++i)
-    color[i] = static_cast<std::uint8_t>(std::lround(kLow[i] + share * (kHigh[i] - kLow[i])));
-  return color;
-}
-
 cv::Mat ColoredCells(const HeightMap& heights, std::span<const std::uint8_t> region,
                      const Range& range, const cv::Rect& cells) {
   const cv::Mat relief = Relief(heights, cells);
@@ -58,18 +48,13 @@ cv::Mat ColoredCells(const HeightMap& heights, std::span<const std::uint8_t> reg
         continue;
       }
       const Color color =
-          HeightColor(std::clamp((z - range.low_m) / (range.high_m - range.low_m), 0.0, 1.0));
+          Mix(kLow, kHigh, std::clamp((z - range.low_m) / (range.high_m - range.low_m), 0.0, 1.0));
       const double shade =
           1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
       const std::size_t cell =
           static_cast<std::size_t>(cells.y + row) * static_cast<std::size_t>(heights.grid.width) +
           static_cast<std::size_t>(cells.x + column);
-      const double pale = region.empty() || region[cell] != 0 ? 0.0 : kPaleOutside;
-      for (int channel = 0; channel < 3; ++channel) {
-        const double value = color[static_cast<std::size_t>(channel)] * shade;
-        out[column][channel] =
-            static_cast<std::uint8_t>(std::lround(value + pale * (255.0 - value)));
-      }
+      out[column] = CellColor(color, shade, !region.empty() && region[cell] == 0);
     }
   }
   return picture;
@@ -78,21 +63,17 @@ cv::Mat ColoredCells(const HeightMap& heights, std::span<const std::uint8_t> reg
 void DrawLegend(Figure& figure, const cv::Rect& area, const Range& range,
                 const HeightImageOptions& options) {
   const PictureWords& words = options.words;
-  const double x = area.x, bar_width = 44;
+  const double x = area.x;
   figure.Text(x, area.y + 14, words.height, {.size_px = 18, .color = kInk, .bold = true});
   figure.Text(x, area.y + 38, words.centimetres, {.size_px = 16, .color = kFaint});
   const double top = area.y + 60, height = std::max(180.0, area.height - 60.0 - 170.0);
-  for (int i = 0; i < static_cast<int>(height); ++i)
-    figure.FillRectangle(x, top + i, bar_width, 1.02, HeightColor(1.0 - (i + 0.5) / height));
-  figure.FrameRectangle(x, top, bar_width, height, kFaint);
+  DrawColorBar(figure, x, top, height, [](double position) { return Mix(kLow, kHigh, position); });
   constexpr int kTicks = 5;
   for (int i = 0; i < kTicks; ++i) {
-    const double share = static_cast<double>(i) / (kTicks - 1), y = top + (1.0 - share) * height;
-    std::string label =
-        fmt::format("{:.1f}", (range.low_m + share * (range.high_m - range.low_m)) / kCentimetre);
-    std::replace(label.begin(), label.end(), '.', words.decimal);
-    figure.Line(x + bar_width, y, x + bar_width + 8, y, kInk, 1.2);
-    figure.Text(x + bar_width + 14, y + 6, label, {.size_px = 17, .color = kInk});
+    const double position = static_cast<double>(i) / (kTicks - 1);
+    const double height_m = range.low_m + position * (range.high_m - range.low_m);
+    DrawTick(figure, x, top + (1.0 - position) * height,
+             WithDecimalSign(fmt::format("{:.1f}", height_m / kCentimetre), words));
   }
   double y = DrawSwatch(figure, x, top + height + 18, area.width, kHoleColor, words.not_measured);
   if (!options.region_mask.empty())

@@ -13,8 +13,6 @@
 namespace plumb {
 namespace {
 
-constexpr Color kInk = {33, 37, 41};
-constexpr Color kFaint = {92, 99, 106};
 constexpr Color kNoticeInk = {122, 28, 10};
 constexpr Color kMarkInk = {20, 60, 90};
 constexpr Color kNoticePaper = {253, 240, 222};
@@ -32,15 +30,10 @@ double RoundLength(double length_m) {
   return power;
 }
 
-std::string InLanguage(std::string number, const PictureWords& words) {
-  std::replace(number.begin(), number.end(), '.', words.decimal);
-  return number;
-}
-
 std::string LengthLabel(double length_m, const PictureWords& words) {
-  return InLanguage(length_m < 0.995 ? fmt::format("{:.3g} cm", length_m / kCentimetre)
-                                     : fmt::format("{:.3g} m", length_m),
-                    words);
+  return WithDecimalSign(length_m < 0.995 ? fmt::format("{:.3g} cm", length_m / kCentimetre)
+                                          : fmt::format("{:.3g} m", length_m),
+                         words);
 }
 
 /// Position of the map on the page and mapping from cells to pixels.
@@ -84,7 +77,7 @@ void DrawAxes(Figure& figure, const MapArea& area, const PictureWords& words) {
     return fmt::format("{:.2f}", std::abs(value) < 1e-9 ? 0.0 : value);
   };
   const auto format = [&](double value) {
-    return InLanguage(step_m < 0.095 ? fine(value) : text(value), words);
+    return WithDecimalSign(step_m < 0.095 ? fine(value) : text(value), words);
   };
   for (double i = std::ceil(grid.x_min / step_m); i * step_m <= grid.x_min + grid.width * grid.step;
        ++i) {
@@ -256,6 +249,37 @@ std::vector<std::uint8_t> PartOfMask(const GridShape& grid, const cv::Rect& cell
     part.insert(part.end(), first, first + cells.width);
   }
   return part;
+}
+
+std::string WithDecimalSign(std::string number, const PictureWords& words) {
+  std::replace(number.begin(), number.end(), '.', words.decimal);
+  return number;
+}
+
+cv::Vec3b CellColor(const Color& color, double shade, bool is_outside) {
+  constexpr double kPaleOutside = 0.45;  // fraction of white
+  cv::Vec3b cell;
+  for (int channel = 0; channel < 3; ++channel) {
+    const double value = color[static_cast<std::size_t>(channel)] * shade;
+    cell[channel] = static_cast<std::uint8_t>(
+        std::lround(value + (is_outside ? kPaleOutside : 0.0) * (255.0 - value)));
+  }
+  return cell;
+}
+
+constexpr double kBarWidth_px = 44;
+
+void DrawColorBar(Figure& figure, double x, double y, double height,
+                  const std::function<Color(double position)>& color_at) {
+  for (int i = 0; i < static_cast<int>(height); ++i)
+    figure.FillRectangle(x, y + i, kBarWidth_px, 1.02, color_at(1.0 - (i + 0.5) / height));
+  figure.FrameRectangle(x, y, kBarWidth_px, height, kFaint);
+}
+
+void DrawTick(Figure& figure, double x, double y, std::string_view label, bool is_bold) {
+  const double right = x + kBarWidth_px;
+  figure.Line(right, y, right + 8, y, kInk, is_bold ? 2.5 : 1.2);
+  figure.Text(right + 14, y + 6, label, {.size_px = 17, .bold = is_bold});
 }
 
 double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,

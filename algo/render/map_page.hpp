@@ -53,6 +53,18 @@ struct MapPage {
 /// Draws the page: CV_8UC3 RGB, at most about 1600 x 1200 pixels whatever the grid.
 [[nodiscard]] cv::Mat DrawPage(const MapPage& page);
 
+/// The number with the decimal sign of the language.
+[[nodiscard]] std::string WithDecimalSign(std::string number, const PictureWords& words);
+
+/// A cell's colour, darkened by a factor and paler outside the region.
+[[nodiscard]] cv::Vec3b CellColor(const Color& color, double shade, bool is_outside);
+
+/// Draws the bar of a legend, from position 0 at its lower end to 1 at its upper, and one of its
+/// ticks. (x, y) is the bar's top left corner, and for a tick its height on the bar.
+void DrawColorBar(Figure& figure, double x, double y, double height,
+                  const std::function<Color(double position)>& color_at);
+void DrawTick(Figure& figure, double x, double y, std::string_view label, bool is_bold = false);
+
 /// Draws a legend line: a swatch and its meaning (wrapped). Returns the y below it.
 double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,
                   std::string_view meaning);

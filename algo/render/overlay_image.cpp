@@ -15,14 +15,6 @@ namespace {
 constexpr Color kReference = {40, 104, 214};
 constexpr Color kCurrent = {226, 62, 46};
 constexpr Color kAgree = {176, 160, 190};
-constexpr Color kInk = {33, 37, 41};
-
-Color Mix(const Color& a, const Color& b, double share_of_b) {
-  Color mixed;
-  for (std::size_t i = 0; i < 3; ++i)
-    mixed[i] = static_cast<std::uint8_t>(std::lround(a[i] + share_of_b * (b[i] - a[i])));
-  return mixed;
-}
 
 /// Colour where both surfaces are present: from "agree" to the upper surface's colour within four
 /// tolerances.
@@ -36,8 +28,8 @@ Color BothColor(double current_minus_reference_m, double tolerance_m) {
 void DrawLegend(Figure& figure, const cv::Rect& area, double tolerance_m,
                 const PictureWords& words) {
   const double x = area.x;
-  std::string tolerance = fmt::format("{:.3g}", tolerance_m / kMillimetre);
-  std::replace(tolerance.begin(), tolerance.end(), '.', words.decimal);
+  const std::string tolerance =
+      WithDecimalSign(fmt::format("{:.3g}", tolerance_m / kMillimetre), words);
   figure.Text(x, area.y + 14, words.surface_on_top, {.size_px = 18, .color = kInk, .bold = true});
   double y = area.y + 34;
   y = DrawSwatch(figure, x, y, area.width, kReference, words.reference);
