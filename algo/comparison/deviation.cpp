@@ -48,9 +48,7 @@ class TriangleCanvas {
         constexpr double kEdge = -1e-9;
         if (v < kEdge || w < kEdge || v + w > 1.0 - kEdge) continue;
         const float z = static_cast<float>(a.z() + v * (b.z() - a.z()) + w * (c.z() - a.z()));
-        float& cell =
-            map_.z[static_cast<std::size_t>(row) * static_cast<std::size_t>(map_.grid.width) +
-                   static_cast<std::size_t>(column)];
+        float& cell = map_.at(row, column);
         if (!(cell >= z)) cell = z;
       }
     }
@@ -79,9 +77,7 @@ class GridSurface {
   [[nodiscard]] bool OnRim(int row, int column) const {
     for (int r = row - 1; r <= row + 1; ++r) {
       for (int c = column - 1; c <= column + 1; ++c) {
-        if (r < 0 || r >= map_.grid.height || c < 0 || c >= map_.grid.width ||
-            !std::isfinite(map_.at(r, c)))
-          return true;
+        if (!map_.grid.contains(r, c) || !std::isfinite(map_.at(r, c))) return true;
       }
     }
     return false;
@@ -89,9 +85,8 @@ class GridSurface {
 
  private:
   [[nodiscard]] float Value(int row, int column) const {
-    if (row < 0 || row >= map_.grid.height || column < 0 || column >= map_.grid.width)
-      return std::numeric_limits<float>::quiet_NaN();
-    return map_.at(row, column);
+    return map_.grid.contains(row, column) ? map_.at(row, column)
+                                           : std::numeric_limits<float>::quiet_NaN();
   }
   // Slope in one direction: central difference, or one-sided at an end or beside a jump.
   [[nodiscard]] float Slope(int row, int column, int dr, int dc) const {
@@ -146,10 +141,8 @@ class NearestCells {
 
  private:
   void Try(std::size_t cell, int row, int column, int other_row, int other_column) {
-    if (other_row < 0 || other_row >= height_ || other_column < 0 || other_column >= width_) return;
-    const std::size_t other =
-        static_cast<std::size_t>(other_row) * static_cast<std::size_t>(width_) +
-        static_cast<std::size_t>(other_column);
+    if (!current_.grid.contains(other_row, other_column)) return;
+    const std::size_t other = current_.grid.index(other_row, other_column);
     const float z = current_.z[other];
     if (!std::isfinite(z)) return;
     const float dx = static_cast<float>(other_column - column) * step_;
@@ -168,16 +161,13 @@ class NearestCells {
         {{0, -direction}, {-direction, -direction}, {-direction, 0}, {-direction, direction}}};
     for (int row = first_row; row >= 0 && row < height_; row += direction) {
       for (int column = first_column; column >= 0 && column < width_; column += direction) {
-        const std::size_t cell = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
-                                 static_cast<std::size_t>(column);
+        const std::size_t cell = current_.grid.index(row, column);
         if (wanted_[cell] == 0 || settled_[cell] != 0) continue;
         for (const auto& [dr, dc] : behind) {
           const int r = row + dr;
           const int c = column + dc;
-          if (r < 0 || r >= height_ || c < 0 || c >= width_) continue;
-          const std::uint32_t candidate =
-              best_[static_cast<std::size_t>(r) * static_cast<std::size_t>(width_) +
-                    static_cast<std::size_t>(c)];
+          if (!current_.grid.contains(r, c)) continue;
+          const std::uint32_t candidate = best_[current_.grid.index(r, c)];
           if (candidate == kNone) continue;
           const int candidate_row = static_cast<int>(candidate) / width_;
           const int candidate_column = static_cast<int>(candidate) % width_;
@@ -279,9 +269,8 @@ HeightMap HeightMapOfCloud(const PointCloud& cloud_in_target, double reach_m,
         const float dy = static_cast<float>((row - row_at) * target.step);
         const float far = (dx * dx + dy * dy) / static_cast<float>(reach_m * reach_m);
         if (far >= 1.0F) continue;
-        visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(target.width) +
-                  static_cast<std::size_t>(column),
-              p.z() - (n.x() * dx + n.y() * dy) / n.z(), (1 - far) * (1 - far) + 1e-3F);
+        visit(target.index(row, column), p.z() - (n.x() * dx + n.y() * dy) / n.z(),
+              (1 - far) * (1 - far) + 1e-3F);
       }
     }
   };

@@ -59,15 +59,13 @@ std::vector<float> SearchMap(const Body& body) {
   const int width = body.grid.width;
   for (int row = 1; row + 1 < body.grid.height; ++row) {
     for (int column = 1; column + 1 < width; ++column) {
-      const std::size_t here = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-                               static_cast<std::size_t>(column);
+      const std::size_t here = body.grid.index(row, column);
       if (std::isfinite(map[here])) continue;
       float sum = 0.0F;
       int count = 0;
       for (int r = -1; r <= 1; ++r) {
         for (int c = -1; c <= 1; ++c) {
-          const float z = map[static_cast<std::size_t>(row + r) * static_cast<std::size_t>(width) +
-                              static_cast<std::size_t>(column + c)];
+          const float z = map[body.grid.index(row + r, column + c)];
           if (!std::isfinite(z)) continue;
           sum += z;
           ++count;

@@ -170,8 +170,7 @@ void KeepLargestComponent(Body& body) {
       const int column = static_cast<int>(cell) % width;
       for (int r = std::max(row - 1, 0); r <= std::min(row + 1, height - 1); ++r) {
         for (int c = std::max(column - 1, 0); c <= std::min(column + 1, width - 1); ++c) {
-          const std::size_t other = static_cast<std::size_t>(r) * static_cast<std::size_t>(width) +
-                                    static_cast<std::size_t>(c);
+          const std::size_t other = body.grid.index(r, c);
           if (body.cells[other] != Body::kBody || label[other] != 0) continue;
           label[other] = next;
           stack.push_back(other);
@@ -224,8 +223,7 @@ void ForEachCell(const HeightMap& map, Visit&& visit) {
     for (int column = 0; column < map.grid.width; ++column) {
       const float z = map.at(row, column);
       if (!std::isfinite(z)) continue;
-      visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(map.grid.width) +
-                static_cast<std::size_t>(column),
+      visit(map.grid.index(row, column),
             Eigen::Vector3d(map.grid.x_centre(column), map.grid.y_centre(row), z));
     }
   }
@@ -355,13 +353,9 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
   const auto relax = [&](int row, int column, int dr, int dc) {
     const int r = row + dr;
     const int c = column + dc;
-    float& here = distance[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
-                           static_cast<std::size_t>(column)];
-    const bool inside = r >= 0 && r < grid.height && c >= 0 && c < grid.width;
-    const float there =
-        inside ? distance[static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) +
-                          static_cast<std::size_t>(c)]
-               : 0.0F;
+    float& here = distance[grid.index(row, column)];
+    const bool inside = grid.contains(r, c);
+    const float there = inside ? distance[grid.index(r, c)] : 0.0F;
     here = std::min(here, there + (dr != 0 && dc != 0 ? 1.41421356F : 1.0F));
   };
   for (int row = 0; row < grid.height; ++row) {
@@ -377,9 +371,7 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
       for (const auto& [dr, dc] :
            {std::pair(0, 1), std::pair(1, 1), std::pair(1, 0), std::pair(1, -1)})
         relax(row, column, dr, dc);
-      const float d =
-          distance[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
-                   static_cast<std::size_t>(column)];
+      const float d = distance[grid.index(row, column)];
       if (d <= largest) continue;
       largest = d;
       result.hole_centre_m = {grid.x_centre(column), grid.y_centre(row)};

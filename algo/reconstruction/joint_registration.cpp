@@ -30,7 +30,7 @@ void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) 
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
     const MapKeyframe& keyframe = map.keyframes[k];
     if (!keyframe.previous) continue;
-    const MapKeyframe& previous = map.keyframes[static_cast<std::size_t>(*keyframe.previous)];
+    const MapKeyframe& previous = map.keyframe(*keyframe.previous);
     if (IsConstrained(map, keyframe) && IsConstrained(map, previous)) continue;
     const LinkEquations link =
         Linearise({*keyframe.previous, static_cast<int>(k), keyframe.T_previous_color},
@@ -52,7 +52,7 @@ double KeypointSigmaFactor(const TrackingMap& map) {
   std::size_t count = 0;
   for (const MapKeyframe& keyframe : map.keyframes)
     for (const KeypointObservation& o : keyframe.keypoints) {
-      const Landmark& landmark = map.landmarks[static_cast<std::size_t>(o.landmark)];
+      const Landmark& landmark = map.landmark(o.landmark);
       count += landmark.usable && landmark.num_observations > 1 ? 1 : 0;
     }
   const double mean = static_cast<double>(count) / static_cast<double>(map.keyframes.size());

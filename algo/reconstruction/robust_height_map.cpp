@@ -262,8 +262,7 @@ void SeedGaps(CoarseMap& map) {
   const std::vector<TopPlane> before = map.cells;
   for (int row = 1; row + 1 < map.grid.height; ++row) {
     for (int column = 1; column + 1 < width; ++column) {
-      const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-                            static_cast<std::size_t>(column);
+      const std::size_t i = map.grid.index(row, column);
       if (before[i].count > 0) continue;
       TopPlane sum;
       sum.normal.setZero();
@@ -298,10 +297,8 @@ void DropSpeckles(CoarseMap& map, float max_step, std::size_t min_cells) {
       const int column = static_cast<int>(patch[k] % static_cast<std::size_t>(width));
       for (const auto& [dy, dx] :
            {std::pair(-1, 0), std::pair(0, -1), std::pair(0, 1), std::pair(1, 0)}) {
-        if (row + dy < 0 || row + dy >= map.grid.height || column + dx < 0 || column + dx >= width)
-          continue;
-        const std::size_t j = static_cast<std::size_t>(row + dy) * static_cast<std::size_t>(width) +
-                              static_cast<std::size_t>(column + dx);
+        if (!map.grid.contains(row + dy, column + dx)) continue;
+        const std::size_t j = map.grid.index(row + dy, column + dx);
         if (seen[j] != 0 || map.cells[j].count == 0 ||
             std::abs(map.cells[j].point.z() - map.cells[patch[k]].point.z()) > max_step)
           continue;
@@ -346,13 +343,10 @@ class MapFiller {
 
  private:
   [[nodiscard]] std::size_t Index(int row, int column) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(map_.grid.width) +
-           static_cast<std::size_t>(column);
+    return map_.grid.index(row, column);
   }
   [[nodiscard]] const TopPlane& PlaneAt(int row, int column) const {
-    return coarse_
-        .cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(coarse_.grid.width) +
-               static_cast<std::size_t>(column)];
+    return coarse_.cells[coarse_.grid.index(row, column)];
   }
 
   void FillTile(int tile_row, int tile_column, bool is_node_pass) {
@@ -412,7 +406,7 @@ class MapFiller {
       sum += nodes_[i];
     }
     if (highest - lowest > max_step_) return false;
-    map_.z[Index(row, column)] = 0.25F * sum;
+    map_.at(row, column) = 0.25F * sum;
     return true;
   }
 
@@ -431,7 +425,7 @@ class MapFiller {
     if (!(std::abs(rise) <= band_ && seed.z() + rise >= options_.z_min &&
           seed.z() + rise <= options_.z_max))
       return;
-    map_.z[Index(row, column)] = seed.z() + rise;
+    map_.at(row, column) = seed.z() + rise;
   }
 
   const CoarseMap& coarse_;

@@ -45,7 +45,7 @@ int LongestReturn(const TrackingMap& map) {
   std::map<std::pair<bool, int>, int> first_seen;  // By (is a marker, index or id).
   int longest = 0;
   for (int k = 0; k < static_cast<int>(map.keyframes.size()); ++k) {
-    const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(k)];
+    const MapKeyframe& keyframe = map.keyframe(k);
     const auto see = [&](bool is_marker, int id) {
       const auto [first, is_new] = first_seen.try_emplace({is_marker, id}, k);
       if (!is_new) longest = std::max(longest, k - first->second);

@@ -89,10 +89,7 @@ class GridMesher {
     mesh_.vertices.emplace_back(static_cast<float>(map_.grid.x_centre(column)),
                                 static_cast<float>(map_.grid.y_centre(row)), Z(node));
     mesh_.normals.emplace_back(Eigen::Vector3f::Zero());
-    if (!colors_.empty())
-      mesh_.colors.push_back(
-          colors_[static_cast<std::size_t>(row) * static_cast<std::size_t>(map_.grid.width) +
-                  static_cast<std::size_t>(column)]);
+    if (!colors_.empty()) mesh_.colors.push_back(colors_[map_.grid.index(row, column)]);
     return index;
   }
 
@@ -146,8 +143,7 @@ std::vector<Color> ColorsFromCloud(const HeightMap& map, const PointCloud& cloud
     for (int r = first_of(row); r <= std::min(grid.height - 1, row + kReach); r += decimation) {
       for (int c = first_of(column); c <= std::min(grid.width - 1, column + kReach);
            c += decimation) {
-        const std::size_t k = static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) +
-                              static_cast<std::size_t>(c);
+        const std::size_t k = grid.index(r, c);
         if (std::isnan(map.z[k])) continue;
         // A cell's own points take precedence over those of its neighbours; among the points of one
         // cell the nearest in height is used.

@@ -125,8 +125,7 @@ void RefreshVelocities(std::vector<TrackedFrame>& frames, TrackingMap& map) {
   }
   for (const TrackedFrame& frame : frames)
     if (frame.tracked && frame.keyframe)
-      map.keyframes[static_cast<std::size_t>(*frame.keyframe)].velocity_per_s =
-          frame.velocity_per_s;
+      map.keyframe(*frame.keyframe).velocity_per_s = frame.velocity_per_s;
 }
 
 std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames,
@@ -139,10 +138,9 @@ std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames
     if (!frames[i].tracked) continue;
     const double dt =
         frames[i].depth_time_s - frames[i].color_time_s + calibration.depth[kDepthDelay];
-    const Vector6d& velocity_per_s =
-        frames[i].keyframe
-            ? map.keyframes[static_cast<std::size_t>(*frames[i].keyframe)].velocity_per_s
-            : frames[i].velocity_per_s;
+    const Vector6d& velocity_per_s = frames[i].keyframe
+                                         ? map.keyframe(*frames[i].keyframe).velocity_per_s
+                                         : frames[i].velocity_per_s;
     trajectory.push_back(
         {frames[i].depth_time_s, T_scene_world * PoseAfter(poses[i], velocity_per_s, dt)});
   }

@@ -22,10 +22,8 @@ constexpr double kReliefStrength = 0.30;
 bool IsHole(const HeightMap& difference, std::span<const std::uint8_t> region, int row,
             int column) {
   const auto is_missing = [&](int r, int c) {
-    if (r < 0 || c < 0 || r >= difference.grid.height || c >= difference.grid.width) return false;
-    const std::size_t cell =
-        static_cast<std::size_t>(r) * static_cast<std::size_t>(difference.grid.width) +
-        static_cast<std::size_t>(c);
+    if (!difference.grid.contains(r, c)) return false;
+    const std::size_t cell = difference.grid.index(r, c);
     return region[cell] != 0 && !std::isfinite(difference.z[cell]);
   };
   return is_missing(row, column) && (is_missing(row - 1, column) || is_missing(row + 1, column) ||
@@ -73,9 +71,7 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
           relief.empty()
               ? 1.0
               : 1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
-      const auto width = static_cast<std::size_t>(difference.grid.width);
-      const std::size_t cell = static_cast<std::size_t>(cells.y + row) * width +
-                               static_cast<std::size_t>(cells.x + column);
+      const std::size_t cell = difference.grid.index(cells.y + row, cells.x + column);
       out[column] =
           CellColor(color, shade, !options.region_mask.empty() && options.region_mask[cell] == 0);
     }

@@ -51,9 +51,7 @@ cv::Mat ColoredCells(const HeightMap& heights, std::span<const std::uint8_t> reg
           Mix(kLow, kHigh, std::clamp((z - range.low_m) / (range.high_m - range.low_m), 0.0, 1.0));
       const double shade =
           1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
-      const std::size_t cell =
-          static_cast<std::size_t>(cells.y + row) * static_cast<std::size_t>(heights.grid.width) +
-          static_cast<std::size_t>(cells.x + column);
+      const std::size_t cell = heights.grid.index(cells.y + row, cells.x + column);
       out[column] = CellColor(color, shade, !region.empty() && region[cell] == 0);
     }
   }

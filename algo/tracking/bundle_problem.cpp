@@ -71,7 +71,7 @@ void Problem::CollectMarkers() {
     for (const MarkerObservation& m : keyframe.data.markers)
       if (map_.markers.contains(m.id)) markers.try_emplace(m.id, 0);
   };
-  for (const int k : free) collect(map_.keyframes[static_cast<std::size_t>(k)]);
+  for (const int k : free) collect(map_.keyframe(k));
   if (options.find_information) std::ranges::for_each(map_.keyframes, collect);
   for (const QuadraticTerm& term : terms)
     if (term.marker) markers.try_emplace(*term.marker, 0);
@@ -101,8 +101,8 @@ void Problem::CollectPoints() {
   // one observation constrains nothing.
   std::vector<std::optional<int>> slot(map_.landmarks.size());
   for (const int k : free) {
-    for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
-      const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+    for (const KeypointObservation& o : map_.keyframe(k).keypoints) {
+      const Landmark& landmark = map_.landmark(o.landmark);
       if (options.keep_witnesses_out && IsWitness(landmark, o.landmark)) continue;
       std::optional<int>& s = slot[static_cast<std::size_t>(o.landmark)];
       if (s || !landmark.usable || landmark.num_observations < 2) continue;
@@ -147,8 +147,7 @@ State Problem::Start() const {
     state.cameras.push_back(camera);
   }
   state.markers.assign(markers.size(), Vector6d::Zero());
-  for (const int id : landmarks)
-    state.landmarks.push_back(map_.landmarks[static_cast<std::size_t>(id)].p_world);
+  for (const int id : landmarks) state.landmarks.push_back(map_.landmark(id).p_world);
   state.calibration = calibration_;
   return state;
 }
@@ -175,7 +174,7 @@ Eigen::Vector3d Problem::CornerInWorld(const State& state, const CornerView& vie
 }
 
 double Problem::DepthDelay(const State& state, int keyframe, double row_share) const {
-  const Keyframe& data = map_.keyframes[static_cast<std::size_t>(keyframe)].data;
+  const Keyframe& data = map_.keyframe(keyframe).data;
   return data.depth_time_s - data.color_time_s + state.calibration.depth[kDepthDelay] +
          row_share * state.calibration.depth[kDepthReadout];
 }
@@ -261,7 +260,7 @@ Problem::TermVector Problem::TermState(const State& state, const QuadraticTerm& 
 
 void Problem::Write(const State& state) const {
   for (const int k : free) {
-    MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(k)];
+    MapKeyframe& keyframe = map_.keyframe(k);
     keyframe.T_world_color = Orthonormalised(
         keyframe.T_world_color * PoseFromTwist(state.cameras[static_cast<std::size_t>(k)].twist));
   }
@@ -271,7 +270,7 @@ void Problem::Write(const State& state) const {
         marker.T_world_marker * PoseFromTwist(state.markers[static_cast<std::size_t>(slot)]));
   }
   for (std::size_t s = 0; s < landmarks.size(); ++s)
-    map_.landmarks[static_cast<std::size_t>(landmarks[s])].p_world = state.landmarks[s];
+    map_.landmark(landmarks[s]).p_world = state.landmarks[s];
   calibration_ = state.calibration;
 }
 

@@ -22,8 +22,7 @@ void FollowedPoints::Follow(const Pyramid& last, const GrayImage& image, const c
   const Pose T_camera_world = T_world_guess.inverse();
   for (const ActivePoint& a : active_) {
     from.push_back(a.pixel);
-    const Eigen::Vector3d p =
-        T_camera_world * map_.landmarks[static_cast<std::size_t>(a.landmark)].p_world;
+    const Eigen::Vector3d p = T_camera_world * map_.landmark(a.landmark).p_world;
     guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(intrinsics_, p).cast<float>())
                                    : a.pixel);
   }
@@ -31,7 +30,7 @@ void FollowedPoints::Follow(const Pyramid& last, const GrayImage& image, const c
   for (std::size_t i = 0; i < active_.size(); ++i) {
     if (!klt.found[i]) continue;
     PosePoint point;
-    point.p_world = map_.landmarks[static_cast<std::size_t>(active_[i].landmark)].p_world;
+    point.p_world = map_.landmark(active_[i].landmark).p_world;
     const Eigen::Vector2d pixel = klt.points[i].cast<double>();
     point.ideal = Undistort(intrinsics_, pixel);
     point.sigma = 1.2 * SigmaPx() / intrinsics_.fx;
@@ -75,7 +74,7 @@ void FollowedPoints::Reassociate(const GrayImage& image, const cv::Mat& depth_m,
     std::vector<Eigen::Vector2f> from;
     std::vector<Eigen::Vector2f> guesses;
     for (const KeypointObservation& o : keyframe.keypoints) {
-      const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+      const Landmark& landmark = map_.landmark(o.landmark);
       if (!landmark.usable || followed.contains(o.landmark)) continue;
       const Eigen::Vector3d p = T_camera_world * landmark.p_world;
       if (p.z() < 0.1) continue;
@@ -99,7 +98,7 @@ void FollowedPoints::Reassociate(const GrayImage& image, const cv::Mat& depth_m,
       followed.insert(landmarks[i]);
       active_.push_back({landmarks[i], klt.points[i]});
       PosePoint point;
-      point.p_world = map_.landmarks[static_cast<std::size_t>(landmarks[i])].p_world;
+      point.p_world = map_.landmark(landmarks[i]).p_world;
       point.ideal = Undistort(intrinsics_, klt.points[i].cast<double>());
       point.sigma = 2.0 * SigmaPx() / intrinsics_.fx;
       points.push_back(point);
@@ -127,7 +126,7 @@ void FollowedPoints::AddObservation(const ActivePoint& point, MapKeyframe& keyfr
   const Eigen::Vector2d pixel = point.pixel.cast<double>();
   const auto [z_m, slope] = SurfaceDepthAt(keyframe.data.view.depth_m, pixel);
   keyframe.keypoints.push_back({point.landmark, pixel, z_m, slope});
-  ++map_.landmarks[static_cast<std::size_t>(point.landmark)].num_observations;
+  ++map_.landmark(point.landmark).num_observations;
 }
 
 void FollowedPoints::Observe(const std::vector<PosePoint>& found, std::size_t first,

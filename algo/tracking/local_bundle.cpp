@@ -107,8 +107,8 @@ class LocalBundle {
   void CollectPoints() {
     std::vector<std::optional<int>> slot(map_.landmarks.size());
     for (const int k : options_.free_keyframes) {
-      for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
-        const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+      for (const KeypointObservation& o : map_.keyframe(k).keypoints) {
+        const Landmark& landmark = map_.landmark(o.landmark);
         std::optional<int>& s = slot[static_cast<std::size_t>(o.landmark)];
         // A landmark with only one observation constrains nothing.
         if (s || !landmark.usable || landmark.num_observations < 2) continue;
@@ -139,7 +139,7 @@ class LocalBundle {
   void CollectCorners(double scale) {
     std::map<int, int> slots;
     for (const int k : options_.free_keyframes)
-      for (const MarkerObservation& m : map_.keyframes[static_cast<std::size_t>(k)].data.markers)
+      for (const MarkerObservation& m : map_.keyframe(k).data.markers)
         if (map_.markers.contains(m.id)) slots.try_emplace(m.id, 0);
     for (auto& [id, slot] : slots) {
       slot = static_cast<int>(markers_.size());
@@ -165,19 +165,18 @@ class LocalBundle {
       state.T_camera_world.push_back(keyframe.T_world_color.inverse());
     for (const int id : markers_)
       state.T_world_marker.push_back(map_.markers.at(id).T_world_marker);
-    for (const int id : landmarks_)
-      state.landmarks.push_back(map_.landmarks[static_cast<std::size_t>(id)].p_world);
+    for (const int id : landmarks_) state.landmarks.push_back(map_.landmark(id).p_world);
     return state;
   }
 
   void Write(const State& state) {
     for (const int k : options_.free_keyframes)
-      map_.keyframes[static_cast<std::size_t>(k)].T_world_color =
+      map_.keyframe(k).T_world_color =
           Orthonormalised(state.T_camera_world[static_cast<std::size_t>(k)].inverse());
     for (std::size_t s = 0; s < markers_.size(); ++s)
       map_.markers.at(markers_[s]).T_world_marker = Orthonormalised(state.T_world_marker[s]);
     for (std::size_t s = 0; s < landmarks_.size(); ++s)
-      map_.landmarks[static_cast<std::size_t>(landmarks_[s])].p_world = state.landmarks[s];
+      map_.landmark(landmarks_[s]).p_world = state.landmarks[s];
   }
 
   // Depth of a point in the camera at its depth stamp, `dt` after the colour stamp: row 2 of p - dt
@@ -200,8 +199,7 @@ class LocalBundle {
         cost += CauchyLoss(r.squaredNorm(), kKeypointLossScale);
         if (view.weight_z == 0) continue;
         const double rz =
-            (DepthAtStamp(map_.keyframes[static_cast<std::size_t>(view.keyframe)], p) - view.z_m) *
-            view.weight_z;
+            (DepthAtStamp(map_.keyframe(view.keyframe), p) - view.z_m) * view.weight_z;
         cost += CauchyLoss(rz * rz, kKeypointLossScale);
       }
     }
@@ -240,7 +238,7 @@ class LocalBundle {
       r.z() = 0;
       J_camera.row(2).setZero();
       if (view.weight_z > 0) {
-        const MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(view.keyframe)];
+        const MapKeyframe& keyframe = map_.keyframe(view.keyframe);
         const double rz = (DepthAtStamp(keyframe, p) - view.z_m) * view.weight_z;
         const double weight_z = std::sqrt(CauchyWeight(rz * rz, kKeypointLossScale));
         const double dt_s = keyframe.data.depth_time_s - keyframe.data.color_time_s;

@@ -72,8 +72,8 @@ std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
   std::vector<KeyframeLink> links;
   for (const auto& [pair, count] : shared) {
     if (count < kCovisible || pair.first == pair.second) continue;
-    const auto& a = map.keyframes[static_cast<std::size_t>(pair.first)];
-    const auto& b = map.keyframes[static_cast<std::size_t>(pair.second)];
+    const auto& a = map.keyframe(pair.first);
+    const auto& b = map.keyframe(pair.second);
     links.push_back({pair.first, pair.second, a.T_world_color.inverse() * b.T_world_color});
   }
   return links;

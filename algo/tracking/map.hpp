@@ -73,6 +73,15 @@ struct TrackingMap {
   std::vector<MapKeyframe> keyframes;
   std::vector<Landmark> landmarks;
   std::map<int, MapMarker> markers;
+
+  [[nodiscard]] MapKeyframe& keyframe(int k) { return keyframes[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] const MapKeyframe& keyframe(int k) const {
+    return keyframes[static_cast<std::size_t>(k)];
+  }
+  [[nodiscard]] Landmark& landmark(int id) { return landmarks[static_cast<std::size_t>(id)]; }
+  [[nodiscard]] const Landmark& landmark(int id) const {
+    return landmarks[static_cast<std::size_t>(id)];
+  }
 };
 
 /// Whether enough shared landmarks or a marker constrain the keyframe. If not (a blank wall),
@@ -81,7 +90,7 @@ struct TrackingMap {
   constexpr int kEnough = 30;
   int shared = 0;
   for (const KeypointObservation& o : keyframe.keypoints) {
-    const Landmark& landmark = map.landmarks[static_cast<std::size_t>(o.landmark)];
+    const Landmark& landmark = map.landmark(o.landmark);
     shared += landmark.usable && landmark.num_observations > 1 ? 1 : 0;
   }
   if (shared >= kEnough) return true;

@@ -54,8 +54,7 @@ void LinkToPrevious(std::size_t gone, TrackingMap& map) {
   const MapKeyframe& keyframe = map.keyframes[gone];
   const int previous = keyframe.previous.value();
   const Pose T_previous_gone =
-      map.keyframes[static_cast<std::size_t>(previous)].T_world_color.inverse() *
-      keyframe.T_world_color;
+      map.keyframe(previous).T_world_color.inverse() * keyframe.T_world_color;
   for (MapKeyframe& other : map.keyframes) {
     if (other.previous != static_cast<int>(gone)) continue;
     other.previous = previous;
@@ -68,12 +67,10 @@ void LinkToPrevious(std::size_t gone, TrackingMap& map) {
 // over sections of the path, some of which end.
 void ReferToKept(const std::vector<bool>& is_kept, const std::vector<Pose>& path,
                  const TrackingMap& map, std::vector<TrackedFrame>& frames) {
-  const auto pose = [&](int keyframe) {
-    return map.keyframes[static_cast<std::size_t>(keyframe)].T_world_color;
-  };
+  const auto pose = [&](int keyframe) { return map.keyframe(keyframe).T_world_color; };
   const auto refer = [&](std::optional<int>& keyframe) {
     if (keyframe && !is_kept[static_cast<std::size_t>(*keyframe)])
-      keyframe = map.keyframes[static_cast<std::size_t>(*keyframe)].previous;
+      keyframe = map.keyframe(*keyframe).previous;
   };
   for (std::size_t i = 0; i < frames.size(); ++i) {
     TrackedFrame& frame = frames[i];
@@ -104,7 +101,7 @@ void RemoveOthers(const std::vector<bool>& is_kept, std::vector<TrackedFrame>& f
       continue;
     }
     for (const KeypointObservation& o : map.keyframes[k].keypoints)
-      --map.landmarks[static_cast<std::size_t>(o.landmark)].num_observations;
+      --map.landmark(o.landmark).num_observations;
   }
   map.keyframes = std::move(kept);
   const auto renumber = [&](std::optional<int>& keyframe) {

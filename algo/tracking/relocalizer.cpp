@@ -209,7 +209,7 @@ std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
   if (features.descriptors.rows < 15) return best;
   const cv::BFMatcher matcher(cv::NORM_HAMMING);
   for (const int k : keyframes) {
-    const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(k)];
+    const MapKeyframe& keyframe = map.keyframe(k);
     if (keyframe.descriptors.rows < 15) continue;
     std::vector<std::vector<cv::DMatch>> pairs;
     matcher.knnMatch(features.descriptors, keyframe.descriptors, pairs, 2);

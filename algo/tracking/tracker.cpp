@@ -240,7 +240,7 @@ std::optional<PoseEstimate> Tracker::FollowFrame(const Frame& frame, const Frame
   if (!best) return std::nullopt;
   std::vector<ActivePoint> agreeing;
   for (std::size_t i = 0; i < best->followed.size(); ++i) {
-    Landmark& landmark = map_.landmarks[static_cast<std::size_t>(best->followed[i].landmark)];
+    Landmark& landmark = map_.landmark(best->followed[i].landmark);
     if (best->estimate.inlier[best->num_corners + i]) {
       agreeing.push_back(best->followed[i]);
     } else if (++landmark.num_rejections > 3 && landmark.num_observations < 3) {
@@ -331,7 +331,7 @@ void Tracker::RefreshKeyframeVelocity(const Frame& frame, const Pose& T_world_no
   if (frames_.empty() || lost_) return;
   const std::optional<int> last = frames_.back().keyframe;
   if (!last) return;
-  MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(*last)];
+  MapKeyframe& keyframe = map_.keyframe(*last);
   const double dt_after = PlausibleStep_s(frame.color_time_s - keyframe.data.color_time_s);
   if (dt_after <= 0) return;
   const Vector6d after = TwistFromPose(keyframe.T_world_color.inverse() * T_world_now) / dt_after;

@@ -105,7 +105,7 @@ class Tracker {
   void FindAllMarkers(FrameData& prepared) const;
   // Only where there is one.
   [[nodiscard]] const MapKeyframe& ReferenceKeyframe() const {
-    return map_.keyframes[static_cast<std::size_t>(reference_.value())];
+    return map_.keyframe(reference_.value());
   }
   [[nodiscard]] Pose PredictedPose(const Frame& frame) const;
   static bool ShowsSomething(const FrameData& prepared);

@@ -129,7 +129,7 @@ void Tracker::MakeKeyframe(const Frame& frame, FrameData& prepared, const Pose& 
 
 // Features cost as much as tracking a frame, and most keyframes are never compared by them.
 void Tracker::Describe(int index) {
-  MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(index)];
+  MapKeyframe& keyframe = map_.keyframe(index);
   if (!keyframe.descriptors.empty() || keyframe.gray.empty()) return;
   DescribedFeatures features =
       DescribeFeatures(keyframe.gray, keyframe.data.view.depth_m, info_.intrinsics);
@@ -180,8 +180,7 @@ void Tracker::CloseLoop(const FrameData& prepared, int index) {
     return;
   if (T_drift.translation().norm() > kDriftFollowed_m ||
       RotationAngle(T_drift) > kDriftFollowed_rad) {
-    const Pose& T_world_old =
-        map_.keyframes[static_cast<std::size_t>(found->keyframe)].T_world_color;
+    const Pose& T_world_old = map_.keyframe(found->keyframe).T_world_color;
     loops_.push_back({found->keyframe, index, T_world_old.inverse() * *T_world_seen});
     DistributeLoopError(loops_, map_);
   }
@@ -253,8 +252,7 @@ void Tracker::AdjustLocally(int index) {
   bundle.marker_length_m = info_.marker_length_m;
   bundle.depth_noise = info_.depth_noise;
   for (int k = std::max(1, index + 1 - options_.local_keyframes); k <= index; ++k)
-    if (IsConstrained(map_, map_.keyframes[static_cast<std::size_t>(k)]))
-      bundle.free_keyframes.push_back(k);
+    if (IsConstrained(map_, map_.keyframe(k))) bundle.free_keyframes.push_back(k);
   AdjustLocalMap(info_.intrinsics, bundle, map_);
 }
 

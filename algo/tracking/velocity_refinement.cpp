@@ -32,7 +32,7 @@ class ImageMotion {
         options_(options),
         map_(map),
         keyframe_index_(keyframe),
-        keyframe_(map.keyframes[static_cast<std::size_t>(keyframe)]) {
+        keyframe_(map.keyframe(keyframe)) {
     camera_.T_camera0_world = keyframe_.T_world_color.inverse();
     camera_.velocity_per_s = keyframe_.velocity_per_s;
   }
@@ -61,7 +61,7 @@ class ImageMotion {
   void AddKeypoints() {
     const double weight = 640.0 / (options_.keypoint_sigma_px * stated_.width);
     for (const KeypointObservation& o : keyframe_.keypoints) {
-      const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+      const Landmark& landmark = map_.landmark(o.landmark);
       if (!landmark.usable || landmark.num_observations < 2) continue;
       if (options_.keep_witnesses_out && IsWitness(landmark, o.landmark)) continue;
       Add(landmark.p_world, o.pixel, Eigen::Vector2d::Zero(), weight, kKeypointLossScale);

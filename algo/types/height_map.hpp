@@ -31,6 +31,13 @@ struct GridShape {
     const double column = std::floor((x - x_min) / step);
     const double row = std::floor((y - y_min) / step);
     if (!(column >= 0 && column < width && row >= 0 && row < height)) return std::nullopt;
+    return index(static_cast<int>(row), static_cast<int>(column));
+  }
+  [[nodiscard]] bool contains(int row, int column) const {
+    return row >= 0 && row < height && column >= 0 && column < width;
+  }
+  /// Index of a cell of the grid, row-major.
+  [[nodiscard]] std::size_t index(int row, int column) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(column);
   }
@@ -43,10 +50,8 @@ struct HeightMap {
 
   explicit HeightMap(const GridShape& shape = {})
       : grid(shape), z(shape.num_cells(), std::numeric_limits<float>::quiet_NaN()) {}
-  [[nodiscard]] float at(int row, int column) const {
-    return z[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
-             static_cast<std::size_t>(column)];
-  }
+  [[nodiscard]] float at(int row, int column) const { return z[grid.index(row, column)]; }
+  [[nodiscard]] float& at(int row, int column) { return z[grid.index(row, column)]; }
 };
 
 }  // namespace plumb

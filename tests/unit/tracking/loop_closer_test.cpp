@@ -58,10 +58,8 @@ const Vector6d kDrift = (Vector6d() << 0, 0.002, 0.0005, 0.002, 0, 0.001).finish
 double WorstError(const TrackingMap& map) {
   double worst = 0;
   for (int k = 0; k < kNumKeyframes; ++k)
-    worst =
-        std::max(worst, (map.keyframes[static_cast<std::size_t>(k)].T_world_color.translation() -
-                         TrueCamera(k).translation())
-                            .norm());
+    worst = std::max(
+        worst, (map.keyframe(k).T_world_color.translation() - TrueCamera(k).translation()).norm());
   return worst;
 }
 
@@ -107,8 +105,7 @@ TEST(DistributeLoopError, SpreadsTheDriftOverTheWay) {
   // Landmarks stay where the keyframe that saw them first saw them.
   for (const Landmark& landmark : map.landmarks) {
     const Vector3d p =
-        map.keyframes[static_cast<std::size_t>(landmark.first_keyframe)].T_world_color.inverse() *
-        landmark.p_world;
+        map.keyframe(landmark.first_keyframe).T_world_color.inverse() * landmark.p_world;
     ASSERT_NEAR(p.z(), 1.0, 1e-9);
   }
   // Neighbours still stand to each other nearly as before.

@@ -85,13 +85,13 @@ Sweep MakeSweep(int num_keyframes) {
   for (const MapKeyframe& keyframe : sweep.map.keyframes)
     sweep.map.landmarks[0].num_observations += static_cast<int>(keyframe.keypoints.size());
   for (int k = 0; k < num_keyframes; ++k) {
-    MapKeyframe& keyframe = sweep.map.keyframes[static_cast<std::size_t>(k)];
+    MapKeyframe& keyframe = sweep.map.keyframe(k);
     TrackedFrame frame;
     frame.tracked = true;
     frame.color_time_s = k;
     frame.keyframe = frame.reference_keyframe = k;
     if (k > 0) {
-      const MapKeyframe& before = sweep.map.keyframes[static_cast<std::size_t>(k - 1)];
+      const MapKeyframe& before = sweep.map.keyframe(k - 1);
       keyframe.previous = frame.previous_keyframe = k - 1;
       keyframe.T_previous_color = frame.T_previous_color =
           before.T_world_color.inverse() * keyframe.T_world_color;

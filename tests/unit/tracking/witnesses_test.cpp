@@ -51,8 +51,7 @@ TEST(Witnesses, DoNotMoveTheSolution) {
   TrackingMap map = truth.map;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
     for (KeypointObservation& o : map.keyframes[k].keypoints)
-      if (IsWitness(map.landmarks[static_cast<std::size_t>(o.landmark)], o.landmark))
-        o.pixel += Eigen::Vector2d(6, -4);
+      if (IsWitness(map.landmark(o.landmark), o.landmark)) o.pixel += Eigen::Vector2d(6, -4);
     for (MarkerObservation& m : map.keyframes[k].data.markers)
       if (IsWitness(map.markers.at(m.id), m.id, static_cast<int>(k)))
         for (Eigen::Vector2d& corner : m.corners) corner += Eigen::Vector2d(6, -4);
