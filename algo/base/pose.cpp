@@ -35,6 +35,10 @@ Pose PoseFromTwist(const Vector6d& rotation_then_translation) {
   return T;
 }
 
+Pose PoseAbout(const Eigen::Vector3d& centre, const Vector6d& twist) {
+  return Eigen::Translation3d(centre) * PoseFromTwist(twist) * Eigen::Translation3d(-centre);
+}
+
 Vector6d TwistFromPose(const Pose& T) {
   Vector6d twist;
   twist << VectorFromRotation(T.linear()), T.translation();

@@ -12,6 +12,7 @@ using Pose = Eigen::Isometry3d;
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
 
 /// [w]x, so that Skew(w) * p = w.cross(p).
 [[nodiscard]] Eigen::Matrix3d Skew(const Eigen::Vector3d& w);
@@ -25,6 +26,16 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 /// Pose of the twist (rotation vector, translation), with independent rotation and translation; not
 /// the SE(3) exponential.
 [[nodiscard]] Pose PoseFromTwist(const Vector6d& rotation_then_translation);
+
+/// The same about a point instead of the origin.
+[[nodiscard]] Pose PoseAbout(const Eigen::Vector3d& centre, const Vector6d& twist);
+
+/// Derivative of PoseFromTwist(x) * p to x at 0.
+[[nodiscard]] inline Matrix3x6d PointJacobian(const Eigen::Vector3d& p) {
+  Matrix3x6d J;
+  J << -Skew(p), Eigen::Matrix3d::Identity();
+  return J;
+}
 
 /// Inverse of PoseFromTwist().
 [[nodiscard]] Vector6d TwistFromPose(const Pose& T);

@@ -233,8 +233,7 @@ StageResult RunStage(const Side& reference, const Side& current, const Pose& T_s
       result.valid = false;
       return result;
     }
-    result.T = Orthonormalised(Eigen::Translation3d(pivot) * PoseFromTwist(twist) *
-                               Eigen::Translation3d(-pivot) * result.T);
+    result.T = Orthonormalised(PoseAbout(pivot, twist) * result.T);
     if (twist.cwiseQuotient(unit).norm() < kStepTolerance_m) break;
   }
   return result;

@@ -266,8 +266,7 @@ class Comparer {
   // remains the fit of the markers, which its residuals and covariance describe.
   void JoinSensor(const SharedSensor& sensor, BodyMotion& motion) {
     const Eigen::Vector3d moved = motion.T * motion.centroid_m;
-    const Pose by(Eigen::Translation3d(moved) * PoseFromTwist(sensor.correction) *
-                  Eigen::Translation3d(-moved));
+    const Pose by = PoseAbout(moved, sensor.correction);
     motion.T = by * motion.T;
     T_sensor_correction_ = by;
     current_cloud_ = TransformedCloud(by, current_cloud_);

@@ -22,8 +22,7 @@ Vector6d CouchSigmas(const Pose& T_motion, const Matrix6d& covariance,
     for (int s = 0; s < 2; ++s) {
       Vector6d twist = Vector6d::Zero();
       twist[i] = s == 0 ? -kStep : kStep;
-      const Pose T_perturbed = Eigen::Translation3d(moved_centroid) * PoseFromTwist(twist) *
-                               Eigen::Translation3d(-moved_centroid) * T_motion;
+      const Pose T_perturbed = PoseAbout(moved_centroid, twist) * T_motion;
       side[static_cast<std::size_t>(s)] =
           CouchVector(T_perturbed, isocentre_reference, T_iec_reference);
     }

@@ -330,8 +330,8 @@ class Registration {
     const Eigen::Vector3d arm = from.R * (to.place_m - from.place_m);
     const Eigen::Vector3d error = arm + from.place_m + from.shift_m - to.place_m - to.shift_m;
     const double information = 1.0 / (sigma_m * sigma_m + 0.25 * error.squaredNorm());
-    Eigen::Matrix<double, 3, 6> of_a, of_b;
-    of_a << -Skew(arm), Eigen::Matrix3d::Identity();
+    const Matrix3x6d of_a = PointJacobian(arm);
+    Matrix3x6d of_b;
     of_b << Eigen::Matrix3d::Zero(), -Eigen::Matrix3d::Identity();
     equations_.AddRight(a, -information * of_a.transpose() * error);
     equations_.AddRight(b, -information * of_b.transpose() * error);

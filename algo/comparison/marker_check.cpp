@@ -17,28 +17,17 @@ namespace {
 constexpr double kAssumed_percent = 1e-3;
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
-Eigen::Vector3d CentreOf(const SceneMarker& marker) {
-  return (marker.corners[0] + marker.corners[1] + marker.corners[2] + marker.corners[3]) / 4.0;
-}
-
-double SideOf(const SceneMarker& marker) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < 4; ++i)
-    sum += (marker.corners[(i + 1) % 4] - marker.corners[i]).norm();
-  return sum / 4.0;
-}
-
 // Size of the second map relative to the first, from the spread of the shared centres about their
 // mean.
 double ScaleOf(const std::vector<std::pair<const SceneMarker*, const SceneMarker*>>& shared) {
   if (shared.size() < 2) return kNotKnown;
   Eigen::Vector3d before = Eigen::Vector3d::Zero(), now = Eigen::Vector3d::Zero();
-  for (const auto& [a, b] : shared) before += CentreOf(*a), now += CentreOf(*b);
+  for (const auto& [a, b] : shared) before += CentreOf(a->corners), now += CentreOf(b->corners);
   before /= static_cast<double>(shared.size()), now /= static_cast<double>(shared.size());
   double spread_before = 0.0, spread_now = 0.0;
   for (const auto& [a, b] : shared) {
-    spread_before += (CentreOf(*a) - before).squaredNorm();
-    spread_now += (CentreOf(*b) - now).squaredNorm();
+    spread_before += (CentreOf(a->corners) - before).squaredNorm();
+    spread_now += (CentreOf(b->corners) - now).squaredNorm();
   }
   return spread_before > 0 ? std::sqrt(spread_now / spread_before) : kNotKnown;
 }
@@ -149,7 +138,7 @@ class Checker {
       const auto known = baseline_->markers.find(id);
       if (known == baseline_->markers.end()) continue;
       const Pose T = FitWithout(id, agreeing).value_or(outcome.alignment->T_reference_current);
-      const double off_m = (T * CentreOf(marker) - CentreOf(known->second)).norm();
+      const double off_m = (T * CentreOf(marker.corners) - CentreOf(known->second.corners)).norm();
       if (!worst || off_m > moved_m) moved_m = off_m, worst = id;
     }
     const double misfit_mm = outcome.alignment->rms_m / kMillimetre,
@@ -172,7 +161,7 @@ class Checker {
     double worst = kNotKnown;
     std::optional<int> id_of_worst;
     for (const auto& [id, marker] : seen_) {
-      const double off = 100 * (SideOf(marker) / scene_.marker_length_m - 1);
+      const double off = 100 * (MeanSide(marker.corners) / scene_.marker_length_m - 1);
       if (!id_of_worst || std::abs(off) > std::abs(worst)) worst = off, id_of_worst = id;
     }
     // Preset `best` assumes that every marker has its nominal size, so that its sides were not

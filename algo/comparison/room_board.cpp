@@ -45,8 +45,6 @@ double SpreadOf(std::span<const Eigen::Vector3d> points) {
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-Eigen::Vector3d CentreOf(const MarkerCorners& corners) { return MeanOf(corners); }
-
 // Half-widths for the position of the cross and for the least certain rotation, from the scatter of
 // the markers.
 void AddUncertainty(BoardFit& fit, std::span<const Eigen::Vector3d> centres_board, double sigma_m) {

@@ -84,18 +84,13 @@ double MarkerResidual(const SharedMarker& marker, const Pose& T_reference_curren
   return std::sqrt(sum / 4.0);
 }
 
-Eigen::Vector3d Centre(const SharedMarker& marker) {
-  return 0.25 *
-         (marker.reference[0] + marker.reference[1] + marker.reference[2] + marker.reference[3]);
-}
-
 // Weighted as in the fit: the point about which its rotation and translation are uncorrelated.
-Eigen::Vector3d CentreOf(std::span<const SharedMarker> shared, const Subset& subset) {
+Eigen::Vector3d WeightedCentre(std::span<const SharedMarker> shared, const Subset& subset) {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double total = 0.0;
   for (const std::size_t i : subset) {
     const double w = 1.0 / (shared[i].sigma_m * shared[i].sigma_m);
-    centre += w * Centre(shared[i]);
+    centre += w * CentreOf(shared[i].reference);
     total += w;
   }
   return centre / total;
@@ -107,8 +102,7 @@ Matrix6d FitCovariance(std::span<const SharedMarker> shared, const Subset& subse
   Matrix6d information = Matrix6d::Zero();
   for (const std::size_t i : subset) {
     for (const Eigen::Vector3d& corner : shared[i].reference) {
-      Eigen::Matrix<double, 3, 6> jacobian;
-      jacobian << -Skew(corner - centre), Eigen::Matrix3d::Identity();
+      const Matrix3x6d jacobian = PointJacobian(corner - centre);
       information += kIndependentShare / (shared[i].sigma_m * shared[i].sigma_m) *
                      jacobian.transpose() * jacobian;
     }
@@ -138,8 +132,7 @@ double ExpectedResidual(const SharedMarker& marker, const Matrix6d& fit_covarian
                         const Eigen::Vector3d& centre) {
   double variance = 0.0;
   for (const Eigen::Vector3d& corner : marker.reference) {
-    Eigen::Matrix<double, 3, 6> jacobian;
-    jacobian << -Skew(corner - centre), Eigen::Matrix3d::Identity();
+    const Matrix3x6d jacobian = PointJacobian(corner - centre);
     variance += (jacobian * fit_covariance * jacobian.transpose()).trace() / 4.0;
   }
   return std::sqrt(variance + 3.0 * marker.sigma_m * marker.sigma_m);
@@ -218,7 +211,7 @@ LeaveOneOut JudgeMarker(std::span<const SharedMarker> shared, const Subset& good
   if (others.empty()) return judged;
   const RigidFit fit = FitSubset(shared, others, true);
   if (!fit.valid) return judged;
-  const Eigen::Vector3d centre = CentreOf(shared, others);
+  const Eigen::Vector3d centre = WeightedCentre(shared, others);
   // Scaled by the scatter of the other markers: the stated sigmas alone would let a marker move by
   // a centimetre unnoticed.
   const double sigma =
@@ -260,17 +253,16 @@ Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subs
                         const RigidFit& fit) {
   Alignment alignment;
   alignment.T_reference_current = fit.T_a_b;
-  alignment.centre_m = CentreOf(shared, subset);
+  alignment.centre_m = WeightedCentre(shared, subset);
   const auto count = static_cast<double>(subset.size());
   double sum = 0.0;
   double spread = 0.0;
   for (const std::size_t i : subset) {
     const double residual = MarkerResidual(shared[i], fit.T_a_b);
     sum += residual * residual;
-    spread += (Centre(shared[i]) - alignment.centre_m).squaredNorm();
-    Eigen::Vector3d current = Eigen::Vector3d::Zero();
-    for (const Eigen::Vector3d& p : shared[i].current) current += 0.25 * p;
-    const Eigen::Vector3d off = Centre(shared[i]) - fit.T_a_b * current;
+    spread += (CentreOf(shared[i].reference) - alignment.centre_m).squaredNorm();
+    const Eigen::Vector3d off =
+        CentreOf(shared[i].reference) - fit.T_a_b * CentreOf(shared[i].current);
     alignment.distortion += off * off.transpose();
     alignment.markers_used.push_back(shared[i].id);
   }

@@ -37,8 +37,7 @@ std::optional<Effect> RigidPart(const std::vector<Point>& points, std::size_t ne
   Matrix6d H = Matrix6d::Zero();
   Effect g = Effect::Zero(6, points.front().moves.cols());
   for (const Point& point : points) {
-    Eigen::Matrix<double, 3, 6> J;
-    J << -Skew(point.p - centre), Eigen::Matrix3d::Identity();
+    const Matrix3x6d J = PointJacobian(point.p - centre);
     H += point.weight * J.transpose() * J;
     g += point.weight * J.transpose() * point.moves;
   }
@@ -53,8 +52,7 @@ std::vector<Point> MarkersOf(const Scene& scene, const Alignment& alignment, con
     const auto moves = scene.sensitivity->markers.find(id);
     const auto marker = scene.markers.find(id);
     if (moves == scene.sensitivity->markers.end() || marker == scene.markers.end()) continue;
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    for (const Eigen::Vector3d& corner : marker->second.corners) centre += 0.25 * corner;
+    const Eigen::Vector3d centre = CentreOf(marker->second.corners);
     const double sigma = std::max(marker->second.sigma_m, 1e-4);
     points.push_back(
         {T * centre, T.linear() * moves->second.cast<double>(), 1.0 / (sigma * sigma)});

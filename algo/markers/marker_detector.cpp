@@ -28,12 +28,6 @@ cv::Mat ToGray(const cv::Mat& image) {
   return gray;
 }
 
-double MeanSide(const ImageCorners& corners) {
-  double sum = 0;
-  for (std::size_t i = 0; i < 4; ++i) sum += (corners[(i + 1) % 4] - corners[i]).norm();
-  return sum / 4;
-}
-
 /// Adds a marker unless the same square is present (an outline and its inner rim may both decode).
 /// Of two, the one with fewer wrong bits, then the larger one, is kept.
 void AddDistinct(const DecodedMarker& marker, std::vector<DecodedMarker>& markers) {

@@ -13,8 +13,6 @@
 
 namespace plumb::bundle {
 
-using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
-
 [[nodiscard]] Eigen::Vector2d Inward(const ImageCorners& corners, std::size_t i);
 
 using DepthRow = Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>;

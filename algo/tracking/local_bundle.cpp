@@ -10,17 +10,16 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/base/robust_weights.hpp"
+#include "algo/tracking/bundle_model.hpp"
 
 namespace plumb {
 namespace {
 
-using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
 using Matrix6x3d = Eigen::Matrix<double, 6, 3>;
 
-constexpr double kNearestPoint_m =
-    0.02;  // Smallest depth in front of the camera for which projections are computed.
-constexpr double kKeypointLossScale = 2.0;  // Cauchy scale in standard deviations.
-constexpr double kCornerLossScale = 3.0;
+using bundle::kCornerLossScale;
+using bundle::kKeypointLossScale;
+using bundle::kNearestPoint_m;
 
 // A keypoint's observation with what the residuals use. Grouped by landmark.
 struct PointView {
@@ -269,8 +268,7 @@ class LocalBundle {
     r *= weight;
     const Eigen::Matrix<double, 2, 3> J = weight * view.weight * ViewDerivative(p);
     // The twist on the marker's side: p_world = T_world_marker (p + w x p + v).
-    Matrix3x6d J_in_marker;
-    J_in_marker << -Skew(view.in_marker), Eigen::Matrix3d::Identity();
+    const Matrix3x6d J_in_marker = PointJacobian(view.in_marker);
     const Eigen::Matrix<double, 2, 6> J_marker =
         J * (T_camera_world.linear() * T_world_marker.linear()) * J_in_marker;
     const int m = 6 * (num_poses_ + view.marker);

@@ -22,6 +22,19 @@ using MarkerCorners = std::array<Eigen::Vector3d, 4>;  ///< metres
 using ImageCorners =
     std::array<Eigen::Vector2d, 4>;  ///< pixels, centres at integers, as seen (distorted)
 
+/// Centre of four corners, in an image or in space.
+template <typename Point>
+[[nodiscard]] Point CentreOf(const std::array<Point, 4>& corners) {
+  return 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
+}
+/// Mean length of the four sides.
+template <typename Point>
+[[nodiscard]] double MeanSide(const std::array<Point, 4>& corners) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) sum += (corners[(i + 1) % 4] - corners[i]).norm();
+  return sum / 4.0;
+}
+
 /// One marker in one image.
 struct MarkerObservation {
   int id = 0;
