@@ -3,7 +3,11 @@
 
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -24,6 +28,21 @@ class Descriptor {
  private:
   int fd_;
 };
+
+/// Reads from a place in the file, in as many calls as it takes. @return the number of bytes, which
+/// is lower at the end of the file; -1 with errno set after an error.
+[[nodiscard]] inline ssize_t ReadAllAt(int fd, std::uint64_t offset, std::span<std::byte> bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t got =
+        ::pread(fd, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return got;
+    if (got == 0) break;
+    done += static_cast<std::size_t>(got);
+  }
+  return static_cast<ssize_t>(done);
+}
 
 /// Writes all bytes, in as many calls as it takes. @param path  Named in the error.
 /// @throws IoError with the text of DescribeWriteError().

@@ -54,6 +54,16 @@ void RefuseOtherMarkers(const SensorSettings& room, const CameraFile& camera,
            room.reference_marker ? fmt::format("{}", *room.reference_marker) : "none configured");
 }
 
+/// What holds where no calibration file states anything else.
+StreamInfo ConfiguredInfo(const SensorSettings& settings, const DepthNoise& depth_noise) {
+  StreamInfo info;
+  info.depth_noise = depth_noise;
+  info.marker_dictionary = settings.marker_dictionary;
+  info.marker_length_m = settings.marker_length_m;
+  info.reference_marker = settings.reference_marker;
+  return info;
+}
+
 /// Result of `read`; a DataError becomes a DeviceError of the sensor, with advice.
 template <typename Read>
 auto ForSensor(const std::string& serial, Read&& read) try {
@@ -83,14 +93,9 @@ StreamInfo CalibratedStreamInfo(const SensorSettings& settings, const std::strin
   const CameraFile camera =
       ForSensor(serial, [&] { return ParseCalibration(text, name, width, height); });
   if (settings.markers_are_the_rooms) RefuseOtherMarkers(settings, camera, name);
-  StreamInfo info;
+  StreamInfo info = ConfiguredInfo(settings, depth_noise);
+  TakeOver(camera, info);
   info.intrinsics = Resized(camera.color, width, height);
-  info.depth_noise = camera.depth_noise.value_or(depth_noise);
-  info.marker_dictionary = camera.marker_dictionary.value_or(settings.marker_dictionary);
-  info.marker_length_m = camera.marker_length_m.value_or(settings.marker_length_m);
-  info.reference_marker =
-      camera.reference_marker ? camera.reference_marker : settings.reference_marker;
-  info.warnings = camera.warnings;
   return info;
 }
 
@@ -104,11 +109,7 @@ StreamInfo LiveStreamInfo(const SensorSettings& settings, const std::string& ser
         settings, ForSensor(serial, [&] { return ReadTextFile(file, kMaxFileBytes); }),
         file.string(), serial, width, height, depth_noise);
   }
-  StreamInfo info;
-  info.depth_noise = depth_noise;
-  info.marker_dictionary = settings.marker_dictionary;
-  info.marker_length_m = settings.marker_length_m;
-  info.reference_marker = settings.reference_marker;
+  StreamInfo info = ConfiguredInfo(settings, depth_noise);
   info.intrinsics = Resized(Intrinsics{}, width, height);
   if (horizontal_fov_rad > 0.2 && horizontal_fov_rad < 2.5)
     info.intrinsics.fx = info.intrinsics.fy = 0.5 * width / std::tan(0.5 * horizontal_fov_rad);

@@ -40,10 +40,10 @@ struct SensorSettings {
 struct SimulatedSweeps {
   std::string suite = "demo";  ///< demo, nine or patient, as `plumb simulate` has them.
   unsigned seed = 1;
-  int frames = 300;  ///< Frames per sweep, at 30 per second.
-  int width = 640, height = 480;
-  std::size_t max_scenes = 0;  ///< Limit of the number of scenes; 0: all.
-  bool plugged = true;         ///< Whether the unit is attached at the start.
+  int frames = 300;               ///< Frames per sweep.
+  int width = 640, height = 480;  ///< Or 320 x 240.
+  std::size_t max_scenes = 0;     ///< Limit of the number of scenes; 0: all.
+  bool plugged = true;            ///< Whether the unit is attached at the start.
   /// Centres of the room calibration board's markers on its sheet, by id. If set, three scenes of
   /// the board come first.
   std::map<int, Eigen::Vector2d> board_centres_m = {};

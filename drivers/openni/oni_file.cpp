@@ -52,14 +52,7 @@ bool IsRegular(const Descriptor& file) {
 }
 
 bool ReadAt(int descriptor, std::uint64_t offset, std::span<std::uint8_t> bytes) {
-  for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t got = ::pread(descriptor, bytes.data() + done, bytes.size() - done,
-                                static_cast<off_t>(offset + done));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return false;
-    done += static_cast<std::size_t>(got);
-  }
-  return true;
+  return ReadAllAt(descriptor, offset, std::as_writable_bytes(bytes)) == std::ssize(bytes);
 }
 
 /// 0 if unknown.

@@ -212,12 +212,7 @@ void OniRecording::ReadCamera(const oni::Header& header, const RecordingDefaults
                                   side_car_file.string(), camera.color.width, camera.color.height,
                                   header.width, header.height));
     }
-    info_.intrinsics = camera.color;
-    info_.depth_noise = camera.depth_noise.value_or(DepthNoise());
-    info_.marker_dictionary = camera.marker_dictionary.value_or(info_.marker_dictionary);
-    info_.marker_length_m = camera.marker_length_m.value_or(info_.marker_length_m);
-    if (camera.reference_marker) info_.reference_marker = camera.reference_marker;
-    info_.warnings = camera.warnings;
+    TakeOver(camera, info_);
     markers_known = camera.marker_dictionary && camera.marker_length_m;
   } else {
     info_.intrinsics = Resized(Intrinsics{}, header.width, header.height);

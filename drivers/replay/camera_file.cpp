@@ -357,4 +357,13 @@ CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
       fmt::format("{} cannot be read as YAML: {}", name, std::string(error.what()).substr(0, 200)));
 }
 
+void TakeOver(const CameraFile& camera, StreamInfo& info) {
+  info.intrinsics = camera.color;
+  if (camera.depth_noise) info.depth_noise = *camera.depth_noise;
+  if (camera.marker_dictionary) info.marker_dictionary = *camera.marker_dictionary;
+  if (camera.marker_length_m) info.marker_length_m = *camera.marker_length_m;
+  if (camera.reference_marker) info.reference_marker = camera.reference_marker;
+  info.warnings.insert(info.warnings.end(), camera.warnings.begin(), camera.warnings.end());
+}
+
 }  // namespace plumb

@@ -9,6 +9,7 @@
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/types/depth_noise.hpp"
+#include "algo/types/frame.hpp"
 
 namespace plumb {
 
@@ -41,5 +42,8 @@ struct CameraFile {
 /// @param name  Name of the file for messages.
 /// @throws DataError naming file, key, what was found and what is expected.
 [[nodiscard]] CameraFile ParseCameraFile(std::string_view text, const std::string& name);
+
+/// Takes over what the file states; the rest of `info` stays. Warnings are appended.
+void TakeOver(const CameraFile& camera, StreamInfo& info);
 
 }  // namespace plumb

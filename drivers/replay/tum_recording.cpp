@@ -103,16 +103,9 @@ CameraFile AssumedCamera(const fs::path& first_image) {
 }
 
 cv::Mat ToMetres(const cv::Mat& depth_units, double units_per_metre) {
-  cv::Mat depth_m(depth_units.size(), CV_32FC1);
-  const auto metres_per_unit = static_cast<float>(1.0 / units_per_metre);
-  for (int row = 0; row < depth_units.rows; ++row) {
-    const auto* in = depth_units.ptr<std::uint16_t>(row);
-    auto* out = depth_m.ptr<float>(row);
-    for (int column = 0; column < depth_units.cols; ++column) {
-      const unsigned units = in[column] == kSaturated ? 0U : in[column];
-      out[column] = static_cast<float>(units) * metres_per_unit;
-    }
-  }
+  cv::Mat depth_m;
+  depth_units.convertTo(depth_m, CV_32F, 1.0 / units_per_metre);
+  depth_m.setTo(0.0F, depth_units == kSaturated);
   return depth_m;
 }
 
@@ -194,14 +187,11 @@ void TumRecording::ReadCamera(const fs::path& folder, const RecordingDefaults& d
   const CameraFile camera =
       given ? ParseCameraFile(ReadTextFile(file, kMaxCameraBytes), file.string())
             : AssumedCamera(plans_.front().color_file);
-  info_.intrinsics = camera.color;
   info_.intrinsics_assumed = !given;
-  info_.depth_noise = camera.depth_noise.value_or(DepthNoise());
-  info_.marker_dictionary = camera.marker_dictionary.value_or(defaults.marker_dictionary);
-  info_.marker_length_m = camera.marker_length_m.value_or(defaults.marker_length_m);
-  info_.reference_marker =
-      camera.reference_marker ? camera.reference_marker : defaults.reference_marker;
-  info_.warnings.insert(info_.warnings.end(), camera.warnings.begin(), camera.warnings.end());
+  info_.marker_dictionary = defaults.marker_dictionary;
+  info_.marker_length_m = defaults.marker_length_m;
+  info_.reference_marker = defaults.reference_marker;
+  TakeOver(camera, info_);
   if (!camera.marker_dictionary || !camera.marker_length_m) {
     info_.warnings.push_back(
         fmt::format("the recording does not state its markers: assumed {} with a side of {} m",

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "drivers/files/descriptor.hpp"
+
 namespace plumb::simulated {
 namespace {
 
@@ -17,17 +19,10 @@ constexpr std::uint32_t kMaxSide = 2560;
 constexpr std::uint32_t kMaxFrames = 20000;
 
 void ReadAt(int descriptor, void* data, std::size_t size, std::size_t offset) {
-  auto* out = static_cast<char*>(data);
-  while (size > 0) {
-    const ssize_t got = ::pread(descriptor, out, size, static_cast<off_t>(offset));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0)
-      throw std::runtime_error(std::string("cannot read cached frames: ") +
-                               (got == 0 ? "file ends" : std::strerror(errno)));
-    out += got;
-    size -= static_cast<std::size_t>(got);
-    offset += static_cast<std::size_t>(got);
-  }
+  const ssize_t got = ReadAllAt(descriptor, offset, {static_cast<std::byte*>(data), size});
+  if (got != static_cast<ssize_t>(size))
+    throw std::runtime_error(std::string("cannot read cached frames: ") +
+                             (got >= 0 ? "file ends" : std::strerror(errno)));
 }
 
 }  // namespace

@@ -150,8 +150,8 @@ void AddVirtualDriver(SensorRegistry& registry) {
                 .is_simulated = true,
                 .set_up = [](const SensorSettings& settings, const SimulatedSweeps& sweeps,
                              const std::stop_token& stop, const SetUpProgress& progress) {
-                  return std::make_unique<VirtualSetup>(settings, VirtualOptionsOf(sweeps), stop,
-                                                        progress);
+                  return std::make_unique<VirtualSetup>(settings, VirtualSensorOptions{sweeps},
+                                                        stop, progress);
                 }});
 }
 

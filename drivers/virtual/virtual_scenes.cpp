@@ -144,19 +144,6 @@ fs::path DefaultVirtualSensorCache() {
   return fs::temp_directory_path() / "plumb-virtual-sensor";
 }
 
-VirtualSensorOptions VirtualOptionsOf(const SimulatedSweeps& sweeps) {
-  VirtualSensorOptions options;
-  options.suite = sweeps.suite;
-  options.seed = sweeps.seed;
-  options.frames = sweeps.frames;
-  options.width = sweeps.width;
-  options.height = sweeps.height;
-  options.max_scenes = sweeps.max_scenes;
-  options.board_centres_m = sweeps.board_centres_m;
-  options.plugged = sweeps.plugged;
-  return options;
-}
-
 RenderedScenes RenderScenes(const VirtualSensorOptions& options, const std::stop_token& stop,
                             const SetUpProgress& progress) {
   const Renderer renderer(options, ScenesOf(options));

@@ -19,20 +19,12 @@
 
 namespace plumb {
 
-struct VirtualSensorOptions {
-  std::string suite = "demo";  ///< demo, nine or patient, as `plumb simulate` has them.
-  unsigned seed = 1;
+struct VirtualSensorOptions : SimulatedSweeps {
   simulated::NoiseLevel noise = simulated::NoiseLevel::kNominal;
-  int frames = 300;  ///< Per scene; a sweep lasts frames / rate_hz.
-  double rate_hz = 30.0;
-  int width = 640;  ///< 640 x 480 or 320 x 240.
-  int height = 480;
-  std::map<int, Eigen::Vector2d> board_centres_m = {};  ///< As in SimulatedSweeps.
-  std::size_t max_scenes = 0;                           ///< Limit of the number of scenes; 0: all.
+  double rate_hz = 30.0;  ///< A sweep lasts frames / rate_hz.
   std::filesystem::path cache_folder =
       {};  ///< Cache of the rendered frames, 1.5 MB each; empty: DefaultVirtualSensorCache().
   std::string serial = "VIRTUAL-0001";  ///< Serial of the unit that exists at the start.
-  bool plugged = true;                  ///< Whether it is attached at the start.
   /// Library of the private driver tree if OpenNI2 shows the sensor; empty: the one installed with
   /// the program, see FindVirtualSensorRuntime().
   std::filesystem::path runtime = {};
@@ -45,9 +37,6 @@ struct VirtualSensorOptions {
 /// $XDG_CACHE_HOME/plumb/virtual-sensor, otherwise ~/.cache/plumb/virtual-sensor, otherwise a
 /// folder in the system's temporary folder.
 [[nodiscard]] std::filesystem::path DefaultVirtualSensorCache();
-
-/// Converts a program's settings to options of the virtual sensor.
-[[nodiscard]] VirtualSensorOptions VirtualOptionsOf(const SimulatedSweeps& sweeps);
 
 /// The rendered scenes of a suite.
 struct RenderedScenes {

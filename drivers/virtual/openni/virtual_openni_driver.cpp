@@ -23,7 +23,7 @@ class VirtualOpenNiSetup : public SensorSetup {
  public:
   VirtualOpenNiSetup(const SensorSettings& settings, const SimulatedSweeps& sweeps,
                      const std::stop_token& stop, const SetUpProgress& progress)
-      : sensor_(VirtualOptionsOf(sweeps), stop, progress), options_{settings} {
+      : sensor_(VirtualSensorOptions{sweeps}, stop, progress), options_{settings} {
     options_.library = sensor_.runtime_library();
     options_.calibration_folder = sensor_.calibration_folder();
     options_.before_stop = [this] { sensor_.Quit(); };
