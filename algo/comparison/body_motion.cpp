@@ -391,7 +391,7 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
     ++inner;
     explained += pairs[i].valid && WeightOf(pairs[i].residual_m, fitted.scale_m) > 0 ? 1 : 0;
   }
-  motion.inlier_share =
+  motion.inlier_fraction =
       inner > 0 ? static_cast<double>(explained) / static_cast<double>(inner) : 0.0;
   return motion;
 }

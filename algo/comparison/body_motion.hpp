@@ -30,7 +30,7 @@ struct SurfaceMotion {
   Matrix6d covariance = Matrix6d::Zero();  ///< Left perturbation about T * region_centroid_m.
   double scale_m = 0.0;                    ///< Robust standard deviation of the residuals.
   /// Fraction of the region's samples that have a weighted correspondence.
-  double inlier_share = 0.0;
+  double inlier_fraction = 0.0;
   int iterations = 0;
 };
 

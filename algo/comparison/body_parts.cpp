@@ -24,9 +24,9 @@ constexpr double kMinMeasured = 1.0 / 3;  // measured fraction below which a par
 // length over width above which an outline shows the body's direction
 constexpr double kElongated = 1.5;
 // fraction of the largest width; narrower bins are head or neck
-constexpr double kNeckShare = 0.62;
+constexpr double kNeckRatio = 0.62;
 // fraction of the largest width at which the shoulders begin
-constexpr double kShoulderShare = 0.8;
+constexpr double kShoulderRatio = 0.8;
 constexpr double kMinNeck_m = 0.04;  // anything shorter is the rounded end of a trunk
 constexpr double kMaxHead_m = 0.45;  // length of head and neck
 // length behind the first end in which the widest part is searched
@@ -149,8 +149,8 @@ std::optional<Shoulders> FindShoulders(const Profile& profile) {
   if (widest <= 0.25) return std::nullopt;  // narrower than any shoulders
   std::size_t narrow = 0;
   for (std::size_t i = 0; i < std::min(profile.size(), bins(kMaxHead_m)); ++i) {
-    if (profile.width(i) < kNeckShare * widest) ++narrow;
-    if (profile.width(i) < kShoulderShare * widest) continue;
+    if (profile.width(i) < kNeckRatio * widest) ++narrow;
+    if (profile.width(i) < kShoulderRatio * widest) continue;
     if (narrow < bins(kMinNeck_m)) return std::nullopt;
     return Shoulders{profile.begin_m + static_cast<double>(i) * kBin_m, widest};
   }
@@ -264,9 +264,10 @@ constexpr std::size_t kMinDisplaced = 20;
 // Mean of the largest displacements along the couch.
 std::optional<Eigen::Vector3d> LargestShift(std::vector<Eigen::Vector3d>& shifts_m) {
   if (shifts_m.size() < kMinDisplaced) return std::nullopt;
-  const auto share =
+  const auto most_displaced =
       static_cast<std::size_t>(kMostDisplaced * static_cast<double>(shifts_m.size()));
-  const auto end = shifts_m.begin() + static_cast<std::ptrdiff_t>(std::max(kMinDisplaced, share));
+  const auto end =
+      shifts_m.begin() + static_cast<std::ptrdiff_t>(std::max(kMinDisplaced, most_displaced));
   std::partial_sort(shifts_m.begin(), end, shifts_m.end(),
                     [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
                       return a.head<2>().squaredNorm() > b.head<2>().squaredNorm();

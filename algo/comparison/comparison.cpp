@@ -23,7 +23,7 @@ namespace {
 constexpr double kCloudReach_m = 0.004;  // disc radius of one point; cloud points are 3 mm apart
 constexpr double kCloudSpacing_m = 0.003;
 // fraction of the tolerance from which a direction is reported as weak
-constexpr double kWeakShare = 0.5;
+constexpr double kWeakFraction = 0.5;
 
 // The six numbers in the order of kNumberNames; absent where they are not reported.
 std::array<std::optional<double>, 6> Values(const CouchNumbers& numbers) {
@@ -230,7 +230,7 @@ class Comparer {
     BodyMotion motion;
     motion.T = surface->T;
     motion.centroid_m = *centroid;
-    motion.inlier_share = surface->inlier_share;
+    motion.inlier_fraction = surface->inlier_fraction;
     const std::optional<SharedSensor> sensor =
         JoinSensors({.reference = reference_,
                      .current = current_,
@@ -333,7 +333,7 @@ class Comparer {
     for (std::size_t i = 0; i < value.size(); ++i) {
       if (!value[i] || !u95[i]) continue;
       evidence_.numbers[i] = MeasuredNumber{*value[i], *u95[i], result_.correction->words[i]};
-      if (*u95[i] > kWeakShare * ToleranceOf(options_.limits, i)) {
+      if (*u95[i] > kWeakFraction * ToleranceOf(options_.limits, i)) {
         result_.motion->weak_directions.push_back({kNumberNames[i], *u95[i], UnitOf(i)});
       }
     }

@@ -66,7 +66,7 @@ struct BodyMotion {
   std::vector<WeakDirection> weak_directions;
   double residual_median_m = 0.0;  ///< Nearest-surface distance in the region after the fit.
   double residual_p95_m = 0.0;
-  double inlier_share =
+  double inlier_fraction =
       0.0;  ///< Fraction of the region's points that the rigid motion explains, 0 to 1.
 };
 

@@ -10,6 +10,9 @@ namespace {
 
 constexpr double kNormal95 = 1.959964;  // half-width of a 95 % interval in standard deviations
 
+// Components of the couch vector.
+enum Couch : Eigen::Index { kLateral, kLongitudinal, kVertical, kPitch, kRoll, kYaw };
+
 // Standard deviations of the couch vector, to first order by central differences. The covariance is
 // a left perturbation (w, t) about the moved centroid m: p -> m + R(w)(p - m) + t.
 Vector6d CouchSigmas(const Pose& T_motion, const Matrix6d& covariance,
@@ -34,13 +37,13 @@ Vector6d CouchSigmas(const Pose& T_motion, const Matrix6d& covariance,
 CouchNumbers NumbersOf(const Vector6d& couch, MarkerKind kind) {
   CouchNumbers numbers;
   if (kind == MarkerKind::kRoom) {
-    numbers.lateral_mm = couch[0] / kMillimetre;
-    numbers.longitudinal_mm = couch[1] / kMillimetre;
-    numbers.vertical_mm = couch[2] / kMillimetre;
+    numbers.lateral_mm = couch[kLateral] / kMillimetre;
+    numbers.longitudinal_mm = couch[kLongitudinal] / kMillimetre;
+    numbers.vertical_mm = couch[kVertical] / kMillimetre;
   }
-  numbers.pitch_deg = couch[3] / kDegree;
-  numbers.roll_deg = couch[4] / kDegree;
-  numbers.yaw_deg = couch[5] / kDegree;
+  numbers.pitch_deg = couch[kPitch] / kDegree;
+  numbers.roll_deg = couch[kRoll] / kDegree;
+  numbers.yaw_deg = couch[kYaw] / kDegree;
   return numbers;
 }
 
@@ -56,7 +59,7 @@ struct PatientWay {
 
 PatientWay WayOf(const PatientAxes& patient, const Eigen::Vector2d& way) {
   const double limit = std::sin(22.5 * kDegree);
-  const auto side = [&](double share) { return share > limit ? 1 : (share < -limit ? -1 : 0); };
+  const auto side = [&](double part) { return part > limit ? 1 : (part < -limit ? -1 : 0); };
   return {side(way.dot(patient.head)), side(way.dot(patient.left))};
 }
 
@@ -86,28 +89,28 @@ std::array<std::string, 6> WordsWithoutRoom(const Vector6d& couch, MarkerKind ki
   std::array<std::string, 6> words;
   if (patient && posture) {
     if (kind == MarkerKind::kRoom) {
-      const bool is_anterior = (couch[2] >= 0) == IsSupine(*posture);
-      words[0] = std::string(couch[2] >= 0 ? "up" : "down") +
+      const bool is_anterior = (couch[kVertical] >= 0) == IsSupine(*posture);
+      words[0] = std::string(couch[kVertical] >= 0 ? "up" : "down") +
                  (is_anterior ? " (anterior)" : " (posterior)");
-      words[1] = ShiftWords(WayOf(*patient, sign(1) * Eigen::Vector2d::UnitY()));
-      words[2] = ShiftWords(WayOf(*patient, sign(0) * Eigen::Vector2d::UnitX()));
+      words[1] = ShiftWords(WayOf(*patient, sign(kLongitudinal) * Eigen::Vector2d::UnitY()));
+      words[2] = ShiftWords(WayOf(*patient, sign(kLateral) * Eigen::Vector2d::UnitX()));
     }
     // A rotation about an axis lifts the side that lies along z cross that axis.
-    words[3] = TiltWords(WayOf(*patient, sign(3) * Eigen::Vector2d::UnitY()));
-    words[4] = TiltWords(WayOf(*patient, -sign(4) * Eigen::Vector2d::UnitX()));
+    words[3] = TiltWords(WayOf(*patient, sign(kPitch) * Eigen::Vector2d::UnitY()));
+    words[4] = TiltWords(WayOf(*patient, -sign(kRoll) * Eigen::Vector2d::UnitX()));
     const Eigen::Vector2d turned(-patient->head.y(), patient->head.x());
     words[5] = std::string("head to patient ") +
-               (sign(5) * turned.dot(patient->left) > 0 ? "left" : "right");
+               (sign(kYaw) * turned.dot(patient->left) > 0 ? "left" : "right");
     return words;
   }
   if (kind == MarkerKind::kRoom) {
-    words[0] = couch[2] >= 0 ? "up" : "down";
-    words[1] = std::string("along ") + letter(1) + "Y of the reference marker";
-    words[2] = std::string("along ") + letter(0) + "X of the reference marker";
+    words[0] = couch[kVertical] >= 0 ? "up" : "down";
+    words[1] = std::string("along ") + letter(kLongitudinal) + "Y of the reference marker";
+    words[2] = std::string("along ") + letter(kLateral) + "X of the reference marker";
   }
-  words[3] = std::string(letter(3)) + "Y side of the reference marker up";
-  words[4] = std::string(letter(4)) + "X side of the reference marker down";
-  words[5] = couch[5] >= 0 ? "counter-clockwise from above" : "clockwise from above";
+  words[3] = std::string(letter(kPitch)) + "Y side of the reference marker up";
+  words[4] = std::string(letter(kRoll)) + "X side of the reference marker down";
+  words[5] = couch[kYaw] >= 0 ? "counter-clockwise from above" : "clockwise from above";
   return words;
 }
 
@@ -117,26 +120,27 @@ std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind,
                                    std::optional<PatientPosture> posture) {
   std::array<std::string, 6> words;
   if (kind == MarkerKind::kRoom) {
-    words[0] = couch[2] >= 0 ? "up" : "down";
-    words[1] = couch[1] >= 0 ? "toward gantry" : "away from gantry";
-    words[2] = couch[0] >= 0 ? "to the right, facing the gantry" : "to the left, facing the gantry";
+    words[0] = couch[kVertical] >= 0 ? "up" : "down";
+    words[1] = couch[kLongitudinal] >= 0 ? "toward gantry" : "away from gantry";
+    words[2] =
+        couch[kLateral] >= 0 ? "to the right, facing the gantry" : "to the left, facing the gantry";
   }
-  words[3] = couch[3] >= 0 ? "gantry end up" : "gantry end down";
-  words[4] =
-      couch[4] >= 0 ? "right side down, facing the gantry" : "left side down, facing the gantry";
-  words[5] = couch[5] >= 0 ? "counter-clockwise from above" : "clockwise from above";
+  words[3] = couch[kPitch] >= 0 ? "gantry end up" : "gantry end down";
+  words[4] = couch[kRoll] >= 0 ? "right side down, facing the gantry"
+                               : "left side down, facing the gantry";
+  words[5] = couch[kYaw] >= 0 ? "counter-clockwise from above" : "clockwise from above";
   if (!posture) return words;
 
   const bool head_first =
       *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kHeadFirstProne;
   const bool left_is_plus_x = head_first == IsSupine(*posture);
   const auto side = [&](bool plus_x) { return plus_x == left_is_plus_x ? "left" : "right"; };
-  if (kind == MarkerKind::kRoom) words[2] = std::string("to patient ") + side(couch[0] >= 0);
-  words[3] = (couch[3] >= 0) == head_first ? "head up" : "head down";
-  words[4] = std::string("patient ") + side(couch[4] >= 0) + " side down";
+  if (kind == MarkerKind::kRoom) words[2] = std::string("to patient ") + side(couch[kLateral] >= 0);
+  words[3] = (couch[kPitch] >= 0) == head_first ? "head up" : "head down";
+  words[4] = std::string("patient ") + side(couch[kRoll] >= 0) + " side down";
   // A counter-clockwise rotation (seen from above) moves the gantry end to -X and the other end to
   // +X.
-  words[5] = std::string("head to patient ") + side((couch[5] >= 0) != head_first);
+  words[5] = std::string("head to patient ") + side((couch[kYaw] >= 0) != head_first);
   return words;
 }
 
@@ -149,9 +153,9 @@ Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_refe
   const Eigen::Matrix3d R = T_correction.linear();
   Vector6d couch;
   couch.head<3>() = T_correction * isocentre_iec - isocentre_iec;
-  couch[3] = std::asin(std::clamp(R(2, 1), -1.0, 1.0));
-  couch[4] = std::atan2(-R(2, 0), R(2, 2));
-  couch[5] = std::atan2(-R(0, 1), R(1, 1));
+  couch[kPitch] = std::asin(std::clamp(R(2, 1), -1.0, 1.0));
+  couch[kRoll] = std::atan2(-R(2, 0), R(2, 2));
+  couch[kYaw] = std::atan2(-R(0, 1), R(1, 1));
   return couch;
 }
 

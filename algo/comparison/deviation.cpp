@@ -12,7 +12,7 @@ namespace {
 constexpr float kMaxJump_m =
     0.01F;  // height step between neighbouring cells; a larger one separates two surfaces
 constexpr float kSheet_m = 0.01F;  // thickness of a cloud's top surface
-constexpr float kMaxRimShare =
+constexpr float kMaxRimRatio =
     0.5F;  // lateral over axial distance; allows for a noisy normal at the rim of a pinhole
 constexpr int kMaxDescent = 200;  // steps of the local search, one cell each
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -325,7 +325,7 @@ HeightMap SignedDistance(const HeightMap& current, const HeightMap& reference,
     // nearest point lies on a crease or an end.
     if (sideways < 1.5F * step / std::max(normal.z(), 0.1F)) {
       distance.z[cell] = -along;
-    } else if (sideways < kMaxRimShare * std::abs(along) || !surface.OnRim(row, column)) {
+    } else if (sideways < kMaxRimRatio * std::abs(along) || !surface.OnRim(row, column)) {
       distance.z[cell] = along < 0 ? offset.norm() : -offset.norm();
     }
   }

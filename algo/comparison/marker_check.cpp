@@ -151,7 +151,7 @@ class Checker {
            fmt::format("marker {}", worst.value()),
            fmt::format("marker {} moved {:.0f} mm", worst.value(), moved_mm));
     const double scale = 100 * (ScaleOf(good) - 1);
-    AtMost("scale", scale, 100 * limits_.max_scale_share, "%", "",
+    AtMost("scale", scale, 100 * limits_.max_scale_error, "%", "",
            fmt::format("the markers lie {:.2f} % farther apart than they did: the sensor's "
                        "calibration may have changed",
                        scale));
@@ -167,7 +167,7 @@ class Checker {
     // Preset `best` assumes that every marker has its nominal size, so that its sides were not
     // measured and cannot be checked.
     if (std::abs(worst) < kAssumed_percent) return;
-    AtMost("side", worst, 100 * limits_.max_side_share, "%",
+    AtMost("side", worst, 100 * limits_.max_side_error, "%",
            id_of_worst ? fmt::format("marker {}", *id_of_worst) : "",
            id_of_worst
                ? fmt::format(
@@ -180,7 +180,7 @@ class Checker {
     const auto found = scene_.calibration.find("depth_scale");
     if (found == scene_.calibration.end()) return;
     const double off = 100 * (found->second - 1);
-    AtMost("depth_scale", off, 100 * limits_.max_depth_share, "%", "",
+    AtMost("depth_scale", off, 100 * limits_.max_depth_error, "%", "",
            fmt::format("the sensor's depth is off by {:+.1f} %: let it warm up, check again, then "
                        "have it calibrated",
                        off));

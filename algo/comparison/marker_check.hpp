@@ -18,9 +18,9 @@ struct MarkerCheckLimits {
   /// Distance of one marker's centre from where all others place it.
   double max_moved_m = 5 * kMillimetre;
   /// Measured side of a marker over its nominal length, minus 1; only where sides are measured.
-  double max_side_share = 0.03;
-  double max_scale_share = 0.005;  ///< Size of the marker map relative to the baseline's, minus 1.
-  double max_depth_share = 0.03;   ///< Depth scale from the sweep's own calibration, minus 1.
+  double max_side_error = 0.03;
+  double max_scale_error = 0.005;  ///< Size of the marker map relative to the baseline's, minus 1.
+  double max_depth_error = 0.03;   ///< Depth scale from the sweep's own calibration, minus 1.
   int min_views = 3;               ///< With fewer views a marker counts as not seen.
   int min_markers = 3;             ///< Fewest markers without a baseline.
 };

@@ -21,7 +21,7 @@ constexpr double kHeightLimit_m = 0.04;
 constexpr std::size_t kMaxSamples = 1500;  // cells of the reference body that are compared
 constexpr std::size_t kNumStarts = 6;
 // cost of an unmeasured cell as a fraction of the limit, because missing data is weak evidence
-constexpr float kUnknownShare = 0.7F;
+constexpr float kUnknownFraction = 0.7F;
 constexpr double kDistinctYaw_rad = 0.21;  // 12 deg
 constexpr double kDistinctShift_m = 0.05;
 
@@ -116,7 +116,7 @@ std::vector<Pose> MotionStarts(const Body& reference, const Body& current) {
       const auto cell = current.grid.cell(turned[i].x() + shift.x(), turned[i].y() + shift.y());
       const float height = cell ? map[*cell] : std::numeric_limits<float>::quiet_NaN();
       if (!std::isfinite(height)) {
-        sum += kUnknownShare * limit;
+        sum += kUnknownFraction * limit;
         continue;
       }
       hits += height > 0.0F ? 1 : 0;

@@ -28,7 +28,7 @@ constexpr double kCoarsePlaneBand_m =
     0.04;  // the first guess is level; 2 deg over 2 m are 35 mm at the ends
 constexpr double kFinePlaneBand_m = 0.010;  // surfaces are uneven by some millimetres over a room
 constexpr double kPlaneNormalCos = 0.985;   // 10 deg
-constexpr double kCarriedShare = 0.5;       // fraction of the largest carried area
+constexpr double kCarriedFraction = 0.5;    // fraction of the largest carried area
 
 struct FoundPlane {
   SupportPlane plane;
@@ -142,7 +142,7 @@ std::optional<SupportPlane> ChooseSupport(const Surface& scene,
   const int most = *std::max_element(carried.begin(), carried.end());
   const SupportPlane* best = nullptr;
   for (std::size_t k = 0; k < planes.size(); ++k) {
-    if (carried[k] < kCarriedShare * most) continue;
+    if (carried[k] < kCarriedFraction * most) continue;
     if (best == nullptr || planes[k].plane.offset_m > best->offset_m) best = &planes[k].plane;
   }
   return *best;

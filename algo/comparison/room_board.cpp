@@ -23,7 +23,7 @@ constexpr double kMinSigma_m = 1e-5;  // lower limit for synthetic markers that 
 const Eigen::Vector2d kRoomA4_m(0.198, 0.263);
 const Eigen::Vector2d kRoomA3_m(0.285, 0.386);
 // A marker needs a white border of one cell. The coarsest dictionary has 4 + 2 cells per side.
-constexpr double kWhiteShare = 4.0 / 3.0;
+constexpr double kWhiteRatio = 4.0 / 3.0;
 constexpr double kGap_m = 4 * kMillimetre;  // space for the cross
 
 MarkerCorners CornersOnBoard(const Eigen::Vector2d& centre_m, double length_m) {
@@ -77,14 +77,14 @@ std::array<int, 4> RoomBoardIds(int dictionary_size) {
 
 RoomBoard MakeRoomBoard(int dictionary_size, double marker_length_m) {
   const std::array<int, 4> ids = RoomBoardIds(dictionary_size);
-  const double cell_m = kWhiteShare * marker_length_m;
+  const double cell_m = kWhiteRatio * marker_length_m;
   const auto fits = [&](const Eigen::Vector2d& room) {
     return marker_length_m >= 0.01 && 2 * cell_m + kGap_m <= room.x();
   };
   if (!fits(kRoomA3_m)) {
     throw std::invalid_argument(fmt::format(
         "four markers of {:g} m do not fit on an A3 sheet, expected 0.01 to {:.3f} m",
-        marker_length_m, std::floor(1000 * (kRoomA3_m.x() - kGap_m) / 2 / kWhiteShare) / 1000));
+        marker_length_m, std::floor(1000 * (kRoomA3_m.x() - kGap_m) / 2 / kWhiteRatio) / 1000));
   }
   RoomBoard board{.is_a3 = !fits(kRoomA4_m), .centres_m = {}, .marker_length_m = marker_length_m};
   const Eigen::Vector2d room = board.is_a3 ? kRoomA3_m : kRoomA4_m;
@@ -130,11 +130,11 @@ std::variant<BoardFit, std::string> FitRoomBoard(const RoomBoard& board, const M
         num, board.centres_m.size(), limits.min_markers);
   }
   BoardFit fit{.scale = SpreadOf(centres_scene) / SpreadOf(centres_board), .num_markers = num};
-  if (!(std::abs(fit.scale - 1) <= limits.max_scale_share)) {
+  if (!(std::abs(fit.scale - 1) <= limits.max_scale_error)) {
     return fmt::format(
         "the board measures {:.1f} % of its size, {:g} % off are allowed: print it at 100 %, "
         "without fitting to the page, and check its ruler",
-        100 * fit.scale, 100 * limits.max_scale_share);
+        100 * fit.scale, 100 * limits.max_scale_error);
   }
   const RigidFit rigid = FitRigid(in_scene, on_board);
   fit.T_scene_board = rigid.T_a_b;

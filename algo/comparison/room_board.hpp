@@ -23,7 +23,7 @@ struct RoomCalibrationLimits {
   std::size_t min_markers = 3;         ///< Markers of the board seen in each scan.
   double max_rms_m = 2 * kMillimetre;  ///< RMS over the board's corners after the rigid fit.
   /// Distances on the board relative to those of the print, minus 1.
-  double max_scale_share = 0.01;
+  double max_scale_error = 0.01;
   std::size_t num_scans = 3;             ///< Number of scans whose positions are compared.
   double max_shift_m = 1 * kMillimetre;  ///< Largest distance of the cross between any two scans.
   double max_turn_rad = 0.2 * kDegree;   ///< Largest rotation of the board between any two scans.

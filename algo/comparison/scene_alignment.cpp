@@ -19,7 +19,7 @@ namespace {
 constexpr double kMinCornerSigma_m = 0.2 * kMillimetre;
 // The four corners of a marker share the error of the views that placed it, so together they count
 // as two independent points.
-constexpr double kIndependentShare = 0.5;
+constexpr double kIndependentFraction = 0.5;
 // The stated sigmas count as much as so many observed values that agree with them.
 constexpr double kStatedSigmasCount = 12.0;
 // Difference of scale between two scans of one room: 0.03 to 0.25 % measured on simulated sweeps.
@@ -103,7 +103,7 @@ Matrix6d FitCovariance(std::span<const SharedMarker> shared, const Subset& subse
   for (const std::size_t i : subset) {
     for (const Eigen::Vector3d& corner : shared[i].reference) {
       const Matrix3x6d jacobian = PointJacobian(corner - centre);
-      information += kIndependentShare / (shared[i].sigma_m * shared[i].sigma_m) *
+      information += kIndependentFraction / (shared[i].sigma_m * shared[i].sigma_m) *
                      jacobian.transpose() * jacobian;
     }
   }
@@ -325,7 +325,7 @@ void FitStretch(std::span<const SharedMarker> shared, const Subset& subset, Alig
   const double degrees_of_freedom =
       std::max(2.0 * static_cast<double>(corners.weights.size()) - 6.0, 1.0);
   const double variance_factor = std::max(1.0, (chi2 - right.dot(best)) / degrees_of_freedom);
-  const Eigen::Matrix3d seen = kIndependentShare / variance_factor * information;
+  const Eigen::Matrix3d seen = kIndependentFraction / variance_factor * information;
   const Eigen::Matrix3d prior = Eigen::Matrix3d::Identity() / (kStretchSigma * kStretchSigma);
   const Eigen::Matrix3d covariance = (seen + prior).inverse();
   alignment.stretch_sigma = std::sqrt(covariance.diagonal().maxCoeff());

@@ -14,7 +14,7 @@
 namespace plumb {
 namespace {
 
-constexpr std::size_t kFirstShare =
+constexpr std::size_t kFirstOneIn =
     16;  // one sixteenth of a depth image already yields nearly all points kept at 2 cm
 
 /// Kept points by cell. A point is entered into every cell that its disk touches, so that a visit
@@ -116,7 +116,7 @@ std::vector<std::uint32_t> PoissonDiskSubset(std::span<const Eigen::Vector3f> po
   // A uniformly random order at low cost: it begins with draws with repetition (a repeated visit
   // changes nothing); then all points excluded by those kept so far are removed in memory order;
   // the rest is shuffled.
-  for (std::size_t k = 0; k < points.size() / kFirstShare; ++k) visit(draw(points.size()));
+  for (std::size_t k = 0; k < points.size() / kFirstOneIn; ++k) visit(draw(points.size()));
   std::vector<std::uint32_t> free;
   std::uint32_t blocker = KeptPoints::kNobody;
   for (std::uint32_t i = 0; i < points.size(); ++i)

@@ -53,7 +53,7 @@ constexpr double kLeastSigma_m = 1e-6;
 // Patches move where their slopes are more than this many times the noise, and more than the most
 // negative ones, which only errors make.
 constexpr double kSignificant = 3.0;
-constexpr double kLowestShare = 0.01;
+constexpr double kLowestFraction = 0.01;
 // A rise counts as surely found from this many times that slope: simulated rises were missed at 2.4
 // to 2.8 times it, and found at 4.3 and more.
 constexpr double kFoundAbove = 3.0;
@@ -159,9 +159,10 @@ class SurfaceFit {
   [[nodiscard]] Rhythm BestRhythm(double longest_period_s) const {
     std::array<Rhythm, kNumFrequencies> best;
     tbb::parallel_for(0, kNumFrequencies, [&](int i) {
-      const double share = static_cast<double>(i) / (kNumFrequencies - 1);
-      best[static_cast<std::size_t>(i)] = BestPhase(
-          2.0 * std::numbers::pi * ((1.0 - share) / longest_period_s + share / kShortestPeriod_s));
+      const double fraction = static_cast<double>(i) / (kNumFrequencies - 1);
+      best[static_cast<std::size_t>(i)] =
+          BestPhase(2.0 * std::numbers::pi *
+                    ((1.0 - fraction) / longest_period_s + fraction / kShortestPeriod_s));
     });
     return *std::max_element(best.begin(), best.end(),
                              [](const Rhythm& a, const Rhythm& b) { return a.excess < b.excess; });
@@ -405,7 +406,7 @@ std::optional<Breathing> FindBreathing(std::span<const SurfacePatch> patches,
     }
     if (known.empty()) return std::nullopt;
     const double noise_m = kMadToSigma * TakeMedian(sizes);
-    const double above_m = std::max(kSignificant * noise_m, -TakeQuantile(known, kLowestShare));
+    const double above_m = std::max(kSignificant * noise_m, -TakeQuantile(known, kLowestFraction));
     const std::size_t num_moving = fit.LetMove(rhythm.angular_per_s, slopes, above_m);
     std::erase_if(known, [&](double slope) { return slope <= above_m; });
     if (round < kRounds && num_moving > 0) {

@@ -16,6 +16,9 @@ namespace plumb::dense {
 namespace {
 
 using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
+// The parts of a term's two twists.
+constexpr int kRotationA = QuadraticTerm::kTwistA, kShiftA = kRotationA + 3;
+constexpr int kRotationB = QuadraticTerm::kTwistB, kShiftB = kRotationB + 3;
 using DepthVector = Eigen::Matrix<double, CalibrationModel::kDepthSize, 1>;
 
 // Position of a lattice's first cell, relative to the first usable cell.
@@ -210,10 +213,10 @@ void FindDenseTerm(const Sensor& sensor, const View& a, const View& b, const Key
         const Eigen::Vector3d q_color = b.T_color_depth * q_b.cast<double>();
         const Eigen::Vector3d n_color_b = b.T_color_depth.linear() * n_b;
         TermVector J;
-        J.segment<3>(0) = p_color.cross(n_color_a);
-        J.segment<3>(3) = n_color_a;
-        J.segment<3>(6) = -q_color.cross(n_color_b);
-        J.segment<3>(9) = -n_color_b;
+        J.segment<3>(kRotationA) = p_color.cross(n_color_a);
+        J.segment<3>(kShiftA) = n_color_a;
+        J.segment<3>(kRotationB) = -q_color.cross(n_color_b);
+        J.segment<3>(kShiftB) = -n_color_b;
         const DepthVector J_depth = DepthJacobian(a, i);
         J.segment<QuadraticTerm::kFocal>(QuadraticTerm::kFocalAt) =
             FocalJacobian(a, i, n_a) - FocalJacobian(b, j, n_b);
@@ -264,10 +267,10 @@ void FindMarkerFaceTerm(const Sensor& sensor, const View& view, int keyframe,
       const Eigen::Vector3d p_color = view.T_color_depth * p;
       const Eigen::Vector3d n_color = view.T_color_depth.linear() * n_depth;
       TermVector J = TermVector::Zero();
-      J.segment<3>(0) = p_color.cross(n_color);
-      J.segment<3>(3) = n_color;
-      J.segment<3>(6) = -in_marker.cross(Eigen::Vector3d::UnitZ());
-      J[11] = -1.0;
+      J.segment<3>(kRotationA) = p_color.cross(n_color);
+      J.segment<3>(kShiftA) = n_color;
+      J.segment<3>(kRotationB) = -in_marker.cross(Eigen::Vector3d::UnitZ());
+      J[kShiftB + 2] = -1.0;  // along z
       const DepthVector J_depth = DepthJacobian(view, i);
       J.tail<CalibrationModel::kDepthSize>() = PositionJacobian(sensor, view, i, J_depth, n_depth);
       J.segment<QuadraticTerm::kFocal>(QuadraticTerm::kFocalAt) = FocalJacobian(view, i, n_depth);
@@ -332,9 +335,10 @@ std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibr
   // Rows are read out one after the other: each cell is moved to where the camera at the stamp
   // would see it.
   const auto readout_s = static_cast<float>(calibration.depth[kDepthReadout]);
-  std::vector<float> row_share;
+  std::vector<float> row_fraction;
   for (int r = 0; r < first.height; ++r)
-    row_share.push_back((static_cast<float>(r) + 0.5F) / static_cast<float>(first.height) - 0.5F);
+    row_fraction.push_back((static_cast<float>(r) + 0.5F) / static_cast<float>(first.height) -
+                           0.5F);
   tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
     const MapKeyframe& keyframe = map.keyframes[k];
     View& view = views[k];
@@ -352,7 +356,7 @@ std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibr
       if (z <= 0) continue;
       const auto corrected = static_cast<float>(correction.Correct(i, z));
       const Eigen::Vector3f p(rays[i].x() * corrected, rays[i].y() * corrected, corrected);
-      const float late_s = row_share[i / static_cast<std::size_t>(view.width)] * readout_s;
+      const float late_s = row_fraction[i / static_cast<std::size_t>(view.width)] * readout_s;
       view.points[i] = p + late_s * (w.cross(p) + v);
     }
   });

@@ -80,7 +80,7 @@ Eigen::VectorXd OwnVariances(const Markers& markers, const Eigen::VectorXd& weig
   Eigen::VectorXd of_markers(markers.size());
   for (Eigen::Index m = 0; m < markers.size(); ++m) {
     const Eigen::Index at = kCoordinates * m;
-    // Of its six degrees of freedom the fit takes this share; over all markers it adds up to 1.
+    // Of its six degrees of freedom the fit takes this fraction; over all markers it adds up to 1.
     const Matrix6d seen = markers.rigid.middleRows<kCoordinates>(at).transpose() *
                           weighted.middleRows<kCoordinates>(at);
     const double hidden = normal.solve(seen).trace() / kTwist;

@@ -47,7 +47,8 @@ TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOption
   tracking.keyframe_distance *= options.keyframe_spacing;
   tracking.keyframe_angle_rad *= options.keyframe_spacing;
   tracking.max_images = options.max_images;
-  tracking.min_tracked_share = 1.0 - options.keyframe_spacing * (1.0 - tracking.min_tracked_share);
+  tracking.min_tracked_fraction =
+      1.0 - options.keyframe_spacing * (1.0 - tracking.min_tracked_fraction);
   return tracking;
 }
 

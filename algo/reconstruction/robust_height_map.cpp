@@ -22,7 +22,7 @@ constexpr int kMinExtentCount =
     30;  // samples for a raster cell to count (a surface at 1 m gives 200 per view)
 constexpr std::size_t kMaxSamples =
     1'500'000;  // limit for the coarse tops; views are thinned evenly to it
-constexpr float kMinTopShare =
+constexpr float kMinTopFraction =
     0.2F;  // fraction of a coarse cell's samples that must support the top
 constexpr std::size_t kMinTopCount = 2;
 constexpr float kMinNormalZ = 0.17F;  // flanks steeper than 80 deg are given no height
@@ -187,7 +187,7 @@ TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, 
     return a.z != b.z ? a.z > b.z : (a.view != b.view ? a.view < b.view : a.pixel < b.pixel);
   });
   const std::size_t needed = std::max(
-      kMinTopCount, static_cast<std::size_t>(kMinTopShare * static_cast<float>(samples.size())));
+      kMinTopCount, static_cast<std::size_t>(kMinTopFraction * static_cast<float>(samples.size())));
   std::size_t end = 0;
   for (std::size_t begin = 0; begin + needed <= samples.size(); ++begin) {
     end = std::max(end, begin);

@@ -69,14 +69,14 @@ CalibrationPrior PriorOfNextSweep(const SensorProfile& profile, const Intrinsics
 SensorProfile Learn(const SensorProfile& profile, const CalibrationPrior& prior,
                     const SweepEvidence& evidence) {
   const CalibrationMatrix& lambda = prior.information;
-  const double share = 1.0 / (kSharedErrors * kSharedErrors);
+  const double fraction = 1.0 / (kSharedErrors * kSharedErrors);
   // The solution x of a sweep whose residuals alone give y: (I + lambda) x = I y + lambda mean.
   // This is I y.
   const CalibrationVector own =
       (evidence.information + lambda) * evidence.solution - lambda * prior.mean;
   SensorProfile learned = profile;
-  learned.covariance = Inverse(lambda + share * evidence.information, "information");
-  learned.mean = learned.covariance * (lambda * prior.mean + share * own);
+  learned.covariance = Inverse(lambda + fraction * evidence.information, "information");
+  learned.mean = learned.covariance * (lambda * prior.mean + fraction * own);
   ++learned.num_sweeps;
   return learned;
 }

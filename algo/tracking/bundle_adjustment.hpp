@@ -18,6 +18,10 @@ namespace plumb {
 /// kFocal entries of CalibrationModel::lens and of CalibrationModel::depth. Sums of millions of
 /// point-to-plane residuals are passed in this form.
 struct QuadraticTerm {
+  // Of the unknowns: the twist of keyframe a and that of keyframe b or the marker, rotations first;
+  // focal lengths; the calibration's depth terms.
+  static constexpr int kTwistA = 0;
+  static constexpr int kTwistB = 6;
   static constexpr int kFocal = 2;
   static constexpr int kFocalAt = 12;
   static constexpr int kDepthCalibrationAt = kFocalAt + kFocal;

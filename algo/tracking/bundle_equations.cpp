@@ -103,7 +103,7 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   PointRows rows;
   const CameraState& camera = state.cameras[static_cast<std::size_t>(view.keyframe)];
   const Eigen::Vector3d& p_world = state.landmarks[static_cast<std::size_t>(view.landmark)];
-  const double row_s = state.calibration.readout_s[0] * view.place.row_share;
+  const double row_s = state.calibration.readout_s[0] * view.place.row_fraction;
   const SeenPoint point = See(camera, p_world, row_s);
   const SeenPixel seen = ProjectCorrected(problem_.stated, state.calibration.lens, point.p);
   const Eigen::Vector2d r = (seen.pixel - view.pixel) * problem_.PixelWeight();
@@ -114,7 +114,7 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   rows.J_point.topRows<2>().noalias() = J * point.J_world;
   rows.J_camera.topRows<2>() = J * point.J_pose;
   rows.J_lens.leftCols<CalibrationModel::kLensSize>() = w * seen.J_lens;
-  rows.J_lens.col(kReadoutAt) = view.place.row_share * (J * point.J_time);
+  rows.J_lens.col(kReadoutAt) = view.place.row_fraction * (J * point.J_time);
   if (!(view.depth.z_m > 0)) {
     rows.r[2] = 0.0;
     rows.J_point.row(2).setZero();
@@ -122,7 +122,7 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
     rows.J_depth.setZero();
     return rows;
   }
-  const double late_s = problem_.DepthDelay(state, view.keyframe, view.place.row_share);
+  const double late_s = problem_.DepthDelay(state, view.keyframe, view.place.row_fraction);
   const SeenPoint late = See(camera, p_world, late_s);
   const PredictedDepth predicted = PredictDepth(state.calibration, late, view.place);
   const Eigen::Vector2d pixel_velocity = seen.J_point * point.J_time;
@@ -140,7 +140,7 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   rows.J_depth[kDepthShiftY] -= scale * measured.J_offset.y();
   const double by_time = measured.J_offset * pixel_velocity;
   rows.J_depth[kDepthDelay] -= by_time;
-  rows.J_depth[kDepthReadout] -= by_time * view.place.row_share;
+  rows.J_depth[kDepthReadout] -= by_time * view.place.row_fraction;
   rows.J_depth *= wz;
   return rows;
 }
@@ -152,9 +152,9 @@ CornerRows Equations::RowsOf(const State& state, const CornerView& view) const {
   marker_side.Prepare();
   const Pose T_marker0_marker = PoseFromTwist(twist);
   const Pose& T_world_marker0 = problem_.MarkerPose(view.marker);
-  const double share = RowShare(view.pixel.y(), problem_.stated.height);
+  const double fraction = RowFraction(view.pixel.y(), problem_.stated.height);
   const Eigen::Vector3d p_world = T_world_marker0 * (T_marker0_marker * view.in_marker);
-  const double row_s = state.calibration.readout_s[0] * share;
+  const double row_s = state.calibration.readout_s[0] * fraction;
   const SeenPoint point =
       See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world, row_s);
   const SeenPixel seen = ProjectCorrected(problem_.stated, state.calibration.lens, point.p);
@@ -170,7 +170,7 @@ CornerRows Equations::RowsOf(const State& state, const CornerView& view) const {
   J_in_world.rightCols<3>() = T_world_marker0.linear();
   rows.J_marker = J * point.J_world * J_in_world;
   rows.J_camera = J * point.J_pose;
-  rows.J_calibration << w * seen.J_lens, share * (J * point.J_time), w * view.inward;
+  rows.J_calibration << w * seen.J_lens, fraction * (J * point.J_time), w * view.inward;
   return rows;
 }
 
@@ -208,6 +208,7 @@ void Equations::AddCornersOfMarker(std::size_t slot) {
 }
 
 void Equations::AddTerm(const QuadraticTerm& term, const Problem::TermVector& slope) {
+  constexpr int kA = QuadraticTerm::kTwistA, kB = QuadraticTerm::kTwistB;
   constexpr int kFocal = QuadraticTerm::kFocal;
   constexpr int kFocalAt = QuadraticTerm::kFocalAt;
   constexpr int kDepthSize = CalibrationModel::kDepthSize;
@@ -225,13 +226,13 @@ void Equations::AddTerm(const QuadraticTerm& term, const Problem::TermVector& sl
     H_.block<kFocal, 6>(f, at) += term.H.block<kFocal, 6>(kFocalAt, in_term);
     H_.block<kDepthSize, 6>(d, at) += term.H.block<kDepthSize, 6>(kDepth, in_term);
   };
-  if (a) add_pose(*a, 0);
-  if (b) add_pose(*b, 6);
+  if (a) add_pose(*a, kA);
+  if (b) add_pose(*b, kB);
   if (a && b) {
     if (*b > *a) {
-      H_.block<6, 6>(*b, *a) += term.H.block<6, 6>(6, 0);
+      H_.block<6, 6>(*b, *a) += term.H.block<6, 6>(kB, kA);
     } else {
-      H_.block<6, 6>(*a, *b) += term.H.block<6, 6>(0, 6);
+      H_.block<6, 6>(*a, *b) += term.H.block<6, 6>(kA, kB);
     }
   }
   if (!problem_.options.calibrate) return;

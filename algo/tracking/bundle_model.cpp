@@ -74,7 +74,7 @@ SeenPixel ProjectCorrected(const Intrinsics& k, const CalibrationModel::Lens& le
 DepthPlace::DepthPlace(const Eigen::Vector2d& pixel, const Intrinsics& stated)
     : centred(CentredCoordinates(pixel.x(), pixel.y(), stated.width, stated.height)),
       products(FieldProducts(centred)),
-      row_share(RowShare(pixel.y(), stated.height)) {}
+      row_fraction(RowFraction(pixel.y(), stated.height)) {}
 
 namespace {
 
@@ -128,7 +128,7 @@ PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint
   J[kDepthDelay] = late;
   J[kDepthSlopeX] = -z * place.centred.x();
   J[kDepthSlopeY] = -z * place.centred.y();
-  J[kDepthReadout] = late * place.row_share;
+  J[kDepthReadout] = late * place.row_fraction;
   J.segment<kNumFieldTerms>(kDepthField) =
       -z * place.products.head<kNumFieldTerms>().cast<double>().transpose();
   J.segment<kNumGrowthTerms>(kDepthGrowth) =

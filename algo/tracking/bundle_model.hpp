@@ -56,7 +56,7 @@ struct SeenPixel {
 
 /// Fraction of the readout before or after the stamp at an image row: -0.5 at the top, 0.5 at the
 /// bottom.
-[[nodiscard]] inline double RowShare(double y_px, int height) {
+[[nodiscard]] inline double RowFraction(double y_px, int height) {
   return (y_px + 0.5) / height - 0.5;
 }
 
@@ -74,7 +74,7 @@ struct DepthPlace {
   DepthPlace(const Eigen::Vector2d& pixel, const Intrinsics& stated);
   Eigen::Vector2d centred;  ///< CentredCoordinates()
   FieldRow products;        ///< FieldProducts()
-  double row_share = 0;
+  double row_fraction = 0;
 };
 /// @param seen  The point at the time of the reading.
 [[nodiscard]] PredictedDepth PredictDepth(const CalibrationModel& calibration,

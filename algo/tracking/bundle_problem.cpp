@@ -173,10 +173,10 @@ Eigen::Vector3d Problem::CornerInWorld(const State& state, const CornerView& vie
          (PoseFromTwist(state.markers[static_cast<std::size_t>(view.marker)]) * view.in_marker);
 }
 
-double Problem::DepthDelay(const State& state, int keyframe, double row_share) const {
+double Problem::DepthDelay(const State& state, int keyframe, double row_fraction) const {
   const Keyframe& data = map_.keyframe(keyframe).data;
   return data.depth_time_s - data.color_time_s + state.calibration.depth[kDepthDelay] +
-         row_share * state.calibration.depth[kDepthReadout];
+         row_fraction * state.calibration.depth[kDepthReadout];
 }
 
 double Problem::Cost(const State& state) const {
@@ -202,14 +202,15 @@ double Problem::PointCost(const State& state, const PointView& view) const {
   const Eigen::Vector3d p = PointInCamera(state, view);
   const Eigen::Vector3d motion =
       -(camera.velocity_per_s.head<3>().cross(p) + camera.velocity_per_s.tail<3>());
-  const Eigen::Vector3d at_row = p + state.calibration.readout_s[0] * view.place.row_share * motion;
+  const Eigen::Vector3d at_row =
+      p + state.calibration.readout_s[0] * view.place.row_fraction * motion;
   if (at_row.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
   const SeenPixel seen = ProjectCorrected(stated, state.calibration.lens, at_row);
   const Eigen::Vector2d r = (seen.pixel - view.pixel) * PixelWeight();
   double cost = 0.5 * CauchyLoss(r.squaredNorm(), kKeypointLossScale);
   if (view.depth.z_m > 0) {
-    const double late_s = DepthDelay(state, view.keyframe, view.place.row_share);
-    const double row_s = state.calibration.readout_s[0] * view.place.row_share;
+    const double late_s = DepthDelay(state, view.keyframe, view.place.row_fraction);
+    const double row_s = state.calibration.readout_s[0] * view.place.row_fraction;
     const DepthBeside measured(view.depth,
                                DepthOffset(state, seen.J_point * motion, late_s - row_s));
     const double rz =
@@ -222,9 +223,10 @@ double Problem::PointCost(const State& state, const PointView& view) const {
 }
 
 double Problem::CornerCost(const State& state, const CornerView& view) const {
-  const double share = RowShare(view.pixel.y(), stated.height);
-  const SeenPoint point = See(state.cameras[static_cast<std::size_t>(view.keyframe)],
-                              CornerInWorld(state, view), state.calibration.readout_s[0] * share);
+  const double fraction = RowFraction(view.pixel.y(), stated.height);
+  const SeenPoint point =
+      See(state.cameras[static_cast<std::size_t>(view.keyframe)], CornerInWorld(state, view),
+          state.calibration.readout_s[0] * fraction);
   if (point.p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
   return 0.5 * CauchyLoss(CornerResidual(state, view, point.p).squaredNorm(), kCornerLossScale);
 }
@@ -245,9 +247,9 @@ Eigen::Vector2d Problem::CornerResidual(const State& state, const CornerView& vi
 Problem::TermVector Problem::TermState(const State& state, const QuadraticTerm& term) const {
   TermVector x;
   x.head<6>() = state.cameras[static_cast<std::size_t>(term.keyframe_a)].twist;
-  x.segment<6>(6) = term.keyframe_b
-                        ? state.cameras[static_cast<std::size_t>(*term.keyframe_b)].twist
-                        : state.markers[static_cast<std::size_t>(markers.at(term.marker.value()))];
+  x.segment<6>(QuadraticTerm::kTwistB) =
+      term.keyframe_b ? state.cameras[static_cast<std::size_t>(*term.keyframe_b)].twist
+                      : state.markers[static_cast<std::size_t>(markers.at(term.marker.value()))];
   for (int i = 0; i < QuadraticTerm::kFocal; ++i)
     x[QuadraticTerm::kFocalAt + i] = state.calibration.lens[static_cast<std::size_t>(i)] -
                                      calibration_.lens[static_cast<std::size_t>(i)];

@@ -68,7 +68,7 @@ class Problem {
 
   [[nodiscard]] double PixelWeight() const;
   /// Time from the colour image's stamp to the depth reading at a row.
-  [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_share) const;
+  [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_fraction) const;
   /// Offset from a keypoint's pixel to where the depth image shows it.
   /// @param pixel_velocity  Of the point in the image, pixels per second.
   /// @param later_s  Time by which the depth is read later.

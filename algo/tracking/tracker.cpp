@@ -28,9 +28,10 @@ struct PointSupport {
 
 PointSupport SupportOf(const PoseEstimate& estimate, std::size_t num_points) {
   if (num_points == 0) return {};
-  const double share = static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points);
-  return {.by_many = estimate.num_inliers >= 12 && share > 0.35,
-          .by_markers = estimate.num_inliers >= 4 && share > 0.6};
+  const double fraction =
+      static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points);
+  return {.by_many = estimate.num_inliers >= 12 && fraction > 0.35,
+          .by_markers = estimate.num_inliers >= 4 && fraction > 0.6};
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ struct TrackerOptions {
   double keyframe_distance = 0.06;
   double keyframe_angle_rad = 0.09;
   /// Fraction of the keyframe's keypoints below which a new keyframe is created.
-  double min_tracked_share = 0.6;
+  double min_tracked_fraction = 0.6;
   int local_keyframes = 6;  ///< Keyframes that local bundle adjustment moves.
   /// Of each block of so many pixels each way, keyframes keep the colour of the middle one.
   int color_block = 1;
@@ -64,8 +64,8 @@ struct TrackedFrame {
 /// @throws std::invalid_argument for fewer than two frames.
 [[nodiscard]] double UsualSpacing(std::span<const TrackedFrame> frames);
 
-/// Two stamps that are closer than this share of the usual spacing are not the times at which the
-/// images were taken. The motion between them, divided by their difference, is not a velocity.
+/// Two stamps that are closer than this fraction of the usual spacing are not the times at which
+/// the images were taken. The motion between them, divided by their difference, is not a velocity.
 inline constexpr double kLeastOfUsualSpacing = 0.5;
 
 /// Not thread-safe: call from one thread. Deterministic.

@@ -54,7 +54,7 @@ bool Tracker::NeedsKeyframe(const Pose& T_world_color) const {
   if (RotationAngle(T_keyframe_now) > options_.keyframe_angle_rad) return true;
   return options_.use_keypoints &&
          static_cast<double>(followed_points_.points().size()) <
-             options_.min_tracked_share * static_cast<double>(reference_count_) &&
+             options_.min_tracked_fraction * static_cast<double>(reference_count_) &&
          (T_keyframe_now.translation().norm() > 0.01 || RotationAngle(T_keyframe_now) > 0.01 ||
           followed_points_.points().size() < 30);
 }

@@ -85,7 +85,7 @@ class ImageMotion {
 
   void Add(const Eigen::Vector3d& p_world, const Eigen::Vector2d& pixel,
            const Eigen::Vector2d& shift, double weight, double loss_scale) {
-    const double dt_s = calibration_.readout_s[0] * RowShare(pixel.y(), stated_.height);
+    const double dt_s = calibration_.readout_s[0] * RowFraction(pixel.y(), stated_.height);
     const SeenPoint seen = See(camera_, p_world, dt_s);
     if (seen.p.z() < kNearestPoint_m) return;
     const SeenPixel projected = ProjectCorrected(stated_, calibration_.lens, seen.p);

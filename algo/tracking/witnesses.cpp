@@ -45,8 +45,8 @@ class Images {
     Eigen::Matrix<double, 2, 3> J_world;
   };
   [[nodiscard]] std::optional<Residual> At(const View& view, const Eigen::Vector3d& p_world) const {
-    const double share = RowShare(view.pixel.y(), stated_.height);
-    const SeenPoint seen = See(*view.camera, p_world, calibration_.readout_s[0] * share);
+    const double fraction = RowFraction(view.pixel.y(), stated_.height);
+    const SeenPoint seen = See(*view.camera, p_world, calibration_.readout_s[0] * fraction);
     if (seen.p.z() < kNearestPoint_m) return std::nullopt;
     const SeenPixel projected = ProjectCorrected(stated_, calibration_.lens, seen.p);
     return Residual{projected.pixel - view.pixel, projected.J_point * seen.J_world};

@@ -149,9 +149,9 @@ void ReadCheck(Section section, MarkerCheckLimits& limits) {
   constexpr double kPercent = 0.01;
   section.TakeScaled("misfit_mm", limits.max_misfit_m, kMillimetre, "millimetres above 0");
   section.TakeScaled("moved_mm", limits.max_moved_m, kMillimetre, "millimetres above 0");
-  section.TakeScaled("side_percent", limits.max_side_share, kPercent, "percent above 0");
-  section.TakeScaled("scale_percent", limits.max_scale_share, kPercent, "percent above 0");
-  section.TakeScaled("depth_percent", limits.max_depth_share, kPercent, "percent above 0");
+  section.TakeScaled("side_percent", limits.max_side_error, kPercent, "percent above 0");
+  section.TakeScaled("scale_percent", limits.max_scale_error, kPercent, "percent above 0");
+  section.TakeScaled("depth_percent", limits.max_depth_error, kPercent, "percent above 0");
   section.Take("min_views", limits.min_views, "a whole number from 1 to 1000",
                [](int n) { return n >= 1 && n <= 1000; });
   section.RejectUnknownKeys();

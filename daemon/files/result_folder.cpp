@@ -84,7 +84,7 @@ Json MotionJson(const BodyMotion& motion) {
           {"weak_directions", weak},
           {"residual_m", {{"median", motion.residual_median_m}, {"p95", motion.residual_p95_m}}},
           {"centroid_m", VectorJson(motion.centroid_m)},
-          {"inlier_share", motion.inlier_share}};
+          {"inlier_share", motion.inlier_fraction}};
 }
 
 Json NumbersJson(const CouchNumbers& numbers) {

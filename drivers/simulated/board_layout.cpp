@@ -90,7 +90,7 @@ class Views {
   }
 
   // The smallest fraction of its sweep in which any scene sees the board.
-  [[nodiscard]] double LeastShare(const Pose& T_world_board) const {
+  [[nodiscard]] double LeastFraction(const Pose& T_world_board) const {
     double least = 1.0;
     for (std::size_t scene = 0; scene < scenes_.size(); ++scene) {
       int sights = 0;
@@ -119,14 +119,14 @@ Pose ReferencePose(const LayoutRegion& region, const std::vector<LayoutScene>& s
   const double tilt = 0.3 * kDegree * random.Uniform();
   const double tilt_direction = random.Uniform(0.0, kTwoPi);
   std::optional<Pose> best;
-  double best_share = 0;
+  double best_fraction = 0;
   for (double x = -region.half_length + 0.05; x < -0.42; x += 0.03) {
     for (double y = -region.half_width + 0.02; y < -0.28; y += 0.03) {
       const Pose T = BoardPose(x, y, yaw, tilt, tilt_direction);
       if (!FreeOfBodies(T, scenes)) continue;
-      const double share = views.LeastShare(T);
-      if (share > best_share) {
-        best_share = share;
+      const double fraction = views.LeastFraction(T);
+      if (fraction > best_fraction) {
+        best_fraction = fraction;
         best = T;
       }
     }

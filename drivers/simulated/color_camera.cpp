@@ -35,23 +35,23 @@ class PixelKernel {
                                  ? 0.5 * (std::erf((x + 0.5) / (blur_px * std::numbers::sqrt2)) -
                                           std::erf((x - 0.5) / (blur_px * std::numbers::sqrt2)))
                                  : 1.0;
-      shares_.push_back(i == 0 ? 0.0 : shares_.back() + density);
+      fractions_.push_back(i == 0 ? 0.0 : fractions_.back() + density);
     }
-    for (double& share : shares_) share /= shares_.back();
+    for (double& fraction : fractions_) fraction /= fractions_.back();
   }
   /// Position below which the given fraction of the light falls.
-  [[nodiscard]] double Inverse(double share) const {
-    const auto above = std::upper_bound(shares_.begin() + 1, shares_.end() - 1, share);
-    const auto i = static_cast<std::size_t>(above - shares_.begin());
-    const double step = shares_[i] - shares_[i - 1];
+  [[nodiscard]] double Inverse(double fraction) const {
+    const auto above = std::upper_bound(fractions_.begin() + 1, fractions_.end() - 1, fraction);
+    const auto i = static_cast<std::size_t>(above - fractions_.begin());
+    const double step = fractions_[i] - fractions_[i - 1];
     return places_[i - 1] +
-           (places_[i] - places_[i - 1]) * (step > 0 ? (share - shares_[i - 1]) / step : 0.5);
+           (places_[i] - places_[i - 1]) * (step > 0 ? (fraction - fractions_[i - 1]) / step : 0.5);
   }
 
  private:
   static constexpr int kSteps = 2000;
   std::vector<double> places_;
-  std::vector<double> shares_;
+  std::vector<double> fractions_;
 };
 
 std::vector<int> Permutation(RandomStream& random, int size) {
@@ -236,12 +236,12 @@ Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
     black -= plane.IsBlack(o.x + t * d.x, o.y + t * d.y);
   }
   const Vector3f p = PointAt(shot, x, y);
-  const float share = static_cast<float>(black[0] + black[1] + black[2] + black[3]) /
-                      static_cast<float>(4 * samples.size());
+  const float fraction = static_cast<float>(black[0] + black[1] + black[2] + black[3]) /
+                         static_cast<float>(4 * samples.size());
   const Material white = ObjectOf(material);
   const Vector3f paper = shot.world.Albedo({white}, p);
   const Vector3f ink = shot.world.Albedo({static_cast<Material>(white + 1)}, p);
-  return shot.world.ShadingAt(material, p).light.cwiseProduct(paper + share * (ink - paper));
+  return shot.world.ShadingAt(material, p).light.cwiseProduct(paper + fraction * (ink - paper));
 }
 
 Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y,

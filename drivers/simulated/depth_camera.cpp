@@ -19,9 +19,9 @@ using Eigen::Vector3f;
 
 constexpr double kJitterFilterPx =
     1.5;  // At 640 pixels width; the jitter of neighbours is slightly correlated.
-constexpr float kEdgeStep = 0.02F;     // Depth difference of neighbours that forms an edge, metres.
-constexpr float kFlyingShare = 0.15F;  // Fraction of edge pixels with a depth in between.
-constexpr float kEdgeLossShare = 0.45F;  // Fraction of edge pixels without depth.
+constexpr float kEdgeStep = 0.02F;  // Depth difference of neighbours that forms an edge, metres.
+constexpr float kFlyingFraction = 0.15F;    // Fraction of edge pixels with a depth in between.
+constexpr float kEdgeLossFraction = 0.45F;  // Fraction of edge pixels without depth.
 constexpr float kGrazingBegin = static_cast<float>(74.0 * kDegree);  // Losses begin here
 constexpr float kGrazingEnd = static_cast<float>(82.0 * kDegree);    // and are complete here.
 constexpr float kSteepest = 1.3F;  // Radians; even steeper surfaces count as edges.
@@ -178,9 +178,9 @@ inline double DepthCamera::SpeckleAt(int x, int y, double z) const {
   double place = std::fmod(x - kProjectorBaseline_m * unit_.depth_true.fx / z, width);
   if (place < 0) place += width;
   const int column = std::min(static_cast<int>(place), width - 1);
-  const double share = place - column;
+  const double fraction = place - column;
   const float* row = &speckle_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width)];
-  return (1.0 - share) * row[column] + share * row[(column + 1) % width];
+  return (1.0 - fraction) * row[column] + fraction * row[(column + 1) % width];
 }
 
 void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m,
@@ -214,8 +214,8 @@ void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m,
       if (highest - lowest > kEdgeStep &&
           highest - lowest > kEdgeStep + 0.02F * lowest * TangentOf(cosine[x])) {
         const auto edge_chance = static_cast<float>(UnitUniform(Hash(hash)));
-        if (edge_chance < kEdgeLossShare) continue;
-        if (edge_chance < kEdgeLossShare + kFlyingShare)
+        if (edge_chance < kEdgeLossFraction) continue;
+        if (edge_chance < kEdgeLossFraction + kFlyingFraction)
           z = lowest + UnitUniform(Hash(hash, 1)) * (highest - lowest);
       }
     }

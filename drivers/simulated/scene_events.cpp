@@ -56,12 +56,12 @@ void AddHand(std::vector<Rod>& rods, const HandVisit& visit, double time_s) {
         MakeRod(tip + Vector3d(1.3 * across, 0, 0), knuckles + Vector3d(across, 0, 0), 0.009));
 }
 
-Pose Between(const Pose& from, const Pose& to, double share) {
+Pose Between(const Pose& from, const Pose& to, double fraction) {
   Pose T = Pose::Identity();
   T.linear() = Eigen::Quaterniond(from.linear())
-                   .slerp(share, Eigen::Quaterniond(to.linear()))
+                   .slerp(fraction, Eigen::Quaterniond(to.linear()))
                    .toRotationMatrix();
-  T.translation() = from.translation() + share * (to.translation() - from.translation());
+  T.translation() = from.translation() + fraction * (to.translation() - from.translation());
   return T;
 }
 
@@ -76,9 +76,9 @@ World WorldAt(const World& world, const SceneEvents& events, double time_s,
   World now = world;
   if (events.pushed) {
     const PushedBoard& pushed = *events.pushed;
-    const double share = Ease((time_s - pushed.begin_s) / (pushed.end_s - pushed.begin_s));
+    const double fraction = Ease((time_s - pushed.begin_s) / (pushed.end_s - pushed.begin_s));
     const Pose& before = world.room().boards.at(pushed.board).T_world_marker;
-    now.MoveBoard(pushed.board, Between(before, pushed.T_world_after, share));
+    now.MoveBoard(pushed.board, Between(before, pushed.T_world_after, fraction));
   }
   if (events.breath) {
     const auto& levels = events.breath->levels;

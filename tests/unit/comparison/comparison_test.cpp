@@ -169,7 +169,7 @@ TEST(ComparisonTest, AMovedArmAndABreathingBellyDoNotDragTheBody) {
   EXPECT_LT(ErrorAt_mm(comparison, T_motion, centroid),
             2.0);  // measured 1.2; the deformed third moved by 15 to 36 mm
   EXPECT_LT(Angle_deg(comparison, T_motion), 0.8);  // measured 0.5, roll about the long axis
-  EXPECT_LT(comparison.motion->inlier_share, 0.95);
+  EXPECT_LT(comparison.motion->inlier_fraction, 0.95);
 }
 
 TEST(ComparisonTest, AFullBodyIsRegisteredToo) {

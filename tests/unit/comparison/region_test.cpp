@@ -143,10 +143,11 @@ TEST(RegionTest, CoverageCountsWhatTheCurrentScanMeasuredAndFindsTheHole) {
     };
     const RegionCoverage coverage =
         CoverageOf(*reference.height_map, mask, MakeSyntheticScene(moved).cloud, 0.003, T_motion);
-    const double hole_share = 3.1416 * radius * radius / MaskArea_m2(*reference.height_map, mask);
+    const double hole_fraction =
+        3.1416 * radius * radius / MaskArea_m2(*reference.height_map, mask);
     // Cells of 6 mm count as measured when partly so: the hole shrinks by half a cell all round, 30
     // % of the smaller one's area.
-    EXPECT_NEAR(1.0 - coverage.coverage, hole_share, 0.4 * hole_share + 0.001);
+    EXPECT_NEAR(1.0 - coverage.coverage, hole_fraction, 0.4 * hole_fraction + 0.001);
     EXPECT_NEAR(coverage.largest_hole_m, 2 * radius, 0.009);
     if (radius == 0) continue;
     EXPECT_LT((coverage.hole_centre_m - hole.head<2>()).norm(), 0.01);

@@ -178,10 +178,10 @@ TEST_F(SensitivityOfTest, EachTermMovesSurfaceAndMarkersAsAnotherSolutionDoes) {
                term, surface.found_m, surface.off_m, markers.found_m, markers.off_m);
     // Measured: at most 0.5 % of the surface's movement and 1.2 % of the markers'. For the readout,
     // whose effect is not linear, 2 %.
-    const double share = term == kReadoutAt ? 0.1 : 0.03;
+    const double fraction = term == kReadoutAt ? 0.1 : 0.03;
     EXPECT_GT(surface.found_m, 0) << term;
-    EXPECT_LT(surface.off_m, share * surface.found_m) << term;
-    EXPECT_LT(markers.off_m, share * markers.found_m) << term;
+    EXPECT_LT(surface.off_m, fraction * surface.found_m) << term;
+    EXPECT_LT(markers.off_m, fraction * markers.found_m) << term;
   }
 }
 

@@ -169,17 +169,18 @@ TEST(DepthCameraTest, TheProjectorsShadowLiesLeftOfTheForeground) {
 TEST(DepthCameraTest, RegistrationErrsOnNominalAndNotOnIdeal) {
   const World world = BallWorld({0, 0, -0.5});
   const Trajectory trajectory(Standing(kHeight));
-  const auto lost_share = [](const cv::Mat& registered) {
+  const auto lost_fraction = [](const cv::Mat& registered) {
     return 1.0 - static_cast<double>(cv::countNonZero(registered)) /
                      static_cast<double>(registered.total());
   };
   const SensorUnit ideal = MakeSensorUnit(NoiseLevel::kIdeal, 1, 640, 480);
-  EXPECT_EQ(lost_share(DepthCamera(ideal).Render(world, trajectory, 2.0, 1).registered), 0.0);
+  EXPECT_EQ(lost_fraction(DepthCamera(ideal).Render(world, trajectory, 2.0, 1).registered), 0.0);
   EXPECT_TRUE(ideal.T_color_depth_true.isApprox(ideal.T_color_depth_assumed));
 
   const SensorUnit nominal = MakeSensorUnit(NoiseLevel::kNominal, 1, 640, 480);
   // The depth camera's view is narrower: a dark rim of 10 to 25 % is left.
-  const double lost = lost_share(DepthCamera(nominal).Render(world, trajectory, 2.0, 1).registered);
+  const double lost =
+      lost_fraction(DepthCamera(nominal).Render(world, trajectory, 2.0, 1).registered);
   EXPECT_GT(lost, 0.08);
   EXPECT_LT(lost, 0.30);
   EXPECT_FALSE(nominal.T_color_depth_true.isApprox(nominal.T_color_depth_assumed, 1e-5));

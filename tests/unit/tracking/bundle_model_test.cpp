@@ -108,10 +108,10 @@ TEST(BundleModel, DerivativesOfAPredictedDepth) {
     calibration.depth[static_cast<std::size_t>(i)] = 0.001 * std::sin(i);
   const DepthPlace place({255.5, 55.5}, SomeLens());
   const auto predict = [&](const CalibrationModel& c) {
-    return PredictDepth(
-        c,
-        See(SomeCamera(), kPoint, c.depth[kDepthDelay] + place.row_share * c.depth[kDepthReadout]),
-        place);
+    return PredictDepth(c,
+                        See(SomeCamera(), kPoint,
+                            c.depth[kDepthDelay] + place.row_fraction * c.depth[kDepthReadout]),
+                        place);
   };
   const PredictedDepth predicted = predict(calibration);
   const double worst =

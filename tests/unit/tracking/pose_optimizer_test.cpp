@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 const Pose kTruth = PoseFromTwist((Vector6d() << 0.3, -0.2, 0.5, 0.4, -0.1, 0.2).finished());
 const Pose kOff = PoseFromTwist((Vector6d() << 0.02, -0.015, 0.02, 0.02, -0.03, 0.015).finished());
 
-std::vector<PosePoint> Points(int count, double outlier_share, double sigma, bool with_depth) {
+std::vector<PosePoint> Points(int count, double outlier_fraction, double sigma, bool with_depth) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
   std::normal_distribution<double> normal;
@@ -28,7 +28,8 @@ std::vector<PosePoint> Points(int count, double outlier_share, double sigma, boo
     point.p_world = kTruth * Vector3d(ideal.x() * z, ideal.y() * z, z);
     point.ideal = ideal + sigma * Vector2d(normal(random), normal(random));
     point.sigma = sigma > 0 ? sigma : 0.001;
-    if (i < outlier_share * count) point.ideal += 0.2 * Vector2d(uniform(random), uniform(random));
+    if (i < outlier_fraction * count)
+      point.ideal += 0.2 * Vector2d(uniform(random), uniform(random));
     if (with_depth) {
       point.inverse_z = 1.0 / z;
       point.inverse_z_sigma = 0.005;
