@@ -17,8 +17,6 @@
 
 namespace plumb {
 
-using store::kSelf;
-
 namespace {
 
 using Clock = std::chrono::steady_clock;

@@ -18,8 +18,6 @@
 
 namespace plumb {
 
-using store::kSelf;
-
 namespace {
 
 /// Ticks between the checks of two stored scans, and until the next search for one that is due.

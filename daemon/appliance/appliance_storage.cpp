@@ -18,8 +18,6 @@
 
 namespace plumb {
 
-using store::kSelf;
-
 namespace {
 
 /// If the display cannot be paired, that is logged, and scanning remains possible.

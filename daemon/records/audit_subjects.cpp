@@ -58,16 +58,16 @@ std::optional<AuditSubject> DescribeSubject(Database& database, const std::strin
                                             const std::string& subject) {
   const auto prefix = std::ranges::find_if(
       kPrefixes, [&](const Prefix& one) { return action.starts_with(one.action); });
-  const auto id = store::ParseId(subject);
+  const auto id = ParseId(subject);
   if (prefix == kPrefixes.end() || !id) return std::nullopt;
   AuditSubject about;
   about.kind = prefix->kind.name;
-  Statement query = database.Prepare(prefix->kind.query);
-  if (!query.Bind(*id).Step()) return about;
+  Statement query = database.Prepare(prefix->kind.query, *id);
+  if (!query.Step()) return about;
   about.exists = true;
   about.patient_code = query.Text(0);
   about.number = static_cast<int>(query.Integer(1));
-  if (query.Integer(2) > 0) about.time = store::FromStored(query.Integer(2));
+  if (query.Integer(2) > 0) about.time = FromStored(query.Integer(2));
   return about;
 }
 

@@ -125,12 +125,12 @@ class Writing {
     Stored scans;
     {
       Statement query = database.Prepare("SELECT id FROM scans WHERE has_folder = 1");
-      while (query.Step()) scans[store::ScanId(query.Integer(0))];
+      while (query.Step()) scans[ScanId(query.Integer(0))];
     }
     Statement query =
         database.Prepare("SELECT scan_id, path, bytes, sha256 FROM scan_files ORDER BY path");
     while (query.Step()) {
-      const auto scan = scans.find(store::ScanId(query.Integer(0)));
+      const auto scan = scans.find(ScanId(query.Integer(0)));
       if (scan == scans.end()) continue;
       scan->second.push_back({.path = query.Text(1),
                               .bytes = static_cast<std::uint64_t>(query.Integer(2)),
@@ -328,7 +328,7 @@ BackupReport BackUpStopped(const fs::path& state, const fs::path& target,
   Migrate(database);
   BackupReport report = WriteBackup(state, database, target, stop, secret);
   Transaction transaction(database);
-  AppendAuditEntry(database, store::kCommand, "backup.make", "",
+  AppendAuditEntry(database, kCommand, "backup.make", "",
                    Described(target, report, secret != nullptr));
   transaction.Commit();
   return report;
@@ -363,7 +363,7 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
     WriteWholeFile(made / kRestored, nlohmann::ordered_json{{"backup", ValidUtf8(backup.string())},
                                                             {"sha256", reader.digest()},
                                                             {"scans", report.scans},
-                                                            {"time", store::Now()}}
+                                                            {"time", StoredNow()}}
                                          .dump(2));
     GiveToOwnerOf(state, made);
     SyncDisk(made);
@@ -431,12 +431,12 @@ void NoteRestore(const fs::path& state, Database& database) {
                          about.at("backup").get<std::string>(), about.at("scans").get<int>(),
                          about.at("sha256").get<std::string>(),
                          fmt::gmtime(std::chrono::system_clock::to_time_t(
-                             store::FromStored(about.at("time").get<std::int64_t>()))));
+                             FromStored(about.at("time").get<std::int64_t>()))));
   } catch (const std::exception& unreadable) {  // that it was restored is known in any case
     detail = fmt::format("the note about it cannot be read: {}", unreadable.what());
   }
   Transaction transaction(database);
-  AppendAuditEntry(database, store::kSelf, "backup.restore", "", detail);
+  AppendAuditEntry(database, kSelf, "backup.restore", "", detail);
   transaction.Commit();
   fs::remove(note, error);  // if that fails, the next start adds the entry once more
 }

@@ -209,11 +209,9 @@ constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1, kVersion2
 
 /// Whether a newer database states that programs with this schema can use it.
 bool IsUsable(Database& database) {
-  Statement tables = database.Prepare("SELECT 1 FROM sqlite_master WHERE name = 'settings'");
-  if (!tables.Step()) return false;
-  Statement query = database.Prepare("SELECT value FROM settings WHERE name = ?");
-  if (!query.Bind(std::string(kUsableFromName)).Step()) return false;
-  const std::string text = query.Text(0);
+  if (!database.Has("SELECT 1 FROM sqlite_master WHERE name = 'settings'")) return false;
+  const std::string text =
+      database.FirstText("SELECT value FROM settings WHERE name = ?", kUsableFromName).value_or("");
   int oldest = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), oldest);
   return error == std::errc() && end == text.data() + text.size() && oldest > 0 &&
@@ -221,20 +219,14 @@ bool IsUsable(Database& database) {
 }
 
 void NoteUsableFrom(Database& database) {
-  database.Prepare("INSERT OR REPLACE INTO settings (name, value) VALUES (?, ?)")
-      .Bind(std::string(kUsableFromName))
-      .Bind(std::to_string(kUsableFromSchema))
-      .Run();
+  database.Run("INSERT OR REPLACE INTO settings (name, value) VALUES (?, ?)", kUsableFromName,
+               std::to_string(kUsableFromSchema));
 }
 
 }  // namespace
 
 void Migrate(Database& database) {
-  int version = 0;
-  {
-    Statement query = database.Prepare("PRAGMA user_version");
-    if (query.Step()) version = static_cast<int>(query.Integer(0));
-  }
+  int version = static_cast<int>(database.FirstInteger("PRAGMA user_version").value_or(0));
   if (version > kSchemaVersion && IsUsable(database)) return;
   if (version < 0 || version > kSchemaVersion) {
     throw DatabaseCorrupt(fmt::format(
