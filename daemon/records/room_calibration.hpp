@@ -55,10 +55,10 @@ struct SignedRoom {
 /// @throws DataError stating what is wrong with it.
 [[nodiscard]] SignedRoom SignedRoomIn(const std::string& json);
 
-/// Why this check shows that the room has changed since it was calibrated, as one sentence; empty
-/// if it has not. Nothing if the check saw too little to decide.
+/// Why the markers that a check saw show that the room has changed since it was calibrated, as one
+/// sentence; empty if it has not. Nothing if it saw too little to decide.
 [[nodiscard]] std::optional<std::string> WhyRoomIsDue(const SignedRoom& room,
-                                                      const std::string& check_json,
+                                                      const MarkerBaseline& seen,
                                                       const MarkerCheckLimits& limits);
 
 }  // namespace plumb

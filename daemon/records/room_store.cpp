@@ -6,6 +6,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/records/check_json.hpp"
 #include "daemon/records/store_refusal.hpp"
 #include "daemon/records/stored_values.hpp"
 
@@ -129,7 +130,9 @@ std::string RoomStore::WhyDue(const SignedRoom& room, const MarkerCheckLimits& l
   Statement query = rows->Prepare("SELECT json FROM checks WHERE id > ? ORDER BY id DESC LIMIT ?",
                                   LastCheckOf(room), kChecksSearched);
   while (query.Step()) {
-    if (const auto why = WhyRoomIsDue(room, query.Text(0), limits)) return *why;
+    const std::optional<MarkerBaseline> seen = BaselineIn(query.Text(0));
+    if (!seen) continue;
+    if (const auto why = WhyRoomIsDue(room, *seen, limits)) return *why;
   }
   return {};
 }
