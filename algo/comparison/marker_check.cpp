@@ -206,18 +206,6 @@ class Checker {
 
 }  // namespace
 
-const char* Name(MarkerCheckStatus status) {
-  switch (status) {
-    case MarkerCheckStatus::kPassed:
-      return "passed";
-    case MarkerCheckStatus::kFailed:
-      return "failed";
-    case MarkerCheckStatus::kNoBaseline:
-      return "no_baseline";
-  }
-  return "failed";
-}
-
 MarkerBaseline BaselineOf(const Scene& scene, const MarkerCheckLimits& limits) {
   MarkerBaseline baseline{{}, scene.marker_dictionary, scene.marker_length_m};
   for (const auto& [id, marker] : scene.markers) {

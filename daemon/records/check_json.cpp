@@ -96,7 +96,9 @@ CheckRecord CheckIn(const std::string& check_json) {
   };
   if (!json.is_object()) return unreadable("it is not a JSON object");
   try {
-    record.status = json.at("status").get<std::string>();
+    const auto status = Named<MarkerCheckStatus>(json.at("status").get<std::string>());
+    if (!status) return unreadable("its status is none that this version knows");
+    record.status = *status;
     record.reasons = json.value("reasons", record.reasons);
     record.num_markers = json.value("markers", Json::object()).size();
     for (const Json& item : json.value("items", Json::array())) {

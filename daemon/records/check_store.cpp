@@ -26,7 +26,7 @@ CheckRecord ReadCheck(const Statement& row) {
 
 std::string CheckStore::Add(const Actor& actor, const std::string& sensor_serial,
                             const TakenCheck& taken) {
-  const char* status = Name(taken.check.status);
+  const std::string status(Name(taken.check.status));
   StoreChange change(database_);
   change->Run("INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (?, ?, ?, ?, ?)",
               StoredNow(), actor.user, sensor_serial, status, CheckJson(taken));

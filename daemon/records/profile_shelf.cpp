@@ -56,7 +56,9 @@ ProfileVersion Parse(const std::string& text, const std::string& serial, int ver
   ProfileVersion found;
   found.version = version;
   found.made = Clock::time_point(std::chrono::seconds(json.at("made_s").get<std::int64_t>()));
-  found.cause = json.at("cause").get<std::string>();
+  const auto cause = Named<ProfileCause>(json.at("cause").get<std::string>());
+  if (!cause) throw DataError("its cause is none that this version knows");
+  found.cause = *cause;
   if (json.at("profile").is_null()) return found;
   found.profile = ParseSensorProfile(json["profile"].dump());
   found.profile->name = fmt::format("{} version {}", serial, version);
@@ -112,7 +114,7 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
   }
   try {
     // Comes first, so that no earlier version replaces it unnoticed at the next scan.
-    in_use.version = Write(serial, "unreadable", std::nullopt);
+    in_use.version = Write(serial, ProfileCause::kUnreadable, std::nullopt);
     const fs::path set_aside =
         folder_ / kSetAside / fmt::format("{}-{}", FolderName(serial), file.filename().string());
     fs::create_directories(set_aside.parent_path());
@@ -138,7 +140,7 @@ std::vector<ProfileVersion> ProfileShelf::Versions(const std::string& serial) co
   return versions;
 }
 
-int ProfileShelf::Write(const std::string& serial, const char* cause,
+int ProfileShelf::Write(const std::string& serial, ProfileCause cause,
                         const std::optional<SensorProfile>& profile) {
   const std::vector<Entry> entries = Entries(serial);
   const int version = entries.empty() ? 1 : entries.front().version + 1;
@@ -146,7 +148,7 @@ int ProfileShelf::Write(const std::string& serial, const char* cause,
   json["serial"] = serial;
   json["made_s"] =
       std::chrono::duration_cast<std::chrono::seconds>(Clock::now().time_since_epoch()).count();
-  json["cause"] = cause;
+  json["cause"] = Name(cause);
   json["profile"] = profile ? Json::parse(SensorProfileJson(*profile)) : Json();
   const std::string body = json.dump(1) + "\n";
   const fs::path folder = FolderOf(serial);
@@ -167,12 +169,12 @@ int ProfileShelf::Add(const std::string& serial, const SensorProfile& profile,
   const std::vector<Entry> entries = Entries(serial);
   if (begun_from && (entries.empty() ? 0 : entries.front().version) != *begun_from)
     throw DataError("the profile was reset or taken back while the sweep went on");
-  return Write(serial, "learned", profile);
+  return Write(serial, ProfileCause::kLearned, profile);
 }
 
 int ProfileShelf::Reset(const std::string& serial) {
   const std::lock_guard lock(mutex_);
-  return Write(serial, "reset", std::nullopt);
+  return Write(serial, ProfileCause::kReset, std::nullopt);
 }
 
 int ProfileShelf::RollBack(const std::string& serial, int version) {
@@ -181,7 +183,7 @@ int ProfileShelf::RollBack(const std::string& serial, int version) {
     if (entry.version != version) continue;
     const ProfileVersion earlier = ReadVersion(entry.file, serial, version);
     if (!earlier.profile) break;
-    return Write(serial, "rolled_back", earlier.profile);
+    return Write(serial, ProfileCause::kRolledBack, earlier.profile);
   }
   throw DataError(
       fmt::format("the sensor {} has no profile of version {}: choose one of those that "

@@ -50,7 +50,7 @@ void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
 
 /// Verdict and numbers for the log: "move: vertical +1.2, ..., yaw -0.10".
 std::string Described(const ResultSummary& result) {
-  std::string text = result.verdict;
+  std::string text(Name(result.verdict));
   for (const NumberAxis& axis : kNumberAxes) {
     if (const auto value = axis.In(result.correction))
       text += fmt::format(", {} {:+.2f} {}", axis.name, *value, axis.unit);
@@ -241,7 +241,7 @@ void ScanStore::Accept(const Actor& actor, const std::string& id, const std::str
                          "this scan has no result: only a compared scan is accepted");
     }
     const ResultSummary result = SummaryOf(query.Text(2));
-    if (result.verdict == "no_answer")
+    if (result.verdict == Verdict::kNoAnswer)
       throw StoreRefusal(ChangeResult::kConflict,
                          "this scan gave no answer: there is nothing to accept");
     if (!query.Text(1).empty())
@@ -253,7 +253,7 @@ void ScanStore::Accept(const Actor& actor, const std::string& id, const std::str
       throw StoreRefusal(ChangeResult::kConflict,
                          "another version of the reference has been approved since this scan: scan "
                          "again, then accept");
-    if (result.verdict != "in_tolerance" && reason.empty())
+    if (result.verdict != Verdict::kInTolerance && reason.empty())
       throw StoreRefusal(ChangeResult::kConflict,
                          "this result is not in tolerance: accepting it requires a reason and "
                          "your password");

@@ -53,11 +53,10 @@ const Json* ObjectIn(const Json& json, const char* key) {
   return &*found;
 }
 
-std::string VerdictIn(const Json& json) {
+Verdict VerdictIn(const Json& json) {
   const auto found = json.find("verdict");
-  for (const Verdict verdict :
-       {Verdict::kInTolerance, Verdict::kUnsure, Verdict::kMove, Verdict::kNoAnswer}) {
-    if (found != json.end() && *found == Name(verdict)) return Name(verdict);
+  if (found != json.end() && found->is_string()) {
+    if (const auto verdict = Named<Verdict>(found->get_ref<const std::string&>())) return *verdict;
   }
   RefuseResult("it has no verdict that this version knows");
 }

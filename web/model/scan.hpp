@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/acceptance/verdict.hpp"
 #include "algo/base/names.hpp"
 #include "web/model/check.hpp"
 #include "web/model/numbers.hpp"
@@ -29,9 +30,9 @@ inline constexpr double kResultValid_s = 120.0;
 
 /// Summary of a comparison, short enough for a list. All other data is in result.json.
 struct ResultSummary {
-  std::string verdict;  ///< "in_tolerance", "unsure", "move" or "no_answer".
+  Verdict verdict = Verdict::kNoAnswer;
   std::vector<std::string> reasons;
-  /// The motion to APPLY. With "no_answer" it is for analysis only, never to be shown as advice.
+  /// The motion to APPLY. With kNoAnswer it is for analysis only, never to be shown as advice.
   std::optional<ReportedNumbers> correction;
   std::optional<ReportedNumbers> u95;
   /// Directions of the correction, in the order of kNumberAxes; empty if unknown.
@@ -68,7 +69,7 @@ struct Scan {
 
 /// Whether every value was within tolerance, but not with its uncertainty.
 [[nodiscard]] inline bool IsUnsure(const Scan& scan) {
-  return scan.result && scan.result->verdict == "unsure";
+  return scan.result && scan.result->verdict == Verdict::kUnsure;
 }
 
 }  // namespace plumb

@@ -61,7 +61,7 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
     ASSERT_EQ(shown.versions.size(), 2U);
     EXPECT_EQ(shown.versions[0].version, 2);
     EXPECT_EQ(shown.versions[0].num_sweeps, 5);
-    EXPECT_EQ(shown.versions[0].cause, "learned");
+    EXPECT_EQ(shown.versions[0].cause, ProfileCause::kLearned);
     EXPECT_EQ(NextScanBeginsFrom(), "A version 2, 5 sweeps");
 
     EXPECT_EQ(Reset("B").result, ChangeResult::kConflict) << "another unit";

@@ -177,7 +177,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   const auto store = Open();
   const std::vector<CheckRecord> checks = store->checks.List(10);
   ASSERT_THAT(checks, SizeIs(2));
-  EXPECT_EQ(checks[0].status, "passed");
+  EXPECT_EQ(checks[0].status, MarkerCheckStatus::kPassed);
   EXPECT_EQ(checks[0].user, "anna");
   EXPECT_EQ(checks[0].sensor_serial, "S1");
   EXPECT_EQ(checks[0].num_markers, 5U);
