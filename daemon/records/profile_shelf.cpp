@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/parse_number.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
 #include "daemon/records/scan_files.hpp"
@@ -87,12 +87,9 @@ std::vector<ProfileShelf::Entry> ProfileShelf::Entries(const std::string& serial
   std::vector<Entry> entries;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(serial), error)) {
-    const std::string name = entry.path().stem().string();
-    int version = 0;
-    const auto [end, failed] = std::from_chars(name.data(), name.data() + name.size(), version);
-    if (entry.path().extension() == kEnding && failed == std::errc() &&
-        end == name.data() + name.size() && version > 0 && version < kMaxVersion)
-      entries.push_back({version, entry.path()});
+    const std::optional<int> version = ParseNumber<int>(entry.path().stem().string());
+    if (entry.path().extension() == kEnding && version && *version > 0 && *version < kMaxVersion)
+      entries.push_back({*version, entry.path()});
   }
   std::sort(entries.begin(), entries.end(),
             [](const Entry& a, const Entry& b) { return a.version > b.version; });

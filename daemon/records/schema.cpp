@@ -1,9 +1,10 @@
 #include "daemon/records/schema.hpp"
 
-#include <charconv>
 #include <string>
 
 #include <fmt/format.h>
+
+#include "algo/base/parse_number.hpp"
 
 namespace plumb {
 namespace {
@@ -196,10 +197,8 @@ bool IsUsable(Database& database) {
   if (!database.Has("SELECT 1 FROM sqlite_master WHERE name = 'settings'")) return false;
   const std::string text =
       database.FirstText("SELECT value FROM settings WHERE name = ?", kUsableFromName).value_or("");
-  int oldest = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), oldest);
-  return error == std::errc() && end == text.data() + text.size() && oldest > 0 &&
-         oldest <= kSchemaVersion;
+  const std::optional<int> oldest = ParseNumber<int>(text);
+  return oldest && *oldest > 0 && *oldest <= kSchemaVersion;
 }
 
 void NoteUsableFrom(Database& database) {

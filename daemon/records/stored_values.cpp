@@ -1,12 +1,12 @@
 #include "daemon/records/stored_values.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/parse_number.hpp"
 #include "daemon/records/store_refusal.hpp"
 
 namespace plumb {
@@ -27,11 +27,9 @@ std::int64_t StoredNow() { return ToStored(WallClock::now()); }
 
 std::optional<std::int64_t> ParseId(std::string_view text) {
   constexpr std::size_t kMaxDigits = 15;
-  std::int64_t id = 0;
-  if (text.empty() || text.size() > kMaxDigits) return std::nullopt;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
-  if (error != std::errc() || end != text.data() + text.size() || id <= 0) return std::nullopt;
-  return id;
+  if (text.size() > kMaxDigits) return std::nullopt;
+  const std::optional<std::int64_t> id = ParseNumber<std::int64_t>(text);
+  return id && *id > 0 ? id : std::nullopt;
 }
 
 std::int64_t RequireId(const std::string& text, const char* what) {
