@@ -1,6 +1,5 @@
 #include "daemon/records/backup.hpp"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -174,9 +173,7 @@ class Writing {
 
 /// In there it would be a part of the next one, and go with what it is to replace.
 void RequireOutside(const fs::path& state, const fs::path& target) {
-  const fs::path inner = fs::weakly_canonical(target), outer = fs::weakly_canonical(state);
-  if (std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first != outer.end())
-    return;
+  if (!IsBelow(fs::weakly_canonical(target), fs::weakly_canonical(state))) return;
   throw std::invalid_argument(
       fmt::format("a backup cannot be made at {}: that is inside the state folder {} itself; name "
                   "a folder on another disk",
@@ -198,19 +195,6 @@ void RequireEmpty(const fs::path& state) {
     throw IoError(fmt::format("cannot list {}: {}", state.string(), error.message()));
 }
 
-/// Files restored by root get the account that runs plumbd as their owner.
-void GiveToOwnerOf(const fs::path& state, const fs::path& tree) {
-  struct stat owner {};
-  if (::geteuid() != 0 || ::stat(state.c_str(), &owner) != 0 || owner.st_uid == 0) return;
-  const auto give = [&](const fs::path& path) {
-    if (::lchown(path.c_str(), owner.st_uid, owner.st_gid) != 0)
-      throw IoError(DescribeWriteError(path, errno));
-  };
-  give(tree);
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(tree))
-    give(entry.path());
-}
-
 void MoveIn(const fs::path& made, const fs::path& state) {
   std::vector<std::string> names = {kRestored, kScans};
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
@@ -222,7 +206,7 @@ void MoveIn(const fs::path& made, const fs::path& state) {
     if (::rename((made / name).c_str(), (state / name).c_str()) != 0)
       throw IoError(DescribeWriteError(state / name, errno));
   }
-  SyncDisk(state);
+  SyncWholeDisk(state);
   std::error_code ignored;
   fs::remove_all(made, ignored);
 }
@@ -244,7 +228,7 @@ void MoveDatabase(const fs::path& from, const fs::path& to) {
     throw IoError(DescribeWriteError(to / name, error));
   }
   try {
-    SyncDisk(to);
+    SyncWholeDisk(to);
   } catch (const IoError&) {
     drop(to);
     throw;
@@ -254,7 +238,7 @@ void MoveDatabase(const fs::path& from, const fs::path& to) {
     drop(to);
     throw IoError(DescribeWriteError(to / kDatabase, error));
   }
-  SyncDisk(to);
+  SyncWholeDisk(to);
   drop(from);
 }
 
@@ -291,7 +275,7 @@ fs::path MoveOldAside(const fs::path& state) {
                                 (state / name).string()));
     throw IoError(DescribeWriteError(state / name, error));
   }
-  SyncDisk(state);
+  SyncWholeDisk(state);
   if (!fs::is_empty(aside)) return aside;
   fs::remove(aside);
   return {};
@@ -366,7 +350,7 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
                                                             {"time", StoredNow()}}
                                          .dump(2));
     GiveToOwnerOf(state, made);
-    SyncDisk(made);
+    SyncWholeDisk(made);
     MoveIn(made, state);
   } catch (const fs::filesystem_error& error) {
     throw IoError(DescribeWriteError(state, error.code().value()));

@@ -1,9 +1,7 @@
 #include "daemon/records/patient_transfer.hpp"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
@@ -229,7 +227,7 @@ class PatientImport {
       report_.bytes += scan ? reader_.CopyTo(Made(), file, stop_).bytes : 0;
       ++report_.files;
     }
-    SyncDisk(store_.folders.state());
+    SyncWholeDisk(store_.folders.state());
   }
 
   void Insert() {
@@ -248,8 +246,9 @@ class PatientImport {
       fs::create_directories(store_.folders.state() / kImports);
       moved.push_back(ImportedFile(store_.folders.state(), patient));
       WriteWholeFile(moved.back(), record_.dump(1, ' ', false, Json::error_handler_t::replace));
-      GiveToOwner(moved);
-      SyncDisk(store_.folders.state());
+      GiveToOwnerOf(store_.folders.state(), store_.folders.state() / kImports);
+      for (const fs::path& path : moved) GiveToOwnerOf(store_.folders.state(), path);
+      SyncWholeDisk(store_.folders.state());
       AppendAuditEntry(*database_, kCommand, "patient.import", std::to_string(patient),
                        fmt::format("{}: {} scans, {} references as drafts, sha256 {}", report_.code,
                                    report_.scans, report_.references, reader_.digest()));
@@ -269,25 +268,6 @@ class PatientImport {
   static void Remove(const std::vector<fs::path>& moved) {
     std::error_code ignored;
     for (const fs::path& path : moved) fs::remove_all(path, ignored);
-  }
-
-  /// Files imported by root get the account that runs plumbd as their owner.
-  void GiveToOwner(const std::vector<fs::path>& moved) const {
-    struct stat owner {};
-    if (::geteuid() != 0 || ::stat(store_.folders.state().c_str(), &owner) != 0 ||
-        owner.st_uid == 0)
-      return;
-    const auto give = [&owner](const fs::path& path) {
-      if (::lchown(path.c_str(), owner.st_uid, owner.st_gid) != 0)
-        throw IoError(DescribeWriteError(path, errno));
-    };
-    give(store_.folders.state() / kImports);
-    for (const fs::path& path : moved) {
-      give(path);
-      if (!fs::is_directory(path)) continue;
-      for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path))
-        give(entry.path());
-    }
   }
 
   void InsertRows() {

@@ -69,7 +69,11 @@ void Sha256::Add(const void* bytes, std::size_t count) {
 std::string Sha256::Hex() {
   std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
   crypto_hash_sha256_final(&state_, hash.data());
-  return fmt::format("{:02x}", fmt::join(hash, ""));
+  return HexOf(hash);
+}
+
+std::string HexOf(std::span<const unsigned char> bytes) {
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
 }
 
 std::string Sha256Of(std::string_view text) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -25,6 +26,8 @@ class Sha256 {
   crypto_hash_sha256_state state_{};
 };
 
+/// Two digits for each byte.
+[[nodiscard]] std::string HexOf(std::span<const unsigned char> bytes);
 [[nodiscard]] std::string Sha256Of(std::string_view text);
 
 /// Result of examining a path.

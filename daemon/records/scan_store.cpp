@@ -1,9 +1,7 @@
 #include "daemon/records/scan_store.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <cerrno>
+#include <cstdio>
 
 #include <fmt/format.h>
 
@@ -38,14 +36,13 @@ DailyCheck DailyCheckOf(std::int64_t stored) {
                        : DailyCheck::kOverdue;
 }
 
-/// Flushes a folder, or with ::syncfs everything on its disk.
-void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) throw DiskRefused(DescribeWriteError(folder, errno));
-  const int result = sync(descriptor);
-  const int error = errno;
-  ::close(descriptor);
-  if (result != 0 && error != EINVAL) throw DiskRefused(DescribeWriteError(folder, error));
+/// @param sync  SyncToDisk or SyncWholeDisk. @throws DiskRefused
+void Flush(const fs::path& folder, void (*sync)(const fs::path&)) {
+  try {
+    sync(folder);
+  } catch (const IoError& error) {
+    throw DiskRefused(error.what());
+  }
 }
 
 /// Verdict and numbers for the log: "move: vertical +1.2, ..., yaw -0.10".
@@ -193,12 +190,12 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
     for (const char* part : {"scene", "result"}) fs::remove_all(staging / part, ignored);
   }
   // Scene and result are on the disk; a recording has too many images to flush them one by one.
-  if (fs::exists(staging / kRecordingFolder, ignored)) Sync(folders_.scans(), ::syncfs);
+  if (fs::exists(staging / kRecordingFolder, ignored)) Flush(folders_.scans(), SyncWholeDisk);
   if (::rename(staging.c_str(), folders_.Scan(scan_id).c_str()) != 0) {
     throw DiskRefused(DescribeWriteError(folders_.Scan(scan_id), errno));
   }
   try {
-    Sync(folders_.scans());
+    Flush(folders_.scans(), SyncToDisk);
     NoteEnd(*writer, scan_id, finished, is_kept, files);
   } catch (...) {  // without its row a scan does not exist
     ::rename(folders_.Scan(scan_id).c_str(), staging.c_str());
