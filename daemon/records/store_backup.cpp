@@ -3,7 +3,6 @@
 #include <linux/magic.h>
 #include <sys/statfs.h>
 
-#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <sstream>
