@@ -183,7 +183,7 @@ FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
   std::vector<std::uint8_t> sealed(crypto_secretstream_xchacha20poly1305_HEADERBYTES);
   ::crypto_secretstream_xchacha20poly1305_init_push(&state, sealed.data(), key_.data());
   target.Write(sealed);
-  Written written{.plain = {.path = path, .bytes = 0, .sha256 = {}}, .sealed = {}};
+  Written written{.plain = {.path = path}, .sealed = {}};
   Sha256 hash;
   do {
     CheckStop(stop);
@@ -219,7 +219,7 @@ FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
   DigestingWriter target(to, path);
   Sha256 sealed_hash;
   sealed_hash.Add(header.data(), header.size());
-  Written written{.plain = {}, .sealed = {.path = path, .bytes = header.size(), .sha256 = {}}};
+  Written written{.plain = {}, .sealed = {.path = path, .bytes = header.size()}};
   do {
     CheckStop(stop);
     const std::vector<std::uint8_t> piece = pieces.Take();

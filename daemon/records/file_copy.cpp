@@ -40,9 +40,7 @@ fs::path InMadeFolders(const fs::path& file) {
 }  // namespace
 
 DigestingWriter::DigestingWriter(const fs::path& folder, const std::string& path)
-    : target_(InMadeFolders(folder / path)),
-      copy_(target_),
-      digest_{.path = path, .bytes = 0, .sha256 = {}} {}
+    : target_(InMadeFolders(folder / path)), copy_(target_), digest_{.path = path} {}
 
 void DigestingWriter::Write(std::span<const std::uint8_t> bytes) {
   hash_.Add(bytes.data(), bytes.size());

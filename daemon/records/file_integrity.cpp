@@ -35,7 +35,7 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
   std::vector<FileDigest> first_seen;
   std::string fault;
   if (is_done && !has(kSceneMarker)) {  // stored by an older Plumb
-    fault = WhyNotThere(folder, {{.path = kSceneMarker, .sha256 = {}}}, look_);
+    fault = WhyNotThere(folder, {{.path = kSceneMarker}}, look_);
     if (fault.empty()) first_seen = DigestsOfScan(folder, stop);
   } else {
     fault = WhyNotIntact(folder, files, scene_only ? kScenePrefix : "", stop);

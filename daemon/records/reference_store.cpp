@@ -44,11 +44,8 @@ Reference ReadReferenceRow(const Statement& row) {
                       .created_by = row.Text(5),
                       .reason = row.Text(6),
                       .revision = static_cast<int>(row.Integer(10)),
-                      .digest = {},
                       .planned_by = row.Text(11),
-                      .approved_by = row.Text(7),
-                      .approved_at = {},
-                      .plan = {}};
+                      .approved_by = row.Text(7)};
   if (!row.IsNull(8)) reference.approved_at = FromStored(row.Integer(8));
   reference.digest = DigestOf(row);
   return reference;

@@ -102,8 +102,7 @@ std::optional<BoardScan> BoardScanIn(const std::string& check_json) {
 }
 
 RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibrationLimits& limits) {
-  RoomCandidate candidate{
-      .scans = std::move(scans), .fit = {}, .why_not = {}, .json = {}, .digest = {}};
+  RoomCandidate candidate{.scans = std::move(scans)};
   std::vector<BoardScan> used;
   std::vector<RoomScan> seen;
   for (const BoardScan& scan : candidate.scans) {

@@ -30,10 +30,10 @@ struct BoardScan {
 /// The calibration that would be signed now.
 struct RoomCandidate {
   std::vector<BoardScan> scans;  ///< Newest first; the newest usable ones count.
-  std::optional<RoomFit> fit;
-  std::string why_not;  ///< Why it may not be signed; empty if it may.
-  std::string json;     ///< Text to be stored; empty without a fit.
-  std::string digest;   ///< SHA-256 of it in hexadecimal: the data that a person signs.
+  std::optional<RoomFit> fit = {};
+  std::string why_not = {};  ///< Why it may not be signed; empty if it may.
+  std::string json = {};     ///< Text to be stored; empty without a fit.
+  std::string digest = {};   ///< SHA-256 of it in hexadecimal: the data that a person signs.
 };
 /// @param scans  Newest first.
 [[nodiscard]] RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans,

@@ -47,7 +47,7 @@ using ExaminePath = std::function<FileLook(const std::filesystem::path&)>;
 struct FileDigest {
   std::string path;  ///< In the scan's folder: "scene/cloud.ply" or "recording".
   std::uint64_t bytes = 0;
-  std::string sha256;  ///< Hexadecimal. For a recording: of the list of its files' digests.
+  std::string sha256 = {};  ///< Hexadecimal. For a recording: of the list of its files' digests.
   bool operator==(const FileDigest&) const = default;
 };
 

@@ -217,13 +217,7 @@ Settings ParseSettings(const std::string& text) {
 ResultSummary SummaryOf(const std::string& result_json) {
   const Json json = ParseBoundedJsonOrNothing(result_json);
   if (!json.is_object()) RefuseResult("expected a JSON object, found none");
-  ResultSummary summary{.verdict = VerdictIn(json),
-                        .reasons = {},
-                        .correction = {},
-                        .u95 = {},
-                        .words = {},
-                        .body_now = {},
-                        .body_after = {}};
+  ResultSummary summary{.verdict = VerdictIn(json)};
   ReadWords(json, summary);
   if (const auto reasons = json.find("reasons"); reasons != json.end()) {
     if (!reasons->is_array()) RefuseResult("its reasons are not a list");

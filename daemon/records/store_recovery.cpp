@@ -112,7 +112,7 @@ std::vector<LookedAt> Recovery::ExamineScans() {
   for (std::size_t i = 0; i < scans.size(); ++i) {
     std::vector<FileDigest> files = StoredDigests(database_, scans[i].id);
     if (files.empty() && has_scene[i])  // stored by an older Plumb, and not examined since
-      files.push_back({.path = kSceneMarker, .sha256 = {}});
+      files.push_back({.path = kSceneMarker});
     scans[i].now = WhyNotThere(folders_.Scan(ScanId(scans[i].id)), files, look_);
     if (!scans[i].now.empty()) scans[i].aside = FindAside(scans[i].id, files);
   }

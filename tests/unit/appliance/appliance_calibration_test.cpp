@@ -136,10 +136,9 @@ class ApplianceRoomTest : public ApplianceProfileTest {
       const std::string id = store.scans.Begin({.patient_id = store.patients.Add(erik_, "P-1", ""),
                                                 .reference_id = {},
                                                 .purpose = ScanPurpose::kReference,
-                                                .sensor_serial = "A",
-                                                .reason = {}});
+                                                .sensor_serial = "A"});
       WriteScene(scene, store.folders.Staging(id) / "scene");
-      store.scans.Finish(id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}});
+      store.scans.Finish(id, {.outcome = ScanOutcome::kDone});
       reference = store.references.Find(store.references.Add(erik_, id, "", {}));
     });
     return reference.value();

@@ -30,11 +30,7 @@ inline void FillScan(const std::filesystem::path& folder) {
 }
 
 inline NewScan Begun(const std::string& patient) {
-  return {.patient_id = patient,
-          .reference_id = {},
-          .purpose = {},
-          .sensor_serial = "S1",
-          .reason = {}};
+  return {.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = "S1"};
 }
 
 /// @param fill  Writes the scan's files into a folder.
@@ -44,7 +40,6 @@ inline std::string StoreScan(
   const std::string id = store.scans.Begin(Begun(patient));
   fill(store.folders.Staging(id));
   store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
-                          .failure = {},
                           .result_json = R"({"verdict":"in_tolerance"})",
                           .swept_area_m2 = 1.0});
   return id;

@@ -75,8 +75,7 @@ TEST_P(FailedSweepTest, KeepsACompleteRecordingOfOneThatFailed) {
     fs::create_directories(recording / "rgb");
     WriteWholeFile(recording / "rgb" / "1.png", std::string_view("image"));
     if (is_complete) WriteWholeFile(recording / "rgb.txt", std::string_view("1 rgb/1.png"));
-    store_->scans.Finish(id,
-                         {.outcome = GetParam(), .failure = "marker not seen", .result_json = {}});
+    store_->scans.Finish(id, {.outcome = GetParam(), .failure = "marker not seen"});
     EXPECT_FALSE(fs::exists(store_->folders.Staging(id)));
     EXPECT_EQ(testing::FilesBelow(store_->folders.Scan(id)).size(),
               is_kept && is_complete ? 2U : 0U);

@@ -91,8 +91,7 @@ TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) 
                                                .sensor_serial = serial,
                                                .reason = "",
                                                .daily_check = DailyCheck::kOverdue});
-    store->scans.Finish(
-        id, {.outcome = ScanOutcome::kFailed, .failure = "of this test", .result_json = ""});
+    store->scans.Finish(id, {.outcome = ScanOutcome::kFailed, .failure = "of this test"});
     return id;
   };
   const std::string early = scan("S1");

@@ -56,11 +56,8 @@ TEST_F(StoreTest, AScanThatWasRunningAtACrashHasFailedAndLeavesNothing) {
   {
     const auto store = Open();
     patient = store->patients.Add(kAnna, "A", "");
-    id = store->scans.Begin({.patient_id = patient,
-                             .reference_id = {},
-                             .purpose = {},
-                             .sensor_serial = {},
-                             .reason = {}});
+    id = store->scans.Begin(
+        {.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}});
     FillStaging(*store, id);
   }
   const auto store = Open();
@@ -192,11 +189,8 @@ TEST_F(StoreTest, RefusesWhatMakesNoSense) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
   EXPECT_EQ(RefusalOf([&] { (void)store->patients.Add(kAnna, "A", ""); }), ChangeResult::kConflict);
-  const std::string running = store->scans.Begin({.patient_id = patient,
-                                                  .reference_id = {},
-                                                  .purpose = {},
-                                                  .sensor_serial = {},
-                                                  .reason = {}});
+  const std::string running = store->scans.Begin(
+      {.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}});
   EXPECT_EQ(RefusalOf([&] { (void)store->references.Add(kAnna, running, "", {}); }),
             ChangeResult::kConflict);
   EXPECT_EQ(RefusalOf([&] { store->removal.WipePatient(kAnna, patient); }),
