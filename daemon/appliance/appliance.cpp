@@ -16,7 +16,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
 namespace {
 
 using Clock = std::chrono::steady_clock;

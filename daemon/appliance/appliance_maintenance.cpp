@@ -17,7 +17,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
 namespace {
 
 /// Ticks between the checks of two stored scans, and until the next search for one that is due.

@@ -7,7 +7,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
 namespace {
 
 constexpr const char* kNewestChecks =

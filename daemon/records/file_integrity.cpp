@@ -6,7 +6,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
 namespace {
 
 constexpr const char* kScenePrefix = "scene/";

@@ -8,7 +8,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
 namespace {
 
 const std::string kPatientColumns =

@@ -11,7 +11,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
 namespace {
 
 constexpr int kScansShown = 6;  // scans of the board shown for one calibration

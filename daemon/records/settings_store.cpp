@@ -6,7 +6,6 @@
 #include "daemon/records/store_refusal.hpp"
 
 namespace plumb {
-
 namespace {
 
 constexpr const char* kStoredSettings = "SELECT value FROM settings WHERE name = 'settings'";
