@@ -1,5 +1,6 @@
 #include "daemon/records/backup.hpp"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>

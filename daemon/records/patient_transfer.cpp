@@ -1,5 +1,7 @@
 #include "daemon/records/patient_transfer.hpp"
 
+#include <sys/stat.h>
+
 #include <cerrno>
 #include <cstdio>
 #include <map>

@@ -64,4 +64,19 @@ inline std::map<std::string, std::string> FilesBelow(const std::filesystem::path
   return files;
 }
 
+/// Turns a database into one of the schema of 0.1.0, without what that cannot hold.
+inline void MakeSchema3(const std::filesystem::path& database) {
+  Database(database, Database::Access::kReadWrite)
+      .Execute(
+          "DROP TABLE preferences; DROP TABLE room_calibrations; DROP TABLE templates; DROP TABLE "
+          "removed_scans; DROP TABLE scan_files; DROP TABLE displays; DROP INDEX scans_of_session; "
+          "ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans DROP COLUMN "
+          "accepted_reason; ALTER TABLE scans DROP COLUMN accepted_at; ALTER TABLE scans DROP "
+          "COLUMN sensor_on_s; ALTER TABLE scans DROP COLUMN check_overdue; ALTER TABLE scans DROP "
+          "COLUMN unavailable; ALTER TABLE scans DROP COLUMN checked_at; ALTER TABLE audit DROP "
+          "COLUMN chain; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP COLUMN "
+          "archived; DROP TABLE sessions; DELETE FROM patients WHERE id = 0; DELETE FROM settings; "
+          "PRAGMA user_version = 3");
+}
+
 }  // namespace plumb::testing

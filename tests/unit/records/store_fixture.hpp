@@ -21,21 +21,6 @@ inline constexpr const char* kResult =
     R"("lateral_mm":-1,"pitch_deg":0.5,"roll_deg":0,"yaw_deg":2,)"
     R"("uncertainty":{"vertical_mm":1.2,"pitch_deg":0.2,"roll_deg":0.3,"yaw_deg":0.1}}})";
 
-/// Turns a database into one of the schema of 0.1.0, without what that cannot hold.
-inline void MakeSchema3(const std::filesystem::path& database) {
-  Database(database, Database::Access::kReadWrite)
-      .Execute(
-          "DROP TABLE preferences; DROP TABLE room_calibrations; DROP TABLE templates; DROP TABLE "
-          "removed_scans; DROP TABLE scan_files; DROP TABLE displays; DROP INDEX scans_of_session; "
-          "ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans DROP COLUMN "
-          "accepted_reason; ALTER TABLE scans DROP COLUMN accepted_at; ALTER TABLE scans DROP "
-          "COLUMN sensor_on_s; ALTER TABLE scans DROP COLUMN check_overdue; ALTER TABLE scans DROP "
-          "COLUMN unavailable; ALTER TABLE scans DROP COLUMN checked_at; ALTER TABLE audit DROP "
-          "COLUMN chain; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP COLUMN "
-          "archived; DROP TABLE sessions; DELETE FROM patients WHERE id = 0; DELETE FROM settings; "
-          "PRAGMA user_version = 3");
-}
-
 class StoreTest : public ::testing::Test {
  protected:
   std::unique_ptr<Store> Open() const { return std::make_unique<Store>(folder_ / "state"); }

@@ -40,7 +40,7 @@ TEST_F(StoreTest, KeepsEverythingOverARestart) {
   EXPECT_EQ(found->accepted_reason, "the swelling is known");
   ASSERT_TRUE(found->accepted_at);
   EXPECT_LT(WallClock::now() - *found->accepted_at, std::chrono::minutes(1));
-  EXPECT_EQ(found->result->verdict, "move");
+  EXPECT_EQ(found->result->verdict, Verdict::kMove);
   EXPECT_EQ(found->result->correction->vertical_mm, 6.5);
   EXPECT_EQ(found->result->correction->longitudinal_mm, std::nullopt);
   EXPECT_EQ(found->result->u95->vertical_mm, 1.2);

@@ -65,7 +65,7 @@ TEST(DocumentsTest, WhatTheGuidesNameIsThere) {
 }
 
 TEST(DocumentsTest, AFileOrNameThatIsGoneIsFound) {
-  EXPECT_THAT(Check("`algo/acceptance/acceptance.cpp` (`Decide`) and `verdict.cpp`").missing,
+  EXPECT_THAT(Check("`algo/acceptance/acceptance.cpp` (`Decide`) and `verdict.hpp`").missing,
               ::testing::IsEmpty());
   EXPECT_THAT(
       Check("`algo/acceptance/gates.cpp`; `algo/acceptance/acceptance.cpp` (`Resolve`), "
