@@ -102,16 +102,8 @@ int Main(int argc, char** argv) {
   add("watch", "Print the events of a running plumbd, one JSON object per line", AddWatch);
   add("sim", "Plug, unplug, stall or advance the virtual sensor of a running plumbd", AddSim);
   add("update", "Install a bundle on the machine of a running plumbd, and restart it", AddUpdate);
-#ifdef PLUMB_WITH_APPLIANCE
-  add("backup", "Back up the data of plumbd: database, scans, calibrations; also while it runs",
-      AddBackup);
-  add("restore", "Restore a state folder from a backup, after checking every file of it",
-      AddRestore);
-  add("verify-log", "Check a downloaded audit log: whether it is as it was written", AddVerifyLog);
-  add("export-patient", "Export one patient from a state folder or a backup", AddExportPatient);
-  add("import-patient", "Import an exported patient into a state folder", AddImportPatient);
-  add("factory-reset", "Reset plumbd's stored data to the state of delivery", AddFactoryReset);
-#endif
+  for (const CommandEntry& entry : StoreCommands())
+    add(entry.name, entry.description, entry.add_options);
 
   try {
     app.parse(argc, argv);

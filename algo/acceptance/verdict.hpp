@@ -1,4 +1,4 @@
-// The verdict on a comparison, in one word.
+// Verdicts in one word.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 
 namespace plumb {
 
+/// On a comparison.
 enum class Verdict : std::uint8_t {
   kInTolerance,  ///< Every value plus its uncertainty lies within its tolerance.
   kUnsure,    ///< Every value lies within its tolerance, but not every value plus its uncertainty.
@@ -16,5 +17,15 @@ enum class Verdict : std::uint8_t {
 template <>
 inline constexpr auto kNamesOf<Verdict> = NamesUpTo<Verdict::kNoAnswer>({"in_tolerance", "unsure",
                                                                          "move", "no_answer"});
+
+/// On a check of the room's markers.
+enum class MarkerCheckStatus : std::uint8_t {
+  kPassed,
+  kFailed,
+  kNoBaseline,  ///< Everything else passed, but there is no baseline to compare with.
+};
+template <>
+inline constexpr auto kNamesOf<MarkerCheckStatus> =
+    NamesUpTo<MarkerCheckStatus::kNoBaseline>({"passed", "failed", "no_baseline"});
 
 }  // namespace plumb

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "algo/base/names.hpp"
+#include "algo/acceptance/verdict.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/scene.hpp"
 
@@ -34,15 +34,6 @@ struct MarkerCheckItem {
   bool passed = false;
   std::string note;  ///< For example "marker 7" or "missing: 3, 9"; may be empty.
 };
-
-enum class MarkerCheckStatus {
-  kPassed,
-  kFailed,
-  kNoBaseline,  ///< Everything else passed, but there is no baseline to compare with.
-};
-template <>
-inline constexpr auto kNamesOf<MarkerCheckStatus> =
-    NamesUpTo<MarkerCheckStatus::kNoBaseline>({"passed", "failed", "no_baseline"});
 
 struct MarkerCheck {
   MarkerCheckStatus status = MarkerCheckStatus::kFailed;

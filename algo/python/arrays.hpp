@@ -46,6 +46,12 @@ inline pybind11::array VectorArray(const std::vector<Eigen::Vector3f>& values,
       reinterpret_cast<const float*>(values.data()), owner));
 }
 
+inline pybind11::array ColorArray(const std::vector<Color>& colors, const pybind11::object& owner) {
+  return ReadOnly(pybind11::array_t<std::uint8_t>(
+      std::vector<pybind11::ssize_t>{static_cast<pybind11::ssize_t>(colors.size()), 3},
+      reinterpret_cast<const std::uint8_t*>(colors.data()), owner));
+}
+
 inline pybind11::array TriangleArray(const TriangleMesh& mesh, const pybind11::object& owner) {
   return ReadOnly(pybind11::array_t<std::uint32_t>(
       std::vector<pybind11::ssize_t>{static_cast<pybind11::ssize_t>(mesh.triangles.size()), 3},

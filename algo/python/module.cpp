@@ -29,6 +29,29 @@ Preset ParsePreset(const std::string& name) {
   throw py::value_error("preset: expected 'best' or 'paper', found '" + name + "'");
 }
 
+PatientPosture ParsePosture(const std::string& name) {
+  if (const std::optional<PatientPosture> posture = PostureNamed(name)) return *posture;
+  throw py::value_error("posture: expected 'HFS', 'HFP', 'FFS' or 'FFP', found '" + name + "'");
+}
+
+MarkerKind ParseMarkerKind(const std::string& name) {
+  if (name == "room") return MarkerKind::kRoom;
+  if (name == "couch") return MarkerKind::kCouch;
+  throw py::value_error("marker_kind: expected 'room' or 'couch', found '" + name + "'");
+}
+
+Pose ParseRoomAxes(const Eigen::Matrix4d& matrix) {
+  Pose T;
+  T.matrix() = matrix;
+  const bool is_rotation =
+      (T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-4 &&
+      T.linear().determinant() > 0;
+  if (!is_rotation || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+    throw py::value_error(
+        "T_iec_reference: expected a rotation and a translation in metres, last row 0 0 0 1");
+  return Orthonormalised(T);
+}
+
 using ProgressCall = std::function<void(const std::string& step, double fraction)>;
 
 // Forwards progress to Python and turns Ctrl-C into a stop request.
@@ -60,13 +83,18 @@ Scene Reconstruct(const std::filesystem::path& recording, const std::string& pre
 Comparison CompareScenes(const Scene& reference, const Scene& current, const std::string& preset,
                          const std::vector<Eigen::Vector2d>& region_m,
                          const std::optional<Eigen::Vector3d>& isocentre_m,
-                         double shift_tolerance_mm, double rotation_tolerance_deg) {
+                         double shift_tolerance_mm, double rotation_tolerance_deg,
+                         const std::string& posture, const std::string& marker_kind,
+                         const std::optional<Eigen::Matrix4d>& T_iec_reference) {
   CompareOptions options;
   options.preset = ParsePreset(preset);
   options.region_polygon_m = region_m;
   options.isocentre_m = isocentre_m;
   options.limits.shift_tolerance_m = shift_tolerance_mm * kMillimetre;
   options.limits.rotation_tolerance_rad = rotation_tolerance_deg * kDegree;
+  options.posture = ParsePosture(posture);
+  options.marker_kind = ParseMarkerKind(marker_kind);
+  if (T_iec_reference) options.T_iec_reference = ParseRoomAxes(*T_iec_reference);
   const py::gil_scoped_release released;
   return Compare(reference, current, options);
 }
@@ -83,16 +111,18 @@ py::object Evaluate(const std::filesystem::path& folder, const std::string& pres
   const Suite suite = OpenSuite(folder);
   EvaluateOptions options;
   options.compare.preset = ParsePreset(preset);
+  // Also asks for Ctrl-C during a reconstruction, which takes long.
+  std::stop_source stop;
+  const auto forward = Forwarded(progress, stop);
   options.get_scene = [&](const std::string& name) {
     const auto source = OpenTumRecording(suite.recordings.at(name));
     ScanRunnerOptions run;
     run.reconstructor.preset = options.compare.preset;
-    return RunScan(*source, run);
+    return RunScan(*source, run, stop.get_token(),
+                   [&](const ScanProgress& scan) { forward(scan.fraction, scan.step); });
   };
   std::string json;
   {
-    std::stop_source stop;
-    const auto forward = Forwarded(progress, stop);
     const py::gil_scoped_release released;
     const Evaluation evaluation =
         EvaluateSuite(suite, options, stop.get_token(),
@@ -189,6 +219,14 @@ void AddScene(py::module_& module) {
           },
           "id -> float64 (4, 3), corners in detector order")
       .def_property_readonly(
+          "marker_sigmas_m",
+          [](const Scene& s) {
+            py::dict sigmas;
+            for (const auto& [id, marker] : s.markers) sigmas[py::int_(id)] = marker.sigma_m;
+            return sigmas;
+          },
+          "id -> standard deviation of one corner coordinate")
+      .def_property_readonly(
           "keyframe_poses", [](const Scene& s) { return PoseArray(s.keyframes); },
           "float64 (n, 4, 4), T_scene_camera")
       .def_property_readonly("keyframe_times_s",
@@ -208,9 +246,17 @@ void AddScene(py::module_& module) {
           [](py::object self) { return VectorArray(self.cast<Scene&>().cloud.normals, self); },
           "float32 (n, 3); shares the scene's memory")
       .def_property_readonly(
+          "colors",
+          [](py::object self) { return ColorArray(self.cast<Scene&>().cloud.colors, self); },
+          "uint8 (n, 3) of the points, red, green, blue, or empty; shares the scene's memory")
+      .def_property_readonly(
           "vertices",
           [](py::object self) { return VectorArray(self.cast<Scene&>().mesh.vertices, self); },
           "float32 (n, 3) of the mesh; shares the scene's memory")
+      .def_property_readonly(
+          "vertex_colors",
+          [](py::object self) { return ColorArray(self.cast<Scene&>().mesh.colors, self); },
+          "uint8 (n, 3) of the mesh's vertices, or empty; shares the scene's memory")
       .def_property_readonly(
           "triangles",
           [](py::object self) { return TriangleArray(self.cast<Scene&>().mesh, self); },
@@ -277,6 +323,20 @@ void AddComparison(py::module_& module) {
           "distance_m",
           [](py::object self) { return MapArray(self.cast<Comparison&>().distance, self); },
           "float32 (rows, columns), nearest-surface distance, or None")
+      .def_property_readonly(
+          "deviation_after_m",
+          [](py::object self) { return MapArray(self.cast<Comparison&>().deviation_after, self); },
+          "float32 (rows, columns), as deviation_m after the correction, or None")
+      .def_property_readonly(
+          "deformation",
+          [](py::object self) -> py::object {
+            const auto& deformation = self.cast<Comparison&>().deformation;
+            if (!deformation) return py::none();
+            return py::dict("points_m"_a = VectorArray(deformation->points, self),
+                            "shifts_m"_a = VectorArray(deformation->shifts_m, self));
+          },
+          "What remains after the rigid motion: float32 (n, 3) points of the reference surface and "
+          "their displacements; or None")
       .def(
           "to_json", [](const Comparison& comparison) { return ResultJson(comparison); },
           "The text of result.json");
@@ -300,8 +360,10 @@ PYBIND11_MODULE(plumb, module) {
              "Reconstructs a recording in the TUM RGB-D layout. Releases the interpreter lock.");
   module.def("compare", &CompareScenes, "reference"_a, "current"_a, "preset"_a = "best",
              "region_m"_a = std::vector<Eigen::Vector2d>(), "isocentre_m"_a = std::nullopt,
-             "shift_tolerance_mm"_a = 3.0, "rotation_tolerance_deg"_a = 1.0,
-             "Compares a current scene with its reference. Releases the interpreter lock.");
+             "shift_tolerance_mm"_a = 3.0, "rotation_tolerance_deg"_a = 1.0, "posture"_a = "HFS",
+             "marker_kind"_a = "room", "T_iec_reference"_a = std::nullopt,
+             "Compares a current scene with its reference, by the room's axes if they are given. "
+             "Releases the interpreter lock.");
   module.def("evaluate", &Evaluate, "suite"_a, "preset"_a = "best", "progress"_a = ProgressCall(),
              "Reconstructs and compares a suite with truth; the figures as a dict.");
 }

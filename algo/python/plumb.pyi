@@ -42,6 +42,7 @@ class Scene:
     preset: str
     frame: str
     markers: Dict[int, NDArray[np.float64]]
+    marker_sigmas_m: Dict[int, float]
     keyframe_poses: NDArray[np.float64]
     keyframe_times_s: NDArray[np.float64]
     poses: NDArray[np.float64]
@@ -50,7 +51,9 @@ class Scene:
     frames_tracked: int
     points: NDArray[np.float32]
     normals: NDArray[np.float32]
+    colors: NDArray[np.uint8]
     vertices: NDArray[np.float32]
+    vertex_colors: NDArray[np.uint8]
     triangles: NDArray[np.uint32]
     heights: Optional[NDArray[np.float32]]
     grid: Optional[Dict[str, float]]
@@ -71,6 +74,8 @@ class Comparison:
     u95: Optional[Dict[str, Optional[float]]]
     deviation_m: Optional[NDArray[np.float32]]
     distance_m: Optional[NDArray[np.float32]]
+    deviation_after_m: Optional[NDArray[np.float32]]
+    deformation: Optional[Dict[str, NDArray[np.float32]]]
     def to_json(self) -> str: ...
 
 def reconstruct(recording: Path, preset: str = "best", progress: Optional[Progress] = None) -> Scene: ...
@@ -82,5 +87,8 @@ def compare(
     isocentre_m: Optional[Sequence[float]] = None,
     shift_tolerance_mm: float = 3.0,
     rotation_tolerance_deg: float = 1.0,
+    posture: str = "HFS",
+    marker_kind: str = "room",
+    T_iec_reference: Optional[Union[NDArray[np.float64], Sequence[Sequence[float]]]] = None,
 ) -> Comparison: ...
 def evaluate(suite: Path, preset: str = "best", progress: Optional[Progress] = None) -> Dict[str, Any]: ...

@@ -16,9 +16,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::kSelf;
-
 namespace {
 
 using Clock = std::chrono::steady_clock;

@@ -17,9 +17,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::kSelf;
-
 namespace {
 
 /// Ticks between the checks of two stored scans, and until the next search for one that is due.

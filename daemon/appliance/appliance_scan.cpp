@@ -218,11 +218,11 @@ void Appliance::OnEnded(const EndedScan& outcome) {
           {{"SCAN", scan_.id}});
     const bool is_check = scan_.purpose == ScanPurpose::kDailyCheck;
     if (!is_check) last_result_ = scan_;
-    const std::string answer = outcome.check
-                                   ? std::string("daily check ") + Name(outcome.check->check.status)
-                               : outcome.verdict                ? Name(*outcome.verdict)
-                               : outcome.kind == Kind::kNoScene ? outcome.reason
-                                                                : "no comparison";
+    const std::string answer =
+        outcome.check     ? fmt::format("daily check {}", Name(outcome.check->check.status))
+        : outcome.verdict ? std::string(Name(*outcome.verdict))
+        : outcome.kind == Kind::kNoScene ? outcome.reason
+                                         : "no comparison";
     Log(LogLevel::kInfo,
         fmt::format("the scan is done {:.2f} s after its last frame, {} frames, {} dropped: {}",
                     outcome.after_last_frame_s, outcome.frames, outcome.frames_dropped, answer),

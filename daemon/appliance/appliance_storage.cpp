@@ -17,9 +17,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::kSelf;
-
 namespace {
 
 /// If the display cannot be paired, that is logged, and scanning remains possible.

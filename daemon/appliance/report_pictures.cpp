@@ -40,8 +40,8 @@ std::vector<MapMark> MarksIn(const Json& result, const SideWords& words) {
   if (!body.is_object()) return {};
   const auto head = WayIn(body, "head_xy"), left = WayIn(body, "left_xy");
   const auto gantry = WayIn(body, "gantry_xy"), right = WayIn(body, "right_xy");
-  const bool names_sides =
-      body.value("named_by", "") == "posture" && result.value("verdict", "") != "no_answer";
+  const bool names_sides = body.value("named_by", "") == "posture" &&
+                           result.value("verdict", "") != Name(Verdict::kNoAnswer);
   std::optional<PatientAxes> patient;
   if (names_sides && head && left) patient = PatientAxes{*head, *left};
   std::optional<RoomWays> room;

@@ -89,26 +89,38 @@ std::string_view VerdictOf(const Scan& scan, const ReportWords& words) {
   if (!scan.result) {
     return scan.purpose == ScanPurpose::kReference ? words.verdict_reference : words.verdict_none;
   }
-  const std::string& verdict = scan.result->verdict;
-  return verdict == "in_tolerance" ? words.verdict_in
-         : verdict == "unsure"     ? words.verdict_unsure
-         : verdict == "move"       ? words.verdict_move
-                                   : words.terms.no_answer;
+  switch (scan.result->verdict) {
+    case Verdict::kInTolerance:
+      return words.verdict_in;
+    case Verdict::kUnsure:
+      return words.verdict_unsure;
+    case Verdict::kMove:
+      return words.verdict_move;
+    case Verdict::kNoAnswer:
+      break;
+  }
+  return words.terms.no_answer;
 }
 
 std::string WhyOf(const Scan& scan, Language language) {
   const ReportWords& words = WordsOf(language);
   if (!scan.result) return Translated(scan.failure, language);
-  const std::string& verdict = scan.result->verdict;
-  if (verdict == "in_tolerance") return std::string(words.why_in);
-  if (verdict == "unsure") return std::string(words.why_unsure);
-  if (verdict == "move") return std::string(words.why_move);
+  switch (scan.result->verdict) {
+    case Verdict::kInTolerance:
+      return std::string(words.why_in);
+    case Verdict::kUnsure:
+      return std::string(words.why_unsure);
+    case Verdict::kMove:
+      return std::string(words.why_move);
+    case Verdict::kNoAnswer:
+      break;
+  }
   return scan.result->reasons.empty() ? "" : Translated(scan.result->reasons.front(), language);
 }
 
 /// A correction without an answer must not be applied, so it is left out.
 bool IsAdvice(const Scan& scan) {
-  return scan.result && scan.result->correction && scan.result->verdict != "no_answer";
+  return scan.result && scan.result->correction && scan.result->verdict != Verdict::kNoAnswer;
 }
 
 std::vector<ReportNumber> NumbersOf(const Scan& scan, const Json& result,
@@ -117,7 +129,7 @@ std::vector<ReportNumber> NumbersOf(const Scan& scan, const Json& result,
   if (!IsAdvice(scan)) return numbers;
   const ReportWords& words = WordsOf(language);
   const std::array<std::string, 6> names = AxisNames(result, words.terms);
-  const bool moves = scan.result->verdict == "move";
+  const bool moves = scan.result->verdict == Verdict::kMove;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const NumberAxis& axis = kNumberAxes[i];
     const std::optional<double> value = axis.In(scan.result->correction);

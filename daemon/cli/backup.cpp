@@ -10,6 +10,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
 #include "daemon/cli/commands.hpp"
+#include "daemon/cli/common_options.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/control/unix_socket.hpp"
 #include "daemon/records/backup.hpp"
@@ -20,8 +21,6 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr const char* kDefaultConfig = "/etc/plumb/plumb.toml";
 
 struct Options {
   fs::path folder;

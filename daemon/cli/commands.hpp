@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <stop_token>
 #include <string>
 
@@ -55,6 +56,15 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddExportPatient(CLI::App& app);
 [[nodiscard]] Command AddImportPatient(CLI::App& app);
 [[nodiscard]] Command AddFactoryReset(CLI::App& app);
+
+/// A subcommand: its name, what its help says first, and one of the functions above.
+struct CommandEntry {
+  const char* name;
+  const char* description;
+  Command (*add_options)(CLI::App&);
+};
+/// Those that work on the stored data of plumbd; none in a build without the appliance.
+[[nodiscard]] std::span<const CommandEntry> StoreCommands();
 
 /// Writes to stdout.
 /// @throws IoError if stdout cannot be written (closed pipe, full disk).

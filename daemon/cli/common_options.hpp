@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +18,9 @@ namespace plumb {
 
 class Progress;
 struct ScanProgress;
+
+/// Configuration of the appliance where none is named.
+inline constexpr const char* kDefaultConfig = "/etc/plumb/plumb.toml";
 
 /// The combined --preset, --config and --sensor-profile; options on the command line take
 /// precedence over the file.

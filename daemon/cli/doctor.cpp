@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +16,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/cli/burn_in.hpp"
 #include "daemon/cli/commands.hpp"
+#include "daemon/cli/common_options.hpp"
 #include "daemon/cli/doctor_report.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/config/sensor_settings.hpp"
@@ -29,8 +29,6 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr char kDefaultConfig[] = "/etc/plumb/plumb.toml";
 
 Config CheckConfig(DoctorReport& report, const std::optional<fs::path>& wanted) {
   const fs::path file = wanted.value_or(kDefaultConfig);

@@ -1,6 +1,5 @@
 // `plumb record`: records a sensor's images into a folder or an .oni file.
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <memory>
 #include <optional>

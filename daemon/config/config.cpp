@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -17,6 +16,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/parse_number.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/config/config_section.hpp"
@@ -308,11 +308,9 @@ std::optional<ListenAddress> ParseListenAddress(std::string_view text) {
   if (is_v6) address = address.substr(1, address.size() - 2);
   if (address.empty() || (address.find(':') != std::string_view::npos) != is_v6)
     return std::nullopt;
-  unsigned port = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
-  if (error != std::errc() || end != digits.data() + digits.size() || port > 65535)
-    return std::nullopt;
-  return ListenAddress{.address = std::string(address), .port = static_cast<std::uint16_t>(port)};
+  const std::optional<std::uint16_t> port = ParseNumber<std::uint16_t>(digits);
+  if (!port) return std::nullopt;
+  return ListenAddress{.address = std::string(address), .port = *port};
 }
 
 PageTransport TransportOf(const WebConfig& web, bool is_loopback) {

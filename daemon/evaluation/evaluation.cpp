@@ -1,7 +1,6 @@
 #include "daemon/evaluation/evaluation.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 #include <fmt/format.h>

@@ -1,7 +1,6 @@
 #include "daemon/evaluation/truth.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <sstream>
 #include <utility>

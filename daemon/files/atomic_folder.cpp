@@ -42,27 +42,16 @@ std::string HiddenPrefix(const fs::path& target) {
   return fmt::format(".{}.plumb-", target.filename().string());
 }
 
-/// Flushes one file or folder to the disk.
-void Sync(const fs::path& path, bool whole_file_system = false) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) throw IoError(DescribeWriteError(path, errno));
-  const int result = whole_file_system ? ::syncfs(descriptor) : ::fsync(descriptor);
-  const int error = errno;
-  ::close(descriptor);
-  if (result != 0 && error != EINVAL)
-    throw IoError(DescribeWriteError(path, error));  // EINVAL: a file system without fsync
-}
-
 void SyncTree(const fs::path& folder) {
   std::vector<fs::path> paths;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
     paths.push_back(entry.path());
   if (paths.size() > kMaxFsyncs) {
-    Sync(folder, true);
+    SyncWholeDisk(folder);
     return;
   }
-  for (const fs::path& path : paths) Sync(path);
-  Sync(folder);
+  for (const fs::path& path : paths) SyncToDisk(path);
+  SyncToDisk(folder);
 }
 
 void CheckReplaceable(const fs::path& target, const OutputKind& kind) {
@@ -198,14 +187,14 @@ void AtomicFolder::Commit() {
     CheckReplaceable(target_, kind_);  // again, because time has passed
     Replace(hidden_, target_);
     committed_ = true;
-    Sync(target_.parent_path());
+    SyncToDisk(target_.parent_path());
   } catch (const fs::filesystem_error& error) {
     throw IoError(DescribeWriteError(target_, error.code().value()));
   }
 }
 
 void AtomicFolder::CommitFile(const fs::path& file) {
-  Sync(file);
+  SyncToDisk(file);
   try {
     CheckReplaceable(target_, kind_);  // again, because time has passed
   } catch (const fs::filesystem_error& error) {
@@ -216,7 +205,7 @@ void AtomicFolder::CommitFile(const fs::path& file) {
   committed_ = true;
   std::error_code ignored;
   fs::remove_all(hidden_, ignored);
-  Sync(target_.parent_path());
+  SyncToDisk(target_.parent_path());
 }
 
 void WriteFileAtomically(const fs::path& target,
@@ -230,9 +219,9 @@ void WriteFileAtomically(const fs::path& target,
       path.parent_path() / (HiddenPrefix(path) + UniqueSuffix() + path.extension().string());
   try {
     write(hidden);
-    Sync(hidden);
+    SyncToDisk(hidden);
     if (::rename(hidden.c_str(), path.c_str()) != 0) throw IoError(DescribeWriteError(path, errno));
-    Sync(path.parent_path());
+    SyncToDisk(path.parent_path());
   } catch (...) {
     ::unlink(hidden.c_str());
     throw;

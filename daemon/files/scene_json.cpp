@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/parse_number.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "drivers/files/image_file.hpp"
 
@@ -91,12 +90,10 @@ Json MapJson(const std::map<std::string, double>& values) {
 
 /// A marker id that is the key of an object.
 int MarkerId(const std::string& key, const Value& value) {
-  int id = -1;
-  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), id);
-  if (error != std::errc{} || end != key.data() + key.size() || id < 0 || id > kMaxMarkerId) {
+  const std::optional<int> id = ParseNumber<int>(key);
+  if (!id || *id < 0 || *id > kMaxMarkerId)
     value.Fail(fmt::format("is not a marker id from 0 to {}", kMaxMarkerId));
-  }
-  return id;
+  return *id;
 }
 
 void ReadMarkers(const Value& root, Scene& scene) {

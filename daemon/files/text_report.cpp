@@ -1,7 +1,6 @@
 #include "daemon/files/text_report.hpp"
 
 #include <cmath>
-#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,7 +1,6 @@
 // A comparison as a table of text.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "algo/comparison/comparison.hpp"

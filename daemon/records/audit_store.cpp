@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -10,15 +11,10 @@
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/utf8.hpp"
-#include "daemon/records/audit_subjects.hpp"
 #include "daemon/records/scan_files.hpp"
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::FromStored;
-using store::Now;
-
 namespace {
 
 /// One entry of the log as the chain covers it; lengths separate the fields.
@@ -50,36 +46,84 @@ std::string ChainOfUnchained(Database& database) {
   return chain;
 }
 
+struct Kind {
+  std::string_view name;
+  /// Its patient's code, number and time by its id; all of them empty where it has none.
+  const char* query;
+};
+
+constexpr Kind kPatient{"patient", "SELECT code, 0, 0 FROM patients WHERE id = ? AND id > 0"};
+constexpr Kind kSession{"session",
+                        "SELECT code, fraction, 0 FROM sessions JOIN patients ON patients.id = "
+                        "patient_id WHERE sessions.id = ?"};
+constexpr Kind kScan{"scan",
+                     "SELECT CASE WHEN patient_id > 0 THEN code ELSE '' END, 0, 0 FROM scans JOIN "
+                     "patients ON patients.id = patient_id WHERE scans.id = ?"};
+constexpr Kind kReference{"reference",
+                          "SELECT code, version, 0 FROM refs JOIN patients ON patients.id = "
+                          "patient_id WHERE refs.id = ?"};
+constexpr Kind kCheck{"check", "SELECT '', 0, time FROM checks WHERE id = ?"};
+
+struct Prefix {
+  std::string_view action;  ///< How the actions begin.
+  const Kind& kind;
+};
+
+// The first one that fits counts.
+constexpr std::array kPrefixes = {
+    Prefix{"view.patient", kPatient},
+    Prefix{"view.reference", kReference},
+    Prefix{"view.scan", kScan},
+    Prefix{"download.numbers", kPatient},
+    Prefix{"download.course", kPatient},
+    Prefix{"download.", kScan},
+    Prefix{"patient.", kPatient},
+    Prefix{"session.", kSession},
+    // A scan that begins has no number yet: its patient is known by the session.
+    Prefix{"scan.start", kSession},
+    Prefix{"scan.end", kSession},
+    Prefix{"cancel", kSession},
+    Prefix{"scan.", kScan},
+    Prefix{"recording.", kScan},
+    Prefix{"reference.", kReference},
+    Prefix{"check.", kCheck},
+};
+
+/// What an entry is about, in the words that people know: a patient's code instead of a row's
+/// number. Nothing where the subject is what people know already: an account, a file, no subject.
+std::optional<AuditSubject> DescribeSubject(Database& database, const std::string& action,
+                                            const std::string& subject) {
+  const auto prefix = std::ranges::find_if(
+      kPrefixes, [&](const Prefix& one) { return action.starts_with(one.action); });
+  const auto id = ParseId(subject);
+  if (prefix == kPrefixes.end() || !id) return std::nullopt;
+  AuditSubject about;
+  about.kind = prefix->kind.name;
+  Statement query = database.Prepare(prefix->kind.query, *id);
+  if (!query.Step()) return about;
+  about.exists = true;
+  about.patient_code = query.Text(0);
+  about.number = static_cast<int>(query.Integer(1));
+  if (query.Integer(2) > 0) about.time = FromStored(query.Integer(2));
+  return about;
+}
+
 }  // namespace
 
 void AppendAuditEntry(Database& database, const Actor& actor, const std::string& action,
                       const std::string& subject, const std::string& detail) {
-  std::int64_t number = 1;
-  {
-    Statement query = database.Prepare("SELECT seq FROM sqlite_sequence WHERE name = 'audit'");
-    if (query.Step()) number = query.Integer(0) + 1;
-  }
-  std::string before;
-  {
-    Statement query = database.Prepare("SELECT chain FROM audit ORDER BY number DESC LIMIT 1");
-    if (query.Step()) before = query.Text(0);
-  }
+  const std::int64_t number =
+      database.FirstInteger("SELECT seq FROM sqlite_sequence WHERE name = 'audit'").value_or(0) + 1;
+  std::string before =
+      database.FirstText("SELECT chain FROM audit ORDER BY number DESC LIMIT 1").value_or("");
   if (before.empty()) before = ChainOfUnchained(database);
-  const std::int64_t time = Now();
-  database
-      .Prepare(
-          "INSERT INTO audit (number, time, user, address, action, subject, detail, chain) VALUES "
-          "(?, ?, ?, ?, ?, ?, ?, ?)")
-      .Bind(number)
-      .Bind(time)
-      .Bind(actor.user)
-      .Bind(actor.address)
-      .Bind(action)
-      .Bind(subject)
-      .Bind(detail)
-      .Bind(Sha256Of(
-          ChainText(before, number, time, {actor.user, actor.address, action, subject, detail})))
-      .Run();
+  const std::int64_t time = StoredNow();
+  database.Run(
+      "INSERT INTO audit (number, time, user, address, action, subject, detail, chain) VALUES "
+      "(?, ?, ?, ?, ?, ?, ?, ?)",
+      number, time, actor.user, actor.address, action, subject, detail,
+      Sha256Of(
+          ChainText(before, number, time, {actor.user, actor.address, action, subject, detail})));
 }
 
 void AuditStore::Log(const Actor& actor, const std::string& action, const std::string& subject,
@@ -91,22 +135,20 @@ void AuditStore::Log(const Actor& actor, const std::string& action, const std::s
 
 std::vector<AuditEntry> AuditStore::Find(const AuditQuery& wanted) {
   const StoreDatabase::Held lists = database_.ForLists();
-  Statement query = lists->Prepare(
+  std::vector<AuditEntry> entries = lists->All(
       "SELECT number, time, user, address, action, subject, detail FROM audit WHERE (?1 <= 0 OR "
       "number < ?1) AND substr(action, 1, length(?2)) = ?2 AND (?3 OR substr(action, 1, 5) <> "
-      "'view.') ORDER BY number DESC LIMIT ?4");
-  query.Bind(wanted.before).Bind(wanted.actions).Bind(std::int64_t{wanted.views});
-  query.Bind(std::int64_t{wanted.limit});
-  std::vector<AuditEntry> entries;
-  while (query.Step()) {
-    entries.push_back({.number = query.Integer(0),
-                       .time = FromStored(query.Integer(1)),
-                       .user = query.Text(2),
-                       .address = query.Text(3),
-                       .action = query.Text(4),
-                       .subject = query.Text(5),
-                       .detail = query.Text(6)});
-  }
+      "'view.') ORDER BY number DESC LIMIT ?4",
+      [](const Statement& row) {
+        return AuditEntry{.number = row.Integer(0),
+                          .time = FromStored(row.Integer(1)),
+                          .user = row.Text(2),
+                          .address = row.Text(3),
+                          .action = row.Text(4),
+                          .subject = row.Text(5),
+                          .detail = row.Text(6)};
+      },
+      wanted.before, wanted.actions, wanted.views, wanted.limit);
   for (AuditEntry& entry : entries)
     entry.about = DescribeSubject(*lists, entry.action, entry.subject);
   return entries;
@@ -116,8 +158,8 @@ std::string AuditStore::Export() {
   const StoreDatabase::Held lists = database_.ForLists();
   Statement query = lists->Prepare(
       "SELECT number, time, user, address, action, subject, detail, chain FROM audit WHERE number "
-      "> (SELECT ifnull(max(number), 0) FROM audit) - ? ORDER BY number");
-  query.Bind(std::int64_t{kMaxExported});
+      "> (SELECT ifnull(max(number), 0) FROM audit) - ? ORDER BY number",
+      kMaxExported);
   std::string lines;
   while (query.Step()) {
     nlohmann::ordered_json line = {{"number", query.Integer(0)}, {"time_us", query.Integer(1)}};
@@ -173,30 +215,28 @@ AuditHead CheckAuditExport(std::string_view lines) {
 }
 
 AuditHead AuditStore::Head() {
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare("SELECT number, chain FROM audit ORDER BY number DESC LIMIT 1");
-  if (!query.Step()) return {};
-  return {.number = query.Integer(0), .chain = query.Text(1)};
+  const auto read = [](const Statement& row) {
+    return AuditHead{.number = row.Integer(0), .chain = row.Text(1)};
+  };
+  return database_.ForRows()
+      ->First("SELECT number, chain FROM audit ORDER BY number DESC LIMIT 1", read)
+      .value_or(AuditHead{});
 }
 
 std::optional<std::int64_t> AuditStore::FirstBroken() {
   const StoreDatabase::Held lists = database_.ForLists();
-  std::int64_t given = 0;  // read first: more may be written meanwhile
-  {
-    Statement query = lists->Prepare("SELECT seq FROM sqlite_sequence WHERE name = 'audit'");
-    if (query.Step()) given = query.Integer(0);
-  }
+  // Read first: more may be written meanwhile.
+  const std::int64_t given =
+      lists->FirstInteger("SELECT seq FROM sqlite_sequence WHERE name = 'audit'").value_or(0);
   std::string chain;
   std::int64_t last = 0;
   bool has_begun = false;
-  {
-    Statement query = lists->Prepare(kAuditRows);
-    while (query.Step()) {
-      chain = ChainOf(query, chain);
-      has_begun = has_begun || !query.Text(7).empty();
-      if (query.Integer(0) != last + 1 || (has_begun && query.Text(7) != chain)) return last + 1;
-      last = query.Integer(0);
-    }
+  Statement query = lists->Prepare(kAuditRows);
+  while (query.Step()) {
+    chain = ChainOf(query, chain);
+    has_begun = has_begun || !query.Text(7).empty();
+    if (query.Integer(0) != last + 1 || (has_begun && query.Text(7) != chain)) return last + 1;
+    last = query.Integer(0);
   }
   return last >= given ? std::nullopt : std::optional(last + 1);  // entries at the end are missing
 }

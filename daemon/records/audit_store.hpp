@@ -45,7 +45,7 @@ class AuditStore {
   static constexpr int kMaxExported = 200'000;
   [[nodiscard]] AuditHead Head();
   /// The number of the first entry that does not match the previous one; nothing if the log is as
-  /// it was written. Entries from before schema 5 are covered together.
+  /// it was written. Entries of 0.1.0, which had no chain, are covered together.
   [[nodiscard]] std::optional<std::int64_t> FirstBroken();
 
  private:

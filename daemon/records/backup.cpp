@@ -125,12 +125,12 @@ class Writing {
     Stored scans;
     {
       Statement query = database.Prepare("SELECT id FROM scans WHERE has_folder = 1");
-      while (query.Step()) scans[store::ScanId(query.Integer(0))];
+      while (query.Step()) scans[ScanId(query.Integer(0))];
     }
     Statement query =
         database.Prepare("SELECT scan_id, path, bytes, sha256 FROM scan_files ORDER BY path");
     while (query.Step()) {
-      const auto scan = scans.find(store::ScanId(query.Integer(0)));
+      const auto scan = scans.find(ScanId(query.Integer(0)));
       if (scan == scans.end()) continue;
       scan->second.push_back({.path = query.Text(1),
                               .bytes = static_cast<std::uint64_t>(query.Integer(2)),
@@ -174,9 +174,7 @@ class Writing {
 
 /// In there it would be a part of the next one, and go with what it is to replace.
 void RequireOutside(const fs::path& state, const fs::path& target) {
-  const fs::path inner = fs::weakly_canonical(target), outer = fs::weakly_canonical(state);
-  if (std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first != outer.end())
-    return;
+  if (!IsBelow(fs::weakly_canonical(target), fs::weakly_canonical(state))) return;
   throw std::invalid_argument(
       fmt::format("a backup cannot be made at {}: that is inside the state folder {} itself; name "
                   "a folder on another disk",
@@ -198,19 +196,6 @@ void RequireEmpty(const fs::path& state) {
     throw IoError(fmt::format("cannot list {}: {}", state.string(), error.message()));
 }
 
-/// Files restored by root get the account that runs plumbd as their owner.
-void GiveToOwnerOf(const fs::path& state, const fs::path& tree) {
-  struct stat owner {};
-  if (::geteuid() != 0 || ::stat(state.c_str(), &owner) != 0 || owner.st_uid == 0) return;
-  const auto give = [&](const fs::path& path) {
-    if (::lchown(path.c_str(), owner.st_uid, owner.st_gid) != 0)
-      throw IoError(DescribeWriteError(path, errno));
-  };
-  give(tree);
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(tree))
-    give(entry.path());
-}
-
 void MoveIn(const fs::path& made, const fs::path& state) {
   std::vector<std::string> names = {kRestored, kScans};
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
@@ -222,7 +207,7 @@ void MoveIn(const fs::path& made, const fs::path& state) {
     if (::rename((made / name).c_str(), (state / name).c_str()) != 0)
       throw IoError(DescribeWriteError(state / name, errno));
   }
-  SyncDisk(state);
+  SyncWholeDisk(state);
   std::error_code ignored;
   fs::remove_all(made, ignored);
 }
@@ -244,7 +229,7 @@ void MoveDatabase(const fs::path& from, const fs::path& to) {
     throw IoError(DescribeWriteError(to / name, error));
   }
   try {
-    SyncDisk(to);
+    SyncWholeDisk(to);
   } catch (const IoError&) {
     drop(to);
     throw;
@@ -254,7 +239,7 @@ void MoveDatabase(const fs::path& from, const fs::path& to) {
     drop(to);
     throw IoError(DescribeWriteError(to / kDatabase, error));
   }
-  SyncDisk(to);
+  SyncWholeDisk(to);
   drop(from);
 }
 
@@ -291,7 +276,7 @@ fs::path MoveOldAside(const fs::path& state) {
                                 (state / name).string()));
     throw IoError(DescribeWriteError(state / name, error));
   }
-  SyncDisk(state);
+  SyncWholeDisk(state);
   if (!fs::is_empty(aside)) return aside;
   fs::remove(aside);
   return {};
@@ -328,7 +313,7 @@ BackupReport BackUpStopped(const fs::path& state, const fs::path& target,
   Migrate(database);
   BackupReport report = WriteBackup(state, database, target, stop, secret);
   Transaction transaction(database);
-  AppendAuditEntry(database, store::kCommand, "backup.make", "",
+  AppendAuditEntry(database, kCommand, "backup.make", "",
                    Described(target, report, secret != nullptr));
   transaction.Commit();
   return report;
@@ -363,10 +348,10 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
     WriteWholeFile(made / kRestored, nlohmann::ordered_json{{"backup", ValidUtf8(backup.string())},
                                                             {"sha256", reader.digest()},
                                                             {"scans", report.scans},
-                                                            {"time", store::Now()}}
+                                                            {"time", StoredNow()}}
                                          .dump(2));
     GiveToOwnerOf(state, made);
-    SyncDisk(made);
+    SyncWholeDisk(made);
     MoveIn(made, state);
   } catch (const fs::filesystem_error& error) {
     throw IoError(DescribeWriteError(state, error.code().value()));
@@ -431,12 +416,12 @@ void NoteRestore(const fs::path& state, Database& database) {
                          about.at("backup").get<std::string>(), about.at("scans").get<int>(),
                          about.at("sha256").get<std::string>(),
                          fmt::gmtime(std::chrono::system_clock::to_time_t(
-                             store::FromStored(about.at("time").get<std::int64_t>()))));
+                             FromStored(about.at("time").get<std::int64_t>()))));
   } catch (const std::exception& unreadable) {  // that it was restored is known in any case
     detail = fmt::format("the note about it cannot be read: {}", unreadable.what());
   }
   Transaction transaction(database);
-  AppendAuditEntry(database, store::kSelf, "backup.restore", "", detail);
+  AppendAuditEntry(database, kSelf, "backup.restore", "", detail);
   transaction.Commit();
   fs::remove(note, error);  // if that fails, the next start adds the entry once more
 }

@@ -1,11 +1,11 @@
 #include "daemon/records/check_json.hpp"
 
-#include <charconv>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
+#include "algo/base/parse_number.hpp"
 
 namespace plumb {
 namespace {
@@ -45,12 +45,10 @@ std::optional<MarkerMap> MarkersIn(const Json& json) {
   if (!json.is_object()) return std::nullopt;
   MarkerMap markers;
   for (const auto& [name, value] : json.items()) {
-    int id = -1;
-    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), id);
+    const std::optional<int> id = ParseNumber<int>(name);
     const auto marker = MarkerIn(value);
-    if (error != std::errc() || end != name.data() + name.size() || id < 0 || !marker)
-      return std::nullopt;
-    markers.emplace(id, *marker);
+    if (!id || *id < 0 || !marker) return std::nullopt;
+    markers.emplace(*id, *marker);
   }
   return markers;
 }
@@ -96,7 +94,9 @@ CheckRecord CheckIn(const std::string& check_json) {
   };
   if (!json.is_object()) return unreadable("it is not a JSON object");
   try {
-    record.status = json.at("status").get<std::string>();
+    const auto status = Named<MarkerCheckStatus>(json.at("status").get<std::string>());
+    if (!status) return unreadable("its status is none that this version knows");
+    record.status = *status;
     record.reasons = json.value("reasons", record.reasons);
     record.num_markers = json.value("markers", Json::object()).size();
     for (const Json& item : json.value("items", Json::array())) {

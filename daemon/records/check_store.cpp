@@ -7,12 +7,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::FromStored;
-using store::Now;
-using store::ParseId;
-using store::ToStored;
-
 namespace {
 
 constexpr const char* kNewestChecks =
@@ -33,34 +27,20 @@ std::string CheckStore::Add(const Actor& actor, const std::string& sensor_serial
                             const TakenCheck& taken) {
   const std::string status(Name(taken.check.status));
   StoreChange change(database_);
-  change
-      .Prepare(
-          "INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (?, ?, ?, ?, ?)")
-      .Bind(Now())
-      .Bind(actor.user)
-      .Bind(sensor_serial)
-      .Bind(status)
-      .Bind(CheckJson(taken))
-      .Run();
-  const std::string id = std::to_string(change.last_id());
+  change->Run("INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (?, ?, ?, ?, ?)",
+              StoredNow(), actor.user, sensor_serial, status, CheckJson(taken));
+  const std::string id = std::to_string(change->last_id());
   change.Log(actor, "check.done", id, status);
   change.Commit();
   return id;
 }
 
 std::vector<CheckRecord> CheckStore::List(int limit) {
-  const StoreDatabase::Held lists = database_.ForLists();
-  Statement query = lists->Prepare(kNewestChecks);
-  query.Bind(std::int64_t{limit});
-  std::vector<CheckRecord> checks;
-  while (query.Step()) checks.push_back(ReadCheck(query));
-  return checks;
+  return database_.ForLists()->All(kNewestChecks, ReadCheck, limit);
 }
 
 std::optional<CheckRecord> CheckStore::Last() {
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(kNewestChecks);
-  return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadCheck(query)) : std::nullopt;
+  return database_.ForRows()->First(kNewestChecks, ReadCheck, 1);
 }
 
 DailyCheck CheckStore::StateSince(WallClock::time_point since, const std::string& sensor_serial) {
@@ -69,17 +49,14 @@ DailyCheck CheckStore::StateSince(WallClock::time_point since, const std::string
   Statement query = rows->Prepare(
       "SELECT status = 'failed', time FROM checks WHERE (status = 'failed' AND (?1 = '' OR "
       "sensor_serial IN (?1, ''))) OR (status = 'passed' AND time <= ?2 AND (?1 = '' OR "
-      "sensor_serial = ?1)) ORDER BY id DESC LIMIT 1");
-  if (!query.Bind(sensor_serial).Bind(Now()).Step() || query.Integer(1) < ToStored(since))
-    return DailyCheck::kOverdue;
+      "sensor_serial = ?1)) ORDER BY id DESC LIMIT 1",
+      sensor_serial, StoredNow());
+  if (!query.Step() || query.Integer(1) < ToStored(since)) return DailyCheck::kOverdue;
   return query.Integer(0) != 0 ? DailyCheck::kFailed : DailyCheck::kPassed;
 }
 
 bool CheckStore::ConfirmsScan(const std::string& scan_id) {
-  const std::optional<std::int64_t> number = ParseId(scan_id);
-  if (!number) return false;
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
+  return database_.ForRows()->Has(
       "SELECT 1 FROM scans JOIN checks ON checks.status = 'passed' AND checks.sensor_serial = "
       "scans.sensor_serial AND checks.time >= scans.finished_at AND checks.time <= ?2 AND "
       "date(checks.time / 1000000, 'unixepoch', 'localtime') = "
@@ -90,42 +67,39 @@ bool CheckStore::ConfirmsScan(const std::string& scan_id) {
       "other.time <= checks.time) "
       "AND EXISTS (SELECT 1 FROM check_baselines WHERE set_at <= scans.started_at) "
       "AND NOT EXISTS (SELECT 1 FROM check_baselines WHERE set_at > scans.started_at AND "
-      "set_at <= checks.time) LIMIT 1");
-  return query.Bind(*number).Bind(Now()).Step();
+      "set_at <= checks.time) LIMIT 1",
+      ParseId(scan_id), StoredNow());
 }
 
 bool CheckStore::RefutesScan(const std::string& scan_id) {
-  const std::optional<std::int64_t> number = ParseId(scan_id);
-  if (!number) return false;
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
-      "SELECT checks.status = 'failed' FROM scans JOIN checks ON checks.time >= scans.started_at "
-      "AND (checks.sensor_serial = scans.sensor_serial OR (checks.status = 'failed' AND "
-      "checks.sensor_serial = '')) WHERE scans.id = ?1 AND checks.status IN ('passed', 'failed') "
-      "ORDER BY checks.id LIMIT 1");
-  return query.Bind(*number).Step() && query.Integer(0) != 0;
+  return database_.ForRows()
+             ->FirstInteger(
+                 "SELECT checks.status = 'failed' FROM scans JOIN checks ON checks.time >= "
+                 "scans.started_at AND (checks.sensor_serial = scans.sensor_serial OR "
+                 "(checks.status = 'failed' AND checks.sensor_serial = '')) WHERE scans.id = ?1 "
+                 "AND checks.status IN ('passed', 'failed') ORDER BY checks.id LIMIT 1",
+                 ParseId(scan_id))
+             .value_or(0) != 0;
 }
 
 std::optional<CheckBaseline> CheckStore::Baseline() {
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
+  return database_.ForRows()->First(
       "SELECT check_id, set_at, set_by, json FROM check_baselines JOIN checks ON checks.id = "
-      "check_id ORDER BY check_baselines.id DESC "
-      "LIMIT 1");
-  if (!query.Step()) return std::nullopt;
-  return CheckBaseline{.check_id = query.Text(0),
-                       .set_at = FromStored(query.Integer(1)),
-                       .set_by = query.Text(2),
-                       .num_markers = CheckIn(query.Text(3)).num_markers};
+      "check_id ORDER BY check_baselines.id DESC LIMIT 1",
+      [](const Statement& row) {
+        return CheckBaseline{.check_id = row.Text(0),
+                             .set_at = FromStored(row.Integer(1)),
+                             .set_by = row.Text(2),
+                             .num_markers = CheckIn(row.Text(3)).num_markers};
+      });
 }
 
 std::optional<MarkerBaseline> CheckStore::BaselineMarkers() {
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
+  const std::optional<std::string> json = database_.ForRows()->FirstText(
       "SELECT json FROM check_baselines JOIN checks ON checks.id = check_id ORDER BY "
       "check_baselines.id DESC LIMIT 1");
-  if (!query.Step()) return std::nullopt;
-  std::optional<MarkerBaseline> markers = BaselineIn(query.Text(0));
+  if (!json) return std::nullopt;
+  std::optional<MarkerBaseline> markers = BaselineIn(*json);
   if (!markers)
     throw DataError("the stored baseline of the daily check cannot be read: set another one");
   return markers;
@@ -136,9 +110,8 @@ void CheckStore::SetBaseline(const Actor& actor, const std::string& check_id) {
   StoreChange change(database_);
   std::string described;
   {
-    Statement query = change.Prepare("SELECT json, user FROM checks WHERE id = ?");
-    if (!number || !query.Bind(*number).Step())
-      throw StoreRefusal(ChangeResult::kNotFound, "there is no such check");
+    Statement query = change->Prepare("SELECT json, user FROM checks WHERE id = ?", number);
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such check");
     const auto baseline = BaselineIn(query.Text(0));
     if (!baseline || baseline->markers.size() < 3) {
       throw StoreRefusal(
@@ -152,18 +125,15 @@ void CheckStore::SetBaseline(const Actor& actor, const std::string& check_id) {
     described = fmt::format("{} markers", baseline->markers.size());
   }
   {
-    Statement query = change.Prepare(
+    Statement query = change->Prepare(
         "SELECT check_id, json FROM check_baselines JOIN checks ON checks.id = check_id ORDER BY "
         "check_baselines.id DESC LIMIT 1");
     if (query.Step())
       described += fmt::format("; before: check {} with {} markers", query.Text(0),
                                CheckIn(query.Text(1)).num_markers);
   }
-  change.Prepare("INSERT INTO check_baselines (check_id, set_at, set_by) VALUES (?, ?, ?)")
-      .Bind(*number)
-      .Bind(Now())
-      .Bind(actor.user)
-      .Run();
+  change->Run("INSERT INTO check_baselines (check_id, set_at, set_by) VALUES (?, ?, ?)", number,
+              StoredNow(), actor.user);
   change.Log(actor, "check.baseline", check_id, described);
   change.Commit();
 }

@@ -33,8 +33,8 @@ Statement::~Statement() {
   if (statement_ == nullptr) return;
   sqlite3_reset(statement_);
   sqlite3_clear_bindings(statement_);
-  if (sqlite3_stmt*& idle = database_->idle_[key_]; idle == nullptr) {
-    idle = statement_;
+  if (*idle_ == nullptr) {
+    *idle_ = statement_;
   } else {
     sqlite3_finalize(statement_);  // the same statement was in use twice
   }
@@ -42,7 +42,7 @@ Statement::~Statement() {
 
 Statement::Statement(Statement&& other) noexcept
     : database_(other.database_),
-      key_(other.key_),
+      idle_(other.idle_),
       statement_(std::exchange(other.statement_, nullptr)),
       next_(other.next_) {}
 
@@ -141,18 +141,18 @@ void Database::Execute(const std::string& sql) {
     Fail(code, "set up");
 }
 
-Statement Database::Prepare(const char* sql) {
-  if (const auto idle = idle_.find(sql); idle != idle_.end() && idle->second != nullptr) {
-    return {*this, sql, std::exchange(idle->second, nullptr)};
-  }
+Statement Database::Take(std::string_view sql) {
+  auto idle = idle_.find(sql);
+  if (idle != idle_.end() && idle->second != nullptr)
+    return {*this, idle->second, std::exchange(idle->second, nullptr)};
   sqlite3_stmt* statement = nullptr;
-  if (const int code =
-          sqlite3_prepare_v3(handle_, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+  if (const int code = sqlite3_prepare_v3(handle_, sql.data(), static_cast<int>(sql.size()),
+                                          SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
       code != SQLITE_OK) {
     Fail(code, "use");
   }
-  idle_.try_emplace(sql, nullptr);
-  return {*this, sql, statement};
+  if (idle == idle_.end()) idle = idle_.try_emplace(std::string(sql), nullptr).first;
+  return {*this, idle->second, statement};
 }
 
 std::int64_t Database::last_id() const { return sqlite3_last_insert_rowid(handle_); }
@@ -237,19 +237,19 @@ void Database::Fail(int code, const char* doing) const {
 }
 
 Transaction::Transaction(Database& database) : database_(database) {
-  database_.Prepare("BEGIN IMMEDIATE").Run();
+  database_.Run("BEGIN IMMEDIATE");
 }
 
 Transaction::~Transaction() {
   if (!open_) return;
   try {
-    database_.Prepare("ROLLBACK").Run();
+    database_.Run("ROLLBACK");
   } catch (const IoError&) {  // SQLite rolls back by itself after some errors
   }
 }
 
 void Transaction::Commit() {
-  database_.Prepare("COMMIT").Run();
+  database_.Run("COMMIT");
   open_ = false;
 }
 

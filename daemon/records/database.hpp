@@ -3,13 +3,16 @@
 #pragma once
 
 #include <chrono>
+#include <concepts>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 #include "algo/base/errors.hpp"
 
@@ -56,6 +59,10 @@ class Statement {
   Statement& Bind(double value);
   Statement& Bind(std::string_view value);
   Statement& BindNull();
+  template <std::integral T>
+  Statement& Bind(T value) {
+    return Bind(static_cast<std::int64_t>(value));
+  }
   template <typename T>
   Statement& Bind(const std::optional<T>& value) {
     return value ? Bind(*value) : BindNull();
@@ -73,10 +80,10 @@ class Statement {
 
  private:
   friend class Database;
-  Statement(Database& database, const char* key, sqlite3_stmt* statement)
-      : database_(&database), key_(key), statement_(statement) {}
+  Statement(Database& database, sqlite3_stmt*& idle, sqlite3_stmt* statement)
+      : database_(&database), idle_(&idle), statement_(statement) {}
   Database* database_;
-  const char* key_;
+  sqlite3_stmt** idle_;  ///< Its place in the database's cache.
   sqlite3_stmt* statement_;
   int next_ = 1;
 };
@@ -102,9 +109,52 @@ class Database {
 
   /// Runs one or more statements without parameters.
   void Execute(const std::string& sql);
-  /// Prepared once and kept for the next call. The text must be a literal, because the cache only
-  /// grows.
-  [[nodiscard]] Statement Prepare(const char* sql);
+  /// With these values for its parameters. Prepared once and kept for the next call: the text must
+  /// not contain data, because the cache only grows.
+  template <typename... Values>
+  [[nodiscard]] Statement Prepare(std::string_view sql, const Values&... values) {
+    Statement statement = Take(sql);
+    (statement.Bind(values), ...);
+    return statement;
+  }
+  /// Prepares the statement and runs it to its end.
+  template <typename... Values>
+  void Run(std::string_view sql, const Values&... values) {
+    Prepare(sql, values...).Run();
+  }
+  /// Whether the query has a row.
+  template <typename... Values>
+  [[nodiscard]] bool Has(std::string_view sql, const Values&... values) {
+    return Prepare(sql, values...).Step();
+  }
+  /// What `read` makes of the first row, a `const Statement&`.
+  template <typename Read, typename... Values>
+  [[nodiscard]] auto First(std::string_view sql, const Read& read, const Values&... values) {
+    Statement row = Prepare(sql, values...);
+    using Value = std::invoke_result_t<const Read&, const Statement&>;
+    return row.Step() ? std::optional<Value>(read(row)) : std::nullopt;
+  }
+  /// What `read` makes of every row.
+  template <typename Read, typename... Values>
+  [[nodiscard]] auto All(std::string_view sql, const Read& read, const Values&... values) {
+    Statement row = Prepare(sql, values...);
+    std::vector<std::invoke_result_t<const Read&, const Statement&>> all;
+    while (row.Step()) all.push_back(read(row));
+    return all;
+  }
+  /// The first column of the first row.
+  template <typename... Values>
+  [[nodiscard]] std::optional<std::string> FirstText(std::string_view sql,
+                                                     const Values&... values) {
+    return First(
+        sql, [](const Statement& row) { return row.Text(0); }, values...);
+  }
+  template <typename... Values>
+  [[nodiscard]] std::optional<std::int64_t> FirstInteger(std::string_view sql,
+                                                         const Values&... values) {
+    return First(
+        sql, [](const Statement& row) { return row.Integer(0); }, values...);
+  }
   [[nodiscard]] std::int64_t last_id() const;
   [[nodiscard]] int num_changed() const;
   /// Checks everything within a time limit. False: not everything could be checked in that time.
@@ -116,11 +166,12 @@ class Database {
 
  private:
   friend class Statement;
+  [[nodiscard]] Statement Take(std::string_view sql);
   [[noreturn]] void Fail(int code, const char* doing) const;
 
   std::filesystem::path file_;
   sqlite3* handle_ = nullptr;
-  std::map<const char*, sqlite3_stmt*> idle_;
+  std::map<std::string, sqlite3_stmt*, std::less<>> idle_;  ///< By text; null while in use.
 };
 
 /// Rolled back unless Commit() was called. Takes the write lock immediately.

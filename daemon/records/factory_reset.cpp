@@ -107,12 +107,12 @@ std::string KeepRecords(const fs::path& state, const Actor& actor) {
   {
     Store store(state);
     StoreChange change(store.database());
-    change.Prepare("DELETE FROM users").Run();
+    change->Run("DELETE FROM users");
     done = fmt::format(
         "records kept; {} accounts, all paired displays, the settings and the page's keys removed",
-        change.num_changed());
-    change.Prepare("DELETE FROM displays").Run();
-    change.Prepare("DELETE FROM settings WHERE name = 'settings'").Run();
+        change->num_changed());
+    change->Run("DELETE FROM displays");
+    change->Run("DELETE FROM settings WHERE name = 'settings'");
     change.Log(actor, "system.factory_reset", "", done);
     change.Commit();
   }

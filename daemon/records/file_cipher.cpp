@@ -90,13 +90,6 @@ const unsigned char* Bytes(const std::string& text) {
 /// Sealed into each piece of a file, so that files of one backup cannot be exchanged.
 const std::string& PlaceOf(const std::string& path) { return path; }
 
-std::string Hex(const unsigned char* bytes, std::size_t count) {
-  std::string text(2 * count + 1, '\0');
-  ::sodium_bin2hex(text.data(), text.size(), bytes, count);
-  text.pop_back();
-  return text;
-}
-
 }  // namespace
 
 BackupSecret::BackupSecret(const fs::path& file, Readers readers) {
@@ -162,7 +155,7 @@ void FileCipher::Derive(const BackupSecret& secret) {
 
 Json FileCipher::Header() const {
   return {{"algorithm", kAlgorithm},
-          {"salt", Hex(salt_.data(), salt_.size())},
+          {"salt", HexOf(salt_)},
           {"operations", operations_},
           {"memory_bytes", memory_bytes_},
           {"key", KeyedHash("key", "")}};
@@ -173,7 +166,7 @@ std::string FileCipher::KeyedHash(const char* purpose, const std::string& text) 
   const std::string named = fmt::format("plumb backup, {}\n{}", purpose, text);
   ::crypto_generichash(hash.data(), hash.size(), Bytes(named), named.size(), key_.data(),
                        key_.size());
-  return Hex(hash.data(), hash.size());
+  return HexOf(hash);
 }
 
 std::string FileCipher::Signature(const std::string& text) const {
@@ -190,7 +183,7 @@ FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
   std::vector<std::uint8_t> sealed(crypto_secretstream_xchacha20poly1305_HEADERBYTES);
   ::crypto_secretstream_xchacha20poly1305_init_push(&state, sealed.data(), key_.data());
   target.Write(sealed);
-  Written written{.plain = {.path = path, .bytes = 0, .sha256 = {}}, .sealed = {}};
+  Written written{.plain = {.path = path}, .sealed = {}};
   Sha256 hash;
   do {
     CheckStop(stop);
@@ -226,7 +219,7 @@ FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
   DigestingWriter target(to, path);
   Sha256 sealed_hash;
   sealed_hash.Add(header.data(), header.size());
-  Written written{.plain = {}, .sealed = {.path = path, .bytes = header.size(), .sha256 = {}}};
+  Written written{.plain = {}, .sealed = {.path = path, .bytes = header.size()}};
   do {
     CheckStop(stop);
     const std::vector<std::uint8_t> piece = pieces.Take();

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <vector>
@@ -39,9 +40,7 @@ fs::path InMadeFolders(const fs::path& file) {
 }  // namespace
 
 DigestingWriter::DigestingWriter(const fs::path& folder, const std::string& path)
-    : target_(InMadeFolders(folder / path)),
-      copy_(target_),
-      digest_{.path = path, .bytes = 0, .sha256 = {}} {}
+    : target_(InMadeFolders(folder / path)), copy_(target_), digest_{.path = path} {}
 
 void DigestingWriter::Write(std::span<const std::uint8_t> bytes) {
   hash_.Add(bytes.data(), bytes.size());
@@ -118,10 +117,22 @@ void PlaceFile(const fs::path& folder, const std::string& name, const std::strin
   SyncToDisk(folder);
 }
 
-void SyncDisk(const fs::path& folder) {
-  const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (opened.get() < 0 || ::syncfs(opened.get()) != 0)
-    throw IoError(DescribeWriteError(folder, errno));
+void GiveToOwnerOf(const fs::path& state, const fs::path& written) {
+  struct stat owner {};
+  if (::geteuid() != 0 || ::stat(state.c_str(), &owner) != 0 || owner.st_uid == 0) return;
+  const auto give = [&owner](const fs::path& path) {
+    if (::lchown(path.c_str(), owner.st_uid, owner.st_gid) != 0)
+      throw IoError(DescribeWriteError(path, errno));
+  };
+  give(written);
+  if (!fs::is_directory(fs::symlink_status(written))) return;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(written))
+    give(entry.path());
+}
+
+bool IsBelow(const fs::path& path, const fs::path& folder) {
+  return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first ==
+         folder.end();
 }
 
 }  // namespace plumb

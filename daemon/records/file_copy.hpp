@@ -56,7 +56,11 @@ class DigestingWriter {
 void PlaceFile(const std::filesystem::path& folder, const std::string& name,
                const std::string& text);
 
-/// Flushes everything on a folder's disk. @throws IoError
-void SyncDisk(const std::filesystem::path& folder);
+/// What root has written into a state folder gets the account that runs plumbd as its owner: a
+/// file, or a folder with all that it holds. @throws IoError
+void GiveToOwnerOf(const std::filesystem::path& state, const std::filesystem::path& written);
+
+/// Whether the path is the folder or lies in it, by their names.
+[[nodiscard]] bool IsBelow(const std::filesystem::path& path, const std::filesystem::path& folder);
 
 }  // namespace plumb

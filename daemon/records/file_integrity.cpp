@@ -6,12 +6,6 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::Now;
-using store::ParseId;
-using store::ScanId;
-using store::ToStored;
-
 namespace {
 
 constexpr const char* kScenePrefix = "scene/";
@@ -26,9 +20,10 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
   bool is_done = false;
   {
     const StoreDatabase::Held writer = database_.ForChanges();
-    Statement query = writer->Prepare("SELECT outcome FROM scans WHERE id = ? AND has_folder = 1");
-    if (!query.Bind(scan).Step()) return "it has no files";
-    is_done = query.Text(0) == "done";
+    const std::optional<std::string> outcome =
+        writer->FirstText("SELECT outcome FROM scans WHERE id = ? AND has_folder = 1", scan);
+    if (!outcome) return "it has no files";
+    is_done = *outcome == "done";
     files = StoredDigests(*writer, scan);
   }
   const auto has = [&](const char* path) {
@@ -39,7 +34,7 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
   std::vector<FileDigest> first_seen;
   std::string fault;
   if (is_done && !has(kSceneMarker)) {  // stored by an older Plumb
-    fault = WhyNotThere(folder, {{.path = kSceneMarker, .sha256 = {}}}, look_);
+    fault = WhyNotThere(folder, {{.path = kSceneMarker}}, look_);
     if (fault.empty()) first_seen = DigestsOfScan(folder, stop);
   } else {
     fault = WhyNotIntact(folder, files, scene_only ? kScenePrefix : "", stop);
@@ -48,17 +43,14 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
     if (auto recording = DigestOfRecording(folder, stop)) first_seen.push_back(*recording);
   }
   StoreChange change(database_);
-  std::string before;
-  {
-    Statement query = change.Prepare("SELECT unavailable FROM scans WHERE id = ?");
-    if (!query.Bind(scan).Step()) return "it was removed meanwhile";
-    before = query.Text(0);
-  }
-  StoreDigests(change.database(), scan, first_seen);
+  const std::optional<std::string> before =
+      change->FirstText("SELECT unavailable FROM scans WHERE id = ?", scan);
+  if (!before) return "it was removed meanwhile";
+  StoreDigests(*change, scan, first_seen);
   // An intact scene says nothing about the other files.
-  if (!scene_only || !fault.empty()) SetUnavailable(change.database(), scan, before, fault);
+  if (!scene_only || !fault.empty()) SetUnavailable(*change, scan, *before, fault);
   if (!scene_only) {
-    change.Prepare("UPDATE scans SET checked_at = ? WHERE id = ?").Bind(Now()).Bind(scan).Run();
+    change->Run("UPDATE scans SET checked_at = ? WHERE id = ?", StoredNow(), scan);
   }
   change.Commit();
   return fault;
@@ -66,39 +58,32 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
 
 std::optional<CheckedScan> FileIntegrity::CheckNext(std::chrono::hours at_least,
                                                     const std::stop_token& stop) {
-  std::string id;
-  {
-    const StoreDatabase::Held writer = database_.ForChanges();
-    const WallClock::time_point now = WallClock::now();
-    // A time in the future is ignored, and files that were unavailable may be back.
-    Statement query = writer->Prepare(
-        "SELECT id FROM scans WHERE has_folder = 1 AND (checked_at <= ?1 OR checked_at > ?2 OR "
-        "(unavailable <> '' AND checked_at <= ?3)) ORDER BY checked_at, id LIMIT 1");
-    query.Bind(ToStored(now - at_least))
-        .Bind(ToStored(now))
-        .Bind(ToStored(now - kUnavailableAgain));
-    if (!query.Step()) return std::nullopt;
-    id = ScanId(query.Integer(0));
-  }
+  const WallClock::time_point now = WallClock::now();
+  // A time in the future is ignored, and files that were unavailable may be back.
+  const std::optional<std::int64_t> next = database_.ForChanges()->FirstInteger(
+      "SELECT id FROM scans WHERE has_folder = 1 AND (checked_at <= ?1 OR checked_at > ?2 OR "
+      "(unavailable <> '' AND checked_at <= ?3)) ORDER BY checked_at, id LIMIT 1",
+      ToStored(now - at_least), ToStored(now), ToStored(now - kUnavailableAgain));
+  if (!next) return std::nullopt;
+  std::string id = ScanId(*next);
   std::string fault = Check(id, /*scene_only=*/false, stop);
   return CheckedScan{.id = std::move(id), .fault = std::move(fault)};
 }
 
 UnusableRecords FileIntegrity::CountUnusable() {
   const StoreDatabase::Held lists = database_.ForLists();
+  const auto count = [&](const char* sql) {
+    return static_cast<int>(lists->FirstInteger(sql).value_or(0));
+  };
   UnusableRecords found;
   found.set_aside = static_cast<int>(folders_.SetAsideAs("").size());
-  {
-    Statement query = lists->Prepare(
-        "SELECT count(*) FROM scans JOIN patients ON patients.id = patient_id WHERE unavailable <> "
-        "'' AND archived = 0");
-    if (query.Step()) found.scans = static_cast<int>(query.Integer(0));
-  }
-  Statement query = lists->Prepare(
+  found.scans = count(
+      "SELECT count(*) FROM scans JOIN patients ON patients.id = patient_id WHERE unavailable <> "
+      "'' AND archived = 0");
+  found.references = count(
       "SELECT count(*) FROM refs JOIN scans ON scans.id = scan_id JOIN patients ON patients.id = "
       "refs.patient_id WHERE unavailable <> '' AND archived = 0 AND version = (SELECT "
       "max(version) FROM refs AS r WHERE r.patient_id = refs.patient_id AND r.approved_by <> '')");
-  if (query.Step()) found.references = static_cast<int>(query.Integer(0));
   return found;
 }
 

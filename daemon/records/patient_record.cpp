@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <set>
-#include <string_view>
 
 #include <fmt/format.h>
 
@@ -21,24 +20,22 @@ constexpr std::size_t kMaxRows = 200'000, kMaxText = std::size_t{64} << 10,
 constexpr std::int64_t kMaxInteger = std::int64_t{1} << 53;  // sufficient for times in nanoseconds
 
 struct Query {
-  const char *table, *columns, *rows;
+  const char *table, *rows;
 };
 constexpr Query kQueries[] = {
-    {"patients", "PRAGMA table_info(patients)", "SELECT * FROM patients WHERE id = ?1"},
-    {"sessions", "PRAGMA table_info(sessions)",
-     "SELECT * FROM sessions WHERE patient_id = ?1 ORDER BY id"},
-    {"scans", "PRAGMA table_info(scans)",
-     "SELECT * FROM scans WHERE patient_id = ?1 AND outcome <> 'running' ORDER BY id"},
-    {"results", "PRAGMA table_info(results)",
+    {"patients", "SELECT * FROM patients WHERE id = ?1"},
+    {"sessions", "SELECT * FROM sessions WHERE patient_id = ?1 ORDER BY id"},
+    {"scans", "SELECT * FROM scans WHERE patient_id = ?1 AND outcome <> 'running' ORDER BY id"},
+    {"results",
      "SELECT * FROM results WHERE scan_id IN (SELECT id FROM scans WHERE patient_id = ?1 AND "
      "outcome <> 'running') ORDER BY scan_id"},
-    {"refs", "PRAGMA table_info(refs)", "SELECT * FROM refs WHERE patient_id = ?1 ORDER BY id"},
-    {"scan_files", "PRAGMA table_info(scan_files)",
+    {"refs", "SELECT * FROM refs WHERE patient_id = ?1 ORDER BY id"},
+    {"scan_files",
      "SELECT * FROM scan_files WHERE scan_id IN (SELECT id FROM scans WHERE patient_id = ?1 AND "
      "outcome <> 'running') ORDER BY scan_id, path"},
 };
 constexpr Query kLog = {
-    "audit", "PRAGMA table_info(audit)",
+    "audit",
     "SELECT * FROM audit WHERE (action LIKE 'patient.%' AND subject = CAST(?1 AS TEXT)) OR "
     "((action LIKE 'session.%' OR action IN ('scan.start', 'scan.end', 'cancel')) AND subject IN "
     "(SELECT CAST(id AS TEXT) FROM sessions WHERE patient_id = ?1)) OR (action LIKE 'reference.%' "
@@ -46,29 +43,15 @@ constexpr Query kLog = {
     "'scan.%' OR action LIKE 'recording.%') AND action NOT IN ('scan.start', 'scan.end') AND "
     "subject IN (SELECT printf('%06d', id) FROM scans WHERE patient_id = ?1)) ORDER BY number"};
 constexpr Query kChecks = {
-    "checks", "PRAGMA table_info(checks)",
+    "checks",
     "SELECT * FROM checks WHERE id IN (SELECT (SELECT max(earlier.id) FROM checks AS earlier WHERE "
     "earlier.sensor_serial = scans.sensor_serial AND earlier.time <= scans.started_at) FROM scans "
     "WHERE patient_id = ?1) ORDER BY id"};
 
-std::vector<ColumnOf> Columns(Database& database, const Query& query) {
-  std::vector<ColumnOf> columns;
-  Statement info = database.Prepare(query.columns);
-  while (info.Step()) {
-    const bool is_key = info.Integer(5) != 0, not_null = info.Integer(3) != 0;
-    columns.push_back({.name = info.Text(1),
-                       .type = info.Text(2),
-                       .is_required = is_key || (not_null && info.IsNull(4)),
-                       .may_be_null = !is_key && !not_null});
-  }
-  return columns;
-}
-
 Json Rows(Database& database, const Query& query, std::int64_t patient) {
-  const std::vector<ColumnOf> columns = Columns(database, query);
+  const std::vector<ColumnOf> columns = ColumnsOf(database, query.table);
   Json rows = Json::array();
-  Statement row = database.Prepare(query.rows);
-  row.Bind(patient);
+  Statement row = database.Prepare(query.rows, patient);
   while (row.Step()) {
     Json values = Json::object();
     for (std::size_t i = 0; i < columns.size(); ++i) {
@@ -187,10 +170,13 @@ void CheckReferences(const Json& rows) {
 }  // namespace
 
 std::vector<ColumnOf> ColumnsOf(Database& database, const std::string& table) {
-  for (const Query& query : kQueries) {
-    if (table == query.table) return Columns(database, query);
-  }
-  throw std::invalid_argument("no table of a patient: " + table);
+  return database.All(fmt::format("PRAGMA table_info({})", table), [](const Statement& info) {
+    const bool is_key = info.Integer(5) != 0, not_null = info.Integer(3) != 0;
+    return ColumnOf{.name = info.Text(1),
+                    .type = info.Text(2),
+                    .is_required = is_key || (not_null && info.IsNull(4)),
+                    .may_be_null = !is_key && !not_null};
+  });
 }
 
 Json PatientRows(Database& database, std::int64_t patient) {
@@ -209,7 +195,7 @@ void CheckPatientRows(Database& database, const Json& rows) {
     const auto table = rows.find(query.table);
     if (table == rows.end() || !table->is_array() || table->size() > kMaxRows)
       throw DataError(fmt::format("its record has no {}, or too many", query.table));
-    const std::vector<ColumnOf> columns = Columns(database, query);
+    const std::vector<ColumnOf> columns = ColumnsOf(database, query.table);
     for (const Json& row : *table) CheckRow(query.table, columns, row);
   }
   if (rows.size() != std::size(kQueries) || rows.at("patients").size() != 1)

@@ -8,15 +8,9 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::FromStored;
-using store::Now;
-using store::ParseId;
-using store::RequireId;
-
 namespace {
 
-constexpr const char* kPatientColumns =
+const std::string kPatientColumns =
     "SELECT id, code, site, created_at,"
     " (SELECT max(refs.id) FROM refs WHERE refs.patient_id = patients.id AND approved_by <> '' AND "
     "version ="
@@ -42,54 +36,37 @@ Patient ReadPatient(const Statement& row) {
 }  // namespace
 
 std::vector<Patient> PatientStore::List() {
-  const StoreDatabase::Held lists = database_.ForLists();
-  static const std::string kSql =
-      std::string(kPatientColumns) + "WHERE id > 0 ORDER BY code LIMIT 1000";
-  Statement query = lists->Prepare(kSql.c_str());
-  std::vector<Patient> patients;
-  while (query.Step()) patients.push_back(ReadPatient(query));
-  return patients;
+  return database_.ForLists()->All(kPatientColumns + "WHERE id > 0 ORDER BY code LIMIT 1000",
+                                   ReadPatient);
 }
 
 std::optional<Patient> PatientStore::Find(const std::string& id) {
-  const std::optional<std::int64_t> number = ParseId(id);
-  if (!number) return std::nullopt;
-  const StoreDatabase::Held rows = database_.ForRows();
-  static const std::string kSql = std::string(kPatientColumns) + "WHERE id = ?";
-  Statement query = rows->Prepare(kSql.c_str());
-  return query.Bind(*number).Step() ? std::optional(ReadPatient(query)) : std::nullopt;
+  return database_.ForRows()->First(kPatientColumns + "WHERE id = ?", ReadPatient, ParseId(id));
 }
 
 std::optional<Patient> PatientStore::FindByCode(const std::string& code) {
-  const StoreDatabase::Held rows = database_.ForRows();
-  static const std::string kSql =
-      std::string(kPatientColumns) + "WHERE code = ? COLLATE NOCASE AND id > 0";
-  Statement query = rows->Prepare(kSql.c_str());
-  return query.Bind(code).Step() ? std::optional(ReadPatient(query)) : std::nullopt;
+  return database_.ForRows()->First(kPatientColumns + "WHERE code = ? COLLATE NOCASE AND id > 0",
+                                    ReadPatient, code);
 }
 
 std::string PatientStore::Add(const Actor& actor, const std::string& code,
                               const std::string& site) {
   StoreChange change(database_);
-  {  // PX-1 and px-1 would be confused at the couch
-    Statement query = change.Prepare("SELECT code FROM patients WHERE code = ? COLLATE NOCASE");
-    if (query.Bind(code).Step())
-      throw StoreRefusal(ChangeResult::kConflict,
-                         fmt::format("there is a patient with the code {} already: choose another "
-                                     "code (capital and small letters count as the same)",
-                                     query.Text(0)));
-  }
+  // PX-1 and px-1 would be confused at the couch.
+  if (const auto same =
+          change->FirstText("SELECT code FROM patients WHERE code = ? COLLATE NOCASE", code))
+    throw StoreRefusal(ChangeResult::kConflict,
+                       fmt::format("there is a patient with the code {} already: choose another "
+                                   "code (capital and small letters count as the same)",
+                                   *same));
   try {
-    change.Prepare("INSERT INTO patients (code, site, created_at) VALUES (?, ?, ?)")
-        .Bind(code)
-        .Bind(site)
-        .Bind(Now())
-        .Run();
+    change->Run("INSERT INTO patients (code, site, created_at) VALUES (?, ?, ?)", code, site,
+                StoredNow());
   } catch (const ConstraintBroken&) {
     throw StoreRefusal(ChangeResult::kConflict,
                        "there is a patient with this code already: choose another code");
   }
-  const std::string id = std::to_string(change.last_id());
+  const std::string id = std::to_string(change->last_id());
   change.Log(actor, "patient.add", id, "");
   change.Commit();
   return id;
@@ -99,25 +76,18 @@ void PatientStore::Change(const Actor& actor, const std::string& id, const std::
                           const std::string& note, const std::optional<CourseNotes>& shown) {
   const std::int64_t number = RequireId(id, "patient");
   StoreChange change(database_);
-  CourseNotes before;
-  {
-    Statement query = change.Prepare("SELECT site, note FROM patients WHERE id = ? AND id > 0");
-    const bool exists = query.Bind(number).Step();
-    if (exists) before = {.site = query.Text(0), .note = query.Text(1)};
-    if (shown && exists && *shown != before)
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "this patient was changed by somebody else meanwhile: look again, then "
-                         "save");
-  }
-  change.Prepare("UPDATE patients SET site = ?, note = ? WHERE id = ? AND id > 0")
-      .Bind(site)
-      .Bind(note)
-      .Bind(number)
-      .Run();
-  if (change.num_changed() == 0)
-    throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+  const auto stored = change->First(
+      "SELECT site, note FROM patients WHERE id = ? AND id > 0",
+      [](const Statement& row) { return CourseNotes{.site = row.Text(0), .note = row.Text(1)}; },
+      number);
+  if (!stored) throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+  if (shown && *shown != *stored)
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "this patient was changed by somebody else meanwhile: look again, then "
+                       "save");
+  change->Run("UPDATE patients SET site = ?, note = ? WHERE id = ? AND id > 0", site, note, number);
   // Never the texts themselves: the log keeps its entries when a patient's data is removed.
-  const bool has_site = site != before.site, has_note = note != before.note;
+  const bool has_site = site != stored->site, has_note = note != stored->note;
   change.Log(actor, "patient.change", id,
              has_site && has_note ? "site and note"
              : has_site           ? "site"
@@ -129,18 +99,12 @@ void PatientStore::Change(const Actor& actor, const std::string& id, const std::
 void PatientStore::Archive(const Actor& actor, const std::string& id, bool archived) {
   const std::int64_t number = RequireId(id, "patient");
   StoreChange change(database_);
-  {
-    Statement query =
-        change.Prepare("SELECT 1 FROM sessions WHERE patient_id = ? AND closed_at IS NULL");
-    if (archived && query.Bind(number).Step())
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "the session of this patient is open: close it first");
-  }
-  change.Prepare("UPDATE patients SET archived = ? WHERE id = ? AND id > 0")
-      .Bind(std::int64_t{archived})
-      .Bind(number)
-      .Run();
-  if (change.num_changed() == 0)
+  if (archived &&
+      change->Has("SELECT 1 FROM sessions WHERE patient_id = ? AND closed_at IS NULL", number))
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "the session of this patient is open: close it first");
+  change->Run("UPDATE patients SET archived = ? WHERE id = ? AND id > 0", archived, number);
+  if (change->num_changed() == 0)
     throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
   change.Log(actor, archived ? "patient.archive" : "patient.unarchive", id, "");
   change.Commit();
@@ -149,18 +113,13 @@ void PatientStore::Archive(const Actor& actor, const std::string& id, bool archi
 namespace {
 
 void CloseOpenSessions(StoreChange& change, const Actor& actor) {
-  std::vector<std::string> open;
-  {
-    Statement query = change.Prepare("SELECT id FROM sessions WHERE closed_at IS NULL");
-    while (query.Step()) open.push_back(query.Text(0));
-  }
-  for (const std::string& id : open) {
-    change.Prepare("UPDATE sessions SET closed_at = ?, closed_by = ? WHERE id = ?")
-        .Bind(Now())
-        .Bind(actor.user)
-        .Bind(ParseId(id))
-        .Run();
-    change.Log(actor, "session.close", id, "");
+  const std::vector<std::int64_t> open =
+      change->All("SELECT id FROM sessions WHERE closed_at IS NULL",
+                  [](const Statement& row) { return row.Integer(0); });
+  for (const std::int64_t id : open) {
+    change->Run("UPDATE sessions SET closed_at = ?, closed_by = ? WHERE id = ?", StoredNow(),
+                actor.user, id);
+    change.Log(actor, "session.close", std::to_string(id), "");
   }
 }
 
@@ -175,31 +134,25 @@ std::string TreatmentStore::Open(const Actor& actor, const std::string& patient_
   {
     // A fraction is a session in which something was compared. The next number follows the highest
     // one; sessions are not counted, because their scans may have been removed.
-    Statement query = change.Prepare(
+    Statement query = change->Prepare(
         "WITH newest AS (SELECT ifnull(max(fraction), 0) AS fraction FROM sessions WHERE "
         "patient_id = ?1 AND purpose = 'fraction') SELECT newest.fraction, archived, EXISTS "
         "(SELECT 1 FROM sessions JOIN scans ON session_id = sessions.id JOIN results ON scan_id = "
         "scans.id WHERE sessions.patient_id = ?1 AND sessions.purpose = 'fraction' AND "
-        "sessions.fraction = newest.fraction) FROM patients, newest WHERE patients.id = ?1");
-    if (!patient || !query.Bind(*patient).Step())
-      throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+        "sessions.fraction = newest.fraction) FROM patients, newest WHERE patients.id = ?1",
+        patient);
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
     if (query.Integer(1) != 0)
       throw StoreRefusal(ChangeResult::kConflict,
                          "this patient is archived: take it out of the archive first");
     if (purpose == ScanPurpose::kFraction)
       fraction = std::max<std::int64_t>(1, query.Integer(0) + query.Integer(2));
   }
-  change
-      .Prepare(
-          "INSERT INTO sessions (patient_id, purpose, fraction, opened_at, opened_by) VALUES (?, "
-          "?, ?, ?, ?)")
-      .Bind(*patient)
-      .Bind(Name(purpose))
-      .Bind(fraction)
-      .Bind(Now())
-      .Bind(actor.user)
-      .Run();
-  const std::string id = std::to_string(change.last_id());
+  change->Run(
+      "INSERT INTO sessions (patient_id, purpose, fraction, opened_at, opened_by) VALUES (?, "
+      "?, ?, ?, ?)",
+      patient, Name(purpose), fraction, StoredNow(), actor.user);
+  const std::string id = std::to_string(change->last_id());
   change.Log(actor, "session.open", id, std::string(Name(purpose)));
   change.Commit();
   return id;
@@ -212,21 +165,21 @@ void TreatmentStore::CloseAll(const Actor& actor) {
 }
 
 std::optional<TreatmentSession> TreatmentStore::Opened() {
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
+  return database_.ForRows()->First(
       "SELECT sessions.id, patient_id, code, purpose, fraction, opened_by, opened_at, (SELECT "
       "count(*) FROM scans WHERE session_id = sessions.id AND outcome = 'done') FROM sessions JOIN "
       "patients ON patients.id = patient_id WHERE closed_at IS NULL ORDER BY sessions.id DESC "
-      "LIMIT 1");
-  if (!query.Step()) return std::nullopt;
-  return TreatmentSession{.id = query.Text(0),
-                          .patient_id = query.Text(1),
-                          .patient_code = query.Text(2),
-                          .purpose = store::Parse<ScanPurpose>("purpose", query.Text(3)),
-                          .fraction = static_cast<int>(query.Integer(4)),
-                          .num_scans = static_cast<int>(query.Integer(7)),
-                          .opened_by = query.Text(5),
-                          .opened_at = FromStored(query.Integer(6))};
+      "LIMIT 1",
+      [](const Statement& row) {
+        return TreatmentSession{.id = row.Text(0),
+                                .patient_id = row.Text(1),
+                                .patient_code = row.Text(2),
+                                .purpose = ParseStored<ScanPurpose>("purpose", row.Text(3)),
+                                .fraction = static_cast<int>(row.Integer(4)),
+                                .num_scans = static_cast<int>(row.Integer(7)),
+                                .opened_by = row.Text(5),
+                                .opened_at = FromStored(row.Integer(6))};
+      });
 }
 
 }  // namespace plumb

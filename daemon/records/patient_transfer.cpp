@@ -1,13 +1,12 @@
 #include "daemon/records/patient_transfer.hpp"
 
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -30,7 +29,6 @@ namespace plumb {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-using store::ScanId;
 
 namespace {
 
@@ -46,7 +44,7 @@ std::optional<std::int64_t> ScanOf(const std::string& path) {
   const fs::path parts(path);
   auto part = parts.begin();
   if (*part++ != kScans || part == parts.end()) return std::nullopt;
-  const std::optional<std::int64_t> scan = store::ParseId(part->string());
+  const std::optional<std::int64_t> scan = ParseId(part->string());
   const bool is_ours = scan && ScanId(*scan) == part->string() && ++part != parts.end();
   return is_ours ? scan : std::nullopt;
 }
@@ -69,8 +67,7 @@ std::unique_ptr<Database> OpenSource(const fs::path& state, bool is_backup) {
     Migrate(*database);
     return database;
   }
-  Statement version = database->Prepare("PRAGMA user_version");
-  if (!version.Step() || version.Integer(0) != kSchemaVersion)
+  if (database->FirstInteger("PRAGMA user_version") != kSchemaVersion)
     throw DataError(fmt::format(
         "the backup {} is of another version of Plumb: restore it first, and export from there",
         state.string()));
@@ -78,10 +75,8 @@ std::unique_ptr<Database> OpenSource(const fs::path& state, bool is_backup) {
 }
 
 std::optional<std::int64_t> FindCode(Database& database, const std::string& code) {
-  Statement query =
-      database.Prepare("SELECT id FROM patients WHERE code = ? COLLATE NOCASE AND id > 0");
-  query.Bind(code);
-  return query.Step() ? std::optional(query.Integer(0)) : std::nullopt;
+  return database.FirstInteger("SELECT id FROM patients WHERE code = ? COLLATE NOCASE AND id > 0",
+                               code);
 }
 
 fs::path ImportedFile(const fs::path& state, std::int64_t patient) {
@@ -142,7 +137,7 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
                        .problems = output.problems()};
   if (is_backup) return report;
   Transaction transaction(*database);
-  AppendAuditEntry(*database, store::kCommand, "patient.export", std::to_string(*patient),
+  AppendAuditEntry(*database, kCommand, "patient.export", std::to_string(*patient),
                    fmt::format("{} to {}: {} scans, {} references, {} problems{}", report.code,
                                ValidUtf8(target.string()), report.scans, report.references,
                                report.problems.size(), secret != nullptr ? ", encrypted" : ""));
@@ -234,7 +229,7 @@ class PatientImport {
       report_.bytes += scan ? reader_.CopyTo(Made(), file, stop_).bytes : 0;
       ++report_.files;
     }
-    SyncDisk(store_.folders.state());
+    SyncWholeDisk(store_.folders.state());
   }
 
   void Insert() {
@@ -253,9 +248,10 @@ class PatientImport {
       fs::create_directories(store_.folders.state() / kImports);
       moved.push_back(ImportedFile(store_.folders.state(), patient));
       WriteWholeFile(moved.back(), record_.dump(1, ' ', false, Json::error_handler_t::replace));
-      GiveToOwner(moved);
-      SyncDisk(store_.folders.state());
-      AppendAuditEntry(*database_, store::kCommand, "patient.import", std::to_string(patient),
+      GiveToOwnerOf(store_.folders.state(), store_.folders.state() / kImports);
+      for (const fs::path& path : moved) GiveToOwnerOf(store_.folders.state(), path);
+      SyncWholeDisk(store_.folders.state());
+      AppendAuditEntry(*database_, kCommand, "patient.import", std::to_string(patient),
                        fmt::format("{}: {} scans, {} references as drafts, sha256 {}", report_.code,
                                    report_.scans, report_.references, reader_.digest()));
       transaction.Commit();
@@ -276,25 +272,6 @@ class PatientImport {
     for (const fs::path& path : moved) fs::remove_all(path, ignored);
   }
 
-  /// Files imported by root get the account that runs plumbd as their owner.
-  void GiveToOwner(const std::vector<fs::path>& moved) const {
-    struct stat owner {};
-    if (::geteuid() != 0 || ::stat(store_.folders.state().c_str(), &owner) != 0 ||
-        owner.st_uid == 0)
-      return;
-    const auto give = [&owner](const fs::path& path) {
-      if (::lchown(path.c_str(), owner.st_uid, owner.st_gid) != 0)
-        throw IoError(DescribeWriteError(path, errno));
-    };
-    give(store_.folders.state() / kImports);
-    for (const fs::path& path : moved) {
-      give(path);
-      if (!fs::is_directory(path)) continue;
-      for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path))
-        give(entry.path());
-    }
-  }
-
   void InsertRows() {
     for (const char* table : kPatientTables) {
       const std::vector<ColumnOf> columns = ColumnsOf(*database_, table);
@@ -303,10 +280,8 @@ class PatientImport {
     // A scan and the reference of its comparison refer to each other.
     for (const Json& scan : rows().at("scans")) {
       if (!scan.contains("reference_id") || scan["reference_id"].is_null()) continue;
-      database_->Prepare("UPDATE scans SET reference_id = ? WHERE id = ?")
-          .Bind(new_ids_["refs"].at(scan["reference_id"]))
-          .Bind(new_ids_["scans"].at(scan["id"]))
-          .Run();
+      database_->Run("UPDATE scans SET reference_id = ? WHERE id = ?",
+                     new_ids_["refs"].at(scan["reference_id"]), new_ids_["scans"].at(scan["id"]));
     }
   }
 
@@ -319,9 +294,8 @@ class PatientImport {
       marks += marks.empty() ? "?" : ", ?";
       values.push_back(ValueHere(table, column.name, row));
     }
-    // The database caches a statement by the address of its text.
-    const std::string sql = fmt::format("INSERT INTO {} ({}) VALUES ({})", table, names, marks);
-    Statement insert = database_->Prepare(statements_.insert(sql).first->c_str());
+    Statement insert =
+        database_->Prepare(fmt::format("INSERT INTO {} ({}) VALUES ({})", table, names, marks));
     for (const Json& value : values) {
       if (value.is_null()) {
         insert.BindNull();
@@ -352,7 +326,7 @@ class PatientImport {
   }
 
   SummedReader reader_;
-  std::set<std::string> statements_;  // outlives the store, which keeps the compiled statements
+
   Store store_;
   StoreDatabase::Held database_;  ///< Held for the whole import.
   std::stop_token stop_;

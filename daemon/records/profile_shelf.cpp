@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/parse_number.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
 #include "daemon/records/scan_files.hpp"
@@ -56,7 +56,9 @@ ProfileVersion Parse(const std::string& text, const std::string& serial, int ver
   ProfileVersion found;
   found.version = version;
   found.made = Clock::time_point(std::chrono::seconds(json.at("made_s").get<std::int64_t>()));
-  found.cause = json.at("cause").get<std::string>();
+  const auto cause = Named<ProfileCause>(json.at("cause").get<std::string>());
+  if (!cause) throw DataError("its cause is none that this version knows");
+  found.cause = *cause;
   if (json.at("profile").is_null()) return found;
   found.profile = ParseSensorProfile(json["profile"].dump());
   found.profile->name = fmt::format("{} version {}", serial, version);
@@ -85,12 +87,9 @@ std::vector<ProfileShelf::Entry> ProfileShelf::Entries(const std::string& serial
   std::vector<Entry> entries;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(serial), error)) {
-    const std::string name = entry.path().stem().string();
-    int version = 0;
-    const auto [end, failed] = std::from_chars(name.data(), name.data() + name.size(), version);
-    if (entry.path().extension() == kEnding && failed == std::errc() &&
-        end == name.data() + name.size() && version > 0 && version < kMaxVersion)
-      entries.push_back({version, entry.path()});
+    const std::optional<int> version = ParseNumber<int>(entry.path().stem().string());
+    if (entry.path().extension() == kEnding && version && *version > 0 && *version < kMaxVersion)
+      entries.push_back({*version, entry.path()});
   }
   std::sort(entries.begin(), entries.end(),
             [](const Entry& a, const Entry& b) { return a.version > b.version; });
@@ -112,7 +111,7 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
   }
   try {
     // Comes first, so that no earlier version replaces it unnoticed at the next scan.
-    in_use.version = Write(serial, "unreadable", std::nullopt);
+    in_use.version = Write(serial, ProfileCause::kUnreadable, std::nullopt);
     const fs::path set_aside =
         folder_ / kSetAside / fmt::format("{}-{}", FolderName(serial), file.filename().string());
     fs::create_directories(set_aside.parent_path());
@@ -138,7 +137,7 @@ std::vector<ProfileVersion> ProfileShelf::Versions(const std::string& serial) co
   return versions;
 }
 
-int ProfileShelf::Write(const std::string& serial, const char* cause,
+int ProfileShelf::Write(const std::string& serial, ProfileCause cause,
                         const std::optional<SensorProfile>& profile) {
   const std::vector<Entry> entries = Entries(serial);
   const int version = entries.empty() ? 1 : entries.front().version + 1;
@@ -146,7 +145,7 @@ int ProfileShelf::Write(const std::string& serial, const char* cause,
   json["serial"] = serial;
   json["made_s"] =
       std::chrono::duration_cast<std::chrono::seconds>(Clock::now().time_since_epoch()).count();
-  json["cause"] = cause;
+  json["cause"] = Name(cause);
   json["profile"] = profile ? Json::parse(SensorProfileJson(*profile)) : Json();
   const std::string body = json.dump(1) + "\n";
   const fs::path folder = FolderOf(serial);
@@ -167,12 +166,12 @@ int ProfileShelf::Add(const std::string& serial, const SensorProfile& profile,
   const std::vector<Entry> entries = Entries(serial);
   if (begun_from && (entries.empty() ? 0 : entries.front().version) != *begun_from)
     throw DataError("the profile was reset or taken back while the sweep went on");
-  return Write(serial, "learned", profile);
+  return Write(serial, ProfileCause::kLearned, profile);
 }
 
 int ProfileShelf::Reset(const std::string& serial) {
   const std::lock_guard lock(mutex_);
-  return Write(serial, "reset", std::nullopt);
+  return Write(serial, ProfileCause::kReset, std::nullopt);
 }
 
 int ProfileShelf::RollBack(const std::string& serial, int version) {
@@ -181,7 +180,7 @@ int ProfileShelf::RollBack(const std::string& serial, int version) {
     if (entry.version != version) continue;
     const ProfileVersion earlier = ReadVersion(entry.file, serial, version);
     if (!earlier.profile) break;
-    return Write(serial, "rolled_back", earlier.profile);
+    return Write(serial, ProfileCause::kRolledBack, earlier.profile);
   }
   throw DataError(
       fmt::format("the sensor {} has no profile of version {}: choose one of those that "

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "algo/sensor_model/sensor_profile.hpp"
+#include "web/model/sensor_profile.hpp"
 
 namespace plumb {
 
@@ -17,7 +18,7 @@ namespace plumb {
 struct ProfileVersion {
   int version = 0;
   std::chrono::system_clock::time_point made;
-  std::string cause;  ///< "learned", "rolled_back", "reset", "unreadable".
+  ProfileCause cause = ProfileCause::kLearned;
   /// Not set: the unit starts again from its stated calibration.
   std::optional<SensorProfile> profile;
 };
@@ -65,7 +66,7 @@ class ProfileShelf {
   };
   [[nodiscard]] std::filesystem::path FolderOf(const std::string& serial) const;
   [[nodiscard]] std::vector<Entry> Entries(const std::string& serial) const;
-  int Write(const std::string& serial, const char* cause,
+  int Write(const std::string& serial, ProfileCause cause,
             const std::optional<SensorProfile>& profile);
 
   std::filesystem::path folder_;

@@ -8,16 +8,9 @@
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::FromStored;
-using store::Now;
-using store::ParseId;
-using store::RequireId;
-using store::ScanId;
-
 namespace {
 
-constexpr const char* kReferenceColumns =
+const std::string kReferenceColumns =
     "SELECT id, patient_id, version, scan_id, created_at, created_by, reason, approved_by, "
     "approved_at, plan, revision, planned_by, (SELECT group_concat(path || ' ' || sha256, "
     "char(10)) FROM (SELECT path, sha256 FROM scan_files WHERE scan_files.scan_id = refs.scan_id "
@@ -50,11 +43,8 @@ Reference ReadReferenceRow(const Statement& row) {
                       .created_by = row.Text(5),
                       .reason = row.Text(6),
                       .revision = static_cast<int>(row.Integer(10)),
-                      .digest = {},
                       .planned_by = row.Text(11),
-                      .approved_by = row.Text(7),
-                      .approved_at = {},
-                      .plan = {}};
+                      .approved_by = row.Text(7)};
   if (!row.IsNull(8)) reference.approved_at = FromStored(row.Integer(8));
   reference.digest = DigestOf(row);
   return reference;
@@ -97,55 +87,36 @@ void RequireSecondPerson(const Reference& reference, const Actor& approver) {
 }  // namespace
 
 std::vector<WaitingReference> ReferenceStore::Waiting() {
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
+  return database_.ForRows()->All(
       "SELECT refs.id, patient_id, code, version, planned_by FROM refs JOIN patients ON "
       "patients.id = patient_id WHERE archived = 0 AND approved_by = '' AND version > (SELECT "
       "ifnull(max(version), 0) FROM refs AS r WHERE r.patient_id = refs.patient_id AND "
       "r.approved_by <> '') AND NOT EXISTS (SELECT 1 FROM refs AS newer WHERE newer.patient_id = "
-      "refs.patient_id AND newer.version > refs.version) ORDER BY refs.id DESC LIMIT 20");
-  std::vector<WaitingReference> waiting;
-  while (query.Step()) {
-    waiting.push_back({.reference_id = query.Text(0),
-                       .patient_id = query.Text(1),
-                       .patient_code = query.Text(2),
-                       .version = static_cast<int>(query.Integer(3)),
-                       .planned_by = query.Text(4)});
-  }
-  return waiting;
+      "refs.patient_id AND newer.version > refs.version) ORDER BY refs.id DESC LIMIT 20",
+      [](const Statement& row) {
+        return WaitingReference{.reference_id = row.Text(0),
+                                .patient_id = row.Text(1),
+                                .patient_code = row.Text(2),
+                                .version = static_cast<int>(row.Integer(3)),
+                                .planned_by = row.Text(4)};
+      });
 }
 
 std::vector<Reference> ReferenceStore::List(const std::string& patient_id) {
-  std::vector<Reference> references;
-  const std::optional<std::int64_t> number = ParseId(patient_id);
-  if (!number) return references;
-  const StoreDatabase::Held lists = database_.ForLists();
-  static const std::string kSql =
-      std::string(kReferenceColumns) + "WHERE patient_id = ? ORDER BY version DESC LIMIT 1000";
-  Statement query = lists->Prepare(kSql.c_str());
-  query.Bind(*number);
-  while (query.Step()) references.push_back(ListReference(query));
-  return references;
+  return database_.ForLists()->All(
+      kReferenceColumns + "WHERE patient_id = ? ORDER BY version DESC LIMIT 1000", ListReference,
+      ParseId(patient_id));
 }
 
 std::optional<Reference> ReferenceStore::Find(const std::string& id) {
-  const std::optional<std::int64_t> number = ParseId(id);
-  if (!number) return std::nullopt;
-  const StoreDatabase::Held rows = database_.ForRows();
-  static const std::string kSql = std::string(kReferenceColumns) + "WHERE id = ?";
-  Statement query = rows->Prepare(kSql.c_str());
-  return query.Bind(*number).Step() ? std::optional(ReadReference(query)) : std::nullopt;
+  return database_.ForRows()->First(kReferenceColumns + "WHERE id = ?", ReadReference, ParseId(id));
 }
 
 std::optional<Reference> ReferenceStore::Approved(const std::string& patient_id) {
-  const std::optional<std::int64_t> number = ParseId(patient_id);
-  if (!number) return std::nullopt;
-  const StoreDatabase::Held rows = database_.ForRows();
-  static const std::string kSql =
-      std::string(kReferenceColumns) +
-      "WHERE patient_id = ? AND approved_by <> '' ORDER BY version DESC LIMIT 1";
-  Statement query = rows->Prepare(kSql.c_str());
-  return query.Bind(*number).Step() ? std::optional(ReadReference(query)) : std::nullopt;
+  return database_.ForRows()->First(
+      kReferenceColumns +
+          "WHERE patient_id = ? AND approved_by <> '' ORDER BY version DESC LIMIT 1",
+      ReadReference, ParseId(patient_id));
 }
 
 std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
@@ -155,9 +126,8 @@ std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
   std::int64_t patient = 0;
   {
     Statement query =
-        change.Prepare("SELECT patient_id, outcome, has_folder FROM scans WHERE id = ?");
-    if (!query.Bind(scan).Step())
-      throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+        change->Prepare("SELECT patient_id, outcome, has_folder FROM scans WHERE id = ?", scan);
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
     if (query.Text(1) != "done" || query.Integer(2) == 0) {
       throw StoreRefusal(ChangeResult::kConflict,
                          "this scan has no scene: only a finished scan can become a reference");
@@ -169,21 +139,13 @@ std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
           "this scan belongs to no patient: open the patient, then scan a reference");
     }
   }
-  change
-      .Prepare(
-          "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
-          "reason, plan) VALUES (?,"
-          " 1 + (SELECT ifnull(max(version), 0) FROM refs WHERE patient_id = ?), ?, ?, ?, '', ?, "
-          "?)")
-      .Bind(patient)
-      .Bind(patient)
-      .Bind(scan)
-      .Bind(Now())
-      .Bind(actor.user)
-      .Bind(reason)
-      .Bind(PlanJson(plan))
-      .Run();
-  const std::string id = std::to_string(change.last_id());
+  change->Run(
+      "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
+      "reason, plan) VALUES (?,"
+      " 1 + (SELECT ifnull(max(version), 0) FROM refs WHERE patient_id = ?), ?, ?, ?, '', ?, "
+      "?)",
+      patient, patient, scan, StoredNow(), actor.user, reason, PlanJson(plan));
+  const std::string id = std::to_string(change->last_id());
   change.Log(actor, "reference.add", id, "scan " + scan_id);
   change.Commit();
   return id;
@@ -196,35 +158,26 @@ std::string ReferenceStore::Plan(const Actor& actor, const std::string& id, int 
   bool is_approved = false;
   std::string stored;
   {
-    Statement query = change.Prepare("SELECT approved_by, revision, plan FROM refs WHERE id = ?");
-    if (!query.Bind(number).Step())
-      throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
+    Statement query =
+        change->Prepare("SELECT approved_by, revision, plan FROM refs WHERE id = ?", number);
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
     is_approved = !query.Text(0).empty();
     RequireRevision(query.Integer(1), revision);
     stored = query.Text(2);
   }
   std::string changed = id;
   if (is_approved) {
-    change
-        .Prepare(
-            "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
-            "reason, plan)"
-            " SELECT patient_id, 1 + (SELECT max(version) FROM refs AS r WHERE r.patient_id = "
-            "refs.patient_id), scan_id, ?, ?, ?,"
-            " 'new plan of version ' || version, ? FROM refs WHERE id = ?")
-        .Bind(Now())
-        .Bind(actor.user)
-        .Bind(actor.user)
-        .Bind(PlanJson(plan))
-        .Bind(number)
-        .Run();
-    changed = std::to_string(change.last_id());
+    change->Run(
+        "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
+        "reason, plan)"
+        " SELECT patient_id, 1 + (SELECT max(version) FROM refs AS r WHERE r.patient_id = "
+        "refs.patient_id), scan_id, ?, ?, ?,"
+        " 'new plan of version ' || version, ? FROM refs WHERE id = ?",
+        StoredNow(), actor.user, actor.user, PlanJson(plan), number);
+    changed = std::to_string(change->last_id());
   } else {
-    change.Prepare("UPDATE refs SET plan = ?, planned_by = ?, revision = revision + 1 WHERE id = ?")
-        .Bind(PlanJson(plan))
-        .Bind(actor.user)
-        .Bind(number)
-        .Run();
+    change->Run("UPDATE refs SET plan = ?, planned_by = ?, revision = revision + 1 WHERE id = ?",
+                PlanJson(plan), actor.user, number);
   }
   // Both as they are stored: one that cannot be read is kept in the log as it was.
   change.Log(actor, "reference.plan", changed, stored + "\n" + PlanJson(plan));
@@ -243,36 +196,27 @@ void ReferenceStore::Approve(const Actor& actor, const std::string& id, int revi
                                      "a backup of its files in their place, or scan again",
                                      fault));
   }
-  std::string signed_digest;
   StoreChange change(database_);
-  {
-    static const std::string kSql = std::string(kReferenceColumns) + "WHERE id = ?";
-    Statement query = change.Prepare(kSql.c_str());
-    if (!query.Bind(number).Step())
-      throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
-    const Reference reference = ReadReferenceRow(query);
-    if (!reference.approved_by.empty())
-      throw StoreRefusal(ChangeResult::kConflict, "this reference is approved already");
-    RequireRevision(reference.revision, revision);
-    Statement newer = change.Prepare(
-        "SELECT 1 FROM refs AS other JOIN refs ON other.patient_id = refs.patient_id AND "
-        "other.version > refs.version WHERE refs.id = ? AND other.approved_by <> '' LIMIT 1");
-    if (newer.Bind(number).Step())
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "a newer version of this reference is approved, and scans are compared "
-                         "with the newest: change the plan of that one");
-    signed_digest = reference.digest;
-    if (!digest.empty() && digest != signed_digest)
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "what is stored is not what was shown: look at the reference again");
-    if (two_users) RequireSecondPerson(reference, actor);
-  }
-  change.Prepare("UPDATE refs SET approved_by = ?, approved_at = ? WHERE id = ?")
-      .Bind(actor.user)
-      .Bind(Now())
-      .Bind(number)
-      .Run();
-  change.Log(actor, "reference.approve", id, "sha256 " + signed_digest);
+  const std::optional<Reference> reference =
+      change->First(kReferenceColumns + "WHERE id = ?", ReadReferenceRow, number);
+  if (!reference) throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
+  if (!reference->approved_by.empty())
+    throw StoreRefusal(ChangeResult::kConflict, "this reference is approved already");
+  RequireRevision(reference->revision, revision);
+  if (change->Has(
+          "SELECT 1 FROM refs AS other JOIN refs ON other.patient_id = refs.patient_id AND "
+          "other.version > refs.version WHERE refs.id = ? AND other.approved_by <> '' LIMIT 1",
+          number))
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "a newer version of this reference is approved, and scans are compared "
+                       "with the newest: change the plan of that one");
+  if (!digest.empty() && digest != reference->digest)
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "what is stored is not what was shown: look at the reference again");
+  if (two_users) RequireSecondPerson(*reference, actor);
+  change->Run("UPDATE refs SET approved_by = ?, approved_at = ? WHERE id = ?", actor.user,
+              StoredNow(), number);
+  change.Log(actor, "reference.approve", id, "sha256 " + reference->digest);
   change.Commit();
 }
 

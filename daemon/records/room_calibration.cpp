@@ -102,8 +102,7 @@ std::optional<BoardScan> BoardScanIn(const std::string& check_json) {
 }
 
 RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibrationLimits& limits) {
-  RoomCandidate candidate{
-      .scans = std::move(scans), .fit = {}, .why_not = {}, .json = {}, .digest = {}};
+  RoomCandidate candidate{.scans = std::move(scans)};
   std::vector<BoardScan> used;
   std::vector<RoomScan> seen;
   for (const BoardScan& scan : candidate.scans) {
@@ -159,17 +158,15 @@ SignedRoom SignedRoomIn(const std::string& text) {
   }
 }
 
-std::optional<std::string> WhyRoomIsDue(const SignedRoom& room, const std::string& check_json,
+std::optional<std::string> WhyRoomIsDue(const SignedRoom& room, const MarkerBaseline& seen,
                                         const MarkerCheckLimits& limits) {
-  const auto seen = BaselineIn(check_json);
-  if (!seen) return std::nullopt;
-  if (seen->dictionary != room.dictionary ||
-      std::abs(seen->marker_length_m - room.marker_length_m) > 1e-6)
+  if (seen.dictionary != room.dictionary ||
+      std::abs(seen.marker_length_m - room.marker_length_m) > 1e-6)
     return "the room has other markers than when it was calibrated";
   Scene scene;
-  scene.markers = seen->markers;
-  scene.marker_dictionary = seen->dictionary;
-  scene.marker_length_m = seen->marker_length_m;
+  scene.markers = seen.markers;
+  scene.marker_dictionary = seen.dictionary;
+  scene.marker_length_m = seen.marker_length_m;
   const MarkerCheck check = CheckMarkers(
       scene, MarkerBaseline{room.fit.markers_iec, room.dictionary, room.marker_length_m}, limits);
   std::optional<std::string> answer;

@@ -30,10 +30,10 @@ struct BoardScan {
 /// The calibration that would be signed now.
 struct RoomCandidate {
   std::vector<BoardScan> scans;  ///< Newest first; the newest usable ones count.
-  std::optional<RoomFit> fit;
-  std::string why_not;  ///< Why it may not be signed; empty if it may.
-  std::string json;     ///< Text to be stored; empty without a fit.
-  std::string digest;   ///< SHA-256 of it in hexadecimal: the data that a person signs.
+  std::optional<RoomFit> fit = {};
+  std::string why_not = {};  ///< Why it may not be signed; empty if it may.
+  std::string json = {};     ///< Text to be stored; empty without a fit.
+  std::string digest = {};   ///< SHA-256 of it in hexadecimal: the data that a person signs.
 };
 /// @param scans  Newest first.
 [[nodiscard]] RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans,
@@ -55,10 +55,10 @@ struct SignedRoom {
 /// @throws DataError stating what is wrong with it.
 [[nodiscard]] SignedRoom SignedRoomIn(const std::string& json);
 
-/// Why this check shows that the room has changed since it was calibrated, as one sentence; empty
-/// if it has not. Nothing if the check saw too little to decide.
+/// Why the markers that a check saw show that the room has changed since it was calibrated, as one
+/// sentence; empty if it has not. Nothing if it saw too little to decide.
 [[nodiscard]] std::optional<std::string> WhyRoomIsDue(const SignedRoom& room,
-                                                      const std::string& check_json,
+                                                      const MarkerBaseline& seen,
                                                       const MarkerCheckLimits& limits);
 
 }  // namespace plumb

@@ -6,15 +6,11 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/records/check_json.hpp"
 #include "daemon/records/store_refusal.hpp"
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
-
-using store::FromStored;
-using store::Now;
-using store::ToStored;
-
 namespace {
 
 constexpr int kScansShown = 6;  // scans of the board shown for one calibration
@@ -44,17 +40,15 @@ SignedRoom ReadRoom(const Statement& row) {
 /// clock may have been set back since the calibration was signed.
 std::int64_t LastCheckOf(const SignedRoom& room) {
   std::int64_t last = 0;
-  for (const std::string& id : room.check_ids)
-    last = std::max(last, store::ParseId(id).value_or(0));
+  for (const std::string& id : room.check_ids) last = std::max(last, ParseId(id).value_or(0));
   return last;
 }
 
 /// 0 if there is no calibration, or if the newest one cannot be read and must be made again.
 std::int64_t LastCheckUsed(Database& database) {
-  Statement query = database.Prepare(kNewestRooms);
-  if (!query.Bind(std::int64_t{1}).Step()) return 0;
   try {
-    return LastCheckOf(ReadRoom(query));
+    const std::optional<SignedRoom> room = database.First(kNewestRooms, ReadRoom, 1);
+    return room ? LastCheckOf(*room) : 0;
   } catch (const DataError&) {
     return 0;
   }
@@ -64,8 +58,8 @@ RoomCandidate ReadCandidate(Database& database, const std::string& serial, std::
   const std::int64_t last_used = LastCheckUsed(database);
   Statement query = database.Prepare(
       "SELECT id, time, user, json FROM checks WHERE sensor_serial = ? AND time >= ? AND id > ? "
-      "ORDER BY id DESC LIMIT ?");
-  query.Bind(serial).Bind(since).Bind(last_used).Bind(std::int64_t{kScansShown});
+      "ORDER BY id DESC LIMIT ?",
+      serial, since, last_used, kScansShown);
   std::vector<BoardScan> scans;
   while (query.Step()) {
     std::optional<BoardScan> scan = BoardScanIn(query.Text(3));
@@ -81,20 +75,16 @@ RoomCandidate ReadCandidate(Database& database, const std::string& serial, std::
 }  // namespace
 
 RoomCandidate RoomStore::Candidate(const std::string& sensor_serial, WallClock::time_point since) {
-  const StoreDatabase::Held lists = database_.ForLists();
-  return ReadCandidate(*lists, sensor_serial, ToStored(since));
+  return ReadCandidate(*database_.ForLists(), sensor_serial, ToStored(since));
 }
 
 std::optional<SignedRoom> RoomStore::Newest() {
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(kNewestRooms);
-  return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadRoom(query)) : std::nullopt;
+  return database_.ForRows()->First(kNewestRooms, ReadRoom, 1);
 }
 
 std::vector<SignedRoom> RoomStore::List(int limit) {
   const StoreDatabase::Held lists = database_.ForLists();
-  Statement query = lists->Prepare(kNewestRooms);
-  query.Bind(std::int64_t{limit});
+  Statement query = lists->Prepare(kNewestRooms, limit);
   std::vector<SignedRoom> rooms;
   while (query.Step()) {
     try {
@@ -108,28 +98,24 @@ std::vector<SignedRoom> RoomStore::List(int limit) {
 std::string RoomStore::Sign(const Actor& actor, const std::string& sensor_serial,
                             WallClock::time_point since, const std::string& digest) {
   StoreChange change(database_);
-  const RoomCandidate candidate = ReadCandidate(change.database(), sensor_serial, ToStored(since));
+  const RoomCandidate candidate = ReadCandidate(*change, sensor_serial, ToStored(since));
   if (!candidate.why_not.empty()) throw StoreRefusal(ChangeResult::kConflict, candidate.why_not);
   if (candidate.digest != digest) {
     throw StoreRefusal(ChangeResult::kConflict,
                        "the board has been scanned again since this was read: read it again");
   }
-  std::string before;
-  {
-    Statement query = change.Prepare(
-        "SELECT version, digest FROM room_calibrations ORDER BY version DESC LIMIT 1");
-    if (query.Step())
-      before = fmt::format("; before: version {}, sha256 {}", query.Integer(0), query.Text(1));
-  }
-  change
-      .Prepare(
-          "INSERT INTO room_calibrations (signed_at, signed_by, digest, json) VALUES (?, ?, ?, ?)")
-      .Bind(Now())
-      .Bind(actor.user)
-      .Bind(candidate.digest)
-      .Bind(candidate.json)
-      .Run();
-  const std::string version = std::to_string(change.last_id());
+  const std::string before =
+      change
+          ->First("SELECT version, digest FROM room_calibrations ORDER BY version DESC LIMIT 1",
+                  [](const Statement& row) {
+                    return fmt::format("; before: version {}, sha256 {}", row.Integer(0),
+                                       row.Text(1));
+                  })
+          .value_or("");
+  change->Run(
+      "INSERT INTO room_calibrations (signed_at, signed_by, digest, json) VALUES (?, ?, ?, ?)",
+      StoredNow(), actor.user, candidate.digest, candidate.json);
+  const std::string version = std::to_string(change->last_id());
   change.Log(actor, "room.calibrate", version,
              fmt::format("scans differ by {:.2f} mm and {:.2f} deg, sha256 {}{}",
                          candidate.fit->shift_m / kMillimetre, candidate.fit->turn_rad / kDegree,
@@ -140,10 +126,12 @@ std::string RoomStore::Sign(const Actor& actor, const std::string& sensor_serial
 
 std::string RoomStore::WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits) {
   const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare("SELECT json FROM checks WHERE id > ? ORDER BY id DESC LIMIT ?");
-  query.Bind(LastCheckOf(room)).Bind(std::int64_t{kChecksSearched});
+  Statement query = rows->Prepare("SELECT json FROM checks WHERE id > ? ORDER BY id DESC LIMIT ?",
+                                  LastCheckOf(room), kChecksSearched);
   while (query.Step()) {
-    if (const auto why = WhyRoomIsDue(room, query.Text(0), limits)) return *why;
+    const std::optional<MarkerBaseline> seen = BaselineIn(query.Text(0));
+    if (!seen) continue;
+    if (const auto why = WhyRoomIsDue(room, *seen, limits)) return *why;
   }
   return {};
 }

@@ -69,7 +69,11 @@ void Sha256::Add(const void* bytes, std::size_t count) {
 std::string Sha256::Hex() {
   std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
   crypto_hash_sha256_final(&state_, hash.data());
-  return fmt::format("{:02x}", fmt::join(hash, ""));
+  return HexOf(hash);
+}
+
+std::string HexOf(std::span<const unsigned char> bytes) {
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
 }
 
 std::string Sha256Of(std::string_view text) {
@@ -102,7 +106,7 @@ FileDigest DigestOfFile(const fs::path& folder, const std::string& path,
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailToRead(full, errno);
   if (!S_ISREG(status.st_mode)) FailToRead(full, S_ISDIR(status.st_mode) ? EISDIR : EINVAL);
   Sha256 hash;
-  FileDigest digest{.path = path, .bytes = 0, .sha256 = {}};
+  FileDigest digest{.path = path};
   std::vector<char> buffer(std::size_t{256} << 10);
   for (;;) {
     CheckStop(stop);
@@ -130,7 +134,7 @@ std::optional<FileDigest> DigestOfRecording(const fs::path& folder, const std::s
   const std::vector<std::string> files = FilesIn(folder, kRecordingFolder);
   if (files.empty()) return std::nullopt;
   Sha256 hash;
-  FileDigest all{.path = kRecordingFolder, .bytes = 0, .sha256 = {}};
+  FileDigest all{.path = kRecordingFolder};
   for (const std::string& file : files) {
     const FileDigest one = DigestOfFile(folder, file, stop);
     const std::string line = fmt::format("{}  {}\n", one.sha256, one.path);
@@ -146,8 +150,8 @@ std::string WhyNotThere(const fs::path& folder, const std::vector<FileDigest>& f
   // Without its folder a scan has lost every file, so that is reported instead of the first file's
   // name.
   if (const FileLook found = look(folder); found.error != 0 || !found.is_folder) {
-    return "its folder " + (found.error == 0 ? std::string("is not a folder")
-                                             : Difference(found, {.path = {}, .sha256 = {}}));
+    return "its folder " +
+           (found.error == 0 ? std::string("is not a folder") : Difference(found, {.path = {}}));
   }
   for (const FileDigest& file : files) {
     if (const std::string why = Difference(look(folder / file.path), file); !why.empty())

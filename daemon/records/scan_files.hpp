@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -25,6 +26,8 @@ class Sha256 {
   crypto_hash_sha256_state state_{};
 };
 
+/// Two digits for each byte.
+[[nodiscard]] std::string HexOf(std::span<const unsigned char> bytes);
 [[nodiscard]] std::string Sha256Of(std::string_view text);
 
 /// Result of examining a path.
@@ -44,7 +47,7 @@ using ExaminePath = std::function<FileLook(const std::filesystem::path&)>;
 struct FileDigest {
   std::string path;  ///< In the scan's folder: "scene/cloud.ply" or "recording".
   std::uint64_t bytes = 0;
-  std::string sha256;  ///< Hexadecimal. For a recording: of the list of its files' digests.
+  std::string sha256 = {};  ///< Hexadecimal. For a recording: of the list of its files' digests.
   bool operator==(const FileDigest&) const = default;
 };
 

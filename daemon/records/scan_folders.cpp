@@ -28,7 +28,7 @@ std::vector<fs::path> ScanFolders::All() const {
   std::error_code error;
   fs::directory_iterator entry(scans(), error);
   for (const fs::directory_iterator end; !error && entry != end; entry.increment(error)) {
-    if (IsStaging(entry->path()) || store::ParseId(entry->path().filename().string()))
+    if (IsStaging(entry->path()) || ParseId(entry->path().filename().string()))
       folders.push_back(entry->path());
   }
   if (error && error != std::errc::no_such_file_or_directory) {

@@ -1,9 +1,7 @@
 #include "daemon/records/scan_store.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <cerrno>
+#include <cstdio>
 
 #include <fmt/format.h>
 
@@ -18,15 +16,9 @@ namespace plumb {
 
 namespace fs = std::filesystem;
 
-using store::FromStored;
-using store::Now;
-using store::ParseId;
-using store::ScanId;
-using store::ToStored;
-
 namespace {
 
-constexpr const char* kScanColumns =
+const std::string kScanColumns =
     "SELECT scans.id, patient_id, reference_id, purpose, outcome, failure, started_at, "
     "finished_at, accepted_by, has_folder, results.json, accepted_reason, session_id, "
     "(SELECT fraction FROM sessions WHERE sessions.id = session_id), sensor_on_s, check_overdue, "
@@ -44,19 +36,18 @@ DailyCheck DailyCheckOf(std::int64_t stored) {
                        : DailyCheck::kOverdue;
 }
 
-/// Flushes a folder, or with ::syncfs everything on its disk.
-void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) throw DiskRefused(DescribeWriteError(folder, errno));
-  const int result = sync(descriptor);
-  const int error = errno;
-  ::close(descriptor);
-  if (result != 0 && error != EINVAL) throw DiskRefused(DescribeWriteError(folder, error));
+/// @param sync  SyncToDisk or SyncWholeDisk. @throws DiskRefused
+void Flush(const fs::path& folder, void (*sync)(const fs::path&)) {
+  try {
+    sync(folder);
+  } catch (const IoError& error) {
+    throw DiskRefused(error.what());
+  }
 }
 
 /// Verdict and numbers for the log: "move: vertical +1.2, ..., yaw -0.10".
 std::string Described(const ResultSummary& result) {
-  std::string text = result.verdict;
+  std::string text(Name(result.verdict));
   for (const NumberAxis& axis : kNumberAxes) {
     if (const auto value = axis.In(result.correction))
       text += fmt::format(", {} {:+.2f} {}", axis.name, *value, axis.unit);
@@ -71,22 +62,17 @@ Scan ScanStore::ReadScan(const Statement& row) const {
   Scan scan{.id = ScanId(row.Integer(0)),
             .patient_id = row.Integer(1) == 0 ? std::string() : row.Text(1),
             .reference_id = row.Text(2),
-            .purpose = store::Parse<ScanPurpose>("purpose", row.Text(3)),
-            .outcome = store::Parse<ScanOutcome>("outcome", row.Text(4)),
+            .purpose = ParseStored<ScanPurpose>("purpose", row.Text(3)),
+            .outcome = ParseStored<ScanOutcome>("outcome", row.Text(4)),
             .failure = row.Text(5),
             .started_at = FromStored(row.Integer(6)),
-            .finished_at = {},
-            .result = {},
             .accepted_by = row.Text(8),
             .accepted_reason = row.Text(11),
-            .accepted_at = {},
             .session_id = row.Text(12),
             .fraction = static_cast<int>(row.Integer(13)),
-            .sensor_on_s = {},
             .daily_check = DailyCheckOf(row.Integer(15)),
             .sensor_serial = row.Text(18),
-            .session_by = row.Text(19),
-            .folder = {}};
+            .session_by = row.Text(19)};
   if (!row.IsNull(14)) scan.sensor_on_s = row.Real(14);
   if (!row.IsNull(17)) scan.accepted_at = FromStored(row.Integer(17));
   if (!row.IsNull(7)) scan.finished_at = FromStored(row.Integer(7));
@@ -115,82 +101,60 @@ Scan ScanStore::ListScan(const Statement& row) const {
 }
 
 void FailInterruptedScans(Database& database) {
-  database
-      .Prepare(
-          "UPDATE scans SET outcome = 'failed', failure = ?, has_folder = 0 WHERE outcome = "
-          "'running'")
-      .Bind(kInterrupted)
-      .Run();
+  database.Run(
+      "UPDATE scans SET outcome = 'failed', failure = ?, has_folder = 0 WHERE outcome = "
+      "'running'",
+      kInterrupted);
 }
 
 std::vector<Scan> ScanStore::List(const std::string& patient_id, int limit) {
-  std::vector<Scan> scans;
-  const std::optional<std::int64_t> number = ParseId(patient_id);
-  if (!number && !patient_id.empty()) return scans;
-  const StoreDatabase::Held lists = database_.ForLists();
-  static const std::string kAll = std::string(kScanColumns) + "ORDER BY scans.id DESC LIMIT ?";
-  static const std::string kOfPatient =
-      std::string(kScanColumns) + "WHERE patient_id = ? ORDER BY scans.id DESC LIMIT ?";
-  Statement query = lists->Prepare(number ? kOfPatient.c_str() : kAll.c_str());
-  if (number) query.Bind(*number);
-  query.Bind(std::int64_t{limit});
-  while (query.Step()) scans.push_back(ListScan(query));
-  return scans;
+  const auto read = [this](const Statement& row) { return ListScan(row); };
+  if (patient_id.empty())
+    return database_.ForLists()->All(kScanColumns + "ORDER BY scans.id DESC LIMIT ?", read, limit);
+  return database_.ForLists()->All(
+      kScanColumns + "WHERE patient_id = ? ORDER BY scans.id DESC LIMIT ?", read,
+      ParseId(patient_id), limit);
 }
 
 std::optional<Scan> ScanStore::Find(const std::string& id) {
-  const std::optional<std::int64_t> number = ParseId(id);
-  if (!number) return std::nullopt;
-  const StoreDatabase::Held rows = database_.ForRows();
-  static const std::string kSql = std::string(kScanColumns) + "WHERE scans.id = ?";
-  Statement query = rows->Prepare(kSql.c_str());
-  return query.Bind(*number).Step() ? std::optional(ReadScan(query)) : std::nullopt;
+  return database_.ForRows()->First(
+      kScanColumns + "WHERE scans.id = ?", [this](const Statement& row) { return ReadScan(row); },
+      ParseId(id));
 }
 
 int ScanStore::CountSince(const std::string& patient_id, WallClock::time_point since) {
-  const std::optional<std::int64_t> number = ParseId(patient_id);
-  if (!number) return 0;
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
-      "SELECT count(*) FROM scans WHERE patient_id = ? AND outcome = 'done' AND started_at >= ?");
-  return query.Bind(*number).Bind(ToStored(since)).Step() ? static_cast<int>(query.Integer(0)) : 0;
+  const std::optional<std::int64_t> count = database_.ForRows()->FirstInteger(
+      "SELECT count(*) FROM scans WHERE patient_id = ? AND outcome = 'done' AND started_at >= ?",
+      ParseId(patient_id), ToStored(since));
+  return static_cast<int>(count.value_or(0));
 }
 
 std::optional<std::string> ScanStore::NewestWithFiles() {
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query =
-      rows->Prepare("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id DESC LIMIT 1");
-  return query.Step() ? std::optional(ScanId(query.Integer(0))) : std::nullopt;
+  return database_.ForRows()->First(
+      "SELECT id FROM scans WHERE has_folder = 1 ORDER BY id DESC LIMIT 1",
+      [](const Statement& row) { return ScanId(row.Integer(0)); });
 }
 
 double ScanStore::SweptArea(const std::string& scan_id) {
-  const std::optional<std::int64_t> number = ParseId(scan_id);
-  if (!number) return 0.0;
-  const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare("SELECT swept_area_m2 FROM scans WHERE id = ?");
-  return query.Bind(*number).Step() ? query.Real(0) : 0.0;
+  const auto read = [](const Statement& row) { return row.Real(0); };
+  return database_.ForRows()
+      ->First("SELECT swept_area_m2 FROM scans WHERE id = ?", read, ParseId(scan_id))
+      .value_or(0.0);
 }
 
 std::string ScanStore::Begin(const NewScan& scan) {
   StoreChange change(database_);
   // a scan whose end could not be recorded because of the disk
-  FailInterruptedScans(change.database());
-  change
-      .Prepare(
-          "INSERT INTO scans (patient_id, reference_id, purpose, outcome, started_at, "
-          "sensor_serial, reason, session_id, sensor_on_s, check_overdue)"
-          " VALUES (?, ?, ?, 'running', ?, ?, ?, ?, ?, ?)")
-      .Bind(ParseId(scan.patient_id).value_or(0))  // 0: of no patient
-      .Bind(ParseId(scan.reference_id))
-      .Bind(Name(scan.purpose))
-      .Bind(Now())
-      .Bind(scan.sensor_serial)
-      .Bind(scan.reason)
-      .Bind(ParseId(scan.session_id))
-      .Bind(scan.sensor_on_s)
-      .Bind(static_cast<std::int64_t>(scan.daily_check))
-      .Run();
-  const std::int64_t number = change.last_id();
+  FailInterruptedScans(*change);
+  const std::int64_t patient = ParseId(scan.patient_id).value_or(0);  // 0: of no patient
+  change->Run(
+      "INSERT INTO scans (patient_id, reference_id, purpose, outcome, started_at, sensor_serial, "
+      "reason, session_id, sensor_on_s, check_overdue) VALUES (?, ?, ?, 'running', ?, ?, ?, ?, ?, "
+      "?)",
+      patient, ParseId(scan.reference_id), Name(scan.purpose), StoredNow(), scan.sensor_serial,
+      scan.reason, ParseId(scan.session_id), scan.sensor_on_s,
+      static_cast<std::int64_t>(scan.daily_check));
+  const std::int64_t number = change->last_id();
   const std::string id = ScanId(number);
   std::error_code error;
   fs::remove_all(folders_.Staging(id), error);
@@ -221,12 +185,12 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
     for (const char* part : {"scene", "result"}) fs::remove_all(staging / part, ignored);
   }
   // Scene and result are on the disk; a recording has too many images to flush them one by one.
-  if (fs::exists(staging / kRecordingFolder, ignored)) Sync(folders_.scans(), ::syncfs);
+  if (fs::exists(staging / kRecordingFolder, ignored)) Flush(folders_.scans(), SyncWholeDisk);
   if (::rename(staging.c_str(), folders_.Scan(scan_id).c_str()) != 0) {
     throw DiskRefused(DescribeWriteError(folders_.Scan(scan_id), errno));
   }
   try {
-    Sync(folders_.scans());
+    Flush(folders_.scans(), SyncToDisk);
     NoteEnd(*writer, scan_id, finished, is_kept, files);
   } catch (...) {  // without its row a scan does not exist
     ::rename(folders_.Scan(scan_id).c_str(), staging.c_str());
@@ -239,22 +203,13 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
                         const std::vector<FileDigest>& files) {
   const std::int64_t number = ParseId(scan_id).value_or(0);
   Transaction transaction(database);
-  database
-      .Prepare(
-          "UPDATE scans SET outcome = ?, failure = ?, finished_at = ?, swept_area_m2 = ?, "
-          "has_folder = ? WHERE id = ?")
-      .Bind(Name(finished.outcome))
-      .Bind(finished.failure)
-      .Bind(Now())
-      .Bind(finished.swept_area_m2)
-      .Bind(std::int64_t{has_folder})
-      .Bind(number)
-      .Run();
+  database.Run(
+      "UPDATE scans SET outcome = ?, failure = ?, finished_at = ?, swept_area_m2 = ?, "
+      "has_folder = ? WHERE id = ?",
+      Name(finished.outcome), finished.failure, StoredNow(), finished.swept_area_m2, has_folder,
+      number);
   if (finished.outcome == ScanOutcome::kDone && !finished.result_json.empty()) {
-    database.Prepare("INSERT INTO results (scan_id, json) VALUES (?, ?)")
-        .Bind(number)
-        .Bind(finished.result_json)
-        .Run();
+    database.Run("INSERT INTO results (scan_id, json) VALUES (?, ?)", number, finished.result_json);
   }
   StoreDigests(database, number, files);
   transaction.Commit();
@@ -265,20 +220,20 @@ void ScanStore::Accept(const Actor& actor, const std::string& id, const std::str
   StoreChange change(database_);
   std::string described;
   {
-    Statement query = change.Prepare(
+    Statement query = change->Prepare(
         "SELECT outcome, accepted_by, (SELECT json FROM results WHERE scan_id = scans.id), "
         "EXISTS (SELECT 1 FROM scans AS newer WHERE newer.patient_id = scans.patient_id AND "
         "newer.id > scans.id AND newer.outcome IN ('done', 'running')), reference_id = (SELECT id "
         "FROM refs WHERE refs.patient_id = scans.patient_id AND approved_by <> '' ORDER BY version "
-        "DESC LIMIT 1) FROM scans WHERE id = ?");
-    if (!number || !query.Bind(*number).Step())
-      throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+        "DESC LIMIT 1) FROM scans WHERE id = ?",
+        number);
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
     if (query.Text(0) != "done" || query.IsNull(2)) {
       throw StoreRefusal(ChangeResult::kConflict,
                          "this scan has no result: only a compared scan is accepted");
     }
     const ResultSummary result = SummaryOf(query.Text(2));
-    if (result.verdict == "no_answer")
+    if (result.verdict == Verdict::kNoAnswer)
       throw StoreRefusal(ChangeResult::kConflict,
                          "this scan gave no answer: there is nothing to accept");
     if (!query.Text(1).empty())
@@ -290,20 +245,14 @@ void ScanStore::Accept(const Actor& actor, const std::string& id, const std::str
       throw StoreRefusal(ChangeResult::kConflict,
                          "another version of the reference has been approved since this scan: scan "
                          "again, then accept");
-    if (result.verdict != "in_tolerance" && reason.empty())
+    if (result.verdict != Verdict::kInTolerance && reason.empty())
       throw StoreRefusal(ChangeResult::kConflict,
                          "this result is not in tolerance: accepting it requires a reason and "
                          "your password");
     described = Described(result);
   }
-  change
-      .Prepare(
-          "UPDATE scans SET accepted_by = ?, accepted_reason = ?, accepted_at = ? WHERE id = ?")
-      .Bind(actor.user)
-      .Bind(reason)
-      .Bind(Now())
-      .Bind(*number)
-      .Run();
+  change->Run("UPDATE scans SET accepted_by = ?, accepted_reason = ?, accepted_at = ? WHERE id = ?",
+              actor.user, reason, StoredNow(), number);
   change.Log(actor, reason.empty() ? "scan.accept" : "scan.accept_outside", id,
              reason.empty() ? described : described + "; reason: " + reason);
   change.Commit();

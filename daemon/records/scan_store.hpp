@@ -22,7 +22,7 @@ struct NewScan {
   std::string reference_id;  ///< Empty without a reference.
   ScanPurpose purpose = ScanPurpose::kFraction;
   std::string sensor_serial;
-  std::string reason;           ///< Reason for a new reference.
+  std::string reason = {};      ///< Reason for a new reference.
   std::string session_id = {};  ///< Empty without an open session.
   std::optional<double> sensor_on_s = {};
   DailyCheck daily_check = DailyCheck::kPassed;
@@ -31,8 +31,8 @@ struct NewScan {
 /// Outcome of a scan.
 struct FinishedScan {
   ScanOutcome outcome = ScanOutcome::kFailed;
-  std::string failure;
-  std::string result_json;  ///< Empty if nothing was compared.
+  std::string failure = {};
+  std::string result_json = {};  ///< Empty if nothing was compared.
   double swept_area_m2 = 0.0;
 };
 

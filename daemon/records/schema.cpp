@@ -1,17 +1,19 @@
 #include "daemon/records/schema.hpp"
 
-#include <array>
-#include <charconv>
 #include <string>
 
 #include <fmt/format.h>
+
+#include "algo/base/parse_number.hpp"
 
 namespace plumb {
 namespace {
 
 // Times are microseconds since 1970, UTC. Order is given by ids, which only increase, because
 // clocks may step.
-constexpr const char* kVersion1 = R"sql(
+//
+// The schema of version 0.1.0. An approval names the plan that was read, by refs.revision.
+constexpr const char* kSchema3 = R"sql(
 CREATE TABLE patients (
   id INTEGER PRIMARY KEY AUTOINCREMENT,
   code TEXT NOT NULL UNIQUE,
@@ -51,6 +53,7 @@ CREATE TABLE refs (
   plan TEXT NOT NULL,
   approved_by TEXT NOT NULL DEFAULT '',
   approved_at INTEGER,
+  revision INTEGER NOT NULL DEFAULT 1,
   UNIQUE (patient_id, version)
 ) STRICT;
 CREATE TRIGGER refs_immutable BEFORE UPDATE ON refs WHEN OLD.approved_by <> ''
@@ -77,10 +80,7 @@ CREATE TABLE audit (
 CREATE TRIGGER audit_no_update BEFORE UPDATE ON audit BEGIN SELECT RAISE(ABORT, 'the audit log is append-only'); END;
 CREATE TRIGGER audit_no_delete BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, 'the audit log is append-only'); END;
 CREATE TABLE settings (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
-)sql";
-
-// The daily checks and the baseline for comparisons. Neither is ever changed.
-constexpr const char* kVersion2 = R"sql(
+-- The daily checks and the baseline for comparisons. Neither is ever changed.
 CREATE TABLE checks (
   id INTEGER PRIMARY KEY AUTOINCREMENT,
   time INTEGER NOT NULL,
@@ -100,14 +100,11 @@ CREATE TRIGGER checks_no_update BEFORE UPDATE ON checks BEGIN SELECT RAISE(ABORT
 CREATE TRIGGER checks_no_delete BEFORE DELETE ON checks BEGIN SELECT RAISE(ABORT, 'checks are append-only'); END;
 )sql";
 
-// An approval names the plan that was read, by its revision.
-constexpr const char* kVersion3 =
-    "ALTER TABLE refs ADD COLUMN revision INTEGER NOT NULL DEFAULT 1;";
-
-// Treatment sessions, known facts at the beginning of a scan, the reason for its acceptance, and
-// paired displays. Scans without a session belong to patient 0, whose number and code no request
-// can name.
-constexpr const char* kVersion4 = R"sql(
+// What came after 0.1.0. Scans without a session belong to patient 0, whose number and code no
+// request can name.
+constexpr const char* kFrom3To9 = R"sql(
+-- Treatment sessions, known facts at the beginning of a scan, the reason for its acceptance, and
+-- paired displays.
 CREATE TABLE sessions (
   id INTEGER PRIMARY KEY AUTOINCREMENT,
   patient_id INTEGER NOT NULL REFERENCES patients(id) ON DELETE CASCADE,
@@ -132,12 +129,9 @@ CREATE TABLE displays (
   paired_at INTEGER NOT NULL,
   paired_by TEXT NOT NULL
 ) STRICT;
-)sql";
-
-// Digests of stored files; the numbers of scans that were removed on purpose, so that others count
-// as missing; a digest chain in the audit log. A scan whose files an older Plumb did not find keeps
-// its folder from now on.
-constexpr const char* kVersion5 = R"sql(
+-- Digests of stored files; the numbers of scans that were removed on purpose, so that others count
+-- as missing; a digest chain in the audit log. A scan whose files 0.1.0 did not find keeps its folder
+-- from now on.
 CREATE TABLE scan_files (
   scan_id INTEGER NOT NULL REFERENCES scans(id) ON DELETE CASCADE,
   path TEXT NOT NULL,
@@ -153,10 +147,7 @@ ALTER TABLE scans ADD COLUMN checked_at INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE audit ADD COLUMN chain TEXT NOT NULL DEFAULT '';
 UPDATE scans SET has_folder = 1, unavailable = failure, failure = ''
   WHERE outcome = 'done' AND has_folder = 0;
-)sql";
-
-// Notes on patients, the archive, and templates of plans.
-constexpr const char* kVersion6 = R"sql(
+-- Notes on patients, the archive, and templates of plans.
 ALTER TABLE patients ADD COLUMN note TEXT NOT NULL DEFAULT '';
 ALTER TABLE patients ADD COLUMN archived INTEGER NOT NULL DEFAULT 0;
 CREATE TABLE templates (
@@ -167,10 +158,7 @@ CREATE TABLE templates (
   rotation_deg REAL NOT NULL,
   changed_by TEXT NOT NULL
 ) STRICT;
-)sql";
-
-// The room's axes as they were signed. The newest calibration is used; none is ever changed.
-constexpr const char* kVersion7 = R"sql(
+-- The room's axes as they were signed. The newest calibration is used; none is ever changed.
 CREATE TABLE room_calibrations (
   version INTEGER PRIMARY KEY AUTOINCREMENT,
   signed_at INTEGER NOT NULL,
@@ -182,18 +170,12 @@ CREATE TRIGGER room_calibrations_no_update BEFORE UPDATE ON room_calibrations
   BEGIN SELECT RAISE(ABORT, 'a signed calibration of the room is never changed'); END;
 CREATE TRIGGER room_calibrations_no_delete BEFORE DELETE ON room_calibrations
   BEGIN SELECT RAISE(ABORT, 'a signed calibration of the room is never removed'); END;
-)sql";
-
-// When a result was accepted; for earlier ones the time comes from the audit log.
-constexpr const char* kVersion8 = R"sql(
+-- When a result was accepted; for earlier ones the time comes from the audit log.
 ALTER TABLE scans ADD COLUMN accepted_at INTEGER;
 UPDATE scans SET accepted_at = (SELECT MAX(time) FROM audit WHERE subject = printf('%06d', scans.id)
   AND action IN ('scan.accept', 'scan.accept_outside')) WHERE accepted_by <> '';
-)sql";
-
-// What each person chose of the page. Drafts that nobody has planned say so: earlier versions named
-// who had scanned them.
-constexpr const char* kVersion9 = R"sql(
+-- What each person chose of the page. Drafts that nobody has planned say so: 0.1.0 named who had
+-- scanned them.
 CREATE TABLE preferences (
   user TEXT PRIMARY KEY REFERENCES users(name) ON DELETE CASCADE,
   language TEXT NOT NULL,
@@ -203,51 +185,45 @@ UPDATE refs SET planned_by = '' WHERE approved_by = '' AND revision = 1
   AND reason NOT LIKE 'new plan of version %';
 )sql";
 
-constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1, kVersion2, kVersion3,
-                                                            kVersion4, kVersion5, kVersion6,
-                                                            kVersion7, kVersion8, kVersion9};
+/// Schemas in between were never released.
+struct Step {
+  int from, to;
+  const char* sql;
+};
+constexpr Step kSteps[] = {{0, 3, kSchema3}, {3, kSchemaVersion, kFrom3To9}};
 
 /// Whether a newer database states that programs with this schema can use it.
 bool IsUsable(Database& database) {
-  Statement tables = database.Prepare("SELECT 1 FROM sqlite_master WHERE name = 'settings'");
-  if (!tables.Step()) return false;
-  Statement query = database.Prepare("SELECT value FROM settings WHERE name = ?");
-  if (!query.Bind(std::string(kUsableFromName)).Step()) return false;
-  const std::string text = query.Text(0);
-  int oldest = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), oldest);
-  return error == std::errc() && end == text.data() + text.size() && oldest > 0 &&
-         oldest <= kSchemaVersion;
+  if (!database.Has("SELECT 1 FROM sqlite_master WHERE name = 'settings'")) return false;
+  const std::string text =
+      database.FirstText("SELECT value FROM settings WHERE name = ?", kUsableFromName).value_or("");
+  const std::optional<int> oldest = ParseNumber<int>(text);
+  return oldest && *oldest > 0 && *oldest <= kSchemaVersion;
 }
 
 void NoteUsableFrom(Database& database) {
-  database.Prepare("INSERT OR REPLACE INTO settings (name, value) VALUES (?, ?)")
-      .Bind(std::string(kUsableFromName))
-      .Bind(std::to_string(kUsableFromSchema))
-      .Run();
+  database.Run("INSERT OR REPLACE INTO settings (name, value) VALUES (?, ?)", kUsableFromName,
+               std::to_string(kUsableFromSchema));
 }
 
 }  // namespace
 
 void Migrate(Database& database) {
-  int version = 0;
-  {
-    Statement query = database.Prepare("PRAGMA user_version");
-    if (query.Step()) version = static_cast<int>(query.Integer(0));
-  }
+  int version = static_cast<int>(database.FirstInteger("PRAGMA user_version").value_or(0));
   if (version > kSchemaVersion && IsUsable(database)) return;
-  if (version < 0 || version > kSchemaVersion) {
-    throw DatabaseCorrupt(fmt::format(
-        "the database has version {}, this Plumb knows up to {}: install the newer Plumb again",
-        version, kSchemaVersion));
-  }
-  for (; version < kSchemaVersion; ++version) {
+  for (const Step& step : kSteps) {
+    if (version != step.from) continue;
     Transaction transaction(database);
-    database.Execute(kSteps[static_cast<std::size_t>(version)]);
-    if (version + 1 == kSchemaVersion) NoteUsableFrom(database);
-    database.Execute(fmt::format("PRAGMA user_version = {}", version + 1));
+    database.Execute(step.sql);
+    if (step.to == kSchemaVersion) NoteUsableFrom(database);
+    database.Execute(fmt::format("PRAGMA user_version = {}", step.to));
     transaction.Commit();
+    version = step.to;
   }
+  if (version == kSchemaVersion) return;
+  throw DatabaseCorrupt(fmt::format(
+      "the database has version {}, this Plumb knows up to {}: install the newer Plumb again",
+      version, kSchemaVersion));
 }
 
 }  // namespace plumb

@@ -10,14 +10,14 @@ inline constexpr int kSchemaVersion = 9;
 /// The oldest schema whose programs can use a database of kSchemaVersion: after an update is rolled
 /// back, the previous version has to start with the data. A migration that only adds tables, and
 /// columns with a default, leaves it unchanged; any other migration sets it to its own number.
-inline constexpr int kUsableFromSchema = 8;
+inline constexpr int kUsableFromSchema = 9;
 
 /// Location of this statement in the database, in the table `settings`.
 inline constexpr const char* kUsableFromName = "usable_from_schema";
 
-/// Migrates the database to kSchemaVersion step by step, each in a transaction. A database of a
-/// newer Plumb is left unchanged if it states that this version can use it.
-/// @throws DatabaseCorrupt otherwise.
+/// Migrates a new database, or one of 0.1.0, to kSchemaVersion, each step in a transaction. A
+/// database of a newer Plumb is left unchanged if it states that this version can use it.
+/// @throws DatabaseCorrupt otherwise, also for schemas that were never released.
 void Migrate(Database& database);
 
 }  // namespace plumb

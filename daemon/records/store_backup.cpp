@@ -3,7 +3,6 @@
 #include <linux/magic.h>
 #include <sys/statfs.h>
 
-#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -12,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "daemon/records/audit_store.hpp"
+#include "daemon/records/file_copy.hpp"
 
 namespace plumb {
 
@@ -23,11 +23,6 @@ namespace {
 constexpr const char* kAdvice =
     "name a folder on another disk, such as one that is mounted at "
     "/var/lib/plumb-backup";
-
-bool IsBelow(const fs::path& path, const fs::path& folder) {
-  return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first ==
-         folder.end();
-}
 
 /// Root, within its file system, of the mount that contains the path.
 std::string MountedFolderOf(const fs::path& path, const std::string& mounts) {

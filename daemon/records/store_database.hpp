@@ -56,14 +56,12 @@ class StoreChange {
   explicit StoreChange(StoreDatabase& database)
       : held_(database.ForChanges()), transaction_(*held_) {}
 
-  [[nodiscard]] Statement Prepare(const char* sql) { return held_->Prepare(sql); }
-  [[nodiscard]] std::int64_t last_id() const { return held_->last_id(); }
-  [[nodiscard]] int num_changed() const { return held_->num_changed(); }
+  Database* operator->() const { return &*held_; }
+  Database& operator*() const { return *held_; }
   /// Adds an entry to the audit log.
   void Log(const Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail);
   void Commit() { transaction_.Commit(); }
-  [[nodiscard]] Database& database() { return *held_; }
 
  private:
   StoreDatabase::Held held_;

@@ -53,10 +53,11 @@ const Json* ObjectIn(const Json& json, const char* key) {
   return &*found;
 }
 
-std::string VerdictIn(const Json& json) {
+Verdict VerdictIn(const Json& json) {
   const auto found = json.find("verdict");
-  for (const std::string_view verdict : kNamesOf<Verdict>)
-    if (found != json.end() && *found == verdict) return std::string(verdict);
+  if (found != json.end() && found->is_string()) {
+    if (const auto verdict = Named<Verdict>(found->get_ref<const std::string&>())) return *verdict;
+  }
   RefuseResult("it has no verdict that this version knows");
 }
 
@@ -216,13 +217,7 @@ Settings ParseSettings(const std::string& text) {
 ResultSummary SummaryOf(const std::string& result_json) {
   const Json json = ParseBoundedJsonOrNothing(result_json);
   if (!json.is_object()) RefuseResult("expected a JSON object, found none");
-  ResultSummary summary{.verdict = VerdictIn(json),
-                        .reasons = {},
-                        .correction = {},
-                        .u95 = {},
-                        .words = {},
-                        .body_now = {},
-                        .body_after = {}};
+  ResultSummary summary{.verdict = VerdictIn(json)};
   ReadWords(json, summary);
   if (const auto reasons = json.find("reasons"); reasons != json.end()) {
     if (!reasons->is_array()) RefuseResult("its reasons are not a list");

@@ -17,7 +17,6 @@
 namespace plumb {
 
 namespace fs = std::filesystem;
-using store::ScanId;
 
 namespace {
 
@@ -77,14 +76,14 @@ void Recovery::Run() {
   FailInterruptedScans(database_);
   report_.interrupted_scans = database_.num_changed();
   if (report_.interrupted_scans > 0) {
-    AppendAuditEntry(database_, store::kSelf, "scan.interrupted", "",
+    AppendAuditEntry(database_, kSelf, "scan.interrupted", "",
                      fmt::format("{} scans had not ended", report_.interrupted_scans));
   }
-  if (!confirmed_.empty()) AppendAuditEntry(database_, store::kSelf, "scans.lost", "", confirmed_);
+  if (!confirmed_.empty()) AppendAuditEntry(database_, kSelf, "scans.lost", "", confirmed_);
   for (const LookedAt& scan : scans) {
     if (!scan.aside.empty())
       AppendAuditEntry(
-          database_, store::kSelf, "folder.return", ScanId(scan.id),
+          database_, kSelf, "folder.return", ScanId(scan.id),
           fmt::format("from {}, with the files that were stored", scan.aside.string()));
   }
   NoteAvailability(scans);
@@ -113,7 +112,7 @@ std::vector<LookedAt> Recovery::ExamineScans() {
   for (std::size_t i = 0; i < scans.size(); ++i) {
     std::vector<FileDigest> files = StoredDigests(database_, scans[i].id);
     if (files.empty() && has_scene[i])  // stored by an older Plumb, and not examined since
-      files.push_back({.path = kSceneMarker, .sha256 = {}});
+      files.push_back({.path = kSceneMarker});
     scans[i].now = WhyNotThere(folders_.Scan(ScanId(scans[i].id)), files, look_);
     if (!scans[i].now.empty()) scans[i].aside = FindAside(scans[i].id, files);
   }
@@ -198,20 +197,20 @@ void Recovery::NoteAvailability(const std::vector<LookedAt>& scans) {
 void Recovery::CollectOrphan(const fs::path& folder) {
   if (ScanFolders::IsStaging(folder)) return Discard(folder, "of a scan that had not ended");
   const std::string name = folder.filename().string();
-  const std::int64_t id = store::ParseId(name).value_or(0);
+  const std::int64_t id = ParseId(name).value_or(0);
   std::string outcome, failure;
   {
     Statement query =
-        database_.Prepare("SELECT outcome, has_folder, failure FROM scans WHERE id = ?");
-    if (query.Bind(id).Step()) {
+        database_.Prepare("SELECT outcome, has_folder, failure FROM scans WHERE id = ?", id);
+    if (query.Step()) {
       if (query.Integer(1) != 0) return;
       outcome = query.Text(0);
       failure = query.Text(2);
     }
   }
   if (outcome.empty()) {
-    Statement query = database_.Prepare("SELECT 1 FROM removed_scans WHERE id = ?");
-    if (query.Bind(id).Step()) return Discard(folder, "of a scan that was removed");
+    if (database_.Has("SELECT 1 FROM removed_scans WHERE id = ?", id))
+      return Discard(folder, "of a scan that was removed");
     return SetAside(folder, name, "no scan of this number is known: is it of another database?");
   }
   if (failure == kInterrupted) {  // an older database may not know that the scan had ended
@@ -229,7 +228,7 @@ void Recovery::Discard(const fs::path& folder, const std::string& why) {
   if (error) return;  // the next start tries again
   ++report_.orphaned_folders;
   Transaction transaction(database_);
-  AppendAuditEntry(database_, store::kSelf, "folder.remove", folder.filename().string(), why);
+  AppendAuditEntry(database_, kSelf, "folder.remove", folder.filename().string(), why);
   transaction.Commit();
 }
 
@@ -247,17 +246,14 @@ void Recovery::SetAside(const fs::path& folder, const std::string& name, const s
   if (error) throw DiskRefused(DescribeWriteError(target, error.value()));
   ++report_.foreign_folders;
   Transaction transaction(database_);
-  AppendAuditEntry(database_, store::kSelf, "folder.set_aside", target.filename().string(), why);
+  AppendAuditEntry(database_, kSelf, "folder.set_aside", target.filename().string(), why);
   transaction.Commit();
 }
 
 }  // namespace
 
 void RefuseScansOfAnother(Database& database, const ScanFolders& scans) {
-  {
-    Statement version = database.Prepare("PRAGMA user_version");
-    if (version.Step() && version.Integer(0) != 0) return;
-  }
+  if (database.FirstInteger("PRAGMA user_version").value_or(0) != 0) return;
   if (IsRestoreInterrupted(scans.state()))
     throw DatabaseCorrupt(fmt::format(
         "restoring a backup into {} was interrupted: restore it again; what was stored before is "

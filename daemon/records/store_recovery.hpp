@@ -1,8 +1,6 @@
 // Recovery of the store at a start after a crash.
 #pragma once
 
-#include <memory>
-
 #include "daemon/records/database.hpp"
 #include "daemon/records/scan_files.hpp"
 #include "daemon/records/scan_folders.hpp"

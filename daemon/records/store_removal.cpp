@@ -14,12 +14,6 @@ namespace plumb {
 
 namespace fs = std::filesystem;
 
-using store::Now;
-using store::ParseId;
-using store::RequireId;
-using store::ScanId;
-using store::ToStored;
-
 namespace {
 
 std::uint64_t BytesOf(const fs::path& folder, const std::stop_token& stop) {
@@ -35,16 +29,10 @@ std::uint64_t BytesOf(const fs::path& folder, const std::stop_token& stop) {
 
 /// So that a start can distinguish removed scans from unknown ones.
 void NoteRemoved(StoreChange& change, const std::string& scan_id) {
-  change.Prepare("INSERT OR IGNORE INTO removed_scans (id) VALUES (?)")
-      .Bind(ParseId(scan_id))
-      .Run();
+  change->Run("INSERT OR IGNORE INTO removed_scans (id) VALUES (?)", ParseId(scan_id));
 }
 
-std::vector<std::string> ScansOf(Statement query) {
-  std::vector<std::string> scans;
-  while (query.Step()) scans.push_back(ScanId(query.Integer(0)));
-  return scans;
-}
+std::string ReadScanId(const Statement& row) { return ScanId(row.Integer(0)); }
 
 }  // namespace
 
@@ -77,23 +65,17 @@ void StoreRemoval::WipePatient(const Actor& actor, const std::string& id) {
   const std::unique_lock removals = gate_.LockRemovals();
   {
     StoreChange change(database_);
-    {
-      Statement query = change.Prepare("SELECT id FROM scans WHERE patient_id = ?");
-      query.Bind(number);
-      scans = ScansOf(std::move(query));
-    }
-    if (const auto running_scan = scans_.running()) {
-      Statement running = change.Prepare("SELECT 1 FROM scans WHERE patient_id = ? AND id = ?");
-      if (running.Bind(number).Bind(*running_scan).Step())
-        throw StoreRefusal(ChangeResult::kConflict,
-                           "a scan of this patient is running: end or cancel it first");
-    }
-    change.Prepare("UPDATE patients SET wiping = 1 WHERE id = ?").Bind(number).Run();
-    if (change.num_changed() == 0)
+    scans = change->All("SELECT id FROM scans WHERE patient_id = ?", ReadScanId, number);
+    if (change->Has("SELECT 1 FROM scans WHERE patient_id = ? AND id = ?", number,
+                    scans_.running()))
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "a scan of this patient is running: end or cancel it first");
+    change->Run("UPDATE patients SET wiping = 1 WHERE id = ?", number);
+    if (change->num_changed() == 0)
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
     for (const std::string& scan : scans) NoteRemoved(change, scan);
-    change.Prepare("DELETE FROM refs WHERE patient_id = ?").Bind(number).Run();
-    change.Prepare("DELETE FROM patients WHERE id = ?").Bind(number).Run();
+    change->Run("DELETE FROM refs WHERE patient_id = ?", number);
+    change->Run("DELETE FROM patients WHERE id = ?", number);
     change.Log(actor, "patient.wipe", id, fmt::format("{} scans", scans.size()));
     change.Commit();
   }
@@ -102,7 +84,7 @@ void StoreRemoval::WipePatient(const Actor& actor, const std::string& id) {
   std::error_code ignored;
   fs::remove(folders_.state() / "imports" / (std::to_string(number) + ".json"), ignored);
   // The write-ahead log must not keep the wiped data either.
-  database_.ForChanges()->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Run();
+  database_.ForChanges()->Run("PRAGMA wal_checkpoint(TRUNCATE)");
 }
 
 void StoreRemoval::RemoveScan(const Actor& actor, const std::string& id,
@@ -113,18 +95,18 @@ void StoreRemoval::RemoveScan(const Actor& actor, const std::string& id,
   const std::unique_lock removals = gate_.LockRemovals();
   {
     StoreChange change(database_);
-    Statement query = change.Prepare(
+    Statement query = change->Prepare(
         "SELECT outcome, EXISTS (SELECT 1 FROM refs WHERE scan_id = scans.id) FROM scans WHERE id "
-        "= ?");
-    if (!number || !query.Bind(*number).Step())
-      throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+        "= ?",
+        number);
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
     if (query.Text(0) == "running")
       throw StoreRefusal(ChangeResult::kConflict, "this scan is running: discard it instead");
     if (query.Integer(1) != 0)
       throw StoreRefusal(ChangeResult::kConflict,
                          "a reference is made of this scan: it goes only with its patient");
     NoteRemoved(change, ScanId(*number));
-    change.Prepare("DELETE FROM scans WHERE id = ?").Bind(*number).Run();
+    change->Run("DELETE FROM scans WHERE id = ?", *number);
     change.Log(actor, "scan.remove", ScanId(*number), reason);
     change.Commit();
   }
@@ -137,15 +119,13 @@ bool StoreRemoval::ForgetScan(const std::string& scan_id, const char* why) {
   const std::unique_lock removals = gate_.LockRemovals();
   {
     StoreChange change(database_);
-    change
-        .Prepare(
-            "DELETE FROM scans WHERE id = ? AND outcome <> 'running' AND id NOT IN (SELECT scan_id "
-            "FROM refs)")
-        .Bind(ParseId(scan_id))
-        .Run();
-    if (change.num_changed() == 0) return false;
+    change->Run(
+        "DELETE FROM scans WHERE id = ? AND outcome <> 'running' AND id NOT IN (SELECT scan_id "
+        "FROM refs)",
+        ParseId(scan_id));
+    if (change->num_changed() == 0) return false;
     NoteRemoved(change, scan_id);
-    change.Log(store::kSelf, "scan.remove", scan_id, why);
+    change.Log(kSelf, "scan.remove", scan_id, why);
     change.Commit();
   }
   RemoveFiles(scan_id);
@@ -155,11 +135,8 @@ bool StoreRemoval::ForgetScan(const std::string& scan_id, const char* why) {
 /// Leaves out scans whose stored files cannot be seen now: removing them frees nothing, and the
 /// files may come back. A scan whose files have changed is treated like any other.
 void StoreRemoval::LeaveOutOfSight(std::vector<std::string>& scan_ids) {
-  std::vector<std::string> unavailable;
-  {
-    const StoreDatabase::Held writer = database_.ForChanges();
-    unavailable = ScansOf(writer->Prepare("SELECT id FROM scans WHERE unavailable <> ''"));
-  }
+  const std::vector<std::string> unavailable =
+      database_.ForChanges()->All("SELECT id FROM scans WHERE unavailable <> ''", ReadScanId);
   std::erase_if(scan_ids, [&](const std::string& id) {
     std::error_code ignored;
     return std::ranges::find(unavailable, id) != unavailable.end() &&
@@ -170,18 +147,13 @@ void StoreRemoval::LeaveOutOfSight(std::vector<std::string>& scan_ids) {
 int StoreRemoval::RemoveOldScans(int retention_days, const std::stop_token& stop) {
   if (retention_days <= 0) return 0;
   const WallClock::time_point now = WallClock::now();
-  std::vector<std::string> old;
-  {
-    const StoreDatabase::Held writer = database_.ForChanges();
-    // Numbers only increase while clocks may step: no scan is older than its predecessor, and times
-    // in the future are wrong.
-    Statement query = writer->Prepare(
-        "SELECT id FROM (SELECT id, outcome, max(CASE WHEN started_at <= ? THEN started_at ELSE 0 "
-        "END) OVER (ORDER BY id) AS since FROM scans) WHERE outcome <> 'running' AND since < ? AND "
-        "id NOT IN (SELECT scan_id FROM refs) ORDER BY id");
-    query.Bind(ToStored(now)).Bind(ToStored(now - std::chrono::hours(24) * retention_days));
-    old = ScansOf(std::move(query));
-  }
+  // Numbers only increase while clocks may step: no scan is older than its predecessor, and times
+  // in the future are wrong.
+  std::vector<std::string> old = database_.ForChanges()->All(
+      "SELECT id FROM (SELECT id, outcome, max(CASE WHEN started_at <= ? THEN started_at ELSE 0 "
+      "END) OVER (ORDER BY id) AS since FROM scans) WHERE outcome <> 'running' AND since < ? AND "
+      "id NOT IN (SELECT scan_id FROM refs) ORDER BY id",
+      ReadScanId, ToStored(now), ToStored(now - std::chrono::hours(24) * retention_days));
   LeaveOutOfSight(old);
   int num_removed = 0;
   for (const std::string& scan : old) {
@@ -196,10 +168,9 @@ void StoreRemoval::ForgetRecording(const std::string& scan_id) {
   const std::unique_lock removals = gate_.LockRemovals();
   {
     StoreChange change(database_);
-    change.Prepare("DELETE FROM scan_files WHERE scan_id = ? AND path = 'recording'")
-        .Bind(ParseId(scan_id))
-        .Run();
-    change.Log(store::kSelf, "recording.remove", scan_id, "quota");
+    change->Run("DELETE FROM scan_files WHERE scan_id = ? AND path = 'recording'",
+                ParseId(scan_id));
+    change.Log(kSelf, "recording.remove", scan_id, "quota");
     change.Commit();
   }
   std::error_code ignored;
@@ -241,10 +212,11 @@ int StoreRemoval::RemoveOldest(std::uint64_t bytes, std::uint64_t max_bytes,
   std::vector<std::string> all, removable;
   {
     const StoreDatabase::Held writer = database_.ForChanges();
-    all = ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id"));
-    removable =
-        ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 "
-                                "AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id"));
+    all = writer->All("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id", ReadScanId);
+    removable = writer->All(
+        "SELECT id FROM scans WHERE has_folder = 1 AND id NOT IN (SELECT scan_id FROM refs) ORDER "
+        "BY id",
+        ReadScanId);
   }
   LeaveOutOfSight(all);
   LeaveOutOfSight(removable);

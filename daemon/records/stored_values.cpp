@@ -1,15 +1,15 @@
 #include "daemon/records/stored_values.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/parse_number.hpp"
 #include "daemon/records/store_refusal.hpp"
 
-namespace plumb::store {
+namespace plumb {
 
 std::int64_t ToStored(WallClock::time_point time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
@@ -23,15 +23,13 @@ WallClock::time_point FromStored(std::int64_t us) {
       std::chrono::microseconds(std::clamp(us, -kMost_us, kMost_us))));
 }
 
-std::int64_t Now() { return ToStored(WallClock::now()); }
+std::int64_t StoredNow() { return ToStored(WallClock::now()); }
 
 std::optional<std::int64_t> ParseId(std::string_view text) {
   constexpr std::size_t kMaxDigits = 15;
-  std::int64_t id = 0;
-  if (text.empty() || text.size() > kMaxDigits) return std::nullopt;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
-  if (error != std::errc() || end != text.data() + text.size() || id <= 0) return std::nullopt;
-  return id;
+  if (text.size() > kMaxDigits) return std::nullopt;
+  const std::optional<std::int64_t> id = ParseNumber<std::int64_t>(text);
+  return id && *id > 0 ? id : std::nullopt;
 }
 
 std::int64_t RequireId(const std::string& text, const char* what) {
@@ -42,11 +40,11 @@ std::int64_t RequireId(const std::string& text, const char* what) {
 
 std::string ScanId(std::int64_t id) { return fmt::format("{:06}", id); }
 
-void RefuseName(const char* what, std::string_view name) {
+void RefuseStoredName(const char* what, std::string_view name) {
   throw DataError(
       fmt::format("this version knows no {} '{}', which is stored: the database was changed from "
                   "outside, or its disk failed. Put a backup of it in its place",
                   what, name.substr(0, 32)));
 }
 
-}  // namespace plumb::store
+}  // namespace plumb

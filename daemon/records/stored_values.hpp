@@ -10,7 +10,7 @@
 #include "web/model/account.hpp"
 #include "web/model/wall_clock.hpp"
 
-namespace plumb::store {
+namespace plumb {
 
 /// The appliance itself, as named in the audit log.
 inline const Actor kSelf{.user = "plumbd", .address = ""};
@@ -21,9 +21,10 @@ inline const Actor kCommand{.user = "command line", .address = ""};
 [[nodiscard]] std::int64_t ToStored(WallClock::time_point time);
 [[nodiscard]] WallClock::time_point FromStored(std::int64_t us);
 /// The time now, as it is stored.
-[[nodiscard]] std::int64_t Now();
+[[nodiscard]] std::int64_t StoredNow();
 
-/// An id from outside; nothing if no record can have it.
+/// An id from outside; nothing if no record can have it. Bound to a statement, nothing equals no
+/// id.
 [[nodiscard]] std::optional<std::int64_t> ParseId(std::string_view text);
 /// The same. @throws StoreRefusal (kNotFound) naming what does not exist.
 [[nodiscard]] std::int64_t RequireId(const std::string& text, const char* what);
@@ -31,12 +32,12 @@ inline const Actor kCommand{.user = "command line", .address = ""};
 /// "000042": the name of a scan's folder, and its id.
 [[nodiscard]] std::string ScanId(std::int64_t id);
 
-[[noreturn]] void RefuseName(const char* what, std::string_view name);
+[[noreturn]] void RefuseStoredName(const char* what, std::string_view name);
 /// @throws DataError for a name that this version does not know.
 template <typename Enum>
-[[nodiscard]] Enum Parse(const char* what, std::string_view name) {
+[[nodiscard]] Enum ParseStored(const char* what, std::string_view name) {
   if (const std::optional<Enum> value = Named<Enum>(name)) return *value;
-  RefuseName(what, name);
+  RefuseStoredName(what, name);
 }
 
-}  // namespace plumb::store
+}  // namespace plumb

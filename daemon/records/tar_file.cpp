@@ -238,7 +238,7 @@ std::string TarReader::Text(const std::string& path, std::size_t max_bytes) cons
 
 FileDigest TarReader::Digest(const std::string& path, const std::stop_token& stop) const {
   Sha256 hash;
-  FileDigest digest{.path = path, .bytes = 0, .sha256 = {}};
+  FileDigest digest{.path = path};
   Read(path, [&](std::span<const std::uint8_t> bytes) {
     CheckStop(stop);
     hash.Add(bytes.data(), bytes.size());

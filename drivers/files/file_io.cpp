@@ -17,6 +17,13 @@ namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
 
+void SyncBy(int (*sync)(int), const std::filesystem::path& path) {
+  const Descriptor opened(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (opened.get() < 0) throw IoError(DescribeWriteError(path, errno));
+  if (sync(opened.get()) != 0 && errno != EINVAL)  // EINVAL: a file system without fsync
+    throw IoError(DescribeWriteError(path, errno));
+}
+
 std::string ErrorText(int error_number) { return std::generic_category().message(error_number); }
 
 /// Reads a regular file into any contiguous container of bytes.
@@ -148,11 +155,8 @@ void WriteWholeFile(const std::filesystem::path& path, std::string_view text) {
   WriteWholeFile(path, AsBytes(text));
 }
 
-void SyncToDisk(const std::filesystem::path& path) {
-  const Descriptor opened(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (opened.get() < 0) throw IoError(DescribeWriteError(path, errno));
-  if (::fsync(opened.get()) != 0 && errno != EINVAL)  // EINVAL: a file system without fsync
-    throw IoError(DescribeWriteError(path, errno));
-}
+void SyncToDisk(const std::filesystem::path& path) { SyncBy(::fsync, path); }
+
+void SyncWholeDisk(const std::filesystem::path& path) { SyncBy(::syncfs, path); }
 
 }  // namespace plumb

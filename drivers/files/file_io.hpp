@@ -56,6 +56,8 @@ void WriteWholeFile(const std::filesystem::path& path, std::string_view text);
 
 /// Forces a file's or a folder's contents to the disk. @throws IoError
 void SyncToDisk(const std::filesystem::path& path);
+/// The same for everything on the disk of a file or folder.
+void SyncWholeDisk(const std::filesystem::path& path);
 
 /// "cannot write FILE: REASON", with advice where it is known (ENOSPC, EDQUOT, EFBIG, EACCES,
 /// EROFS).

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <optional>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/parse_number.hpp"
 
 namespace plumb {
 namespace {
@@ -37,19 +37,17 @@ std::string Quoted(std::string_view text) {
 }
 
 double ParseStamp(std::string_view token, const std::string& where) {
-  double time_s = 0.0;
-  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), time_s);
-  if (error != std::errc{} || end != token.data() + token.size() || !std::isfinite(time_s) ||
-      time_s < 0) {
+  const std::optional<double> time_s = ParseNumber<double>(token);
+  if (!time_s || !std::isfinite(*time_s) || *time_s < 0) {
     throw DataError(
         fmt::format("{}: {} is not a time stamp, expected seconds", where, Quoted(token)));
   }
-  if (time_s > kMaxTime_s) {
+  if (*time_s > kMaxTime_s) {
     throw DataError(fmt::format(
         "{}: time stamp {} is too large for seconds; convert milli- or nanoseconds to seconds",
         where, Quoted(token)));
   }
-  return time_s;
+  return *time_s;
 }
 
 void CheckFileName(std::string_view file, const std::string& where) {

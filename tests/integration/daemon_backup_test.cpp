@@ -39,7 +39,6 @@ TEST(DaemonBackupTest, ABackupOf200ScansDisturbsNoSweepAndIsRestoredByteIdentica
       WriteWholeFile(store.folders.Staging(id) / "scene" / "cloud.ply",
                      std::string(std::size_t{200} << 10, static_cast<char>('a' + i % 26)) + id);
       store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
-                              .failure = {},
                               .result_json = R"({"verdict":"in_tolerance"})",
                               .swept_area_m2 = 1.0});
     }

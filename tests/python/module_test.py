@@ -3,6 +3,7 @@
 
 Usage: module_test.py PLUMB_BINARY EXAMPLE FOLDER, with the module's folder in PYTHONPATH.
 """
+import _thread
 import ast
 import contextlib
 import importlib.util
@@ -83,6 +84,10 @@ class SceneTest(unittest.TestCase):
         self.assertLess(np.abs(identity - np.eye(3)).max(), 1e-9)
         self.assertEqual(scene.points.shape, scene.normals.shape)
         self.assertTrue(np.shares_memory(scene.points, scene.points))
+        self.assertEqual((scene.colors.shape, scene.colors.dtype), (scene.points.shape, np.uint8))
+        self.assertEqual(scene.vertex_colors.shape, scene.vertices.shape)
+        self.assertEqual(set(scene.marker_sigmas_m), set(scene.markers))
+        self.assertTrue(all(0.0 < sigma < 0.01 for sigma in scene.marker_sigmas_m.values()))
         self.assertEqual(scene.heights.ndim, 2)
         self.assertAlmostEqual(scene.grid["step"], 0.0015)
         self.assertIn("tracking", self.steps)
@@ -136,6 +141,43 @@ class SceneTest(unittest.TestCase):
         self.assertLess(miss_mm, 1.5)  # measured: 1.24 mm at 320 columns
         self.assertEqual(result.covariance.shape, (6, 6))
         self.assertEqual(json.loads(result.to_json())["verdict"], result.verdict)
+        self.assertEqual(result.deviation_after_m.shape, result.deviation_m.shape)
+        self.assertLess(np.nanmedian(np.abs(result.deviation_after_m)),
+                        np.nanmedian(np.abs(result.deviation_m)))
+        remaining = result.deformation
+        self.assertEqual(remaining["points_m"].shape, remaining["shifts_m"].shape)
+        self.assertEqual(remaining["points_m"].shape[1], 3)
+
+    def test_a_comparison_takes_the_rooms_axes_the_posture_and_the_kind_of_markers(self):
+        plain = plumb.compare(*self.scenes)
+        # The room's x axis is the marker's y axis: pitch is about x, roll about y.
+        turned = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+        room = plumb.compare(*self.scenes, T_iec_reference=turned)
+        self.assertAlmostEqual(room.correction["vertical_mm"], plain.correction["vertical_mm"])
+        self.assertAlmostEqual(abs(room.correction["lateral_mm"]),
+                               abs(plain.correction["longitudinal_mm"]))
+        couch = plumb.compare(*self.scenes, marker_kind="couch")
+        self.assertIsNone(couch.correction["vertical_mm"])
+        bodies = [json.loads(plumb.compare(*self.scenes, T_iec_reference=turned,
+                                           posture=posture).to_json())["body"]
+                  for posture in ("HFS", "HFP")]
+        np.testing.assert_allclose(bodies[0]["left_xy"], np.negative(bodies[1]["left_xy"]))
+        for wrong in ({"posture": "up"}, {"marker_kind": "floor"},
+                      {"T_iec_reference": np.diag([2.0, 1, 1, 1])}):
+            with self.assertRaisesRegex(ValueError, next(iter(wrong))):
+                plumb.compare(*self.scenes, **wrong)
+
+    def test_ctrl_c_ends_an_evaluation_during_its_first_reconstruction(self):
+        steps = []
+
+        def interrupt(step, fraction):
+            if not steps:
+                threading.Timer(0.05, _thread.interrupt_main).start()
+            steps.append(step)
+
+        with self.assertRaises(KeyboardInterrupt):
+            plumb.evaluate(SUITE, progress=interrupt)
+        self.assertNotIn("comparing", steps)
 
     def test_a_comparison_with_a_region_that_holds_nothing_has_no_answer(self):
         far = [[9.0, 9.0], [9.1, 9.0], [9.1, 9.1]]

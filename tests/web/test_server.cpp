@@ -378,7 +378,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "tolerated" || name == "unsure") {
     FakeAppliance::Recorded shown = Moved(recorder, "z", 0, "HFS");
     ResultSummary& result = *shown.result;
-    result.verdict = name == "unsure" ? "unsure" : "in_tolerance";
+    result.verdict = name == "unsure" ? Verdict::kUnsure : Verdict::kInTolerance;
     if (name == "unsure") {
       result.correction->vertical_mm = -2.8;
       result.u95->vertical_mm = 1.2;
@@ -420,7 +420,7 @@ SensorProfiles KnownSensor() {
     const int age_days = 30 - 7 * version;
     return SensorProfileVersion{.version = version,
                                 .made_at = WallClock::now() - std::chrono::hours(24 * age_days),
-                                .cause = "learned",
+                                .cause = ProfileCause::kLearned,
                                 .num_sweeps = version,
                                 .values = {{"focal_x_scale", focal},
                                            {"focal_y_scale", focal},

@@ -103,9 +103,9 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
   }
   if (scan.result) {
     // The numbers of a comparison without an answer must not be acted on.
-    const bool is_answer = scan.result->verdict != "no_answer";
+    const bool is_answer = scan.result->verdict != Verdict::kNoAnswer;
     json["result"] = {
-        {"verdict", scan.result->verdict},
+        {"verdict", Name(scan.result->verdict)},
         {"reasons", scan.result->reasons},
         {"correction", NumbersJson(is_answer ? scan.result->correction : std::nullopt)},
         {"u95", NumbersJson(is_answer ? scan.result->u95 : std::nullopt)},
@@ -134,7 +134,7 @@ Json CheckJson(const CheckRecord& check, WallClock::time_point now) {
                     0, std::chrono::duration_cast<std::chrono::seconds>(now - check.time).count())},
       {"user", check.user},
       {"sensor_serial", check.sensor_serial},
-      {"status", check.status},
+      {"status", Name(check.status)},
       {"reasons", check.reasons},
       {"items", items},
       {"num_markers", check.num_markers}};

@@ -40,11 +40,11 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
   text += ",accepted_by,accepted_at,accepted_reason,check_overdue,check_failed\r\n";
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != ScanOutcome::kDone) continue;
-    const bool is_advice = scan->result && scan->result->verdict != "no_answer";
+    const bool is_advice = scan->result && scan->result->verdict != Verdict::kNoAnswer;
     text +=
         fmt::format("{},{},{},{},{},{}", Cell(patient.code), Cell(scan->id),
                     scan->fraction > 0 ? std::to_string(scan->fraction) : "", Name(scan->purpose),
-                    TimeText(scan->started_at), scan->result ? Cell(scan->result->verdict) : "");
+                    TimeText(scan->started_at), scan->result ? Name(scan->result->verdict) : "");
     const auto add = [&](const std::optional<ReportedNumbers>& numbers) {
       for (const NumberAxis& axis : kNumberAxes)
         text.append(1, ',').append(Number(axis.In(numbers)));
@@ -175,7 +175,7 @@ Json ProfilesJson(const SensorProfiles& profiles) {
   for (const SensorProfileVersion& one : profiles.versions)
     json["versions"].push_back({{"version", one.version},
                                 {"made_at", TimeText(one.made_at)},
-                                {"cause", one.cause},
+                                {"cause", Name(one.cause)},
                                 {"num_sweeps", one.num_sweeps},
                                 {"values", one.values}});
   return json;

@@ -112,7 +112,7 @@ std::string NumberCells(std::size_t i, const ResultSummary& result, std::string_
   const ShownNumber shown = Shown(*value, u95, axis.is_shift() ? 1 : 2, decimal);
   const std::string unit = axis.is_shift() ? " mm" : axis.symbol();
   const bool in = size + u95 <= tolerance, unsure = !in && size <= tolerance;
-  const std::string way = result.verdict != "move"
+  const std::string way = result.verdict != Verdict::kMove
                               ? std::string(unsure ? words.terms.scan_again : words.terms.no_move)
                           : shown.is_zero ? std::string(words.no_change)
                           : size <= u95   ? std::string(words.terms.insignificant)
@@ -131,16 +131,16 @@ std::string NumberCells(std::size_t i, const ResultSummary& result, std::string_
 }
 
 /// @param review  The page is for reading or printing, or the result can no longer be acted on.
-std::string_view TableTitle(const std::string& verdict, bool review, const ResultWords& words) {
-  if (verdict == "move") return review ? words.found_then : words.to_apply;
-  if (verdict == "in_tolerance") return review ? words.remained_then : words.remaining;
+std::string_view TableTitle(Verdict verdict, bool review, const ResultWords& words) {
+  if (verdict == Verdict::kMove) return review ? words.found_then : words.to_apply;
+  if (verdict == Verdict::kInTolerance) return review ? words.remained_then : words.remaining;
   return review ? words.measured_then : words.measured;
 }
 
 /// A correction without an answer must not be applied, so it is left out.
 std::string NumbersTable(const ResultSummary& result, const std::array<std::string, 6>& names,
                          const Tolerance& tolerance, bool review, const ResultWords& words) {
-  if (!result.correction || result.verdict == "no_answer") return "";
+  if (!result.correction || result.verdict == Verdict::kNoAnswer) return "";
   std::string rows, heads;
   for (std::size_t i = 0; i < names.size(); ++i)
     rows += NumberCells(i, result, EscapeHtml(names[i]), tolerance, words);
@@ -152,7 +152,7 @@ std::string NumbersTable(const ResultSummary& result, const std::array<std::stri
 }
 
 std::string BodyList(const ResultSummary& result, const ResultWords& words) {
-  if (!result.correction || result.verdict == "no_answer") return "";
+  if (!result.correction || result.verdict == Verdict::kNoAnswer) return "";
   const auto list = [&](std::string_view title, const std::vector<std::string>& parts) {
     std::string items;
     for (const std::string& part : parts) items += fmt::format("<li>{}</li>", Said(part, words));
@@ -174,11 +174,11 @@ std::string Pictures(const Scan& scan, const ResultWords& words) {
       scan.id, words.map, words.overlay, words.code);
 }
 
-std::string_view VerdictText(const std::string& verdict, bool review, const ResultWords& words) {
-  const VerdictWords* said = verdict == "in_tolerance" ? &words.in_tolerance
-                             : verdict == "unsure"     ? &words.unsure
-                             : verdict == "move"       ? &words.move
-                                                       : nullptr;
+std::string_view VerdictText(Verdict verdict, bool review, const ResultWords& words) {
+  const VerdictWords* said = verdict == Verdict::kInTolerance ? &words.in_tolerance
+                             : verdict == Verdict::kUnsure    ? &words.unsure
+                             : verdict == Verdict::kMove      ? &words.move
+                                                              : nullptr;
   if (said == nullptr) return words.terms.no_answer;
   return review ? said->then : said->now;
 }
@@ -290,10 +290,10 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
   const auto reference = records.references.FindReference(scan.reference_id);
   if (reference) body += ReferenceLine(*reference, words);
   if (!scan.result) return body + fmt::format("<p>{}</p>", words.no_reference);
-  const std::string& verdict = scan.result->verdict;
+  const Verdict verdict = scan.result->verdict;
   const bool review = old || wanted.scan.has_value();
   body += fmt::format("<section class=\"{}\"><p class=\"verdict {}\">{}</p>", old ? "old" : "fresh",
-                      EscapeHtml(verdict), VerdictText(verdict, review, words));
+                      Name(verdict), VerdictText(verdict, review, words));
   for (const std::string& reason : scan.result->reasons)
     body += fmt::format("<p>{}</p>", Said(reason, words));
   const ResultNotes notes = records.scans.Notes(scan.id, wanted.language);

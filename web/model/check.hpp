@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/acceptance/verdict.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
@@ -30,7 +31,7 @@ struct CheckRecord {
   WallClock::time_point time;
   std::string user;  ///< User who requested it.
   std::string sensor_serial;
-  std::string status = "failed";  ///< "passed", "failed" or "no_baseline".
+  MarkerCheckStatus status = MarkerCheckStatus::kFailed;
   std::vector<std::string> reasons;
   std::vector<CheckItem> items;
   std::size_t num_markers = 0;  ///< Markers that were seen well.

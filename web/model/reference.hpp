@@ -37,11 +37,11 @@ struct Reference {
   std::string reason;
   /// Counts the plans saved into this version; saving and approving state which one was read.
   int revision = 1;
-  std::string digest;  ///< SHA-256 of the signed data: scan, version and plan.
+  std::string digest = {};  ///< SHA-256 of the signed data: scan, version and plan.
   std::string planned_by;
   std::string approved_by;  ///< Empty for a draft; "auto" for the demo's.
-  std::optional<WallClock::time_point> approved_at;
-  ReferencePlan plan;
+  std::optional<WallClock::time_point> approved_at = {};
+  ReferencePlan plan = {};
   std::string unreadable = {};  ///< Why the stored plan cannot be read; `plan` is then invalid.
 };
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/acceptance/verdict.hpp"
 #include "algo/base/names.hpp"
 #include "web/model/check.hpp"
 #include "web/model/numbers.hpp"
@@ -29,15 +30,15 @@ inline constexpr double kResultValid_s = 120.0;
 
 /// Summary of a comparison, short enough for a list. All other data is in result.json.
 struct ResultSummary {
-  std::string verdict;  ///< "in_tolerance", "unsure", "move" or "no_answer".
-  std::vector<std::string> reasons;
-  /// The motion to APPLY. With "no_answer" it is for analysis only, never to be shown as advice.
-  std::optional<ReportedNumbers> correction;
-  std::optional<ReportedNumbers> u95;
+  Verdict verdict = Verdict::kNoAnswer;
+  std::vector<std::string> reasons = {};
+  /// The motion to APPLY. With kNoAnswer it is for analysis only, never to be shown as advice.
+  std::optional<ReportedNumbers> correction = {};
+  std::optional<ReportedNumbers> u95 = {};
   /// Directions of the correction, in the order of kNumberAxes; empty if unknown.
-  std::array<std::string, 6> words;
-  std::vector<std::string> body_now;    ///< "left shoulder 9 mm high", before any correction.
-  std::vector<std::string> body_after;  ///< The same after the correction: the posture.
+  std::array<std::string, 6> words = {};
+  std::vector<std::string> body_now = {};    ///< "left shoulder 9 mm high", before any correction.
+  std::vector<std::string> body_after = {};  ///< The same after the correction: the posture.
 };
 
 struct Scan {
@@ -48,27 +49,27 @@ struct Scan {
   ScanOutcome outcome = ScanOutcome::kRunning;
   std::string failure;  ///< Reason for a failed or cancelled scan.
   WallClock::time_point started_at;
-  std::optional<WallClock::time_point> finished_at;
-  std::optional<ResultSummary> result;
+  std::optional<WallClock::time_point> finished_at = {};
+  std::optional<ResultSummary> result = {};
   std::string accepted_by;      ///< Empty if not accepted.
   std::string accepted_reason;  ///< Reason for acceptance outside tolerance.
-  std::optional<WallClock::time_point> accepted_at;
+  std::optional<WallClock::time_point> accepted_at = {};
   std::string session_id;  ///< Treatment session of the scan; empty if there is none.
   int fraction = 0;        ///< Fraction number of that session; 0 if there is none.
   /// Time that the sensor was on when the scan began, for warm-up.
-  std::optional<double> sensor_on_s;
+  std::optional<double> sensor_on_s = {};
   DailyCheck daily_check = DailyCheck::kPassed;  ///< When the scan began.
   std::string sensor_serial = {};                ///< Of the unit that was swept.
   std::string session_by = {};  ///< Who opened its session; empty if there is none.
   /// Time since its end by a monotonic clock; not set if only the wall clock is available.
   std::optional<double> age_s = {};
-  std::filesystem::path
-      folder;  ///< DIR/scans/ID; contains scene/, result/ and recording/ as far as they exist.
+  std::filesystem::path folder =
+      {};  ///< DIR/scans/ID; contains scene/, result/ and recording/ as far as they exist.
 };
 
 /// Whether every value was within tolerance, but not with its uncertainty.
 [[nodiscard]] inline bool IsUnsure(const Scan& scan) {
-  return scan.result && scan.result->verdict == "unsure";
+  return scan.result && scan.result->verdict == Verdict::kUnsure;
 }
 
 }  // namespace plumb

@@ -1,19 +1,27 @@
 // Profiles of a sensor unit.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "algo/base/names.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
+
+/// Why a version of a profile was made.
+enum class ProfileCause : std::uint8_t { kLearned, kRolledBack, kReset, kUnreadable };
+template <>
+inline constexpr auto kNamesOf<ProfileCause> =
+    NamesUpTo<ProfileCause::kUnreadable>({"learned", "rolled_back", "reset", "unreadable"});
 
 /// The profile of a sensor unit from then on.
 struct SensorProfileVersion {
   int version = 0;
   WallClock::time_point made_at;
-  std::string cause;  ///< "learned", "rolled_back", "reset" or "unreadable".
+  ProfileCause cause = ProfileCause::kLearned;
   /// Number of sweeps from which it was learned; 0: the stated calibration is used.
   int num_sweeps = 0;
   std::map<std::string, double> values;  ///< As scene.json names them.

@@ -101,10 +101,9 @@ class RealRuledAppliance : public RuledAppliance {
       id = store.scans.Begin({.patient_id = patient_id,
                               .reference_id = {},
                               .purpose = ScanPurpose::kReference,
-                              .sensor_serial = "A",
-                              .reason = {}});
+                              .sensor_serial = "A"});
       testing::FillScan(store.folders.Staging(id));
-      store.scans.Finish(id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}});
+      store.scans.Finish(id, {.outcome = ScanOutcome::kDone});
     });
     return id;
   }

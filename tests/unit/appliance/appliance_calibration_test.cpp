@@ -61,7 +61,7 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
     ASSERT_EQ(shown.versions.size(), 2U);
     EXPECT_EQ(shown.versions[0].version, 2);
     EXPECT_EQ(shown.versions[0].num_sweeps, 5);
-    EXPECT_EQ(shown.versions[0].cause, "learned");
+    EXPECT_EQ(shown.versions[0].cause, ProfileCause::kLearned);
     EXPECT_EQ(NextScanBeginsFrom(), "A version 2, 5 sweeps");
 
     EXPECT_EQ(Reset("B").result, ChangeResult::kConflict) << "another unit";
@@ -136,10 +136,9 @@ class ApplianceRoomTest : public ApplianceProfileTest {
       const std::string id = store.scans.Begin({.patient_id = store.patients.Add(erik_, "P-1", ""),
                                                 .reference_id = {},
                                                 .purpose = ScanPurpose::kReference,
-                                                .sensor_serial = "A",
-                                                .reason = {}});
+                                                .sensor_serial = "A"});
       WriteScene(scene, store.folders.Staging(id) / "scene");
-      store.scans.Finish(id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}});
+      store.scans.Finish(id, {.outcome = ScanOutcome::kDone});
       reference = store.references.Find(store.references.Add(erik_, id, "", {}));
     });
     return reference.value();

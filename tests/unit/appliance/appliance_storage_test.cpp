@@ -394,15 +394,11 @@ TEST_F(StorageRetryTest, SafeModeEndsWhenWhatIsStoredCanBeReadAgainAndNotBefore)
 }
 
 std::string StoreSmallScan(Store& store, const std::string& patient) {
-  const std::string id = store.scans.Begin({.patient_id = patient,
-                                            .reference_id = {},
-                                            .purpose = {},
-                                            .sensor_serial = {},
-                                            .reason = {}});
+  const std::string id = store.scans.Begin(
+      {.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}});
   fs::create_directory(store.folders.Staging(id) / "scene");
   WriteWholeFile(store.folders.Staging(id) / "scene" / "scene.json", std::string_view("{}"));
-  store.scans.Finish(
-      id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}, .swept_area_m2 = 0});
+  store.scans.Finish(id, {.outcome = ScanOutcome::kDone, .swept_area_m2 = 0});
   return id;
 }
 

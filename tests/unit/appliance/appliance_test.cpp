@@ -161,8 +161,7 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
       running = appliance_->store()->scans.Begin({.patient_id = patient,
                                                   .reference_id = {},
                                                   .purpose = ScanPurpose::kReference,
-                                                  .sensor_serial = "A",
-                                                  .reason = {}});
+                                                  .sensor_serial = "A"});
       services_->services().patients.WipePatient(
           tess, patient, [&](const Change& change) { refused.set_value(change); });
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
@@ -174,10 +173,9 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
     On([&] {
       ASSERT_TRUE(appliance_->WebStatus().session) << "nothing was removed";
       EXPECT_EQ(appliance_->open_patient(), patient);
-      appliance_->store()->scans.Finish(running, {.outcome = ScanOutcome::kCancelled,
-                                                  .failure = "discarded",
-                                                  .result_json = {},
-                                                  .swept_area_m2 = 0.0});
+      appliance_->store()->scans.Finish(
+          running,
+          {.outcome = ScanOutcome::kCancelled, .failure = "discarded", .swept_area_m2 = 0.0});
       services_->services().patients.WipePatient(
           tess, patient, [&](const Change& change) { wiped.set_value(change); });
     });
@@ -240,10 +238,9 @@ TEST_F(ApplianceTest, ASurfaceIsPackedOnceAndAFailureIsNotKept) {
         const std::string id = store.scans.Begin({.patient_id = patient,
                                                   .reference_id = {},
                                                   .purpose = ScanPurpose::kFraction,
-                                                  .sensor_serial = "A",
-                                                  .reason = {}});
+                                                  .sensor_serial = "A"});
         std::filesystem::create_directory(store.folders.Staging(id) / "scene");
-        store.scans.Finish(id, {.outcome = ScanOutcome::kDone, .failure = {}, .result_json = {}});
+        store.scans.Finish(id, {.outcome = ScanOutcome::kDone});
         scans.push_back(store.scans.Find(id).value());
       }
     });

@@ -85,8 +85,7 @@ TEST_F(ReportsTest, AReasonThatIsNoUtf8EndsNoReport) {
   const auto report_of_failure = [&](const std::string& reason) {
     const std::string id = store_.scans.Begin(
         {.patient_id = patient_, .reference_id = {}, .sensor_serial = "S1", .reason = ""});
-    store_.scans.Finish(id,
-                        {.outcome = ScanOutcome::kFailed, .failure = reason, .result_json = {}});
+    store_.scans.Finish(id, {.outcome = ScanOutcome::kFailed, .failure = reason});
     return ScanReportPdf(sources_, *store_.scans.Find(id), Language::kEnglish).size();
   };
   const std::size_t usual = report_of_failure("cannot write /data/senal: no space");

@@ -49,15 +49,13 @@ class PatientTransferTest : public ::testing::Test {
     scan_ = store.scans.Begin(begun);
     testing::FillScan(store.folders.Staging(scan_));
     store.scans.Finish(scan_, {.outcome = ScanOutcome::kDone,
-                               .failure = {},
                                .result_json = R"({"verdict":"in_tolerance"})",
                                .swept_area_m2 = 0.5});
     store.audit.Log(kAnna, "scan.start", session, "fraction");
     store.audit.Log(kAnna, "scan.start", "", "unassigned");
     store.scans.Accept(kAnna, scan_);
     const std::string failed = store.scans.Begin(testing::Begun(patient_));
-    store.scans.Finish(
-        failed, {.outcome = ScanOutcome::kFailed, .failure = "no marker", .result_json = {}});
+    store.scans.Finish(failed, {.outcome = ScanOutcome::kFailed, .failure = "no marker"});
     store.treatments.CloseAll(kAnna);
     Store there(this->there());
     for (const char* code : {"A", "B", "C"}) (void)there.patients.Add(kAnna, code, "");

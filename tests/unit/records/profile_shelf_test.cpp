@@ -46,7 +46,7 @@ TEST(ProfileShelf, GivesBackWhatWasLearnedLastToThatUnitAlone) {
   EXPECT_EQ(in_use.newest->profile->num_sweeps, 3);
   EXPECT_EQ(in_use.newest->profile->covariance, Profile(0).covariance);
   EXPECT_EQ(in_use.newest->profile->stated, Profile(0).stated);
-  EXPECT_EQ(in_use.newest->cause, "learned");
+  EXPECT_EQ(in_use.newest->cause, ProfileCause::kLearned);
   EXPECT_LT(std::chrono::system_clock::now() - in_use.newest->made, std::chrono::minutes(1));
   EXPECT_FALSE(shelf.Read("B").newest);
   EXPECT_THROW(static_cast<void>(shelf.Read("")), std::invalid_argument);
@@ -99,7 +99,7 @@ TEST(ProfileShelf, ADamagedVersionIsSetAsideAndScansGoOnWithout) {
     EXPECT_EQ(next.fault, "");
     ASSERT_TRUE(next.newest);
     EXPECT_FALSE(next.newest->profile);
-    EXPECT_EQ(next.newest->cause, "unreadable");
+    EXPECT_EQ(next.newest->cause, ProfileCause::kUnreadable);
     // The version before is there to be taken back.
     EXPECT_EQ(shelf.RollBack("A", 1), 4);
     EXPECT_EQ(Focal(shelf.Read("A")), 0.001);
@@ -133,7 +133,7 @@ TEST(ProfileShelf, AResetUnitBeginsAgainAndCanBeTakenBack) {
   EXPECT_THROW(static_cast<void>(shelf.RollBack("A", 7)), DataError);
   EXPECT_EQ(shelf.RollBack("A", 1), 3);
   EXPECT_EQ(Focal(shelf.Read("A")), 0.001);
-  EXPECT_EQ(shelf.Read("A").newest->cause, "rolled_back");
+  EXPECT_EQ(shelf.Read("A").newest->cause, ProfileCause::kRolledBack);
 }
 
 }  // namespace

@@ -30,11 +30,7 @@ inline void FillScan(const std::filesystem::path& folder) {
 }
 
 inline NewScan Begun(const std::string& patient) {
-  return {.patient_id = patient,
-          .reference_id = {},
-          .purpose = {},
-          .sensor_serial = "S1",
-          .reason = {}};
+  return {.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = "S1"};
 }
 
 /// @param fill  Writes the scan's files into a folder.
@@ -44,7 +40,6 @@ inline std::string StoreScan(
   const std::string id = store.scans.Begin(Begun(patient));
   fill(store.folders.Staging(id));
   store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
-                          .failure = {},
                           .result_json = R"({"verdict":"in_tolerance"})",
                           .swept_area_m2 = 1.0});
   return id;
@@ -67,6 +62,21 @@ inline std::map<std::string, std::string> FilesBelow(const std::filesystem::path
     files[entry.path().lexically_relative(folder)] = std::string(bytes.begin(), bytes.end());
   }
   return files;
+}
+
+/// Turns a database into one of the schema of 0.1.0, without what that cannot hold.
+inline void MakeSchema3(const std::filesystem::path& database) {
+  Database(database, Database::Access::kReadWrite)
+      .Execute(
+          "DROP TABLE preferences; DROP TABLE room_calibrations; DROP TABLE templates; DROP TABLE "
+          "removed_scans; DROP TABLE scan_files; DROP TABLE displays; DROP INDEX scans_of_session; "
+          "ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans DROP COLUMN "
+          "accepted_reason; ALTER TABLE scans DROP COLUMN accepted_at; ALTER TABLE scans DROP "
+          "COLUMN sensor_on_s; ALTER TABLE scans DROP COLUMN check_overdue; ALTER TABLE scans DROP "
+          "COLUMN unavailable; ALTER TABLE scans DROP COLUMN checked_at; ALTER TABLE audit DROP "
+          "COLUMN chain; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP COLUMN "
+          "archived; DROP TABLE sessions; DELETE FROM patients WHERE id = 0; DELETE FROM settings; "
+          "PRAGMA user_version = 3");
 }
 
 }  // namespace plumb::testing

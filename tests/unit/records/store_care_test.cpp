@@ -75,8 +75,7 @@ TEST_P(FailedSweepTest, KeepsACompleteRecordingOfOneThatFailed) {
     fs::create_directories(recording / "rgb");
     WriteWholeFile(recording / "rgb" / "1.png", std::string_view("image"));
     if (is_complete) WriteWholeFile(recording / "rgb.txt", std::string_view("1 rgb/1.png"));
-    store_->scans.Finish(id,
-                         {.outcome = GetParam(), .failure = "marker not seen", .result_json = {}});
+    store_->scans.Finish(id, {.outcome = GetParam(), .failure = "marker not seen"});
     EXPECT_FALSE(fs::exists(store_->folders.Staging(id)));
     EXPECT_EQ(testing::FilesBelow(store_->folders.Scan(id)).size(),
               is_kept && is_complete ? 2U : 0U);
@@ -249,7 +248,7 @@ TEST_F(StoreCareTest, AStoredResultThatCannotBeReadIsAnErrorAndMissingNumbersAre
   EXPECT_EQ(couch.correction->vertical_mm, std::nullopt) << "markers on the couch show no shift";
   EXPECT_EQ(couch.correction->yaw_deg, 3.0);
   EXPECT_FALSE(couch.u95);
-  EXPECT_EQ(SummaryOf(R"({"verdict":"no_answer","correction":null})").verdict, "no_answer");
+  EXPECT_EQ(SummaryOf(R"({"verdict":"no_answer","correction":null})").verdict, Verdict::kNoAnswer);
   for (const std::string& bad :
        {std::string(), std::string("[]"), std::string("{}"), std::string(R"({"verdict":1})"),
         std::string(R"({"verdict":"fine"})"), std::string(R"({"verdict":"move","reasons":"one"})"),
@@ -322,10 +321,11 @@ TEST_F(StoreCareTest, AScanThatCannotBeReadHidesNoOtherOfThePatient) {
 }
 
 TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
-  for (const char* bad : {"", "[]", "{}", R"({"status":1})", R"({"status":"passed","items":[1]})",
-                          R"({"status":"passed","reasons":7})"}) {
+  for (const char* bad :
+       {"", "[]", "{}", R"({"status":1})", R"({"status":"fine"})",
+        R"({"status":"passed","items":[1]})", R"({"status":"passed","reasons":7})"}) {
     const CheckRecord record = CheckIn(bad);
-    EXPECT_EQ(record.status, "failed") << bad;
+    EXPECT_EQ(record.status, MarkerCheckStatus::kFailed) << bad;
     EXPECT_THAT(record.reasons, ::testing::ElementsAre(HasSubstr("cannot be read"))) << bad;
   }
 }

@@ -91,8 +91,7 @@ TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) 
                                                .sensor_serial = serial,
                                                .reason = "",
                                                .daily_check = DailyCheck::kOverdue});
-    store->scans.Finish(
-        id, {.outcome = ScanOutcome::kFailed, .failure = "of this test", .result_json = ""});
+    store->scans.Finish(id, {.outcome = ScanOutcome::kFailed, .failure = "of this test"});
     return id;
   };
   const std::string early = scan("S1");
@@ -177,7 +176,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   const auto store = Open();
   const std::vector<CheckRecord> checks = store->checks.List(10);
   ASSERT_THAT(checks, SizeIs(2));
-  EXPECT_EQ(checks[0].status, "passed");
+  EXPECT_EQ(checks[0].status, MarkerCheckStatus::kPassed);
   EXPECT_EQ(checks[0].user, "anna");
   EXPECT_EQ(checks[0].sensor_serial, "S1");
   EXPECT_EQ(checks[0].num_markers, 5U);

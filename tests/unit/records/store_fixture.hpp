@@ -31,16 +31,11 @@ class StoreTest : public ::testing::Test {
   }
   static std::string Scan(Store& store, const std::string& patient,
                           const std::string& reference = "", const std::string& result = "") {
-    const std::string id = store.scans.Begin({.patient_id = patient,
-                                              .reference_id = reference,
-                                              .purpose = {},
-                                              .sensor_serial = "S1",
-                                              .reason = {}});
+    const std::string id = store.scans.Begin(
+        {.patient_id = patient, .reference_id = reference, .purpose = {}, .sensor_serial = "S1"});
     FillStaging(store, id);
-    store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
-                            .failure = {},
-                            .result_json = result,
-                            .swept_area_m2 = 2.5});
+    store.scans.Finish(
+        id, {.outcome = ScanOutcome::kDone, .result_json = result, .swept_area_m2 = 2.5});
     return id;
   }
   static std::string ApprovedReference(Store& store, const std::string& patient) {

@@ -525,7 +525,7 @@ TEST_F(StoreRecoveryTest, AFolderOfANumberThatWasGivenOutAndHasNoRowIsSetAside) 
   EXPECT_THAT(testing::FilesBelow(state() / "set-aside" / scan), ::testing::SizeIs(7));
 }
 
-TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
+TEST_F(StoreRecoveryTest, AStoreOfTheFirstVersionKeepsScansThatItHadGivenUp) {
   std::string kept, given_up;
   {
     const auto store = Open();
@@ -533,19 +533,9 @@ TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
     kept = StoreScan(*store, patient);
     given_up = StoreScan(*store, patient);
   }
-  {
-    Database direct(state() / "plumb.db", Database::Access::kReadWrite);
-    direct.Execute(
-        "DROP TABLE preferences; "
-        "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
-        "patients DROP COLUMN note; ALTER TABLE patients "
-        "DROP COLUMN archived; DROP TABLE templates; DROP TABLE scan_files; DROP TABLE "
-        "removed_scans; ALTER TABLE scans DROP "
-        "COLUMN "
-        "unavailable; ALTER TABLE scans DROP COLUMN checked_at; ALTER TABLE audit DROP COLUMN "
-        "chain; UPDATE scans SET has_folder = 0, failure = 'its files are gone' WHERE id = 2; "
-        "PRAGMA user_version = 4");
-  }
+  testing::MakeSchema3(state() / "plumb.db");
+  Database(state() / "plumb.db", Database::Access::kReadWrite)
+      .Execute("UPDATE scans SET has_folder = 0, failure = 'its files are gone' WHERE id = 2");
   const auto store = Open();
   EXPECT_EQ(store->recovery().orphaned_folders, 0);
   EXPECT_EQ(store->recovery().attached_scans, 1);

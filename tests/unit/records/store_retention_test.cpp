@@ -66,28 +66,25 @@ TEST_F(StoreTest, AScanWhoseRowTheDiskRefusesIsNoneAndLeavesNothing) {
     const auto store = Open();
     patient = store->patients.Add(kAnna, "A", "");
   }
-  EXPECT_EQ(testing::WriteOnFullDisk(
-                200'000,
-                [&] {
-                  const auto store = Open();
-                  const std::string scan = store->scans.Begin({.patient_id = patient,
-                                                               .reference_id = {},
-                                                               .purpose = {},
-                                                               .sensor_serial = {},
-                                                               .reason = {}});
-                  FillStaging(*store, scan);
-                  const std::string large(400'000, ' ');  // does not fit
-                  EXPECT_THROW(store->scans.Finish(scan, {.outcome = ScanOutcome::kDone,
-                                                          .failure = {},
-                                                          .result_json = "{}" + large,
-                                                          .swept_area_m2 = 0}),
-                               IoError);
-                  EXPECT_FALSE(fs::exists(store->folders.Scan(scan)));
-                  EXPECT_TRUE(fs::exists(store->folders.Staging(scan)));
-                  if (::testing::Test::HasFailure()) throw std::logic_error("see above");
-                  store->removal.WipePatient(kAnna, patient);  // it does not run any more
-                }),
-            testing::WriteOutcome::kDone);
+  EXPECT_EQ(
+      testing::WriteOnFullDisk(
+          200'000,
+          [&] {
+            const auto store = Open();
+            const std::string scan = store->scans.Begin(
+                {.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}});
+            FillStaging(*store, scan);
+            const std::string large(400'000, ' ');  // does not fit
+            EXPECT_THROW(store->scans.Finish(scan, {.outcome = ScanOutcome::kDone,
+                                                    .result_json = "{}" + large,
+                                                    .swept_area_m2 = 0}),
+                         IoError);
+            EXPECT_FALSE(fs::exists(store->folders.Scan(scan)));
+            EXPECT_TRUE(fs::exists(store->folders.Staging(scan)));
+            if (::testing::Test::HasFailure()) throw std::logic_error("see above");
+            store->removal.WipePatient(kAnna, patient);  // it does not run any more
+          }),
+      testing::WriteOutcome::kDone);
   EXPECT_EQ(Open()->patients.List().size(), 0U);
   EXPECT_TRUE(fs::is_empty(folder_ / "state" / "scans"));
 }
@@ -95,8 +92,7 @@ TEST_F(StoreTest, AScanWhoseRowTheDiskRefusesIsNoneAndLeavesNothing) {
 TEST_F(StoreTest, AScanThatCouldNotBeEndedHasFailedWhenTheNextBegins) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
-  const NewScan scan{
-      .patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}, .reason = {}};
+  const NewScan scan{.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}};
   const std::string lost = store->scans.Begin(scan);
   (void)store->scans.Begin(scan);
   EXPECT_EQ(store->scans.Find(lost)->outcome, ScanOutcome::kFailed);

@@ -60,10 +60,7 @@ void MakeNewer(const fs::path& database, const std::string& usable_from) {
       "ALTER TABLE patients ADD COLUMN colour TEXT NOT NULL DEFAULT 'none'; ALTER TABLE scans ADD "
       "COLUMN mood TEXT; CREATE TABLE rooms (id INTEGER PRIMARY KEY, name TEXT NOT NULL) STRICT;");
   direct.Execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion + 1));
-  direct.Prepare("UPDATE settings SET value = ? WHERE name = ?")
-      .Bind(usable_from)
-      .Bind(std::string(kUsableFromName))
-      .Run();
+  direct.Run("UPDATE settings SET value = ? WHERE name = ?", usable_from, kUsableFromName);
 }
 
 TEST_F(StoreTest, AfterARollBackTheOldVersionWorksWithTheNewerDatabase) {
@@ -81,9 +78,8 @@ TEST_F(StoreTest, AfterARollBackTheOldVersionWorksWithTheNewerDatabase) {
   EXPECT_THAT(again->patients.List(), SizeIs(2));
   EXPECT_TRUE(again->scans.Find(scan));
   Database direct(database(), Database::Access::kReadOnly);
-  Statement version = direct.Prepare("PRAGMA user_version");
-  ASSERT_TRUE(version.Step());
-  EXPECT_EQ(version.Integer(0), kSchemaVersion + 1);  // the newer version finds it migrated
+  EXPECT_EQ(direct.FirstInteger("PRAGMA user_version"),
+            kSchemaVersion + 1);  // the newer version finds it migrated
 }
 
 TEST_F(StoreTest, ANewerDatabaseThatThisVersionCannotUseIsRefused) {
@@ -99,64 +95,18 @@ TEST_F(StoreTest, ANewerDatabaseThatThisVersionCannotUseIsRefused) {
   }
 }
 
-TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
-  (void)Open()->patients.Add(kAnna, "P-1", "");
-  {
-    Database direct(database(), Database::Access::kReadWrite);
-    direct.Execute(
-        "DROP TABLE preferences; "
-        "DROP TABLE room_calibrations; DROP TABLE check_baselines; DROP TABLE checks; ALTER TABLE "
-        "refs DROP COLUMN revision; "
-        "DROP INDEX scans_of_session; ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans "
-        "DROP COLUMN accepted_reason; ALTER TABLE scans DROP COLUMN accepted_at; ALTER TABLE scans "
-        "DROP COLUMN sensor_on_s; ALTER TABLE scans "
-        "DROP COLUMN check_overdue; ALTER TABLE scans DROP COLUMN unavailable; ALTER TABLE scans "
-        "DROP COLUMN checked_at; ALTER TABLE audit DROP COLUMN chain; DROP TABLE scan_files; DROP "
-        "TABLE removed_scans; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP "
-        "COLUMN archived; DROP TABLE templates; DROP TABLE sessions; DROP TABLE displays; DELETE "
-        "FROM patients "
-        "WHERE id = 0; PRAGMA user_version = 1");
-  }
-  const auto store = Open();
-  EXPECT_THAT(store->patients.List(), SizeIs(1));
-  EXPECT_THAT(store->checks.List(10), SizeIs(0));
-  const MarkerCheck failed{
-      .status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {"no marker was seen"}};
-  EXPECT_EQ(store->checks.Add(kAnna, "S1", {.check = failed}), "1");
-}
-
-TEST_F(StoreTest, WhenAResultOfTheSchemaBeforeWasAcceptedIsTakenFromTheLog) {
-  std::string accepted, other;
+TEST_F(StoreTest, AStoreOfTheFirstVersionKeepsWhatItHas) {
+  std::string patient, accepted, other;
   {
     const auto store = Open();
-    const std::string patient = store->patients.Add(kAnna, "P-1", "thorax");
+    patient = store->patients.Add(kAnna, "P-1", "thorax");
     const std::string reference = ApprovedReference(*store, patient);
     other = Scan(*store, patient, reference, kResult);
     accepted = Scan(*store, patient, reference, kResult);
     store->scans.Accept(kAnna, accepted, "the swelling is known");
   }
   const AuditEntry logged = Open()->audit.Find({0, 1, "scan.accept"}).at(0);
-  {
-    Database direct(database(), Database::Access::kReadWrite);
-    direct.Execute(
-        "DROP TABLE preferences; "
-        "ALTER TABLE scans DROP COLUMN accepted_at; PRAGMA user_version = 7");
-  }
-  const auto store = Open();
-  EXPECT_EQ(store->scans.Find(accepted)->accepted_at, logged.time);
-  EXPECT_FALSE(store->scans.Find(other)->accepted_at);
-}
-
-TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
-  const std::string patient = Open()->patients.Add(kAnna, "P-1", "thorax");
-  {
-    Database direct(database(), Database::Access::kReadWrite);
-    direct.Execute(
-        "DROP TABLE preferences; "
-        "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
-        "patients DROP COLUMN note; ALTER TABLE patients "
-        "DROP COLUMN archived; DROP TABLE templates; PRAGMA user_version = 5");
-  }
+  testing::MakeSchema3(database());
   const auto store = Open();
   ASSERT_THAT(store->patients.List(), SizeIs(1));
   EXPECT_EQ(store->patients.Find(patient)->site, "thorax");
@@ -164,6 +114,22 @@ TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
   EXPECT_FALSE(store->patients.Find(patient)->archived);
   store->patients.Change(kAnna, patient, "thorax", "note");
   EXPECT_EQ(store->patients.Find(patient)->note, "note");
+  EXPECT_EQ(store->scans.Find(accepted)->accepted_at, logged.time) << "taken from the log";
+  EXPECT_FALSE(store->scans.Find(other)->accepted_at);
+  const MarkerCheck failed{
+      .status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {"no marker was seen"}};
+  EXPECT_EQ(store->checks.Add(kAnna, "S1", {.check = failed}), "1");
+}
+
+TEST_F(StoreTest, ADatabaseOfASchemaThatWasNeverReleasedIsRefused) {
+  for (const int version : {1, 2, 4, 5, 6, 7, 8}) {
+    fs::remove(database());
+    (void)Open();
+    Database(database(), Database::Access::kReadWrite)
+        .Execute(fmt::format("PRAGMA user_version = {}", version));
+    EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }),
+                HasSubstr(fmt::format("the database has version {}", version)));
+  }
 }
 
 }  // namespace

@@ -27,16 +27,13 @@ class StoreSessionsTest : public ::testing::Test {
                                               .reference_id = {},
                                               .purpose = ScanPurpose::kFraction,
                                               .sensor_serial = "S1",
-                                              .reason = {},
                                               .session_id = session,
                                               .sensor_on_s = 90.0,
                                               .daily_check = DailyCheck::kFailed});
     fs::create_directories(store.folders.Staging(id) / "scene");
     WriteWholeFile(store.folders.Staging(id) / "scene" / "scene.json", std::string_view("{}"));
-    store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
-                            .failure = {},
-                            .result_json = result,
-                            .swept_area_m2 = 1.0});
+    store.scans.Finish(
+        id, {.outcome = ScanOutcome::kDone, .result_json = result, .swept_area_m2 = 1.0});
     return id;
   }
   template <typename Call>
@@ -117,7 +114,6 @@ TEST_F(StoreSessionsTest, ADiscardedScanHasNoResultAndIsNotAFraction) {
                                               .reference_id = {},
                                               .purpose = ScanPurpose::kFraction,
                                               .sensor_serial = "S1",
-                                              .reason = {},
                                               .session_id = session});
     store.scans.Finish(id, {.outcome = outcome,
                             .failure = "discarded",

@@ -40,7 +40,7 @@ TEST_F(StoreTest, KeepsEverythingOverARestart) {
   EXPECT_EQ(found->accepted_reason, "the swelling is known");
   ASSERT_TRUE(found->accepted_at);
   EXPECT_LT(WallClock::now() - *found->accepted_at, std::chrono::minutes(1));
-  EXPECT_EQ(found->result->verdict, "move");
+  EXPECT_EQ(found->result->verdict, Verdict::kMove);
   EXPECT_EQ(found->result->correction->vertical_mm, 6.5);
   EXPECT_EQ(found->result->correction->longitudinal_mm, std::nullopt);
   EXPECT_EQ(found->result->u95->vertical_mm, 1.2);
@@ -56,11 +56,8 @@ TEST_F(StoreTest, AScanThatWasRunningAtACrashHasFailedAndLeavesNothing) {
   {
     const auto store = Open();
     patient = store->patients.Add(kAnna, "A", "");
-    id = store->scans.Begin({.patient_id = patient,
-                             .reference_id = {},
-                             .purpose = {},
-                             .sensor_serial = {},
-                             .reason = {}});
+    id = store->scans.Begin(
+        {.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}});
     FillStaging(*store, id);
   }
   const auto store = Open();
@@ -192,11 +189,8 @@ TEST_F(StoreTest, RefusesWhatMakesNoSense) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
   EXPECT_EQ(RefusalOf([&] { (void)store->patients.Add(kAnna, "A", ""); }), ChangeResult::kConflict);
-  const std::string running = store->scans.Begin({.patient_id = patient,
-                                                  .reference_id = {},
-                                                  .purpose = {},
-                                                  .sensor_serial = {},
-                                                  .reason = {}});
+  const std::string running = store->scans.Begin(
+      {.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}});
   EXPECT_EQ(RefusalOf([&] { (void)store->references.Add(kAnna, running, "", {}); }),
             ChangeResult::kConflict);
   EXPECT_EQ(RefusalOf([&] { store->removal.WipePatient(kAnna, patient); }),

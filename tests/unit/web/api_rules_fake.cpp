@@ -43,7 +43,7 @@ class FakeRuledAppliance : public RuledAppliance {
   std::string PassDailyCheck(const std::string& user) override {
     CheckRecord check;
     check.user = user;
-    check.status = "passed";
+    check.status = MarkerCheckStatus::kPassed;
     check.num_markers = 6;
     loop_->Do([&] {
       check.id = fmt::format("c{}", ++num_checks_);
@@ -60,7 +60,7 @@ class FakeRuledAppliance : public RuledAppliance {
       auto& versions = service_.profiles.versions;
       SensorProfileVersion learned;
       learned.version = static_cast<int>(versions.size()) + 1;
-      learned.cause = "learned";
+      learned.cause = ProfileCause::kLearned;
       learned.num_sweeps = 4;
       versions.insert(versions.begin(), learned);
     });

@@ -62,7 +62,7 @@ class DisplayViewTest : public WebTest {
       std::filesystem::create_directories((scan.folder / file).parent_path());
       std::ofstream(scan.folder / file) << "{}";
     }
-    if (!reference.empty()) scan.result.emplace().verdict = "in_tolerance";
+    if (!reference.empty()) scan.result.emplace().verdict = Verdict::kInTolerance;
     return scan;
   }
 

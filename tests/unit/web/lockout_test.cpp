@@ -258,7 +258,7 @@ TEST_F(LockoutTest, ASensorProfileIsSeenByAllAndChangedByAnEngineerWithThePasswo
   const auto version = [](int number, int sweeps) {
     SensorProfileVersion one;
     one.version = number;
-    one.cause = "learned";
+    one.cause = ProfileCause::kLearned;
     one.num_sweeps = sweeps;
     one.values = {{"depth_scale", 0.992}};
     return one;
