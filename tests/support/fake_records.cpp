@@ -314,7 +314,8 @@ void FakeAppliance::RemoveScan(const Actor& actor, const std::string& id, const 
                                Done done) {
   for (const Reference& reference : references) {
     if (reference.scan_id == id)
-      return Finish(done, Refusal(ChangeResult::kConflict, "a reference is made of this scan"));
+      return Finish(done,
+                    Refusal(ChangeResult::kConflict, "this scan is the source of a reference"));
   }
   if (std::erase_if(scans, [&](const Scan& scan) { return scan.id == id; }) == 0)
     return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such scan"));

@@ -30,7 +30,7 @@ export const kWords = {
   'head and patient right side up': 'cabeza y lado derecho del paciente arriba',
   'feet and patient left side up': 'pies y lado izquierdo del paciente arriba',
   'feet and patient right side up': 'pies y lado derecho del paciente arriba',
-  'a reference is made of this scan: it goes only with its patient':
+  'this scan is the source of a reference: it is deleted only with its patient':
     'una referencia procede de este escaneo: solo se borra con su paciente',
   'the session of a patient is open: close it first':
     'hay una sesión de un paciente abierta: ciérrela primero',

@@ -154,7 +154,7 @@ export const kFaultWords = {
   'there are too many bundles: remove one first': 'hay demasiados archivos: quite antes uno',
   'there is no such bundle': 'no existe ese archivo de actualización',
   'there is no installer (RAUC) on this machine': 'no hay instalador (RAUC) en esta máquina',
-  'the installer cannot be asked': 'el instalador no responde',
+  'the installer cannot be reached': 'el instalador no responde',
   'the installer does not say why': 'el instalador no dice por qué',
   'the installer\'s answer cannot be read: is it RAUC 1.8?':
     'no se entiende la respuesta del instalador: ¿es RAUC 1.8?',
@@ -184,7 +184,7 @@ export const kFaultWords = {
   'of a scan that was discarded': 'de un escaneo que se descartó',
   'no scan of this number is known: is it of another database?':
     'no se conoce ningún escaneo con este número: ¿es de otra base de datos?',
-  'it is complete, but its scan was never noted as done':
+  'it is complete, but its scan was never recorded as finished':
     'está completa, pero su escaneo nunca se anotó como terminado',
   'name a folder on another disk, such as one that is mounted at /var/lib/plumb-backup':
     'indique una carpeta de otro disco, como uno montado en /var/lib/plumb-backup',
