@@ -231,7 +231,7 @@ async function followScan() {
   const { scans } = await get('scans?limit=1', true);
   if (scans[0]?.outcome === 'failed') {
     warn(`${S.result.failed}: ${translated(scans[0].failure)}`);
-  };
+  }
 }
 
 /// Pointer and keys count as use: who draws a plan is not logged out at Save. Two minutes before

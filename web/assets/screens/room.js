@@ -341,7 +341,7 @@ function display(main) {
     clear(body, parts);
     say(parts[0].textContent);
   };
-  /// What grows while the rest stays as it is.
+  /// Updates what grows while the rest stays as it is.
   const update = (fraction) => {
     const bar = body.querySelector('progress');
     if (bar && fraction !== null && fraction !== undefined) bar.value = fraction;
@@ -380,7 +380,7 @@ export async function showRoom(main, { speak, applyTheme }) {
         await loadSession();
         break;
       }
-      await pair(main, () => showLogin(main, false, () => location.reload()));
+      await pair(main, () => showLogin(main, false, null, () => location.reload()));
       break;
     } catch {
       clear(main, h('h1', { class: 'visually-hidden' }, S.room.title),
