@@ -70,7 +70,8 @@ Role ReadRole(Fields& fields) {
 }
 
 Response Busy() {
-  Response response = ErrorResponse(503, "too many logins wait; try again in a few seconds");
+  Response response =
+      ErrorResponse(503, "too many people are logging in; try again in a few seconds");
   response.headers.emplace_back("Retry-After", "5");
   return response;
 }
@@ -522,7 +523,7 @@ void Accounts::AddUser(const Request& request, const Respond& respond) {
 void Accounts::ChangeUser(const Request& request, const Respond& respond) {
   Fields fields(request.body);
   if (!users_.FindUser(request.arguments.at(0)))
-    return respond(ErrorResponse(404, "no account of that name"));
+    return respond(ErrorResponse(404, "there is no account of this name"));
   UserChange change{.name = request.arguments.at(0),
                     .role = {},
                     .disabled = {},

@@ -112,7 +112,7 @@ class Accounts : public SessionLookup {
                 std::function<void(const std::string&)> then);
   /// The same completion, which does nothing once this object is destroyed.
   [[nodiscard]] Done WhileAlive(Done done) const;
-  /// As the settings have it; nothing where they cannot be read.
+  /// The time in the settings; nothing where they cannot be read.
   [[nodiscard]] std::optional<int> IdleLogout_min() const;
   [[nodiscard]] std::string Cookie(const std::string& token, bool end) const;
   [[nodiscard]] std::string cookie_name() const {

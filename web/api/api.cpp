@@ -140,7 +140,7 @@ Response ScanFileResponse(ScanService& scans, const std::string& scan_id, std::s
   if (!scan) return ErrorResponse(404, "no such scan");
   for (const ScanFile& file : kScanFiles) {
     if (file.name != name) continue;
-    if (scan->folder.empty()) return ErrorResponse(404, "the files of this scan are gone");
+    if (scan->folder.empty()) return ErrorResponse(404, "the files of this scan no longer exist");
     return FileResponse(scan->folder / file.path, file.type, download_name);
   }
   return ErrorResponse(404, "this scan has no such file");
@@ -186,7 +186,7 @@ void AddApplianceRoutes(Table& table, ApplianceService& appliance) {
   });
   table.Read("/api/v1/preview", Permission::kRoom, [&appliance](const Request&) {
     const auto picture = appliance.Preview();
-    if (!picture) return ErrorResponse(404, "the camera shows nothing now");
+    if (!picture) return ErrorResponse(404, "there is no camera image at the moment");
     Response response;
     response.type = "image/jpeg";
     response.body = *picture;
@@ -194,7 +194,7 @@ void AddApplianceRoutes(Table& table, ApplianceService& appliance) {
   });
   table.Read("/api/v1/scan/surface", Permission::kRoom, [&appliance](const Request&) {
     const auto map = appliance.SweptSurface();
-    if (!map) return ErrorResponse(404, "no sweep shows a surface now");
+    if (!map) return ErrorResponse(404, "there is no surface of a sweep at the moment");
     Response response;
     response.type = "application/octet-stream";
     response.body = *map;

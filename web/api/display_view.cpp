@@ -14,7 +14,7 @@ enum class Subject : std::uint8_t { kPatient, kReference, kScan, kScanFile };
 struct ShownRoute {
   std::string_view pattern;
   Subject subject;
-  const char* absent;  ///< What the route answers where there is no such record.
+  const char* absent;  ///< The route's answer where there is no such record.
 };
 
 constexpr std::array kShownRoutes = {
@@ -83,7 +83,7 @@ void LimitDisplays(Router& router, const Services& services) {
         [services, shown, answer = route.handler](const Request& request, const Respond& respond) {
           if (request.session->role == Role::kDisplay) {
             if (shown == nullptr)
-              return respond(ErrorResponse(404, "there is nothing at this address"));
+              return respond(ErrorResponse(404, "nothing was found at this address"));
             const DisplayView view(services.appliance.GetStatus(), services.patients,
                                    services.references);
             if (!view.Shows(shown->subject, request.arguments))

@@ -93,7 +93,8 @@ void Displays::AddRoutes(Router& router) {
 void Displays::Begin(const Request&, const Respond& respond) {
   Expire();
   if (pairings_.size() >= kMaxWaiting)
-    return respond(ErrorResponse(503, "too many screens wait to be paired; try again later"));
+    return respond(
+        ErrorResponse(503, "too many screens are waiting to be paired; try again later"));
   const std::string token = RandomToken(32);
   pairings_.push_back({.code = MakeCode(), .token_hash = StoredHashOf(token), .begun = now_()});
   Response response;
@@ -118,7 +119,7 @@ void Displays::Claim(const Request& request, const Respond& respond) {
   const bool waits = std::any_of(pairings_.begin(), pairings_.end(), [&](const Pairing& pairing) {
     return pairing.token_hash == hash;
   });
-  if (!waits) return respond(ErrorResponse(404, "this pairing is over: begin again"));
+  if (!waits) return respond(ErrorResponse(404, "this pairing has expired: start again"));
   Response response;
   response.body = Dump({{"paired", false}});
   respond(std::move(response));

@@ -214,7 +214,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
       {"version", status.version},
       {"warnings", status.warnings},
       {"rolled_back", TextOrNull(status.rolled_back)}};
-  // What is acted on goes by this age, so the wall clock does not take the place of the steady one.
+  // This age decides what may be acted on, so the wall clock does not replace the steady one.
   if (status.last_result && !status.last_result->age_s) json["last_result"]["age_s"] = nullptr;
   AddDailyCheck(json, status.daily_check, "check_overdue", "check_failed");
   return json;

@@ -35,7 +35,7 @@ using Json = nlohmann::ordered_json;
 
 /// "2026-03-01T09:30:00Z"
 [[nodiscard]] std::string TimeText(WallClock::time_point time);
-/// Of any year: a certificate's end may be past what a time_point holds.
+/// Takes any year: a certificate's end may be past what a time_point holds.
 [[nodiscard]] std::string TimeText(std::time_t time);
 
 /// The fields of a request's body. Every accessor throws DataError naming the field, what was

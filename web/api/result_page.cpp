@@ -190,10 +190,10 @@ struct Records {
   ScanService& scans;
 };
 
-/// What was requested.
+/// A request for the page.
 struct Wanted {
   std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
-  Status status;                    ///< Of the appliance at the request.
+  Status status;                    ///< The appliance's at the request.
   bool is_display = false;          ///< Requested by a display in the room.
   Language language = Language::kEnglish;
   const ResultWords& words = ResultWordsOf(language);
@@ -328,7 +328,7 @@ Response ResultPage(const Records& records, const Wanted& wanted) {
     scan = records.scans.FindScan(*wanted.scan);
     if (scan && !may_show(*scan)) scan.reset();
   }
-  // Of a scan that is named, only that one is read or printed.
+  // If a scan is named, only that one is read or printed.
   if (wanted.scan) failed.reset();
   if (!scan) std::swap(scan, failed);
   Response response;
@@ -343,7 +343,7 @@ Response ResultPage(const Records& records, const Wanted& wanted) {
   return response;
 }
 
-/// As the address says ("?language=es"), else as the browser does.
+/// The language that the address names ("?language=es"), else the one that the browser prefers.
 Language LanguageOf(const Request& request) {
   const auto found = request.query.find("language");
   if (found == request.query.end()) return PreferredLanguage(request.Header("accept-language"));

@@ -41,7 +41,7 @@ const asJson = (response) => response.json();
 const errorOf = async (response) => new ApiError(response.status,
   await response.json().catch(() => null));
 
-/// What `read` makes of the answer.
+/// Sends a request; returns what `read` makes of the answer.
 async function ask(method, path, body,
   { background = false, timeout_ms = kAnswer_ms, read = asJson } = {}) {
   const headers = {};
@@ -106,7 +106,7 @@ export const postForFile = (path) =>
 export const put = (path, body) => ask('PUT', api(path), body);
 export const removeFor = (path, body) => ask('DELETE', api(path), body,
   { timeout_ms: kLongAnswer_ms, read: orNothing });
-/// For what copies much: the answer comes when it is done.
+/// For requests that copy much: the answer comes when they are done.
 export const postLong = (path) => ask('POST', api(path), undefined,
   { timeout_ms: kVeryLongAnswer_ms, read: orNothing });
 export const remove = (path) => ask('DELETE', api(path), undefined, { timeout_ms: kLongAnswer_ms });
@@ -290,7 +290,7 @@ export const live = {
       endSession();
     } else this.notify(message.kind);
   },
-  /// What another tab says.
+  /// Takes a message of another tab.
   hear(message) {
     if (message.kind === 'used') {
       touched = now();

@@ -59,7 +59,7 @@ export function say(text, seen = false) {
   place.className = seen ? 'toast' : 'visually-hidden';
   if (seen) toastTimer = setTimeout(() => say(''), kToast_ms);
 }
-/// What a person just did has worked.
+/// Says that what a person just did has worked.
 export const done = (text) => say(text, true);
 
 export function warn(text) {
@@ -117,7 +117,7 @@ async function work(button, task) {
   }
 }
 
-/// For what is signed: the person types the own password again.
+/// A person who signs types their own password again.
 export const signingPassword = () => h('input', {
   type: 'password', required: true, autocomplete: 'current-password', ...kPassword,
 });
@@ -128,7 +128,7 @@ export function action(label, task, properties) {
   return button;
 }
 
-/// What identifies a control after it was built again.
+/// Identifies a control after it was built again.
 const nameOf = (control) => [control.tagName, control.getAttribute('href'),
   control.getAttribute('aria-label') ?? control.textContent].join(' ');
 

@@ -30,7 +30,7 @@ async function fetchSurface() {
   };
 }
 
-/// Of the plan that this sweep will be compared with; null where there is none.
+/// The posture in the plan that this sweep will be compared with; null where there is none.
 async function plannedPosture() {
   const { session, scan } = live.status ?? {};
   if (session?.purpose !== 'fraction' || scan?.purpose !== 'fraction') return null;

@@ -9,10 +9,10 @@ const kMargin_m = 0.1;
 
 const times = ([x, y], k) => [k * x, k * y];
 
-/// What the marks on a picture are, and where they lie: {by, ways: {NAME: [x, y]}}, unit vectors of
-/// the map, x right, y up.
+/// Returns whose the marks on a picture are, and where they lie: {by, ways: {NAME: [x, y]}}, unit
+/// vectors of the map, x right, y up.
 ///
-/// Which side is the patient's was decided where the words were made: only a result whose body
+/// The patient's sides were decided where the words were made: only a result whose body
 /// "named_by" is "posture" shows head, feet, left and right, where the comparison found them. Else
 /// the marks are the axes of the room, as in the words; where that is not known, the map's own.
 /// @param room  Of the status: as it is known now.

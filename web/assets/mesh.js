@@ -61,7 +61,7 @@ function label(text, height) {
   return sprite;
 }
 
-/// What lies where, around the box that is looked at: the marks of the maps.
+/// The marks of the maps, around the box that is looked at: they show what lies where.
 function marksAround(compass, words, box, radius) {
   const group = new THREE.Group();
   const centre = box.getCenter(new THREE.Vector3());

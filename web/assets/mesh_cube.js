@@ -47,8 +47,8 @@ function face(text) {
   return texture;
 }
 
-// What is written on a face stands upright for who looks at it with z up, and on the top for who
-// stands at the feet.
+// The writing on a face stands upright for a person who looks at it with z up, and the writing on
+// the top for one who stands at the feet.
 const kTurns = [Math.PI / 2, -Math.PI / 2, Math.PI, 0, 0, Math.PI];
 
 /// Gives draw(renderer, camera, target), which adds the cube to what is drawn, and dispose().

@@ -1,11 +1,11 @@
 // How the 3-D view moves a surface as the correction will.
 import * as THREE from 'three';
 
-/// Of four rows.
+/// Makes a matrix of four rows.
 export const matrixOf = (rows) => new THREE.Matrix4().set(...rows.flat());
 
-/// What the correction does to the current surface, in that surface's frame: the motion of the body
-/// in the map's frame, undone.
+/// The motion by which the correction moves the current surface, in that surface's frame: it undoes
+/// the motion of the body in the map's frame.
 export function correctionOf(T, motion) {
   const toMap = T ? matrixOf(T) : new THREE.Matrix4();
   return toMap.clone().invert().multiply(matrixOf(motion).invert()).multiply(toMap);

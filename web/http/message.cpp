@@ -35,7 +35,7 @@ void UploadFile::Append(std::string_view bytes) {
     const ssize_t count = ::write(fd_, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0)
-      throw IoError(fmt::format("the disk takes no more of the upload: {}", std::strerror(errno)));
+      throw IoError(fmt::format("cannot write the upload to the disk: {}", std::strerror(errno)));
     bytes.remove_prefix(static_cast<std::size_t>(count));
     written_ += count;
   }

@@ -1,4 +1,4 @@
-// What users do with a result: scan again, accept it, make it a reference, download it.
+// Lets users act on a result: scan again, accept it, make it a reference, download it.
 import { fileUrl, live, may, post } from '../api.js';
 import { action, clear, done, field, form, h, signedTime, signingPassword } from '../dom.js';
 import { kReason } from '../limits.js';

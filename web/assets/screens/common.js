@@ -1,10 +1,11 @@
-// What several screens show.
+// Parts that several screens show.
 import { get, live, since_s } from '../api.js';
 import { clear, h } from '../dom.js';
 import { kJudgements } from '../numbers.js';
 import { S, translated } from '../strings.js';
 
-/// Of a time that the sensor has been on; how long it must be on is a setting of the appliance.
+/// Whether a sensor is cold that has been on for this time; how long it must be on is a setting of
+/// the appliance.
 export const isCold = (on_s) => on_s < live.status?.sensor.warm_up_s;
 export const minutesOf = (seconds) => Math.round(seconds / 6) / 10;
 export const kOldAfter_s = 120;
@@ -16,7 +17,7 @@ export const sentence = (reason = '') => {
   return `${capital(text).replaceAll('+-', '±')}${/[.!]$/.test(text) || !text ? '' : '.'}`;
 };
 
-/// What is wrong and what to do about it; nothing where nothing is.
+/// Says what is wrong and what to do about it; null where nothing is.
 export function faultWords({ fault, fault_kind: kind }) {
   if (!fault) return null;
   const words = capital(translated(fault)).replace(/[.!]$/, '');

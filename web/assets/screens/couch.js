@@ -14,8 +14,8 @@ export function readingOf(text) {
   return Math.abs(value) <= kMax_cm ? value : null;
 }
 
-/// What the axis is set to, in centimetres with one digit as couches show it; a shift that is not
-/// known to differ from nothing leaves it where it is.
+/// The value to set the axis to, in centimetres with one digit as couches show it; a shift that is
+/// not known to differ from nothing leaves the axis where it is.
 export function targetOf(reading_cm, correction_mm, u95_mm) {
   const shift_cm = isStill(correction_mm, u95_mm) ? 0 : correction_mm / 10;
   return Math.round(10 * (reading_cm + shift_cm)) / 10;

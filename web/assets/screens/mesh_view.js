@@ -41,7 +41,7 @@ function cutControls(view) {
 }
 
 const kSurface_ms = 600000;  // on a slow line
-/// What arrived is no surface.
+/// The bytes that arrived are no surface.
 class DamagedSurface extends Error {}
 
 async function surfaceOf(scanId, onPart) {
@@ -154,8 +154,8 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
       clear(below, marksNote(map?.compass),
         controls(view, canvas, { reference, scan, details }, map?.compass));
     } catch (error) {
-      // What did not arrive, or not whole, may arrive the next time; what the browser cannot show,
-      // it never can.
+      // A surface that did not arrive, or not whole, may arrive the next time; one that the browser
+      // cannot show never will be.
       if (error instanceof ApiError || error instanceof DamagedSurface) offer(error.message);
       else clear(place, h('p', { class: 'hint' }, text.meshFailed));
     }

@@ -260,13 +260,13 @@ export async function showPatient(place, id) {
   let approved;
   let told;
   let buttons = null;
-  /// What begins a session is the first thing to press only where this patient's is not open.
+  /// The button that begins a session is the primary one only where this patient's is not open.
   const weigh = () => opening.querySelector('.start-session')
     ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
   const load = async () => {
     const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
       get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
-    // What is typed as a reason stays as long as nothing else is offered.
+    // A reason that was typed stays as long as nothing else is offered.
     const opens = `${patient.approved_reference_id} ${patient.archived}`;
     if (approved !== opens) {
       approved = opens;

@@ -106,7 +106,7 @@ function whyNotApprove(reference) {
   return isOwn && may('approve') ? S.plan.secondPerson : null;
 }
 
-/// What an approval signs, read-only and complete, with the checksum that goes into the log.
+/// Shows what an approval signs, read-only and complete, with the checksum that goes into the log.
 function summary(reference, patient, { scan, scene, picture }, approve) {
   const text = S.plan;
   const { plan } = reference;
@@ -298,7 +298,7 @@ async function draft(place, reference, store, reload) {
       .then((element) => clear(templatePlace, element), (error) => warn(error.message));
   }
   if (kept) {
-    // What was stored is what an edit is compared with, not what was kept.
+    // An edit is compared with what was stored, not with what was kept.
     const blank = controls(reference,
       { region: reference.plan.region_m, isocentre: reference.plan.isocentre_m },
       storedPlan(reference), editable);

@@ -1,4 +1,4 @@
-// What plans of one site begin with: size of the region and tolerances.
+// Templates, with which plans of one site begin: size of the region and tolerances.
 import { get, post, put } from '../api.js';
 import { action, clear, done, h } from '../dom.js';
 import { S } from '../strings.js';

@@ -119,7 +119,7 @@ function bodyWords({ scan, details }, valid) {
     details.body.named_by === 'axes' && h('p', { class: 'caution' }, text.bodyByAxes));
 }
 
-/// What the sweep saw, where there is nothing to compare it with.
+/// Shows what the sweep saw, where there is nothing to compare it with.
 function seen({ scan, scene }) {
   const canvas = h('canvas', { class: 'map', role: 'img', 'aria-label': S.result.heights });
   const grid = scene.heightmap;

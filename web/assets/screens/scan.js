@@ -56,7 +56,7 @@ export function surfaceIn(place) {
   };
 }
 
-/// What the large button does now: its words and its request; nothing where it is off.
+/// Returns what the large button does now: its words and its request; nothing where it is off.
 function offer({ state, fault_kind: fault }) {
   const text = S.scan;
   if (state === 'scanning') return { label: text.stop, request: 'scan/end' };

@@ -36,8 +36,8 @@ function backupCard() {
 
 const kCannotRead = /the stored settings cannot be read/;
 
-/// What is stored, or why it cannot be read: then nothing is filled in, since a default would look
-/// like a value that somebody set.
+/// Returns what is stored, or why it cannot be read: then nothing is filled in, since a default
+/// would look like a value that somebody set.
 async function readSettings() {
   try {
     return { settings: await get('settings'), fault: null };

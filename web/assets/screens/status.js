@@ -1,4 +1,4 @@
-// What the appliance does, what waits, and what lets people scan.
+// Shows what the appliance does, what waits, and what lets people scan.
 import { get, live, may } from '../api.js';
 import { clear, h, localTime, redraw, table } from '../dom.js';
 import { lastLogin, lastLoginWords } from '../last_login.js';

@@ -286,7 +286,7 @@ export const es = {
         + 'nuevo, despacio.',
       move: 'Aplique la corrección de abajo y escanee de nuevo.', no_answer: '',
     },
-    // Of a result that can no longer be acted on.
+    // These are for a result that can no longer be acted on.
     verdictsThen: {
       in_tolerance: 'ESTABA EN TOLERANCIA', unsure: 'NO ERA CONCLUYENTE',
       move: 'ESTABA FUERA DE TOLERANCIA', no_answer: 'SIN RESPUESTA',

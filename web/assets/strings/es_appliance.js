@@ -95,7 +95,7 @@ export const kWords = {
   'there is no such patient': 'no existe ese paciente',
   'a scan is running already: end or cancel it first':
     'ya hay un escaneo en curso: termínelo o descártelo primero',
-  'your role may not do this': 'su función no permite hacer esto',
+  'your role is not allowed to do this': 'su función no permite hacer esto',
   'no sensor is attached': 'no hay ningún sensor conectado',
   'profiles are switched off in the configuration':
     'los perfiles están desactivados en la configuración',
