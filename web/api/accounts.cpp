@@ -434,7 +434,7 @@ void Accounts::ShowLastLogin(const Request& request, const Respond& respond) {
   const auto age =
       std::chrono::duration_cast<WallClock::duration>(options_.now() - request.session->begun);
   const WallClock::time_point begun = WallClock::now() - age - kOwnEntry;
-  RespondAside(
+  RespondInBackground(
       background_, "last login",
       [this, user = request.session->user, begun] {
         const LoginHistory history = LoginsBefore(audit_, user, begun);

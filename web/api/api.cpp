@@ -160,8 +160,8 @@ class Table {
                  }});
   }
   /// For lists and files, which are not read on the loop.
-  void ReadAside(const char* pattern, Permission permission, Get get) {
-    AddAside(router_, background_, pattern, permission, std::move(get));
+  void ReadInBackground(const char* pattern, Permission permission, Get get) {
+    AddInBackground(router_, background_, pattern, permission, std::move(get));
   }
   void Write(const char* method, const char* pattern, Permission permission, BodyKind body,
              Handler change) {
@@ -220,7 +220,7 @@ void AddApplianceRoutes(Table& table, ApplianceService& appliance) {
 
 void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& references,
                       ScanService& scans) {
-  table.ReadAside("/api/v1/patients", Permission::kView, [&patients](const Request&) {
+  table.ReadInBackground("/api/v1/patients", Permission::kView, [&patients](const Request&) {
     return JsonResponse({{"patients", ListJson(patients.Patients())}});
   });
   table.Write(
@@ -281,14 +281,15 @@ void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& 
                 fields.Finish();
                 patients.CloseSession(request.actor(), session, Answer(respond));
               });
-  table.ReadAside("/api/v1/patients/{id}/references", Permission::kView,
-                  [&patients, &references](const Request& request) {
-                    if (!patients.FindPatient(request.arguments[0]))
-                      return ErrorResponse(404, "no such patient");
-                    return JsonResponse(
-                        {{"references", ListJson(references.References(request.arguments[0]))}});
-                  });
-  table.ReadAside(
+  table.ReadInBackground(
+      "/api/v1/patients/{id}/references", Permission::kView,
+      [&patients, &references](const Request& request) {
+        if (!patients.FindPatient(request.arguments[0]))
+          return ErrorResponse(404, "no such patient");
+        return JsonResponse(
+            {{"references", ListJson(references.References(request.arguments[0]))}});
+      });
+  table.ReadInBackground(
       "/api/v1/patients/{id}/scans", Permission::kView,
       [&patients, &scans](const Request& request) {
         if (!patients.FindPatient(request.arguments[0]))
@@ -323,14 +324,14 @@ void AddReferenceRoutes(Table& table, ReferenceService& references) {
                 fields.Finish();
                 references.AddReference(request.actor(), scan_id, reason, Answer(respond));
               });
-  table.ReadAside("/api/v1/references/{id}", Permission::kRoom,
-                  [&references](const Request& request) {
-                    const auto reference = references.FindReference(request.arguments[0]);
-                    if (!reference) return ErrorResponse(404, "no such reference");
-                    Json json = ToJson(*reference);
-                    json["room"] = ToJson(references.RoomOfReference(*reference));
-                    return JsonResponse(json);
-                  });
+  table.ReadInBackground("/api/v1/references/{id}", Permission::kRoom,
+                         [&references](const Request& request) {
+                           const auto reference = references.FindReference(request.arguments[0]);
+                           if (!reference) return ErrorResponse(404, "no such reference");
+                           Json json = ToJson(*reference);
+                           json["room"] = ToJson(references.RoomOfReference(*reference));
+                           return JsonResponse(json);
+                         });
   table.Write("PUT", "/api/v1/references/{id}/plan", Permission::kPlan, BodyKind::kJson,
               [&references](const Request& request, const Respond& respond) {
                 const auto [plan, revision] = ParsePlan(request.body);
@@ -340,7 +341,7 @@ void AddReferenceRoutes(Table& table, ReferenceService& references) {
 }
 
 void AddScanRoutes(Table& table, ScanService& scans) {
-  table.ReadAside("/api/v1/scans", Permission::kView, [&scans](const Request& request) {
+  table.ReadInBackground("/api/v1/scans", Permission::kView, [&scans](const Request& request) {
     const auto limit = static_cast<int>(QueryNumber(request, "limit", kMaxListed, kMaxListed));
     return JsonResponse({{"scans", ListJson(scans.Scans("", limit))}});
   });
@@ -361,29 +362,30 @@ void AddScanRoutes(Table& table, ScanService& scans) {
                 scans.AcceptScan(request.actor(), request.arguments[0], /*reason=*/{},
                                  Answer(respond));
               });
-  table.ReadAside("/api/v1/scans/{id}/files/{name}", Permission::kRoom,
-                  [&scans](const Request& request) {
-                    if (auto picture = TranslatedPicture(scans, request))
-                      return std::move(*picture);
-                    return ScanFileResponse(scans, request.arguments[0], request.arguments[1],
-                                            DownloadName(request));
-                  });
-  table.ReadAside("/api/v1/scans/{id}/maps/{name}", Permission::kRoom,
-                  [&scans](const Request& request) {
-                    auto map = scans.CompactMap(request.arguments[0], request.arguments[1]);
-                    if (!map) return ErrorResponse(404, "this scan has no such map");
-                    Response response;
-                    response.type = "application/octet-stream";
-                    response.body = std::move(*map);
-                    return response;
-                  });
-  table.ReadAside("/api/v1/results/{id}", Permission::kRoom, [&scans](const Request& request) {
-    return ScanFileResponse(scans, request.arguments[0], "result.json", /*download_name=*/"");
-  });
+  table.ReadInBackground("/api/v1/scans/{id}/files/{name}", Permission::kRoom,
+                         [&scans](const Request& request) {
+                           if (auto picture = TranslatedPicture(scans, request))
+                             return std::move(*picture);
+                           return ScanFileResponse(scans, request.arguments[0],
+                                                   request.arguments[1], DownloadName(request));
+                         });
+  table.ReadInBackground("/api/v1/scans/{id}/maps/{name}", Permission::kRoom,
+                         [&scans](const Request& request) {
+                           auto map = scans.CompactMap(request.arguments[0], request.arguments[1]);
+                           if (!map) return ErrorResponse(404, "this scan has no such map");
+                           Response response;
+                           response.type = "application/octet-stream";
+                           response.body = std::move(*map);
+                           return response;
+                         });
+  table.ReadInBackground(
+      "/api/v1/results/{id}", Permission::kRoom, [&scans](const Request& request) {
+        return ScanFileResponse(scans, request.arguments[0], "result.json", /*download_name=*/"");
+      });
 }
 
 void AddCheckRoutes(Table& table, CheckService& checks) {
-  table.ReadAside("/api/v1/checks", Permission::kView, [&checks](const Request&) {
+  table.ReadInBackground("/api/v1/checks", Permission::kView, [&checks](const Request&) {
     return JsonResponse(ToJson(checks.GetChecks(), WallClock::now()));
   });
   table.Write("POST", "/api/v1/checks/open", Permission::kScan, BodyKind::kNone,
@@ -397,13 +399,13 @@ void AddCheckRoutes(Table& table, CheckService& checks) {
 }
 
 void AddSettingsRoutes(Table& table, SettingsService& settings, AuditLog& audit) {
-  table.ReadAside("/api/v1/audit", Permission::kAudit, [&audit](const Request& request) {
+  table.ReadInBackground("/api/v1/audit", Permission::kAudit, [&audit](const Request& request) {
     const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
     const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
     const bool views = QueryNumber(request, "views", 1, 1) == 1;
     return JsonResponse({{"entries", ListJson(audit.Audit({before, limit, "", views}))}});
   });
-  table.ReadAside("/api/v1/audit.jsonl", Permission::kAudit, [&audit](const Request&) {
+  table.ReadInBackground("/api/v1/audit.jsonl", Permission::kAudit, [&audit](const Request&) {
     Response response;
     response.type = "application/x-ndjson";
     response.body = audit.ExportAudit();
@@ -458,7 +460,7 @@ void AddUpdateRoutes(Table& table, UpdateService& updates) {
 }
 
 void AddMaintenanceRoutes(Table& table, MaintenanceService& maintenance, AuditLog& audit) {
-  table.ReadAside("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
+  table.ReadInBackground("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
     const std::optional<AuditEntry> last = LastBackup(audit);
     return JsonResponse({{"last", last ? ToJson(*last) : Json(nullptr)}});
   });

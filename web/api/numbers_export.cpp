@@ -76,39 +76,40 @@ Response File(std::string body, std::string type, const std::string& name) {
 }
 
 void AddReports(Router& router, BackgroundWork& background, ScanService& scans) {
-  AddAside(router, background, "/api/v1/scans/{id}/report.pdf", Permission::kView,
-           [&scans](const Request& request) {
-             auto pdf = scans.ScanReport(request.arguments[0], LanguageIn(request));
-             if (!pdf) return ErrorResponse(404, "there is no such scan");
-             return File(std::move(*pdf), "application/pdf",
-                         fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
-           });
-  AddAside(router, background, "/api/v1/patients/{id}/report.pdf", Permission::kView,
-           [&scans](const Request& request) {
-             auto pdf = scans.CourseReport(request.arguments[0], LanguageIn(request));
-             if (!pdf) return ErrorResponse(404, "there is no such patient");
-             return File(std::move(*pdf), "application/pdf",
-                         fmt::format("plumb_course_{}.pdf", request.arguments[0]));
-           });
+  AddInBackground(router, background, "/api/v1/scans/{id}/report.pdf", Permission::kView,
+                  [&scans](const Request& request) {
+                    auto pdf = scans.ScanReport(request.arguments[0], LanguageIn(request));
+                    if (!pdf) return ErrorResponse(404, "there is no such scan");
+                    return File(std::move(*pdf), "application/pdf",
+                                fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
+                  });
+  AddInBackground(router, background, "/api/v1/patients/{id}/report.pdf", Permission::kView,
+                  [&scans](const Request& request) {
+                    auto pdf = scans.CourseReport(request.arguments[0], LanguageIn(request));
+                    if (!pdf) return ErrorResponse(404, "there is no such patient");
+                    return File(std::move(*pdf), "application/pdf",
+                                fmt::format("plumb_course_{}.pdf", request.arguments[0]));
+                  });
 }
 
 void AddNumbers(Router& router, BackgroundWork& background, PatientService& patients,
                 ScanService& scans) {
-  AddAside(router, background, "/api/v1/patients/{id}/numbers.csv", Permission::kView,
-           [&patients, &scans](const Request& request) {
-             const auto patient = patients.FindPatient(request.arguments[0]);
-             if (!patient) return ErrorResponse(404, "there is no such patient");
-             return File(Csv(*patient, scans.Scans(patient->id, kMaxScans)),
-                         "text/csv; charset=utf-8",
-                         fmt::format("plumb_numbers_{}.csv", patient->code));
-           });
-  AddAside(router, background, "/api/v1/patients/{id}/numbers.json", Permission::kView,
-           [&patients, &scans](const Request& request) {
-             const auto patient = patients.FindPatient(request.arguments[0]);
-             if (!patient) return ErrorResponse(404, "there is no such patient");
-             return File(NumbersJson(*patient, scans.Scans(patient->id, kMaxScans)),
-                         "application/json", fmt::format("plumb_numbers_{}.json", patient->code));
-           });
+  AddInBackground(router, background, "/api/v1/patients/{id}/numbers.csv", Permission::kView,
+                  [&patients, &scans](const Request& request) {
+                    const auto patient = patients.FindPatient(request.arguments[0]);
+                    if (!patient) return ErrorResponse(404, "there is no such patient");
+                    return File(Csv(*patient, scans.Scans(patient->id, kMaxScans)),
+                                "text/csv; charset=utf-8",
+                                fmt::format("plumb_numbers_{}.csv", patient->code));
+                  });
+  AddInBackground(router, background, "/api/v1/patients/{id}/numbers.json", Permission::kView,
+                  [&patients, &scans](const Request& request) {
+                    const auto patient = patients.FindPatient(request.arguments[0]);
+                    if (!patient) return ErrorResponse(404, "there is no such patient");
+                    return File(NumbersJson(*patient, scans.Scans(patient->id, kMaxScans)),
+                                "application/json",
+                                fmt::format("plumb_numbers_{}.json", patient->code));
+                  });
 }
 
 constexpr std::size_t kMostBytes = std::size_t{64} << 20;
@@ -153,20 +154,20 @@ void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files
 /// All data of a course in one file.
 void AddCourse(Router& router, BackgroundWork& background, PatientService& patients,
                ScanService& scans) {
-  AddAside(router, background, "/api/v1/patients/{id}/course.zip", Permission::kView,
-           [&patients, &scans](const Request& request) {
-             const auto patient = patients.FindPatient(request.arguments[0]);
-             if (!patient) return ErrorResponse(404, "there is no such patient");
-             const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
-             std::vector<ArchivedFile> files = {
-                 {.name = "numbers.csv", .bytes = Csv(*patient, list)},
-                 {.name = "numbers.json", .bytes = NumbersJson(*patient, list)}};
-             if (auto pdf = scans.CourseReport(patient->id, LanguageIn(request)))
-               files.push_back({.name = "course.pdf", .bytes = std::move(*pdf)});
-             AddResults(list, files);
-             return File(ZipOf(files), "application/zip",
-                         fmt::format("plumb_course_{}.zip", patient->code));
-           });
+  AddInBackground(router, background, "/api/v1/patients/{id}/course.zip", Permission::kView,
+                  [&patients, &scans](const Request& request) {
+                    const auto patient = patients.FindPatient(request.arguments[0]);
+                    if (!patient) return ErrorResponse(404, "there is no such patient");
+                    const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
+                    std::vector<ArchivedFile> files = {
+                        {.name = "numbers.csv", .bytes = Csv(*patient, list)},
+                        {.name = "numbers.json", .bytes = NumbersJson(*patient, list)}};
+                    if (auto pdf = scans.CourseReport(patient->id, LanguageIn(request)))
+                      files.push_back({.name = "course.pdf", .bytes = std::move(*pdf)});
+                    AddResults(list, files);
+                    return File(ZipOf(files), "application/zip",
+                                fmt::format("plumb_course_{}.zip", patient->code));
+                  });
 }
 
 Json ProfilesJson(const SensorProfiles& profiles) {
@@ -188,19 +189,19 @@ int VersionIn(const std::string& text) {
 }
 
 void AddProfiles(Router& router, BackgroundWork& background, SensorProfileService& profiles) {
-  AddAside(router, background, "/api/v1/sensor-profile", Permission::kView,
-           [&profiles](const Request&) {
-             Response response;
-             response.body = Dump(ProfilesJson(profiles.GetSensorProfiles()));
-             return response;
-           });
-  AddAside(router, background, "/api/v1/sensor-profile/{version}/file", Permission::kView,
-           [&profiles](const Request& request) {
-             auto text = profiles.SensorProfileFile(VersionIn(request.arguments[0]));
-             if (!text) return ErrorResponse(404, "there is no such profile");
-             return File(std::move(*text), "application/json",
-                         fmt::format("plumb_sensor_profile_{}.json", request.arguments[0]));
-           });
+  AddInBackground(router, background, "/api/v1/sensor-profile", Permission::kView,
+                  [&profiles](const Request&) {
+                    Response response;
+                    response.body = Dump(ProfilesJson(profiles.GetSensorProfiles()));
+                    return response;
+                  });
+  AddInBackground(router, background, "/api/v1/sensor-profile/{version}/file", Permission::kView,
+                  [&profiles](const Request& request) {
+                    auto text = profiles.SensorProfileFile(VersionIn(request.arguments[0]));
+                    if (!text) return ErrorResponse(404, "there is no such profile");
+                    return File(std::move(*text), "application/json",
+                                fmt::format("plumb_sensor_profile_{}.json", request.arguments[0]));
+                  });
 }
 
 }  // namespace

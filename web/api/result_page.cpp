@@ -387,7 +387,7 @@ void AddResultPage(Router& router, const Services& services) {
              .status = appliance.GetStatus(),
              .is_display = request.session->role == Role::kDisplay,
              .language = language};
-         RespondAside(
+         RespondInBackground(
              background, "GET /result", [records, wanted] { return ResultPage(records, wanted); },
              respond);
        }});

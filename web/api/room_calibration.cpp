@@ -73,7 +73,7 @@ void Add(Router& router, const Services& services, const char* path,
   router.Add({"GET", path, Permission::kView, BodyKind::kNone,
               [&background = services.background, &room = services.room,
                name = std::string("GET ") + path, make](const Request&, const Respond& respond) {
-                RespondAside(
+                RespondInBackground(
                     background, name, [&room, make] { return make(room); }, respond);
               }});
 }

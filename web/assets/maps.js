@@ -46,8 +46,8 @@ export function errorColour(tolerances) {
   let i = 1;
   while (i < kStops.length - 1 && kStops[i][0] < value) ++i;
   const [a, b] = [kStops[i - 1], kStops[i]];
-  const share = (value - a[0]) / (b[0] - a[0]);
-  return [1, 2, 3].map((k) => a[k] + (b[k] - a[k]) * share);
+  const fraction = (value - a[0]) / (b[0] - a[0]);
+  return [1, 2, 3].map((k) => a[k] + (b[k] - a[k]) * fraction);
 }
 
 const kSteps = 1024;
@@ -162,7 +162,7 @@ export function outlineOf(region, grid) {
 }
 
 /// The part of the grid that holds the region and `margin_m` around it: {left, top, width, height}
-/// as shares of the whole picture (y down); the whole where there is no region.
+/// as fractions of the whole picture (y down); the whole where there is no region.
 export function cropOf(region, grid, margin_m = 0.1) {
   const { width, height, values } = region;
   let [x0, x1, y0, y1] = [width, -1, height, -1];

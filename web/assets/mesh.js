@@ -3,7 +3,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { cellAt, errorIndex, errorTable, kOutside } from './maps.js';
 import { orientationCube } from './mesh_cube.js';
-import { correctionOf, matrixOf, shareOf } from './mesh_motion.js';
+import { correctionOf, matrixOf, fractionOf } from './mesh_motion.js';
 
 function geometryOf({ positions, corners }) {
   const geometry = new THREE.BufferGeometry();
@@ -100,8 +100,8 @@ function boxOfInterest(geometry, grid, region, T) {
 /// @param surface  {positions, corners}.
 /// @param motion  Of the body, in the map's frame; null: there is no correction to show.
 /// @param words  Of the compass's marks.
-/// Gives setGhost(load, share), setShare(share), correct(share, deviationAfter), look(name),
-/// cut(way, share), picture(), stop().
+/// Gives setGhost(load, fraction), setFraction(fraction), correct(fraction, deviationAfter),
+/// look(name), cut(way, fraction), picture(), stop().
 export function openMesh(canvas, {
   surface, grid, deviation, region, T, motion, tolerance_m, compass, words,
 }) {
@@ -192,17 +192,17 @@ export function openMesh(canvas, {
   let isGhostWanted = false;
   // Both surfaces are drawn solid in turn by a screen-door pattern: nothing flickers where they lie
   // in each other, as it does with transparency.
-  const setShare = (share) => {
+  const setFraction = (fraction) => {
     if (!ghost) return;
-    ghost.material.opacity = Math.max(0.02, 1 - share);
-    material.opacity = Math.max(0.02, share);
+    ghost.material.opacity = Math.max(0.02, 1 - fraction);
+    material.opacity = Math.max(0.02, fraction);
     material.alphaHash = ghost.visible;
     material.needsUpdate = true;
     request();
   };
   /// Takes away what lies beyond a plane: above it ("height"), or toward the first mark ("along")
-  /// or to the right of that ("across"). `share` of the box stays; nothing is cut without a way.
-  const cut = (way, share) => {
+  /// or to the right of that ("across"). `fraction` of the box stays; nothing is cut without a way.
+  const cut = (way, fraction) => {
     const [ux, uy] = Object.values(compass?.ways ?? {})[0] ?? [0, 1];
     const normal = { height: [0, 0, -1], along: [-ux, -uy, 0], across: [-uy, ux, 0] }[way];
     let planes = null;
@@ -212,7 +212,7 @@ export function openMesh(canvas, {
         i & 1 ? box.max.x : box.min.x, i & 2 ? box.max.y : box.min.y,
         i & 4 ? box.max.z : box.min.z)));
       const [least, most] = [Math.min(...ends), Math.max(...ends)];
-      plane.constant = -(most + share * (least - most));
+      plane.constant = -(most + fraction * (least - most));
       planes = [plane];
     }
     for (const one of [material, ghost?.material]) {
@@ -226,25 +226,24 @@ export function openMesh(canvas, {
   let corrected = null;
   return {
     look,
-    setShare,
+    setFraction,
     cut,
-    /// Moves the surface by a share of the correction, 0 to 1. Its colours are those of the nearer
-    /// end.
-    /// @param deviationAfter  The error map after the correction.
-    correct(share, deviationAfter) {
+    /// Moves the surface by a fraction of the correction, 0 to 1. Its colours are those of the
+    /// nearer end. @param deviationAfter The error map after the correction.
+    correct(fraction, deviationAfter) {
       if (!correction) return;
-      body.matrix.copy(shareOf(correction, share, center));
+      body.matrix.copy(fractionOf(correction, fraction, center));
       body.matrixWorldNeedsUpdate = true;
-      if (share > 0.5) {
+      if (fraction > 0.5) {
         const toMap = T ? matrixOf(T) : new THREE.Matrix4();
         corrected ??= coloursByError(geometry, grid, deviationAfter, region,
           rowsOf(toMap.multiply(correction)), tolerance_m);
       }
-      geometry.setAttribute('color', share > 0.5 ? corrected : measured);
+      geometry.setAttribute('color', fraction > 0.5 ? corrected : measured);
       request();
     },
     /// @param load  Gives the reference's surface; null: it is hidden.
-    async setGhost(load, share) {
+    async setGhost(load, fraction) {
       isGhostWanted = Boolean(load);
       const reference = !ghost && load ? await load() : null;
       // Meanwhile it may have been hidden again, or have come by another call.
@@ -261,7 +260,7 @@ export function openMesh(canvas, {
         material.opacity = 1;
         material.alphaHash = false;
         material.needsUpdate = true;
-      } else setShare(share);
+      } else setFraction(fraction);
       request();
     },
     picture() {

@@ -11,11 +11,11 @@ export function correctionOf(T, motion) {
   return toMap.clone().invert().multiply(matrixOf(motion).invert()).multiply(toMap);
 }
 
-/// A share of a rigid motion: turned and shifted by it, as seen from `centre`.
-export function shareOf(motion, share, centre) {
+/// A fraction of a rigid motion: turned and shifted by it, as seen from `centre`.
+export function fractionOf(motion, fraction, centre) {
   const turn = new THREE.Quaternion()
-    .slerp(new THREE.Quaternion().setFromRotationMatrix(motion), share);
-  const shift = centre.clone().applyMatrix4(motion).sub(centre).multiplyScalar(share);
+    .slerp(new THREE.Quaternion().setFromRotationMatrix(motion), fraction);
+  const shift = centre.clone().applyMatrix4(motion).sub(centre).multiplyScalar(fraction);
   const from = centre.clone().negate().applyQuaternion(turn).add(centre).add(shift);
   return new THREE.Matrix4().compose(from, turn, new THREE.Vector3(1, 1, 1));
 }

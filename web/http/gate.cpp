@@ -127,8 +127,8 @@ void RespondGuarded(const std::string& name, const std::function<void()>& rest,
   }
 }
 
-void RespondAside(BackgroundWork& background, const std::string& name,
-                  std::function<Response()> make, const Respond& respond) {
+void RespondInBackground(BackgroundWork& background, const std::string& name,
+                         std::function<Response()> make, const Respond& respond) {
   auto made = std::make_shared<Response>();
   const auto work = [made, name, make = std::move(make)] {
     try {
@@ -145,12 +145,12 @@ void RespondAside(BackgroundWork& background, const std::string& name,
   respond(std::move(busy));
 }
 
-void AddAside(Router& router, BackgroundWork& background, const char* pattern,
-              Permission permission, std::function<Response(const Request&)> make) {
+void AddInBackground(Router& router, BackgroundWork& background, const char* pattern,
+                     Permission permission, std::function<Response(const Request&)> make) {
   router.Add({"GET", pattern, permission, BodyKind::kNone,
               [&background, name = std::string("GET ") + pattern, make = std::move(make)](
                   const Request& request, const Respond& respond) {
-                RespondAside(
+                RespondInBackground(
                     background, name, [make, request] { return make(request); }, respond);
               }});
 }

@@ -297,8 +297,8 @@ function nearestEdge(region, [x, y]) {
     const [bx, by] = region[(i + 1) % region.length];
     const length2 = (bx - ax) ** 2 + (by - ay) ** 2 || 1e-9;
     const along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length2;
-    const share = Math.max(0, Math.min(1, along));
-    const away = distance([x, y], [ax + share * (bx - ax), ay + share * (by - ay)]);
+    const fraction = Math.max(0, Math.min(1, along));
+    const away = distance([x, y], [ax + fraction * (bx - ax), ay + fraction * (by - ay)]);
     if (away < best[0]) best = [away, i + 1];
   });
   return best[1];

@@ -59,9 +59,9 @@ function trust({ scan, details, scene }) {
   add(text.views, scene && `${scene.keyframes}`);
   add(text.frames, scene && `${scene.frames.tracked} / ${scene.frames.total}`);
   const lost = scene?.frames.dropped ?? 0;
-  const share = lost > 0 ? Math.round(100 * lost / Math.max(1, scene.frames.total)) : 0;
-  add(text.framesLost, lost > 0 ? text.framesLostOf(lost, share) : null,
-    share >= 5 ? 'caution' : '');
+  const percent = lost > 0 ? Math.round(100 * lost / Math.max(1, scene.frames.total)) : 0;
+  add(text.framesLost, lost > 0 ? text.framesLostOf(lost, percent) : null,
+    percent >= 5 ? 'caution' : '');
   add(text.lost, scene?.longest_lost_s > 0 ? `${fixed(scene.longest_lost_s, 1)} s` : null,
     'caution');
   add(text.depthScale, scene?.calibration?.depth_scale

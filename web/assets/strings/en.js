@@ -363,8 +363,8 @@ export const en = {
       + 'same.',
     meshDamaged: 'The surface arrived damaged. The pictures above show the same.',
     ghost: 'Show the reference', ghostLoading: 'Loading the reference…',
-    correctionShare: 'Share of the correction that is shown',
-    ghostShare: 'Reference to current', views3d: {
+    correctionFraction: 'Share of the correction that is shown',
+    ghostFraction: 'Reference to current', views3d: {
       top: 'Top', anterior: 'Anterior', posterior: 'Posterior', left: 'Left', right: 'Right',
       head: 'Head', feet: 'Feet', reset: 'Reset',
     },
