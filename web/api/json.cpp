@@ -49,6 +49,12 @@ std::string Dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+Response JsonResponse(const Json& json, int status) {
+  Response response = BodyResponse("application/json", Dump(json));
+  response.status = status;
+  return response;
+}
+
 std::string TimeText(WallClock::time_point time) {
   return TimeText(WallClock::to_time_t(std::chrono::floor<std::chrono::seconds>(time)));
 }
@@ -113,6 +119,12 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
         {"body", {{"now", scan.result->body_now}, {"after", scan.result->body_after}}}};
   }
   return json;
+}
+
+Json ListJson(const std::vector<Scan>& scans, WallClock::time_point now) {
+  Json list = Json::array();
+  for (const Scan& scan : scans) list.push_back(ToJson(scan, now));
+  return list;
 }
 
 namespace {

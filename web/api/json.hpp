@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "web/http/message.hpp"
 #include "web/model/account.hpp"
 #include "web/model/audit.hpp"
 #include "web/model/check.hpp"
@@ -14,7 +15,6 @@
 #include "web/model/settings.hpp"
 #include "web/model/status.hpp"
 #include "web/model/wall_clock.hpp"
-#include "web/security/sessions.hpp"
 
 namespace plumb::web {
 
@@ -31,7 +31,15 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] Json ToJson(const User& user);  ///< Without the hash.
 [[nodiscard]] Json ToJson(const AuditEntry& entry);
 [[nodiscard]] Json ToJson(const UpdateStatus& update);
+template <typename T>
+[[nodiscard]] Json ListJson(const std::vector<T>& items) {
+  Json list = Json::array();
+  for (const T& item : items) list.push_back(ToJson(item));
+  return list;
+}
+[[nodiscard]] Json ListJson(const std::vector<Scan>& scans, WallClock::time_point now);
 [[nodiscard]] std::string Dump(const Json& json);
+[[nodiscard]] Response JsonResponse(const Json& json, int status = 200);
 
 /// "2026-03-01T09:30:00Z"
 [[nodiscard]] std::string TimeText(WallClock::time_point time);

@@ -1,13 +1,11 @@
 // The room's calibration: its state, and the board to print.
+#include <utility>
+
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
-#include "web/http/gate.hpp"
 
 namespace plumb::web {
 namespace {
-
-constexpr const char* kPath = "/api/v1/room-calibration";
-constexpr const char* kBoardPath = "/api/v1/room-calibration/board.pdf";
 
 Json ScanJson(const RoomBoardScan& scan) {
   Json json = {{"check", scan.check_id},
@@ -50,39 +48,20 @@ Json StatusJson(const RoomCalibrationStatus& status) {
   return json;
 }
 
-Response StatusResponse(RoomCalibrationService& service) {
-  Response response;
-  response.body = Dump(StatusJson(service.GetRoomCalibration()));
-  return response;
-}
-
-Response BoardResponse(RoomCalibrationService& service) {
-  std::string why_not;
-  auto pdf = service.RoomBoardPdf(why_not);
-  if (!pdf) return ErrorResponse(409, why_not);
-  Response response;
-  response.type = "application/pdf";
-  response.body = std::move(*pdf);
-  response.headers.emplace_back("Content-Disposition",
-                                "attachment; filename=\"plumb_room_board.pdf\"");
-  return response;
-}
-
-void Add(Router& router, const Services& services, const char* path,
-         Response (*make)(RoomCalibrationService&)) {
-  router.Add({"GET", path, Permission::kView, BodyKind::kNone,
-              [&background = services.background, &room = services.room,
-               name = std::string("GET ") + path, make](const Request&, const Respond& respond) {
-                RespondInBackground(
-                    background, name, [&room, make] { return make(room); }, respond);
-              }});
-}
-
 }  // namespace
 
-void AddRoomCalibrationRoutes(Router& router, const Services& services) {
-  Add(router, services, kPath, &StatusResponse);
-  Add(router, services, kBoardPath, &BoardResponse);
+void AddRoomCalibrationRoutes(Routes& routes, const Services& services) {
+  RoomCalibrationService& room = services.room;
+  routes.ReadInBackground("/api/v1/room-calibration", Permission::kView, [&room](const Request&) {
+    return JsonResponse(StatusJson(room.GetRoomCalibration()));
+  });
+  routes.ReadInBackground(
+      "/api/v1/room-calibration/board.pdf", Permission::kView, [&room](const Request&) {
+        std::string why_not;
+        auto pdf = room.RoomBoardPdf(why_not);
+        if (!pdf) return ErrorResponse(409, why_not);
+        return Download("application/pdf", std::move(*pdf), "plumb_room_board.pdf");
+      });
 }
 
 }  // namespace plumb::web

@@ -140,19 +140,8 @@ void RespondInBackground(BackgroundWork& background, const std::string& name,
   if (background.RunInBackground(BackgroundPool::kReads, work,
                                  [made, respond] { respond(std::move(*made)); }))
     return;
-  Response busy = ErrorResponse(503, "too many requests at once; try again in a few seconds");
-  busy.headers.emplace_back("Retry-After", "2");
-  respond(std::move(busy));
-}
-
-void AddInBackground(Router& router, BackgroundWork& background, const char* pattern,
-                     Permission permission, std::function<Response(const Request&)> make) {
-  router.Add({"GET", pattern, permission, BodyKind::kNone,
-              [&background, name = std::string("GET ") + pattern, make = std::move(make)](
-                  const Request& request, const Respond& respond) {
-                RespondInBackground(
-                    background, name, [make, request] { return make(request); }, respond);
-              }});
+  respond(RetryLater(503, "too many requests at once; try again in a few seconds",
+                     std::chrono::seconds(2)));
 }
 
 void AddSecurityHeaders(Response& response, bool tls) {

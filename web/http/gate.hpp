@@ -60,11 +60,6 @@ void RespondGuarded(const std::string& name, const std::function<void()>& rest,
 void RespondInBackground(BackgroundWork& background, const std::string& name,
                          std::function<Response()> make, const Respond& respond);
 
-/// Adds a GET route for lists or files, which are not read on the loop. `background` must outlive
-/// the router.
-void AddInBackground(Router& router, BackgroundWork& background, const char* pattern,
-                     Permission permission, std::function<Response(const Request&)> make);
-
 /// The headers of every answer.
 /// @param tls  The answer is sent over TLS, and the browser must use TLS from now on.
 void AddSecurityHeaders(Response& response, bool tls);

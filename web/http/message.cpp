@@ -81,4 +81,38 @@ Response ErrorResponse(int status, const std::string& message) {
   return response;
 }
 
+Response RetryLater(int status, const std::string& message, std::chrono::seconds wait) {
+  Response response = ErrorResponse(status, message);
+  response.headers.emplace_back("Retry-After", std::to_string(wait.count()));
+  return response;
+}
+
+Response BodyResponse(std::string type, std::string body) {
+  Response response;
+  response.type = std::move(type);
+  response.body = std::move(body);
+  return response;
+}
+
+void NameDownload(Response& response, const std::string& name) {
+  if (name.empty()) return;
+  response.headers.emplace_back("Content-Disposition",
+                                fmt::format("attachment; filename=\"{}\"", name));
+}
+
+Response Download(std::string type, std::string body, const std::string& name) {
+  Response response = BodyResponse(std::move(type), std::move(body));
+  NameDownload(response, name);
+  return response;
+}
+
+void SetCookie(Response& response, const std::string& name, const std::string& value, bool secure,
+               std::optional<std::chrono::seconds> max_age) {
+  response.headers.emplace_back(
+      "Set-Cookie",
+      fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}{}", name, value,
+                  max_age ? fmt::format("; Max-Age={}", max_age->count()) : std::string(),
+                  secure ? "; Secure" : ""));
+}
+
 }  // namespace plumb::web

@@ -315,9 +315,8 @@ struct Transport::Callbacks {
     if (size <= options.small_answer_bytes ||
         (unsent <= options.max_unsent_bytes && size <= options.max_unsent_bytes - unsent))
       return;
-    exchange.response =
-        ErrorResponse(503, "too much data is being sent; try again in a few seconds");
-    exchange.response->headers.emplace_back("Retry-After", "5");
+    exchange.response = RetryLater(503, "too much data is being sent; try again in a few seconds",
+                                   std::chrono::seconds(5));
   }
 
   /// Takes the body: there is never a second copy of it.

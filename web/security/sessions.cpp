@@ -30,6 +30,16 @@ std::string RandomBytes(std::size_t bytes) {
   return random;
 }
 
+std::string RandomCode(int letters) {
+  constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";
+  std::string code;
+  for (int i = 0; i < letters; ++i) {
+    if (i == letters / 2) code += '-';
+    code += kLetters[randombytes_uniform(static_cast<std::uint32_t>(kLetters.size()))];
+  }
+  return code;
+}
+
 std::string RandomToken(std::size_t bytes) {
   const std::string random = RandomBytes(bytes);
   std::string text(sodium_base64_ENCODED_LEN(bytes, sodium_base64_VARIANT_URLSAFE_NO_PADDING),

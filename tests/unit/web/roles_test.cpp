@@ -136,8 +136,7 @@ class RolesTest : public WebTest {
   /// "GET /path" of every route of the server.
   [[nodiscard]] std::vector<std::string> Routes() const {
     std::vector<std::string> routes;
-    for (const std::string& name : server_->RouteNames())
-      routes.push_back(name.substr(0, name.rfind(' ')));
+    for (const web::Route& route : server_->routes()) routes.push_back(route.Name());
     return routes;
   }
 
