@@ -617,7 +617,7 @@ await h.step('two at one plan: neither saves over or approves what they have not
   await clara.getByLabel('Rotations (degrees)').fill('2');
   await shift(bob).fill('6');
   await save(bob);
-  await clara.getByRole('alert').getByText('while you are editing it').waitFor();
+  await clara.getByRole('alert').getByText('while you were editing it').waitFor();
   equal(await shift(clara).inputValue(), '5', 'what is edited stays');
   await save(clara);
   await clara.getByRole('alert').getByText('Someone else has changed the plan').waitFor();

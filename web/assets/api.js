@@ -13,6 +13,7 @@ const kAnswer_ms = 20000;
 const kLongAnswer_ms = 60000;  // files, and what removes or packs many
 const kVeryLongAnswer_ms = 3600000;  // a backup of a full disk
 const kLogOut_ms = 5000;
+const kPicture_ms = 5000;
 const kSilent_s = 25;  // the appliance sends a beat every 5 s
 
 /// A moment, for since_s().
@@ -95,6 +96,24 @@ const readFile = async (response) => ({ blob: await response.blob(), name: nameO
 const orNothing = (response) => response.json().catch(() => ({}));
 const api = (path) => `/api/v1/${path}`;
 export const get = (path, background = false) => ask('GET', api(path), undefined, { background });
+export const getOrNull = (path) => get(path, true).catch(() => null);
+/// For pictures that are asked for again and again.
+export const fetchPicture = (path) => fetch(api(path), {
+  headers: { 'X-Plumb-Background': '1' }, cache: 'no-store',
+  signal: AbortSignal.timeout(kPicture_ms),
+});
+/// Calls `task` until the returned function is called; it returns after how many milliseconds
+/// again.
+export function repeat(task) {
+  let stopped = false;
+  const next = async () => {
+    if (stopped) return;
+    const wait_ms = await task();
+    setTimeout(next, wait_ms);
+  };
+  next();
+  return () => { stopped = true; };
+}
 export const getBytes = (path, onPart, timeout_ms = kLongAnswer_ms) =>
   ask('GET', api(path), undefined, {
     timeout_ms,

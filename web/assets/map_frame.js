@@ -148,6 +148,11 @@ function marks(view, compass) {
 export const setMarks = (box, view, compass) =>
   clear(box.querySelector('.all-ways'), marks(view, compass));
 
+/// @param reach  Half the length of its arms.
+export const crossAt = ([x, y], reach, look) => svg('path', {
+  d: `M${x - reach} ${y}h${2 * reach}M${x} ${y - reach}v${2 * reach}`, class: look,
+});
+
 /// @param canvas  Shows the view; what stands over it is drawn beside it.
 export function mapFrame({ grid, view, canvas, region, compass, isocentre, cross }) {
   const size = sizeOf(view);
@@ -156,13 +161,8 @@ export function mapFrame({ grid, view, canvas, region, compass, isocentre, cross
     transform: `translate(${-view.crop.left * grid.width * grid.step} `
       + `${-view.crop.top * grid.height * grid.step})`,
   }, outline && svg('path', { d: outline, class: 'outline' }),
-  isocentre && (() => {
-    const x = isocentre[0] - grid.x_min;
-    const y = grid.height * grid.step - (isocentre[1] - grid.y_min);
-    return svg('path', {
-      d: `M${x - size} ${y}h${2 * size}M${x} ${y - size}v${2 * size}`, class: 'isocentre',
-    });
-  })());
+  isocentre && crossAt([isocentre[0] - grid.x_min,
+    grid.height * grid.step - (isocentre[1] - grid.y_min)], size, 'isocentre'));
   const bar = Math.min(0.1, view.width / 3);
   const drawing = svg('svg', {
     viewBox: `0 0 ${view.width} ${view.height}`, class: 'frame', 'aria-hidden': 'true',

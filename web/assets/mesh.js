@@ -1,9 +1,10 @@
 // The 3-D view; loaded only when it is opened.
+import { arrowOf } from './dom.js';
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { cellAt, errorIndex, errorTable, kOutside } from './maps.js';
 import { orientationCube } from './mesh_cube.js';
-import { correctionOf, matrixOf, fractionOf } from './mesh_motion.js';
+import { correctionOf, fractionOf, mapFrameOf } from './mesh_motion.js';
 
 function geometryOf({ positions, corners }) {
   const geometry = new THREE.BufferGeometry();
@@ -16,6 +17,13 @@ function geometryOf({ positions, corners }) {
 const rowsOf = ({ elements }) => [0, 1, 2, 3].map((row) =>
   [0, 1, 2, 3].map((column) => elements[4 * column + row]));
 
+/// The cell of the map under a point of the mesh, or -1.
+function cellOf(grid, T, x, y, z) {
+  if (!grid) return -1;
+  return T ? cellAt(grid, T[0][0] * x + T[0][1] * y + T[0][2] * z + T[0][3],
+    T[1][0] * x + T[1][1] * y + T[1][2] * z + T[1][3]) : cellAt(grid, x, y);
+}
+
 /// Colours of the vertices by the error map; T maps the mesh's frame to the map's.
 /// @param region  NaN outside the region of interest: dimmed there, as the map is.
 function coloursByError(geometry, grid, deviation, region, T, tolerance_m) {
@@ -23,10 +31,7 @@ function coloursByError(geometry, grid, deviation, region, T, tolerance_m) {
   const colours = new Uint8Array(3 * position.count);
   const scale = errorTable();
   for (let i = 0; i < position.count; ++i) {
-    const [x, y, z] = [position.getX(i), position.getY(i), position.getZ(i)];
-    const u = T ? T[0][0] * x + T[0][1] * y + T[0][2] * z + T[0][3] : x;
-    const v = T ? T[1][0] * x + T[1][1] * y + T[1][2] * z + T[1][3] : y;
-    const cell = grid ? cellAt(grid, u, v) : -1;
+    const cell = cellOf(grid, T, position.getX(i), position.getY(i), position.getZ(i));
     const value = cell < 0 ? NaN : deviation.values[cell];
     const at = 3 * errorIndex(value / tolerance_m);
     const light = cell >= 0 && region && Number.isNaN(region.values[cell]) ? kOutside : 1;
@@ -38,6 +43,7 @@ function coloursByError(geometry, grid, deviation, region, T, tolerance_m) {
 }
 
 const kGround = 0x0d1216;
+const kTurn = 0.1;  // radians for each arrow key
 
 /// A word that faces the viewer and hides behind nothing.
 function label(text, height) {
@@ -85,10 +91,7 @@ function boxOfInterest(geometry, grid, region, T) {
   const point = new THREE.Vector3();
   for (let i = 0; i < position.count; i += 3) {
     point.fromBufferAttribute(position, i);
-    const { x, y, z } = point;
-    const u = T ? T[0][0] * x + T[0][1] * y + T[0][2] * z + T[0][3] : x;
-    const v = T ? T[1][0] * x + T[1][1] * y + T[1][2] * z + T[1][3] : y;
-    const cell = grid && region ? cellAt(grid, u, v) : -1;
+    const cell = region ? cellOf(grid, T, point.x, point.y, point.z) : -1;
     if (cell >= 0 && !Number.isNaN(region.values[cell])) box.expandByPoint(point);
   }
   if (!box.isEmpty()) return box;
@@ -168,17 +171,15 @@ export function openMesh(canvas, {
     request();
   };
   canvas.addEventListener('keydown', (event) => {
-    const turn = {
-      ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1],
-    }[event.key];
+    const turn = arrowOf(event);
     const zoom = { '+': 0.9, '=': 0.9, '-': 1.1 }[event.key];
     if (!turn && !zoom) return;
     event.preventDefault();
     const offset = camera.position.clone().sub(controls.target);
     if (turn) {
-      offset.applyAxisAngle(new THREE.Vector3(0, 0, 1), turn[0]);
+      offset.applyAxisAngle(new THREE.Vector3(0, 0, 1), kTurn * turn[0]);
       const side = new THREE.Vector3().crossVectors(camera.up, offset).normalize();
-      const tilted = offset.clone().applyAxisAngle(side, turn[1]);
+      const tilted = offset.clone().applyAxisAngle(side, -kTurn * turn[1]);
       if (Math.abs(tilted.clone().normalize().z) < 0.99) offset.copy(tilted);
     }
     if (zoom) offset.multiplyScalar(zoom);
@@ -229,15 +230,15 @@ export function openMesh(canvas, {
     setFraction,
     cut,
     /// Moves the surface by a fraction of the correction, 0 to 1. Its colours are those of the
-    /// nearer end. @param deviationAfter The error map after the correction.
+    /// nearer end.
+    /// @param deviationAfter  The error map after the correction.
     correct(fraction, deviationAfter) {
       if (!correction) return;
       body.matrix.copy(fractionOf(correction, fraction, center));
       body.matrixWorldNeedsUpdate = true;
       if (fraction > 0.5) {
-        const toMap = T ? matrixOf(T) : new THREE.Matrix4();
         corrected ??= coloursByError(geometry, grid, deviationAfter, region,
-          rowsOf(toMap.multiply(correction)), tolerance_m);
+          rowsOf(mapFrameOf(T).multiply(correction)), tolerance_m);
       }
       geometry.setAttribute('color', fraction > 0.5 ? corrected : measured);
       request();
@@ -252,7 +253,7 @@ export function openMesh(canvas, {
           color: 0x6ea8ff, alphaHash: true, side: THREE.DoubleSide,
           clippingPlanes: material.clippingPlanes,
         }));
-        if (T) ghost.applyMatrix4(new THREE.Matrix4().set(...T.flat()).invert());
+        if (T) ghost.applyMatrix4(mapFrameOf(T).invert());
         scene.add(ghost);
       }
       if (ghost) ghost.visible = isGhostWanted;

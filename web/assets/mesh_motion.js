@@ -2,12 +2,15 @@
 import * as THREE from 'three';
 
 /// Makes a matrix of four rows.
-export const matrixOf = (rows) => new THREE.Matrix4().set(...rows.flat());
+const matrixOf = (rows) => new THREE.Matrix4().set(...rows.flat());
+
+/// From the frame of a mesh to the map's; the same without T.
+export const mapFrameOf = (T) => (T ? matrixOf(T) : new THREE.Matrix4());
 
 /// The motion by which the correction moves the current surface, in that surface's frame: it undoes
 /// the motion of the body in the map's frame.
 export function correctionOf(T, motion) {
-  const toMap = T ? matrixOf(T) : new THREE.Matrix4();
+  const toMap = mapFrameOf(T);
   return toMap.clone().invert().multiply(matrixOf(motion).invert()).multiply(toMap);
 }
 

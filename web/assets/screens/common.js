@@ -1,5 +1,5 @@
 // Parts that several screens show.
-import { get, live, since_s } from '../api.js';
+import { get, getOrNull, live, since_s } from '../api.js';
 import { clear, h } from '../dom.js';
 import { kJudgements } from '../numbers.js';
 import { S, translated } from '../strings.js';
@@ -93,6 +93,30 @@ export function lastKnownNote(look, role = 'status', before = () => '') {
   };
   return { element, draw };
 }
+
+/// As live.listen(); calls `tick` regularly besides. Returns what ends both.
+export function follow(listener, tick, every_ms = 1000) {
+  const stop = live.listen(listener);
+  const timer = setInterval(tick, every_ms);
+  return () => {
+    clearInterval(timer);
+    stop();
+  };
+}
+
+/// What belongs to a scan; null where there is none, or it cannot be had.
+export async function partsOf(scan) {
+  const [reference, details, scene] = await Promise.all([
+    scan.reference_id ? getOrNull(`references/${scan.reference_id}`) : null,
+    scan.result ? getOrNull(`results/${scan.id}`) : null,
+    getOrNull(`scans/${scan.id}/files/scene.json`)]);
+  return { reference, details, scene };
+}
+
+/// Parts of the body, in words; none: every part is as in the reference.
+export const findings = (parts) => h('ul', { class: 'findings' }, parts.length
+  ? parts.map((part) => h('li', {}, translated(part)))
+  : h('li', { class: 'fine-part' }, `✓ ${S.result.asReference}`));
 
 /// Codes by patient id, for lists.
 export async function patientCodes() {

@@ -1,6 +1,6 @@
 // Computes the couch readings to set from the present ones: nobody has to add in their head.
 import { live } from '../api.js';
-import { clear, field, h } from '../dom.js';
+import { clear, field, h, hint } from '../dom.js';
 import { isStill, kAxes } from '../numbers.js';
 import { S } from '../strings.js';
 
@@ -48,5 +48,5 @@ export function couchReadings({ result, details }) {
     return h('div', { class: 'couch-axis' }, field(`${text.axes[axis.name]} (cm)`, input), target);
   });
   return h('details', { class: 'couch' }, h('summary', {}, text.couch),
-    h('p', { class: 'hint' }, text.couchHint), h('div', { class: 'couch-axes' }, rows));
+    hint(text.couchHint), h('div', { class: 'couch-axes' }, rows));
 }

@@ -1,6 +1,6 @@
 // The card of the 3-D view, which is loaded only when it is opened.
 import { ApiError, getBytes } from '../api.js';
-import { action, checkbox, clear, h, select, warn } from '../dom.js';
+import { action, checkbox, clear, h, hint, saveFrom, select, warn } from '../dom.js';
 import { progressIn } from '../error_map.js';
 import { marksNote } from '../map_frame.js';
 import { loadMap } from '../maps.js';
@@ -94,7 +94,7 @@ function controls(view, canvas, { reference, scan, details }, compass) {
   const buttons = viewsOf(compass).map((name) =>
     action(nameOf(name, compass), async () => view.look(name), {}));
   const picture = action(text.screenshot, async () => {
-    h('a', { href: view.picture(), download: `plumb_${scan.id}_3d.png` }).click();
+    saveFrom(view.picture(), `plumb_${scan.id}_3d.png`);
   }, {});
   const cut = cutControls(view);
   if (!reference) return h('div', { class: 'row' }, buttons, picture, cut);
@@ -157,10 +157,10 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
       // A surface that did not arrive, or not whole, may arrive the next time; one that the browser
       // cannot show never will be.
       if (error instanceof ApiError || error instanceof DamagedSurface) offer(error.message);
-      else clear(place, h('p', { class: 'hint' }, text.meshFailed));
+      else clear(place, hint(text.meshFailed));
     }
   }, {});
-  const offer = (words) => clear(place, open, h('p', { class: 'hint' }, words));
+  const offer = (words) => clear(place, open, hint(words));
   place.classList.add('waiting');
   offer(text.meshHint);
   return { element: place, stop: () => view?.stop() };
