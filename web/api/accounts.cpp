@@ -177,7 +177,7 @@ void Accounts::AddRoutes(Routes& routes) {
   add("POST", "/api/v1/certificate/new", Permission::kSettings, BodyKind::kJson,
       &Accounts::MakeNewCertificate);
   routes.Read("/api/v1/users", Permission::kUsers, [this](const Request&) {
-    return JsonResponse({{"users", ListJson(users_.Users())}});
+    return JsonResponse({{"users", users_.Users()}});
   });
   add("POST", "/api/v1/users", Permission::kUsers, BodyKind::kJson, &Accounts::AddUser);
   add("PUT", "/api/v1/users/{name}", Permission::kUsers, BodyKind::kJson, &Accounts::ChangeUser);
@@ -362,7 +362,7 @@ void Accounts::ShowLastLogin(const Request& request, const Respond& respond) {
       background_, "last login",
       [this, user = request.session->user, begun] {
         const LoginHistory history = LoginsBefore(audit_, user, begun);
-        return JsonResponse({{"last", history.last ? Json{{"time", TimeText(history.last->time)},
+        return JsonResponse({{"last", history.last ? Json{{"time", history.last->time},
                                                           {"address", history.last->address}}
                                                    : Json(nullptr)},
                              {"failed", history.failed}});

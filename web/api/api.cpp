@@ -161,7 +161,7 @@ void AddPatientRoutes(Routes& routes, PatientService& patients, ReferenceService
   routes
       .ReadInBackground("/api/v1/patients", Permission::kView,
                         [&patients](const Request&) {
-                          return JsonResponse({{"patients", ListJson(patients.Patients())}});
+                          return JsonResponse({{"patients", patients.Patients()}});
                         })
       .Discloses("view.patients");
   routes.Write(
@@ -179,8 +179,7 @@ void AddPatientRoutes(Routes& routes, PatientService& patients, ReferenceService
       .Read("/api/v1/patients/{id}", Permission::kRoom,
             [&patients](const Request& request) {
               const auto patient = patients.FindPatient(request.arguments[0]);
-              return patient ? JsonResponse(ToJson(*patient))
-                             : ErrorResponse(404, "no such patient");
+              return patient ? JsonResponse(*patient) : ErrorResponse(404, "no such patient");
             })
       .Discloses("view.patient")
       .ShowsDisplays(ShownRecord::kPatient, "no such patient");
@@ -231,8 +230,7 @@ void AddPatientRoutes(Routes& routes, PatientService& patients, ReferenceService
           [&patients, &references](const Request& request) {
             if (!patients.FindPatient(request.arguments[0]))
               return ErrorResponse(404, "no such patient");
-            return JsonResponse(
-                {{"references", ListJson(references.References(request.arguments[0]))}});
+            return JsonResponse({{"references", references.References(request.arguments[0])}});
           })
       .Discloses("view.patient");
   routes
@@ -249,7 +247,7 @@ void AddPatientRoutes(Routes& routes, PatientService& patients, ReferenceService
 
 void AddTemplateRoutes(Routes& routes, SettingsService& settings) {
   routes.Read("/api/v1/templates", Permission::kView, [&settings](const Request&) {
-    return JsonResponse({{"templates", ListJson(settings.Templates())}});
+    return JsonResponse({{"templates", settings.Templates()}});
   });
   routes.Write("PUT", "/api/v1/templates", Permission::kPlan, BodyKind::kJson,
                [&settings](const Request& request, const Done& done) {
@@ -278,8 +276,8 @@ void AddReferenceRoutes(Routes& routes, ReferenceService& references) {
                         [&references](const Request& request) {
                           const auto reference = references.FindReference(request.arguments[0]);
                           if (!reference) return ErrorResponse(404, "no such reference");
-                          Json json = ToJson(*reference);
-                          json["room"] = ToJson(references.RoomOfReference(*reference));
+                          Json json = *reference;
+                          json["room"] = references.RoomOfReference(*reference);
                           return JsonResponse(json);
                         })
       .Discloses("view.reference")
@@ -373,7 +371,7 @@ void AddSettingsRoutes(Routes& routes, SettingsService& settings, AuditLog& audi
             const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
             const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
             const bool views = QueryNumber(request, "views", 1, 1) == 1;
-            return JsonResponse({{"entries", ListJson(audit.Audit({before, limit, "", views}))}});
+            return JsonResponse({{"entries", audit.Audit({before, limit, "", views})}});
           })
       .Discloses("view.log");
   routes
@@ -394,7 +392,7 @@ void AddSettingsRoutes(Routes& routes, SettingsService& settings, AuditLog& audi
 
 void AddUpdateRoutes(Routes& routes, UpdateService& updates) {
   routes.Read("/api/v1/update", Permission::kView, [&updates](const Request&) {
-    Json answer = ToJson(updates.GetUpdate());
+    Json answer = updates.GetUpdate();
     answer["stick"] = updates.StickBundles();
     return JsonResponse(answer);
   });
@@ -429,8 +427,7 @@ void AddUpdateRoutes(Routes& routes, UpdateService& updates) {
 
 void AddMaintenanceRoutes(Routes& routes, MaintenanceService& maintenance, AuditLog& audit) {
   routes.ReadInBackground("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
-    const std::optional<AuditEntry> last = LastBackup(audit);
-    return JsonResponse({{"last", last ? ToJson(*last) : Json(nullptr)}});
+    return JsonResponse({{"last", LastBackup(audit)}});
   });
   routes.Write("POST", "/api/v1/backup", Permission::kSettings, BodyKind::kNone,
                [&maintenance](const Request& request, const Done& done) {

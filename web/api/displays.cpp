@@ -129,7 +129,7 @@ Response Displays::List() {
   for (const Display& display : service_.Displays()) {
     list.push_back(Json{{"id", display.id},
                         {"name", display.name},
-                        {"paired_at", TimeText(display.paired_at)},
+                        {"paired_at", display.paired_at},
                         {"paired_by", display.paired_by}});
   }
   return JsonResponse({{"displays", list}});

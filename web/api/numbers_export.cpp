@@ -59,7 +59,7 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
 }
 
 std::string NumbersJson(const Patient& patient, const std::vector<Scan>& scans) {
-  return Dump({{"patient", ToJson(patient)}, {"scans", ListJson(scans, WallClock::now())}});
+  return Dump({{"patient", patient}, {"scans", ListJson(scans, WallClock::now())}});
 }
 
 void AddReports(Routes& routes, ScanService& scans) {
@@ -171,7 +171,7 @@ Json ProfilesJson(const SensorProfiles& profiles) {
       {"serial", profiles.serial}, {"why_none", profiles.why_none}, {"versions", Json::array()}};
   for (const SensorProfileVersion& one : profiles.versions)
     json["versions"].push_back({{"version", one.version},
-                                {"made_at", TimeText(one.made_at)},
+                                {"made_at", one.made_at},
                                 {"cause", one.cause},
                                 {"num_sweeps", one.num_sweeps},
                                 {"values", one.values}});

@@ -8,10 +8,8 @@ namespace plumb::web {
 namespace {
 
 Json ScanJson(const RoomBoardScan& scan) {
-  Json json = {{"check", scan.check_id},
-               {"time", TimeText(scan.time)},
-               {"user", scan.user},
-               {"fault", scan.fault}};
+  Json json = {
+      {"check", scan.check_id}, {"time", scan.time}, {"user", scan.user}, {"fault", scan.fault}};
   if (!scan.fault.empty()) return json;
   json["num_markers"] = scan.num_markers;
   json["rms_mm"] = scan.rms_mm;
@@ -22,13 +20,10 @@ Json ScanJson(const RoomBoardScan& scan) {
 }
 
 Json VersionJson(const RoomCalibrationVersion& one) {
-  return {{"version", one.version},     {"signed_at", TimeText(one.signed_at)},
-          {"signed_by", one.signed_by}, {"digest", one.digest},
-          {"shift_mm", one.shift_mm},   {"turn_deg", one.turn_deg},
+  return {{"version", one.version}, {"signed_at", one.signed_at}, {"signed_by", one.signed_by},
+          {"digest", one.digest},   {"shift_mm", one.shift_mm},   {"turn_deg", one.turn_deg},
           {"checks", one.check_ids}};
 }
-
-Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 Json StatusJson(const RoomCalibrationStatus& status) {
   Json json = {{"versions", Json::array()},
@@ -36,8 +31,8 @@ Json StatusJson(const RoomCalibrationStatus& status) {
                {"configured", status.is_configured},
                {"scans", Json::array()},
                {"num_wanted", status.num_wanted},
-               {"shift_mm", OrNull(status.shift_mm)},
-               {"turn_deg", OrNull(status.turn_deg)},
+               {"shift_mm", status.shift_mm},
+               {"turn_deg", status.turn_deg},
                {"max_shift_mm", status.max_shift_mm},
                {"max_turn_deg", status.max_turn_deg},
                {"why_not_sign", status.why_not_sign},
