@@ -1,7 +1,6 @@
 // Set-up, login and accounts: everything that handles passwords.
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>

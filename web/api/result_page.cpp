@@ -1,7 +1,6 @@
 // The last result as plain HTML: for browsers without script, and for printing.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 

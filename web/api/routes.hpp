@@ -2,7 +2,7 @@
 #pragma once
 
 #include <functional>
-#include <string>
+#include <utility>
 
 #include "web/http/router.hpp"
 #include "web/model/change.hpp"

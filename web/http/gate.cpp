@@ -1,9 +1,9 @@
 #include "web/http/gate.hpp"
 
-#include <fmt/format.h>
 #include <sodium.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 

@@ -3,7 +3,6 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <vector>
 
 #include "algo/base/errors.hpp"
 
