@@ -221,7 +221,7 @@ void Appliance::AuditAct(ScanAction action, const Actor& actor) {
 void Appliance::Audit(const Actor& actor, const std::string& action, const std::string& subject,
                       const std::string& detail) {
   const auto report = [action](std::string_view why) {
-    Log(LogLevel::kError, fmt::format("the audit log does not take '{}': {}", action, why));
+    Log(LogLevel::kError, fmt::format("cannot write '{}' to the audit log: {}", action, why));
   };
   if (store_ == nullptr) return report(storage_fault_);
   const bool posted = store_thread_.Post([=, this] {

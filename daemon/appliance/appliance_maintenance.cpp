@@ -100,7 +100,7 @@ void Appliance::CheckRecords() {
       // The journal is stored separately: if somebody rewrites the whole log, its last digest no
       // longer matches the one that was noted here.
       if (const AuditHead head = store_->audit.Head(); fault.empty())
-        Log(LogLevel::kInfo, fmt::format("the audit log is whole up to entry {}, chain {}",
+        Log(LogLevel::kInfo, fmt::format("the audit log is intact up to entry {}, chain {}",
                                          head.number, head.chain));
     } catch (const DatabaseCorrupt& error) {
       loop_.Post("record check", [this, what = std::string(error.what())] {

@@ -8,12 +8,8 @@
 
 namespace plumb {
 
-Change Refusal(ChangeResult result, std::string message) {
-  return {.result = result, .message = std::move(message), .id = {}, .file = {}};
-}
-
 Change AnswerOf(const std::string& why_not) {
-  return Refusal(why_not.empty() ? ChangeResult::kDone : ChangeResult::kConflict, why_not);
+  return Refused(why_not.empty() ? ChangeResult::kDone : ChangeResult::kConflict, why_not);
 }
 
 std::string StoreAccess::Unreadable(const std::exception& error) {
@@ -34,7 +30,7 @@ std::string StoreAccess::WhyUnreadable(const std::function<void(Store&)>& read) 
 
 void StoreAccess::RunOnStoreThread(Done done, std::function<std::string(Store&)> change) {
   Store* store = appliance_.store();
-  if (store == nullptr) return done(Refusal(ChangeResult::kFailed, appliance_.storage_fault()));
+  if (store == nullptr) return done(Refused(ChangeResult::kFailed, appliance_.storage_fault()));
   // The store's thread outlives this object, which must not be used there.
   const bool posted = appliance_.store_thread().Post(
       [store, done, appliance = &appliance_, change = std::move(change), alive = alive_] {
@@ -42,11 +38,11 @@ void StoreAccess::RunOnStoreThread(Done done, std::function<std::string(Store&)>
         try {
           answer.id = change(*store);
         } catch (const StoreRefusal& refusal) {
-          answer = Refusal(refusal.result(), refusal.what());
+          answer = Refused(refusal.result(), refusal.what());
         } catch (const DiskRefused& error) {
-          answer = Refusal(ChangeResult::kNoSpace, error.what());
+          answer = Refused(ChangeResult::kNoSpace, error.what());
         } catch (const std::exception& error) {
-          answer = Refusal(ChangeResult::kFailed, error.what());
+          answer = Refused(ChangeResult::kFailed, error.what());
         }
         appliance->loop().Post("store changed", [appliance, done, answer, alive] {
           if (!*alive) return;
@@ -54,7 +50,7 @@ void StoreAccess::RunOnStoreThread(Done done, std::function<std::string(Store&)>
           if (answer.result == ChangeResult::kDone) appliance->NotifyWeb(web::EventKind::kData);
         });
       });
-  if (!posted) done(Refusal(ChangeResult::kFailed, "the store is busy: try again"));
+  if (!posted) done(Refused(ChangeResult::kFailed, "the store is busy: try again"));
 }
 
 }  // namespace plumb

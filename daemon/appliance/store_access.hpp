@@ -14,8 +14,6 @@
 
 namespace plumb {
 
-/// An answer with a message, mostly for a change that was not made.
-[[nodiscard]] Change Refusal(ChangeResult result, std::string message);
 /// Done if `why_not` is empty, otherwise a conflict with the state of the appliance.
 [[nodiscard]] Change AnswerOf(const std::string& why_not);
 

@@ -17,9 +17,7 @@ namespace {
 
 const Actor kInstaller{.user = "installer", .address = {}};
 
-Change Conflict(std::string why) {
-  return {.result = ChangeResult::kConflict, .message = std::move(why), .id = {}, .file = {}};
-}
+Change Conflict(std::string why) { return Refused(ChangeResult::kConflict, std::move(why)); }
 
 }  // namespace
 
@@ -136,9 +134,9 @@ void Updates::InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile
     try {
       copy = CopyBundle(file->fd(), folder, max_bytes);
     } catch (const DataError& error) {
-      failure = {.result = ChangeResult::kInvalid, .message = error.what(), .id = {}, .file = {}};
+      failure = Refused(ChangeResult::kInvalid, error.what());
     } catch (const std::exception& error) {
-      failure = {.result = ChangeResult::kFailed, .message = error.what(), .id = {}, .file = {}};
+      failure = Refused(ChangeResult::kFailed, error.what());
     }
     loop.Post("bundle copied", [copied, copy, failure, alive] {
       if (*alive) copied(copy, failure);
@@ -152,10 +150,8 @@ void Updates::InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile
 void Updates::InstallFromStick(const Actor& actor, const std::string& bundle, Done done) {
   auto file = std::make_shared<const AttachedFile>(sticks_.Open(bundle));
   if (file->fd() < 0) {
-    return done({.result = ChangeResult::kNotFound,
-                 .message = fmt::format("no USB stick with {} is plugged in", bundle),
-                 .id = {},
-                 .file = {}});
+    return done(Refused(ChangeResult::kNotFound,
+                        fmt::format("no USB stick with {} is plugged in", bundle)));
   }
   InstallFile(actor, std::move(file), bundle, std::move(done));
 }
@@ -172,7 +168,7 @@ void Updates::ResetToFactory(const Actor& actor, FactoryReset kind, Done done) {
   const auto noted = [this, actor, kind, done](const std::string& failure) {
     if (!failure.empty()) {
       restarting_ = false;
-      return done({.result = ChangeResult::kFailed, .message = failure, .id = {}, .file = {}});
+      return done(Refused(ChangeResult::kFailed, failure));
     }
     options_.log(actor, "system.factory_reset_request", "",
                  kind == FactoryReset::kWipe ? "everything is removed" : "records are kept");
@@ -212,7 +208,7 @@ void Updates::GoDown(const Actor& actor, Done done) {
         restarting_ = false;
         options_.log(actor, "system.restart_failed", "", failure);
         Log(LogLevel::kError, failure);
-        done({.result = ChangeResult::kFailed, .message = failure, .id = {}, .file = {}});
+        done(Refused(ChangeResult::kFailed, failure));
       });
 }
 

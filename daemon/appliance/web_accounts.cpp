@@ -82,7 +82,7 @@ class WebAuditLog final : public web::AuditLog {
     const auto report = [action](const Change& answer) {
       if (answer.result == ChangeResult::kDone) return;
       plumb::Log(LogLevel::kError,
-                 fmt::format("the audit log does not take '{}': {}", action, answer.message));
+                 fmt::format("cannot write '{}' to the audit log: {}", action, answer.message));
     };
     store_.Write(&Store::audit, report,
                  [=](AuditStore& audit) { audit.Log(actor, action, subject, detail); });

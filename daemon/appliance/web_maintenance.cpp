@@ -28,12 +28,12 @@ class WebMaintenance final : public web::MaintenanceService {
   void MakeBackup(const Actor& actor, Done done) override {
     const std::filesystem::path folder = appliance_.BackupTarget();
     if (folder.empty())
-      return done(Refusal(ChangeResult::kInvalid,
+      return done(Refused(ChangeResult::kInvalid,
                           "no folder for backups is configured: set backup_folder in [storage]"));
     appliance_.BackUp(
         actor, folder, [done, alive = alive_](const std::string& error, const BackupReport&) {
           if (!*alive) return;
-          done(Refusal(error.empty() ? ChangeResult::kDone : ChangeResult::kFailed, error));
+          done(Refused(error.empty() ? ChangeResult::kDone : ChangeResult::kFailed, error));
         });
   }
 

@@ -75,10 +75,10 @@ class WebPatients final : public web::PatientService {
   void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
                    const std::string& reason, const std::string& replaces, Done done) override {
     const std::optional<Patient> patient = FindPatient(id);
-    if (!patient) return done(Refusal(ChangeResult::kNotFound, "there is no such patient"));
+    if (!patient) return done(Refused(ChangeResult::kNotFound, "there is no such patient"));
     if (purpose == ScanPurpose::kDailyCheck) {
       return done(
-          Refusal(ChangeResult::kInvalid, "a daily check is of no patient: open it as a check"));
+          Refused(ChangeResult::kInvalid, "a daily check is of no patient: open it as a check"));
     }
     if (const std::string why = WhyNotOpen(appliance_.IsRunning(), *patient, purpose); !why.empty())
       return done(AnswerOf(why));
@@ -93,7 +93,7 @@ class WebPatients final : public web::PatientService {
     if (open && open->patient_id == id && open->purpose == purpose &&
         purpose == ScanPurpose::kFraction) {
       appliance_.OpenSession(open->id, id, purpose, reason, actor);
-      return done({.result = ChangeResult::kDone, .message = {}, .id = open->id, .file = {}});
+      return done(DoneWith(open->id));
     }
     if (open && open->patient_id != id && open->id != replaces) {
       return done(AnswerOf(fmt::format("the session of {} is open (opened by {}): close it first",

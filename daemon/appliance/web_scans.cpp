@@ -37,7 +37,7 @@ class WebScans final : public web::ScanService {
     if (appliance_.IsRunning())
       return done(AnswerOf("a scan is running: accept its result, not an older one"));
     const std::optional<Scan> scan = FindScan(id);
-    if (!scan) return done(Refusal(ChangeResult::kNotFound, "there is no such scan"));
+    if (!scan) return done(Refused(ChangeResult::kNotFound, "there is no such scan"));
     // A scan from an earlier run of the appliance is too old to act on.
     if (scan->result && appliance_.AgeOf(id).value_or(kResultValid_s + 1) > kResultValid_s)
       return done(AnswerOf("this result is older than 2 minutes: scan again, then accept"));

@@ -37,7 +37,7 @@ class WebSettings final : public web::SettingsService {
 
   void ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) override {
     if (const std::string wrong = CheckSettings(change); !wrong.empty())
-      return done(Refusal(ChangeResult::kInvalid, wrong));
+      return done(Refused(ChangeResult::kInvalid, wrong));
     // The store's thread makes one change after the other, so none comes between reading and
     // writing.
     store_.Write(&Store::settings, std::move(done), [=](SettingsStore& stored) {

@@ -215,7 +215,7 @@ void Recovery::CollectOrphan(const fs::path& folder) {
   }
   if (failure == kInterrupted) {  // an older database may not know that the scan had ended
     return SetAside(folder, name + ScanFolders::kInterruptedSuffix,
-                    "it is complete, but its scan was never noted as done");
+                    "it is complete, but its scan was never recorded as finished");
   }
   if (outcome == "failed" || outcome == "cancelled")
     Discard(folder,

@@ -103,8 +103,9 @@ void StoreRemoval::RemoveScan(const Actor& actor, const std::string& id,
     if (query.Text(0) == "running")
       throw StoreRefusal(ChangeResult::kConflict, "this scan is running: discard it instead");
     if (query.Integer(1) != 0)
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "a reference is made of this scan: it goes only with its patient");
+      throw StoreRefusal(
+          ChangeResult::kConflict,
+          "this scan is the source of a reference: it is deleted only with its patient");
     NoteRemoved(change, ScanId(*number));
     change->Run("DELETE FROM scans WHERE id = ?", *number);
     change.Log(actor, "scan.remove", ScanId(*number), reason);

@@ -47,10 +47,6 @@ class DeferredClose {
 
 }  // namespace
 
-Change Refused(ChangeResult result, std::string message) {
-  return {.result = result, .message = std::move(message), .id = {}, .file = {}};
-}
-
 std::vector<std::string> BundleFolder::List() const {
   std::vector<std::string> names;
   std::error_code error;

@@ -11,8 +11,6 @@
 
 namespace plumb {
 
-[[nodiscard]] Change Refused(ChangeResult result, std::string message);
-
 /// Files named NAME.raucb. Not thread-safe.
 class BundleFolder {
  public:

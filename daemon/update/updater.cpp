@@ -382,7 +382,7 @@ struct Updater::Impl {
     const int result =
         sd_bus_call_method_async(bus.get(), nullptr, kService, kPath, kInstaller, "InstallBundle",
                                  &Impl::OnBegun, this, "sa{sv}", path.c_str(), 0);
-    if (result < 0) Refuse(ChangeResult::kFailed, "the installer cannot be asked");
+    if (result < 0) Refuse(ChangeResult::kFailed, "the installer cannot be reached");
   }
 
   static int OnBegun(sd_bus_message* message, void* self, sd_bus_error*) {
@@ -457,7 +457,7 @@ struct Updater::Impl {
                                             : sd_bus_call_method_async(
                                                   bus.get(), nullptr, kService, kPath, kInstaller,
                                                   "Info", &Impl::OnInfo, this, "s", file.c_str());
-    if (result < 0) return Refuse(ChangeResult::kFailed, "the installer cannot be asked");
+    if (result < 0) return Refuse(ChangeResult::kFailed, "the installer cannot be reached");
     bus.Process();
   }
 };

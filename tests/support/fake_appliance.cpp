@@ -19,10 +19,6 @@ FakeAppliance::FakeAppliance() {
   update.message = "updates need the appliance image";
 }
 
-Change FakeAppliance::Refusal(ChangeResult result, std::string message) {
-  return {result, std::move(message), "", ""};
-}
-
 Status FakeAppliance::GetStatus() {
   Status told = status;
   if (told.last_result && told.last_result->finished_at && !told.last_result->age_s)
@@ -47,19 +43,19 @@ void FakeAppliance::Did(const Actor& actor, const std::string& action, const std
                         const Done& done, const std::string& id) {
   Log(actor, action, subject, "");
   Notify(EventKind::kData);
-  Finish(done, {ChangeResult::kDone, "", id, ""});
+  Finish(done, DoneWith(id));
 }
 
 void FakeAppliance::StartSweep(const Actor& actor, Done done) {
   if (status.state == ApplianceState::kReady || status.state == ApplianceState::kResult)
     return Press(actor, std::move(done));
   Finish(done,
-         Refusal(ChangeResult::kConflict, "a scan is running already: end or cancel it first"));
+         Refused(ChangeResult::kConflict, "a scan is running already: end or cancel it first"));
 }
 
 void FakeAppliance::EndSweep(const Actor& actor, Done done) {
   if (status.state == ApplianceState::kScanning) return Press(actor, std::move(done));
-  Finish(done, Refusal(ChangeResult::kConflict, "no scan is running"));
+  Finish(done, Refused(ChangeResult::kConflict, "no scan is running"));
 }
 
 void FakeAppliance::Fail(const std::string& reason) {
@@ -94,7 +90,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
   }
   if (status.state != ApplianceState::kReady && status.state != ApplianceState::kResult) {
     return Finish(
-        done, Refusal(ChangeResult::kConflict,
+        done, Refused(ChangeResult::kConflict,
                       "in this state a press is ignored; it requires ready, scanning or result"));
   }
   Scan scan;
@@ -129,7 +125,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
 void FakeAppliance::Cancel(const Actor& actor, Done done) {
   if (!status.scan)
     return Finish(
-        done, Refusal(ChangeResult::kConflict,
+        done, Refused(ChangeResult::kConflict,
                       "in this state there is nothing to cancel; it requires scanning or working"));
   if (!is_check_) scans.back().outcome = ScanOutcome::kCancelled;
   if (!is_check_) scans.back().failure = "cancelled";
@@ -251,9 +247,9 @@ void FakeAppliance::SeeBoard(const CheckRecord& check) {
 
 void FakeAppliance::SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) {
   if (room.scans.size() < room.num_wanted || !room.why_not_sign.empty())
-    return Finish(done, Refusal(ChangeResult::kConflict, room.why_not_sign));
+    return Finish(done, Refused(ChangeResult::kConflict, room.why_not_sign));
   if (digest != room.digest) {
-    return Finish(done, Refusal(ChangeResult::kConflict,
+    return Finish(done, Refused(ChangeResult::kConflict,
                                 "the board has been scanned again since this was read: read it "
                                 "again"));
   }
@@ -286,7 +282,7 @@ std::optional<std::string> FakeAppliance::RoomBoardPdf(std::string& why_not) {
 }
 
 void FakeAppliance::OpenCheck(const Actor& actor, Done done) {
-  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  if (status.scan) return Finish(done, Refused(ChangeResult::kConflict, "a scan is running"));
   if (!is_check_) patient_before_check_ = status.patient_id;
   is_check_ = true;
   checker_ = actor.user;
@@ -300,9 +296,9 @@ void FakeAppliance::SetCheckBaseline(const Actor& actor, const std::string& chec
   const auto found = std::find_if(checks.checks.begin(), checks.checks.end(),
                                   [&](const CheckRecord& check) { return check.id == check_id; });
   if (found == checks.checks.end())
-    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such check"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "there is no such check"));
   if (found->user == actor.user)
-    return Finish(done, Refusal(ChangeResult::kRefused, "another person sets it as the baseline"));
+    return Finish(done, Refused(ChangeResult::kRefused, "another person sets it as the baseline"));
   checks.baseline = CheckBaseline{check_id, WallClock::now(), actor.user, found->num_markers};
   Did(actor, "check.baseline", check_id, done);
 }
@@ -315,7 +311,7 @@ std::optional<std::string> FakeAppliance::SensorProfileFile(int version) {
 
 void FakeAppliance::ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) {
   if (serial != profiles.serial)
-    return Finish(done, Refusal(ChangeResult::kConflict, "the sensor is not connected"));
+    return Finish(done, Refused(ChangeResult::kConflict, "the sensor is not connected"));
   SensorProfileVersion reset;
   reset.version = profiles.versions.empty() ? 1 : profiles.versions.front().version + 1;
   reset.made_at = WallClock::now();
@@ -327,7 +323,7 @@ void FakeAppliance::ResetSensorProfile(const Actor& actor, const std::string& se
 void FakeAppliance::RollBackSensorProfile(const Actor& actor, const std::string& serial,
                                           int version, Done done) {
   if (serial != profiles.serial)
-    return Finish(done, Refusal(ChangeResult::kConflict, "the sensor is not connected"));
+    return Finish(done, Refused(ChangeResult::kConflict, "the sensor is not connected"));
   for (SensorProfileVersion one : profiles.versions) {
     if (one.version != version || one.num_sweeps == 0) continue;
     one.version = profiles.versions.front().version + 1;
@@ -335,7 +331,7 @@ void FakeAppliance::RollBackSensorProfile(const Actor& actor, const std::string&
     profiles.versions.insert(profiles.versions.begin(), one);
     return Did(actor, "profile.roll_back", serial, done);
   }
-  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such version"));
+  Finish(done, Refused(ChangeResult::kNotFound, "there is no such version"));
 }
 
 void FakeAppliance::EndScan() {
@@ -404,7 +400,7 @@ void FakeAppliance::RemoveTemplate(const Actor& actor, const std::string& site, 
   if (std::erase_if(templates, [&](const PlanTemplate& old) {
         return strcasecmp(old.site.c_str(), site.c_str()) == 0;
       }) == 0)
-    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no template of this site"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "there is no template of this site"));
   Did(actor, "template.remove", "", done);
 }
 
@@ -417,14 +413,14 @@ void FakeAppliance::AddDisplay(const Actor& actor, const Display& display, Done 
 void FakeAppliance::RemoveDisplay(const Actor& actor, const std::string& id, Done done) {
   const auto found = std::ranges::find(displays, id, &Display::id);
   if (found == displays.end())
-    return Finish(done, Refusal(ChangeResult::kNotFound, "no such display"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "no such display"));
   const std::string name = found->name;
   displays.erase(found);
   Did(actor, "display.remove", name, done);
 }
 
 void FakeAppliance::MakeBackup(const Actor& actor, Done done) {
-  if (!backup_fault.empty()) return Finish(done, Refusal(ChangeResult::kInvalid, backup_fault));
+  if (!backup_fault.empty()) return Finish(done, Refused(ChangeResult::kInvalid, backup_fault));
   Did(actor, "backup.make", "", done);
 }
 
@@ -436,7 +432,7 @@ std::optional<User> FakeAppliance::FindUser(const std::string& name) {
 
 void FakeAppliance::AddUser(const Actor& actor, const User& user, Done done) {
   if (FindUser(user.name))
-    return Finish(done, Refusal(ChangeResult::kConflict, "this name is taken"));
+    return Finish(done, Refused(ChangeResult::kConflict, "this name is taken"));
   users.push_back(user);
   Did(actor, "user.add", user.name, done);
 }
@@ -449,9 +445,9 @@ void FakeAppliance::SetPreferences(const Actor& actor, const Preferences& prefer
 void FakeAppliance::ChangeUser(const Actor& actor, const UserChange& change, Done done) {
   const auto found = std::find_if(users.begin(), users.end(),
                                   [&](const User& other) { return other.name == change.name; });
-  if (found == users.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such user"));
+  if (found == users.end()) return Finish(done, Refused(ChangeResult::kNotFound, "no such user"));
   if (change.expected_hash && (found->disabled || found->password_hash != *change.expected_hash))
-    return Finish(done, Refusal(ChangeResult::kConflict,
+    return Finish(done, Refused(ChangeResult::kConflict,
                                 "the account has been changed by somebody else meanwhile"));
   User user = *found;
   user.role = change.role.value_or(user.role);
@@ -462,7 +458,7 @@ void FakeAppliance::ChangeUser(const Actor& actor, const UserChange& change, Don
     return after.role == Role::kEngineer && !after.disabled;
   });
   if (!engineer_left)
-    return Finish(done, Refusal(ChangeResult::kConflict, "one engineer must remain"));
+    return Finish(done, Refused(ChangeResult::kConflict, "one engineer must remain"));
   *found = user;
   Did(actor, "user.change", user.name, done);
 }
@@ -513,7 +509,7 @@ void FakeAppliance::AddBundle(const Actor& actor, const std::filesystem::path& f
   std::string magic(4, ' ');
   in.read(magic.data(), 4);
   if (magic != "hsqs")
-    return Finish(done, Refusal(ChangeResult::kInvalid,
+    return Finish(done, Refused(ChangeResult::kInvalid,
                                 name + " is not a bundle: expected a squashfs image"));
   uploaded_bytes = std::filesystem::file_size(file);
   update.bundles.push_back(name);
@@ -523,15 +519,15 @@ void FakeAppliance::AddBundle(const Actor& actor, const std::filesystem::path& f
 
 void FakeAppliance::RemoveBundle(const Actor& actor, const std::string& name, Done done) {
   if (std::erase(update.bundles, name) == 0)
-    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such bundle"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "there is no such bundle"));
   Notify(EventKind::kUpdate);
   Did(actor, "update.remove", name, done);
 }
 
 void FakeAppliance::InstallUpdate(const Actor& actor, const std::string& bundle, Done done) {
   if (status.scan)
-    return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running; update after it"));
-  if (!update.supported) return Finish(done, Refusal(ChangeResult::kConflict, update.message));
+    return Finish(done, Refused(ChangeResult::kConflict, "a scan is running; update after it"));
+  if (!update.supported) return Finish(done, Refused(ChangeResult::kConflict, update.message));
   update.installing = true;
   update.fraction = 0.4;
   update.message = "Copying image to rootfs.1";
@@ -541,14 +537,14 @@ void FakeAppliance::InstallUpdate(const Actor& actor, const std::string& bundle,
 
 void FakeAppliance::InstallFromStick(const Actor& actor, const std::string& bundle, Done done) {
   if (std::find(stick.begin(), stick.end(), bundle) == stick.end())
-    return Finish(done, Refusal(ChangeResult::kNotFound, "no USB stick with it is plugged in"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "no USB stick with it is plugged in"));
   if (std::find(update.bundles.begin(), update.bundles.end(), bundle) == update.bundles.end())
     update.bundles.push_back(bundle);
   InstallUpdate(actor, bundle, done);
 }
 
 void FakeAppliance::RestartSystem(const Actor& actor, Done done) {
-  const auto refuse = [&](const char* why) { Finish(done, Refusal(ChangeResult::kConflict, why)); };
+  const auto refuse = [&](const char* why) { Finish(done, Refused(ChangeResult::kConflict, why)); };
   if (update.installing) return refuse("a system update is being installed: wait until it is done");
   if (status.scan) return refuse("a scan is running: wait for its result");
   if (status.session) return refuse("the session of a patient is open: close it first");
@@ -558,7 +554,7 @@ void FakeAppliance::RestartSystem(const Actor& actor, Done done) {
 
 void FakeAppliance::ResetToFactory(const Actor& actor, FactoryReset kind, Done done) {
   if (status.session)
-    return Finish(done, Refusal(ChangeResult::kConflict,
+    return Finish(done, Refused(ChangeResult::kConflict,
                                 "the session of a patient is open: close it first, then restart"));
   factory_reset = kind;
   Did(actor, "system.factory_reset_request", "", done);

@@ -234,7 +234,6 @@ class FakeAppliance : public web::BackgroundWork,
   Reference& MakeReference(const Scan& scan, const std::string& by, const std::string& reason);
 
  private:
-  [[nodiscard]] static Change Refusal(ChangeResult result, std::string message);
   /// As the store describes it; sessions are remembered, all else is looked up.
   [[nodiscard]] std::optional<AuditSubject> SubjectOf(const AuditEntry& entry);
   void Finish(const Done& done, Change change);

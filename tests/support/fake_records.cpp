@@ -55,7 +55,7 @@ void FakeAppliance::AddPatient(const Actor& actor, const std::string& code, cons
   if (std::any_of(patients.begin(), patients.end(), [&](const Patient& patient) {
         return strcasecmp(patient.code.c_str(), code.c_str()) == 0;
       })) {
-    return Finish(done, Refusal(ChangeResult::kConflict, "there is a patient of this code"));
+    return Finish(done, Refused(ChangeResult::kConflict, "there is a patient of this code"));
   }
   patients.push_back({fmt::format("p{:04}", next_id_++), code, site, WallClock::now(), "", 0, ""});
   Did(actor, "patient.add", patients.back().id, done, patients.back().id);
@@ -67,14 +67,14 @@ void FakeAppliance::ChangePatient(const Actor& actor, const std::string& id,
   for (Patient& patient : patients) {
     if (patient.id != id) continue;
     if (shown && *shown != CourseNotes{.site = patient.site, .note = patient.note})
-      return Finish(done, Refusal(ChangeResult::kConflict,
+      return Finish(done, Refused(ChangeResult::kConflict,
                                   "this patient was changed by somebody else meanwhile: look "
                                   "again, then save"));
     patient.site = wanted.site;
     patient.note = wanted.note;
     return Did(actor, "patient.change", id, done);
   }
-  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such patient"));
+  Finish(done, Refused(ChangeResult::kNotFound, "there is no such patient"));
 }
 
 void FakeAppliance::ArchivePatient(const Actor& actor, const std::string& id, bool archived,
@@ -82,17 +82,17 @@ void FakeAppliance::ArchivePatient(const Actor& actor, const std::string& id, bo
   for (Patient& patient : patients) {
     if (patient.id != id) continue;
     if (archived && status.session && status.session->patient_id == id)
-      return Finish(done, Refusal(ChangeResult::kConflict,
+      return Finish(done, Refused(ChangeResult::kConflict,
                                   "the session of this patient is open: close it first"));
     patient.archived = archived;
     return Did(actor, archived ? "patient.archive" : "patient.unarchive", id, done);
   }
-  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such patient"));
+  Finish(done, Refused(ChangeResult::kNotFound, "there is no such patient"));
 }
 
 void FakeAppliance::WipePatient(const Actor& actor, const std::string& id, Done done) {
   if (std::erase_if(patients, [&](const Patient& patient) { return patient.id == id; }) == 0) {
-    return Finish(done, Refusal(ChangeResult::kNotFound, "no such patient"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "no such patient"));
   }
   std::erase_if(references, [&](const Reference& reference) { return reference.patient_id == id; });
   std::erase_if(scans, [&](const Scan& scan) { return scan.patient_id == id; });
@@ -108,17 +108,17 @@ void FakeAppliance::WipePatient(const Actor& actor, const std::string& id, Done 
 void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
                                 const std::string&, const std::string& replaces, Done done) {
   const Patient* patient = PatientOf(id);
-  if (patient == nullptr) return Finish(done, Refusal(ChangeResult::kNotFound, "no such patient"));
+  if (patient == nullptr) return Finish(done, Refused(ChangeResult::kNotFound, "no such patient"));
   if (purpose == ScanPurpose::kFraction && patient->approved_reference_id.empty()) {
-    return Finish(done, Refusal(ChangeResult::kConflict,
+    return Finish(done, Refused(ChangeResult::kConflict,
                                 "this patient has no approved reference; take one first"));
   }
-  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  if (status.scan) return Finish(done, Refused(ChangeResult::kConflict, "a scan is running"));
   if (patient->archived)
-    return Finish(done, Refusal(ChangeResult::kConflict,
+    return Finish(done, Refused(ChangeResult::kConflict,
                                 "this patient is archived: take it out of the archive first"));
   if (purpose == ScanPurpose::kReference && !status.reference_block.empty())
-    return Finish(done, Refusal(ChangeResult::kConflict, status.reference_block));
+    return Finish(done, Refused(ChangeResult::kConflict, status.reference_block));
   CloseCheck();
   if (status.session && status.session->patient_id == id && status.session->purpose == purpose) {
     const std::string same = status.session->id;
@@ -126,7 +126,7 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
   }
   if (status.session && status.session->patient_id != id && status.session->id != replaces) {
     return Finish(done,
-                  Refusal(ChangeResult::kConflict,
+                  Refused(ChangeResult::kConflict,
                           fmt::format("the session of {} is open (opened by {}): close it "
                                       "first",
                                       status.session->patient_code, status.session->opened_by)));
@@ -149,9 +149,9 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
 }
 
 void FakeAppliance::CloseSession(const Actor& actor, const std::string& session_id, Done done) {
-  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  if (status.scan) return Finish(done, Refused(ChangeResult::kConflict, "a scan is running"));
   if (!status.session || (!session_id.empty() && status.session->id != session_id))
-    return Finish(done, Refusal(ChangeResult::kConflict, "this session is closed already"));
+    return Finish(done, Refused(ChangeResult::kConflict, "this session is closed already"));
   const std::string id = status.session->id;
   status.session.reset();
   status.patient_id.clear();
@@ -230,9 +230,9 @@ void FakeAppliance::AddReference(const Actor& actor, const std::string& scan_id,
                                  const std::string& reason, Done done) {
   const auto scan = FindScan(scan_id);
   if (!scan || scan->outcome != ScanOutcome::kDone)
-    return Finish(done, Refusal(ChangeResult::kNotFound, "no finished scan of this id"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "no finished scan of this id"));
   if (!status.reference_block.empty())
-    return Finish(done, Refusal(ChangeResult::kConflict, status.reference_block));
+    return Finish(done, Refused(ChangeResult::kConflict, status.reference_block));
   const std::string id = MakeReference(*scan, actor.user, reason).id;
   Did(actor, "reference.add", id, done, id);
 }
@@ -242,10 +242,10 @@ void FakeAppliance::PlanReference(const Actor& actor, const std::string& id, int
   const auto found = std::find_if(references.begin(), references.end(),
                                   [&](const Reference& reference) { return reference.id == id; });
   if (found == references.end())
-    return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "no such reference"));
   if (found->revision != revision)
     return Finish(done,
-                  Refusal(ChangeResult::kConflict, "this plan has been changed by somebody else"));
+                  Refused(ChangeResult::kConflict, "this plan has been changed by somebody else"));
   if (found->approved_by.empty()) {
     found->plan = plan;
     ++found->revision;
@@ -274,22 +274,22 @@ void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, 
   const auto found = std::find_if(references.begin(), references.end(),
                                   [&](const Reference& reference) { return reference.id == id; });
   if (found == references.end())
-    return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "no such reference"));
   if (!status.reference_block.empty())
-    return Finish(done, Refusal(ChangeResult::kConflict, status.reference_block));
+    return Finish(done, Refused(ChangeResult::kConflict, status.reference_block));
   if (!found->approved_by.empty())
-    return Finish(done, Refusal(ChangeResult::kConflict, "this reference is approved already"));
+    return Finish(done, Refused(ChangeResult::kConflict, "this reference is approved already"));
   if (found->revision != revision)
     return Finish(done,
-                  Refusal(ChangeResult::kConflict, "this plan has been changed by somebody else"));
+                  Refused(ChangeResult::kConflict, "this plan has been changed by somebody else"));
   if (!digest.empty() && digest != found->digest)
-    return Finish(done, Refusal(ChangeResult::kConflict, "what is stored is not what was shown"));
+    return Finish(done, Refused(ChangeResult::kConflict, "what is stored is not what was shown"));
   if (found->planned_by.empty())
-    return Finish(done, Refusal(ChangeResult::kConflict,
+    return Finish(done, Refused(ChangeResult::kConflict,
                                 "nobody has planned this reference: save its plan first"));
   if (found->created_by == actor.user || found->planned_by == actor.user) {
     return Finish(done,
-                  Refusal(ChangeResult::kRefused,
+                  Refused(ChangeResult::kRefused,
                           "a second person must approve: you made or planned this reference"));
   }
   found->approved_by = actor.user;
@@ -314,10 +314,11 @@ void FakeAppliance::RemoveScan(const Actor& actor, const std::string& id, const 
                                Done done) {
   for (const Reference& reference : references) {
     if (reference.scan_id == id)
-      return Finish(done, Refusal(ChangeResult::kConflict, "a reference is made of this scan"));
+      return Finish(done,
+                    Refused(ChangeResult::kConflict, "this scan is the source of a reference"));
   }
   if (std::erase_if(scans, [&](const Scan& scan) { return scan.id == id; }) == 0)
-    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such scan"));
+    return Finish(done, Refused(ChangeResult::kNotFound, "there is no such scan"));
   Notify(EventKind::kData);
   Did(actor, "scan.remove", id, done);
 }
@@ -326,8 +327,8 @@ void FakeAppliance::AcceptScan(const Actor& actor, const std::string& id, const 
                                Done done) {
   const auto found =
       std::find_if(scans.begin(), scans.end(), [&](const Scan& scan) { return scan.id == id; });
-  if (found == scans.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such scan"));
-  const auto refuse = [&](const char* why) { Finish(done, Refusal(ChangeResult::kConflict, why)); };
+  if (found == scans.end()) return Finish(done, Refused(ChangeResult::kNotFound, "no such scan"));
+  const auto refuse = [&](const char* why) { Finish(done, Refused(ChangeResult::kConflict, why)); };
   if (status.scan) return refuse("a scan is running: accept its result, not an older one");
   if (!found->result || found->result->verdict == "no_answer")
     return refuse("there is nothing to accept");

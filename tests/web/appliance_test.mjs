@@ -151,7 +151,7 @@ await h.step('the daily check of the real markers: no baseline, then passed', as
     console.log(`    ${(await bob.locator('tbody tr').allInnerTexts()).slice(0, 6).join(' | ').replace(/\s+/g, ' ')}`);
   };
   await takeCheck('NO BASELINE');
-  await bob.getByText('Another physicist than the one who took this check').waitFor();
+  await bob.getByText('A physicist other than the one who took this check').waitFor();
   const second = await h.person('second');
   await h.logIn(second, 'clara');
   await second.goto(`${h.url}#/check`);

@@ -111,7 +111,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   equal(await bob.getByLabel('Isocentre x').inputValue(), '', 'no isocentre');
   // A marker that was laid at the lasers.
   await bob.getByLabel('Marker at the lasers').selectOption('Marker 1');
-  await bob.getByRole('button', { name: 'Take its centre' }).click();
+  await bob.getByRole('button', { name: 'Use its centre' }).click();
   const { markers } = await bob.evaluate(async () => {
     const get = async (path) => (await fetch(`/api/v1/${path}`)).json();
     return get(`scans/${(await get(`references/${location.hash.split('/')[2]}`)).scan_id}/files/scene.json`);
@@ -236,7 +236,7 @@ await h.step('corners by keys where the crosshair is, and one taken away by a fi
 
 await h.step('unsaved work: asked before it is left, kept for its person where the session ends, discarded where they say so', async () => {
   const shift = bob.getByLabel('Shifts (mm)');
-  const note = bob.getByText('Your unsaved changes from before were kept.');
+  const note = bob.getByText('Your earlier unsaved changes were kept.');
   const kept = () => bob.evaluate(() => Object.keys(sessionStorage).filter((key) => key.startsWith('plumb-plan-')).length);
   const logInHere = async (name) => {
     await bob.getByLabel('Name').fill(name);
@@ -382,7 +382,7 @@ await h.step('the surface opens in 3-D', async () => {
   await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
   await anna.getByRole('progressbar', { name: 'Loading the surface' }).waitFor();
   go();
-  await anna.locator('.mesh-place').getByText('The appliance does not answer.').waitFor();
+  await anna.locator('.mesh-place').getByText('The appliance is not responding.').waitFor();
   await anna.unroute(surface);
   await anna.route(surface, (route) => route.fulfill({ contentType: 'application/octet-stream', body: 'PLM2 and no more' }));
   await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
@@ -419,7 +419,7 @@ await h.step('the surface opens in 3-D', async () => {
   // The cut takes away, the more the further it goes; without it all is there again.
   const whole = await drawn();
   await anna.getByLabel('Cut', { exact: true }).selectOption({ label: 'lengthwise' });
-  const where = anna.getByLabel('Place of the cut');
+  const where = anna.getByLabel('Position of the cut');
   const half = await drawn();
   check(half.bright < 0.9 * whole.bright, `the cut leaves ${half.bright} of ${whole.bright}`);
   keep('mesh-cut', half.bytes);
@@ -757,7 +757,7 @@ await h.step('a factory reset: its kind chosen, wiping with its word typed, the 
   await submit.waitFor();
   equal(await word.isVisible(), false, 'no word to type yet');
   await engineer.getByLabel('What to reset').selectOption('wipe');
-  await engineer.getByText('Only a backup elsewhere brings them back').waitFor();
+  await engineer.getByText('They can be recovered only from a backup').waitFor();
   await word.fill('wipe');
   await password.fill(h.password);
   await submit.click();

@@ -118,6 +118,18 @@ await h.step('a link with the key pairs a display without a code, and does not k
   await wall.context().close();
 });
 
+await h.step('a person may log in on the screen in the room instead of pairing it', async () => {
+  const tablet = await h.person('tablet', { width: 1280, height: 800 });
+  await tablet.goto(`${h.url}room`);
+  await tablet.getByRole('button', { name: 'Log in' }).click();
+  await tablet.getByLabel('Name').fill('bob');
+  await tablet.getByLabel('Password').fill(h.password);
+  await tablet.getByRole('button', { name: 'Log in' }).click();
+  await tablet.locator('.room-code').waitFor();
+  equal(await tablet.locator('#alert').innerText(), '', 'nothing went wrong');
+  await tablet.context().close();
+});
+
 await h.step('one tap opens, confirms and leads to the sweep; the room says whose session', async () => {
   await openOnPage(anna, 'P-0042');
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).waitFor();

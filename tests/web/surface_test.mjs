@@ -16,7 +16,7 @@ for (const name of ['inflate', 'packed_mesh', 'mesh_motion']) {
 }
 const load = (file) => import(pathToFileURL(file).href);
 const { readMesh } = await load(join(folder, 'packed_mesh.js'));
-const { correctionOf, shareOf } = await load(join(folder, 'mesh_motion.js'));
+const { correctionOf, fractionOf } = await load(join(folder, 'mesh_motion.js'));
 const { Vector3 } = await load(createRequire(join(folder, 'package.json')).resolve('three')
   .replace('three.cjs', 'three.module.js'));
 rmSync(folder, { recursive: true });
@@ -120,17 +120,17 @@ for (const p of kPoints) {
 }
 
 const centre = [0.2, 0.1, 0.15];
-const shareAt = (share) => shareOf(correction, share, new Vector3(...centre));
+const motionAt = (fraction) => fractionOf(correction, fraction, new Vector3(...centre));
 const turnOf = ({ elements: e }) => Math.acos((e[0] + e[5] + e[10] - 1) / 2) * 180 / Math.PI;
 for (const p of kPoints) {
-  check(apart(by(shareAt(0), p), p) < 1e-9, `${p}: nothing has moved at first`);
-  check(apart(by(shareAt(1), p), by(correction, p)) < 1e-9, `${p}: all of the correction at the end`);
+  check(apart(by(motionAt(0), p), p) < 1e-9, `${p}: nothing has moved at first`);
+  check(apart(by(motionAt(1), p), by(correction, p)) < 1e-9, `${p}: all of the correction at the end`);
 }
-for (const share of [0.25, 0.5, 0.8]) {
-  check(Math.abs(turnOf(shareAt(share)) - 12 * share) < 1e-6, `${share} of the turn`);
+for (const fraction of [0.25, 0.5, 0.8]) {
+  check(Math.abs(turnOf(motionAt(fraction)) - 12 * fraction) < 1e-6, `${fraction} of the turn`);
   const end = by(correction, centre);
-  const expected = centre.map((value, i) => value + share * (end[i] - value));
-  check(apart(by(shareAt(share), centre), expected) < 1e-9, `${share} of the way of the centre`);
+  const expected = centre.map((value, i) => value + fraction * (end[i] - value));
+  check(apart(by(motionAt(fraction), centre), expected) < 1e-9, `${fraction} of the way of the centre`);
 }
 
 for (const failure of failures) console.log(`  - ${failure}`);

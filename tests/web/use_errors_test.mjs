@@ -337,7 +337,7 @@ await h.step('the map of a plan names the sides that its posture has in a known 
   const way = (name) => bob.locator(`.plan-grid [data-mark=${name}]`);
   await way('head').waitFor();
   equal((await marksIn(bob, '.plan-grid')).join(), 'feet,gantry,head,left,right', 'the plan');
-  await bob.locator('.plan-grid').getByText('check that the patient lies so').waitFor();
+  await bob.locator('.plan-grid').getByText('check that the patient is lying that way').waitFor();
   // On this map the gantry is on the right, so that what is to the right of who faces it is at the bottom.
   const posture = bob.locator('.plan-grid').getByLabel('Posture');
   equal(await posture.inputValue(), 'HFS', 'as approved');
@@ -371,7 +371,7 @@ await h.step('during a sweep for a fraction the growing map names the sides of t
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).click();
   await anna.locator('.live-surface [data-mark=head]').waitFor();
   equal((await marksIn(anna, '.live-surface')).join(), 'feet,gantry,head,left,right', 'the map that grows');
-  await anna.locator('.live-surface').getByText('check that the patient lies so').waitFor();
+  await anna.locator('.live-surface').getByText('check that the patient is lying that way').waitFor();
   await h.look(anna, 'marks-live', { axe: false });
   h.tell('fast');
   await anna.waitForURL(/#\/result/, { timeout: 60000 });
@@ -561,7 +561,7 @@ await h.step('scan again leads to the sweep only in the session of the same pati
   await anna.getByRole('link', { name: 'PX-0001' }).click();
   // In place of an approved one it takes a reason.
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
-  await anna.getByRole('alert').getByText('Type why a new reference is taken').waitFor();
+  await anna.getByRole('alert').getByText('State why a new reference is to replace').waitFor();
   equal((await h.api(anna, 'status')).body.session.purpose, 'fraction', 'nothing was opened');
   await anna.getByLabel('Reason for the new reference').fill('weight loss');
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
@@ -617,7 +617,7 @@ await h.step('two at one plan: neither saves over or approves what they have not
   await clara.getByLabel('Rotations (degrees)').fill('2');
   await shift(bob).fill('6');
   await save(bob);
-  await clara.getByRole('alert').getByText('while you are editing it').waitFor();
+  await clara.getByRole('alert').getByText('while you were editing it').waitFor();
   equal(await shift(clara).inputValue(), '5', 'what is edited stays');
   await save(clara);
   await clara.getByRole('alert').getByText('Someone else has changed the plan').waitFor();

@@ -4,6 +4,7 @@
 #include <sodium.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/names.hpp"
@@ -11,7 +12,6 @@
 #include "web/api/look_back.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/connection_table.hpp"
-#include "web/http/gate.hpp"
 #include "web/model/account.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/wall_clock.hpp"
@@ -37,17 +37,6 @@ std::string ReadNewPassword(Fields& fields, const std::string& user) {
   return password;
 }
 
-/// "XXXX-XXXX" without letters that are easily confused: 40 bits.
-std::string MakeSetupCode() {
-  constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";
-  std::string code;
-  for (int i = 0; i < 8; ++i) {
-    if (i == 4) code += '-';
-    code += kLetters[randombytes_uniform(static_cast<std::uint32_t>(kLetters.size()))];
-  }
-  return code;
-}
-
 bool SameText(const std::string& a, const std::string& b) {
   return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0;
 }
@@ -70,54 +59,21 @@ Role ReadRole(Fields& fields) {
 }
 
 Response Busy() {
-  Response response = ErrorResponse(503, "too many logins wait; try again in a few seconds");
-  response.headers.emplace_back("Retry-After", "5");
-  return response;
-}
-
-Response TooMany(const std::string& error, std::chrono::seconds wait) {
-  Response response = ErrorResponse(429, error);
-  response.headers.emplace_back("Retry-After", std::to_string(wait.count()));
-  return response;
+  return RetryLater(503, "too many people are logging in; try again in a few seconds",
+                    std::chrono::seconds(5));
 }
 
 Response Redirect(const std::string& where) {
-  Response response;
+  Response response = BodyResponse("text/plain; charset=utf-8", "");
   response.status = 303;
-  response.type = "text/plain; charset=utf-8";
   response.headers.emplace_back("Location", where);
   return response;
 }
 
 }  // namespace
 
-Response ChangeResponse(const Change& change) {
-  switch (change.result) {
-    case ChangeResult::kDone:
-      break;
-    case ChangeResult::kInvalid:
-      return ErrorResponse(400, change.message);
-    case ChangeResult::kNotFound:
-      return ErrorResponse(404, change.message);
-    case ChangeResult::kConflict:
-      return ErrorResponse(409, change.message);
-    case ChangeResult::kRefused:
-      return ErrorResponse(403, change.message);
-    case ChangeResult::kNoSpace:
-      return ErrorResponse(507, change.message);
-    case ChangeResult::kFailed:
-      return ErrorResponse(500, change.message);
-  }
-  Response response;
-  response.status = change.id.empty() ? 200 : 201;
-  Json json = Json::object();
-  if (!change.id.empty()) json["id"] = change.id;
-  if (!change.message.empty()) json["message"] = change.message;
-  response.body = Dump(json);
-  return response;
-}
-
-Accounts::Accounts(const Services& services, AccountOptions options)
+Accounts::Accounts(const Services& services, const HttpServerOptions& options,
+                   std::function<void(const TlsIdentity&)> replace_certificate)
     : users_(services.accounts),
       audit_(services.audit),
       settings_(services.settings),
@@ -128,10 +84,12 @@ Accounts::Accounts(const Services& services, AccountOptions options)
       profiles_(services.profiles),
       updates_(services.updates),
       background_(services.background),
-      options_(std::move(options)),
-      displays_(services.displays, options_.certificate.has_value(), options_.now),
-      devices_(options_.device_key, options_.certificate.has_value()),
-      worker_(options_.password_operations, options_.password_memory_bytes) {
+      options_(options),
+      replace_certificate_(std::move(replace_certificate)),
+      certificate_(options.tls),
+      displays_(services.displays, options.tls.has_value(), options.now),
+      devices_(options.device_key, options.tls.has_value()),
+      worker_(options.password_operations, options.password_memory_bytes) {
   LookForAccounts();
   Expire();
 }
@@ -141,7 +99,7 @@ void Accounts::LookForAccounts() {
   accounts_fault_ = users_.WhyUnreadable();
   if (!accounts_fault_.empty()) return;
   try {
-    if (users_.Users().empty()) setup_code_ = MakeSetupCode();
+    if (users_.Users().empty()) setup_code_ = RandomCode(8);  // 40 bits
   } catch (const std::exception& error) {
     accounts_fault_ = error.what();
   }
@@ -172,86 +130,57 @@ std::shared_ptr<Session> Accounts::SessionOf(const Request& request, bool touch)
   return session ? session : displays_.SessionOf(request);
 }
 
-std::string Accounts::Cookie(const std::string& token, bool end) const {
-  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}{}", cookie_name(), token,
-                     options_.certificate ? "; Secure" : "", end ? "; Max-Age=0" : "");
-}
-
 Done Accounts::WhileAlive(Done done) const {
   return [alive = std::weak_ptr(alive_), done = std::move(done)](const Change& change) {
     if (!alive.expired()) done(change);
   };
 }
 
-void Accounts::AddRoutes(Router& router) {
-  displays_.AddRoutes(router);
-  const auto bind = [this](void (Accounts::*handler)(const Request&, const Respond&)) {
-    return [this, handler](const Request& request, const Respond& respond) {
-      (this->*handler)(request, respond);
-    };
+void Accounts::AddRoutes(Routes& routes) {
+  displays_.AddRoutes(routes);
+  AddSignedActs(routes);
+  const auto add = [&](const char* method, const char* pattern, Permission permission,
+                       BodyKind body, auto handler) {
+    routes.Add(method, pattern, permission, body, std::bind_front(handler, this));
   };
-  router.Add({"POST", "/api/v1/setup", Permission::kNone, BodyKind::kJson, bind(&Accounts::SetUp)});
-  router.Add({"POST", "/api/v1/login", Permission::kNone, BodyKind::kJson,
-              [this](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const std::string name = fields.Text("name", 1, kMaxName);
-                std::string password = fields.Text("password", 1, kMaxPassword);
-                fields.Finish();
-                LogIn(request, name, std::move(password), /*form=*/false, respond);
-              }});
-  router.Add({"POST", "/login", Permission::kNone, BodyKind::kForm,
-              [this](const Request& request, const Respond& respond) {
-                auto form = ParseForm(request.body);
-                if (!form || !IsPlainText((*form)["name"]) || (*form)["name"].size() > kMaxName ||
-                    (*form)["password"].size() > kMaxPassword) {
-                  return respond(ErrorResponse(400, "expected the fields name and password"));
-                }
-                LogIn(request, (*form)["name"], (*form)["password"], /*form=*/true, respond);
-              }});
-  router.Add(
-      {"POST", "/api/v1/logout", Permission::kLogin, BodyKind::kNone, bind(&Accounts::LogOut)});
-  router.Add({"GET", "/api/v1/session", Permission::kLogin, BodyKind::kNone,
-              bind(&Accounts::DescribeSession)});
-  router.Add({"GET", "/api/v1/session/last-login", Permission::kLogin, BodyKind::kNone,
-              bind(&Accounts::ShowLastLogin)});
-  router.Add({"POST", "/api/v1/session/password", Permission::kLogin, BodyKind::kJson,
-              bind(&Accounts::ChangeOwnPassword)});
-  router.Add({"PUT", "/api/v1/session/preferences", Permission::kLogin, BodyKind::kJson,
-              bind(&Accounts::SetPreferences)});
-  router.Add({"POST", "/api/v1/references/{id}/approve", Permission::kApprove, BodyKind::kJson,
-              bind(&Accounts::ApproveReference)});
-  router.Add({"DELETE", "/api/v1/patients/{id}", Permission::kWipe, BodyKind::kJson,
-              bind(&Accounts::WipePatient)});
-  router.Add({"POST", "/api/v1/scans/{id}/accept-outside", Permission::kAccept, BodyKind::kJson,
-              bind(&Accounts::AcceptOutside)});
-  router.Add({"POST", "/api/v1/update/restart", Permission::kUpdate, BodyKind::kJson,
-              bind(&Accounts::RestartSystem)});
-  router.Add({"POST", "/api/v1/system/factory-reset", Permission::kUpdate, BodyKind::kJson,
-              bind(&Accounts::ResetToFactory)});
-  router.Add({"POST", "/api/v1/room-calibration/sign", Permission::kCalibrate, BodyKind::kJson,
-              bind(&Accounts::SignRoomCalibration)});
-  router.Add({"POST", "/api/v1/sensor-profile/reset", Permission::kSettings, BodyKind::kJson,
-              bind(&Accounts::ResetSensorProfile)});
-  router.Add({"POST", "/api/v1/sensor-profile/roll-back", Permission::kSettings, BodyKind::kJson,
-              bind(&Accounts::RollBackSensorProfile)});
-  router.Add({"GET", "/api/v1/certificate", Permission::kSettings, BodyKind::kNone,
-              bind(&Accounts::DescribeCertificate)});
-  router.Add({"PUT", "/api/v1/certificate", Permission::kSettings, BodyKind::kJson,
-              bind(&Accounts::ReplaceCertificate)});
-  router.Add({"POST", "/api/v1/certificate/new", Permission::kSettings, BodyKind::kJson,
-              bind(&Accounts::MakeNewCertificate)});
-  router.Add({"GET", "/api/v1/users", Permission::kUsers, BodyKind::kNone,
-              [this](const Request&, const Respond& respond) {
-                Json users = Json::array();
-                for (const User& user : users_.Users()) users.push_back(ToJson(user));
-                Response response;
-                response.body = Dump({{"users", users}});
-                respond(std::move(response));
-              }});
-  router.Add(
-      {"POST", "/api/v1/users", Permission::kUsers, BodyKind::kJson, bind(&Accounts::AddUser)});
-  router.Add({"PUT", "/api/v1/users/{name}", Permission::kUsers, BodyKind::kJson,
-              bind(&Accounts::ChangeUser)});
+  add("POST", "/api/v1/setup", Permission::kNone, BodyKind::kJson, &Accounts::SetUp);
+  routes.Add("POST", "/api/v1/login", Permission::kNone, BodyKind::kJson,
+             [this](const Request& request, const Respond& respond) {
+               Fields fields(request.body);
+               const std::string name = fields.Text("name", 1, kMaxName);
+               std::string password = fields.Text("password", 1, kMaxPassword);
+               fields.Finish();
+               LogIn(request, name, std::move(password), /*form=*/false, respond);
+             });
+  routes.Add("POST", "/login", Permission::kNone, BodyKind::kForm,
+             [this](const Request& request, const Respond& respond) {
+               auto form = ParseForm(request.body);
+               if (!form || !IsPlainText((*form)["name"]) || (*form)["name"].size() > kMaxName ||
+                   (*form)["password"].size() > kMaxPassword) {
+                 return respond(ErrorResponse(400, "expected the fields name and password"));
+               }
+               LogIn(request, (*form)["name"], (*form)["password"], /*form=*/true, respond);
+             });
+  add("POST", "/api/v1/logout", Permission::kLogin, BodyKind::kNone, &Accounts::LogOut);
+  routes.Read("/api/v1/session", Permission::kLogin,
+              [this](const Request& request) { return DescribeSession(request); });
+  add("GET", "/api/v1/session/last-login", Permission::kLogin, BodyKind::kNone,
+      &Accounts::ShowLastLogin);
+  add("POST", "/api/v1/session/password", Permission::kLogin, BodyKind::kJson,
+      &Accounts::ChangeOwnPassword);
+  add("PUT", "/api/v1/session/preferences", Permission::kLogin, BodyKind::kJson,
+      &Accounts::SetPreferences);
+  routes.Read("/api/v1/certificate", Permission::kSettings,
+              [this](const Request&) { return DescribeCertificate(); });
+  add("PUT", "/api/v1/certificate", Permission::kSettings, BodyKind::kJson,
+      &Accounts::ReplaceCertificate);
+  add("POST", "/api/v1/certificate/new", Permission::kSettings, BodyKind::kJson,
+      &Accounts::MakeNewCertificate);
+  routes.Read("/api/v1/users", Permission::kUsers, [this](const Request&) {
+    return JsonResponse({{"users", users_.Users()}});
+  });
+  add("POST", "/api/v1/users", Permission::kUsers, BodyKind::kJson, &Accounts::AddUser);
+  add("PUT", "/api/v1/users/{name}", Permission::kUsers, BodyKind::kJson, &Accounts::ChangeUser);
 }
 
 void Accounts::HashThen(std::string password, const Respond& respond,
@@ -272,10 +201,10 @@ Response Accounts::Welcome(const User& user, bool form) {
   if (form && IsFirst(user.password_hash)) return Redirect("/result?first=1");
   const Sessions::Opened opened = sessions_.Open(user, options_.now());
   opened.session->must_change_password = IsFirst(user.password_hash);
-  Response response = form ? Redirect("/result") : Response{};
-  response.headers.emplace_back("Set-Cookie", DeviceCookie(user.name, user.password_hash));
-  response.headers.emplace_back("Set-Cookie", Cookie(opened.token, /*end=*/false));
-  if (!form) response.body = Dump({{"user", user.name}, {"role", Name(user.role)}});
+  Response response =
+      form ? Redirect("/result") : JsonResponse({{"user", user.name}, {"role", Name(user.role)}});
+  SetDeviceCookie(response, user.name, user.password_hash);
+  SetCookie(response, cookie_name(), opened.token, certificate_.has_value());
   return response;
 }
 
@@ -295,8 +224,8 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   auto wait = limiter_.Wait(key, now);
   if (!is_local) wait = std::max(wait, limiter_.Wait(all, now, kMaxSetupGuesses));
   if (wait.count() > 0)
-    return respond(
-        TooMany(fmt::format("too many wrong setup codes; wait {} seconds", wait.count()), wait));
+    return respond(RetryLater(
+        429, fmt::format("too many wrong setup codes; wait {} seconds", wait.count()), wait));
   if (!SameText(code, setup_code_)) {
     limiter_.Failed(key, now);
     if (!is_local) limiter_.Failed(all, now, kMaxSetupGuesses);
@@ -321,11 +250,11 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   });
 }
 
-std::string Accounts::DeviceCookie(const std::string& user, const std::string& stored) const {
-  constexpr int kYear_s = 365 * 24 * 3600;
-  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}",
-                     devices_.NameFor(user), devices_.Make(user, stored), kYear_s,
-                     options_.certificate ? "; Secure" : "");
+void Accounts::SetDeviceCookie(Response& response, const std::string& user,
+                               const std::string& stored) const {
+  constexpr std::chrono::hours kYear{365 * 24};
+  SetCookie(response, devices_.NameFor(user), devices_.Make(user, stored), certificate_.has_value(),
+            kYear);
 }
 
 std::vector<std::string> Accounts::CountersOf(const Request& request, const std::string& name,
@@ -341,7 +270,8 @@ std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& cou
   std::chrono::seconds wait{0};
   for (const std::string& counter : counters) wait = std::max(wait, limiter_.Wait(counter, now));
   if (wait.count() > 0)
-    return TooMany(fmt::format("too many wrong passwords; wait {} seconds", wait.count()), wait);
+    return RetryLater(429, fmt::format("too many wrong passwords; wait {} seconds", wait.count()),
+                      wait);
   // Counted before hashing, so that many guesses sent at once are as slow as one after the other.
   for (const std::string& counter : counters) limiter_.Failed(counter, now);
   return std::nullopt;
@@ -385,9 +315,8 @@ void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, bool m
 void Accounts::LogOut(const Request& request, const Respond& respond) {
   sessions_.End(request.session);
   audit_.Log(request.actor(), "logout", "", "");
-  Response response;
-  response.headers.emplace_back("Set-Cookie", Cookie("", /*end=*/true));
-  response.body = "{}";
+  Response response = JsonResponse(Json::object());
+  SetCookie(response, cookie_name(), "", certificate_.has_value(), std::chrono::seconds(0));
   respond(std::move(response));
 }
 
@@ -400,12 +329,10 @@ void Accounts::SetPreferences(const Request& request, const Respond& respond) {
     throw DataError("language: expected en or es");
   if (wanted.theme != "dark" && wanted.theme != "light" && wanted.theme != "auto")
     throw DataError("theme: expected dark, light or auto");
-  users_.SetPreferences(request.actor(), wanted, WhileAlive([respond](const Change& change) {
-                          respond(ChangeResponse(change));
-                        }));
+  users_.SetPreferences(request.actor(), wanted, WhileAlive(Answer(respond)));
 }
 
-void Accounts::DescribeSession(const Request& request, const Respond& respond) {
+Response Accounts::DescribeSession(const Request& request) {
   const Preferences chosen = users_.PreferencesOf(request.session->user);
   const auto or_null = [](const std::string& text) {
     return text.empty() ? Json(nullptr) : Json(text);
@@ -413,17 +340,15 @@ void Accounts::DescribeSession(const Request& request, const Respond& respond) {
   Json permissions = Json::array();
   for (const Permission permission : PermissionsOf(request.session->role))
     permissions.push_back(Name(permission));
-  Response response;
-  response.body =
-      Dump({{"user", request.session->user},
-            {"role", Name(request.session->role)},
-            {"permissions", permissions},
-            {"csrf_token", request.session->csrf_token},
-            {"password_change_required", request.session->must_change_password},
-            {"idle_logout_min", IdleLogout_min().value_or(idle_logout_min_)},
-            {"preferences",
-             {{"language", or_null(chosen.language)}, {"theme", or_null(chosen.theme)}}}});
-  respond(std::move(response));
+  return JsonResponse(
+      {{"user", request.session->user},
+       {"role", Name(request.session->role)},
+       {"permissions", permissions},
+       {"csrf_token", request.session->csrf_token},
+       {"password_change_required", request.session->must_change_password},
+       {"idle_logout_min", IdleLogout_min().value_or(idle_logout_min_)},
+       {"preferences",
+        {{"language", or_null(chosen.language)}, {"theme", or_null(chosen.theme)}}}});
 }
 
 void Accounts::ShowLastLogin(const Request& request, const Respond& respond) {
@@ -433,16 +358,14 @@ void Accounts::ShowLastLogin(const Request& request, const Respond& respond) {
   const auto age =
       std::chrono::duration_cast<WallClock::duration>(options_.now() - request.session->begun);
   const WallClock::time_point begun = WallClock::now() - age - kOwnEntry;
-  RespondAside(
+  RespondInBackground(
       background_, "last login",
       [this, user = request.session->user, begun] {
         const LoginHistory history = LoginsBefore(audit_, user, begun);
-        Response response;
-        response.body = Dump({{"last", history.last ? Json{{"time", TimeText(history.last->time)},
-                                                           {"address", history.last->address}}
-                                                    : Json(nullptr)},
-                              {"failed", history.failed}});
-        return response;
+        return JsonResponse({{"last", history.last ? Json{{"time", history.last->time},
+                                                          {"address", history.last->address}}
+                                                   : Json(nullptr)},
+                             {"failed", history.failed}});
       },
       respond);
 }
@@ -491,7 +414,7 @@ void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond)
                 if (change.result == ChangeResult::kDone) {
                   sessions_.EndAllOf(name, session);
                   session->must_change_password = false;
-                  response.headers.emplace_back("Set-Cookie", DeviceCookie(name, hash));
+                  SetDeviceCookie(response, name, hash);
                 }
                 respond(std::move(response));
               }));
@@ -522,7 +445,7 @@ void Accounts::AddUser(const Request& request, const Respond& respond) {
 void Accounts::ChangeUser(const Request& request, const Respond& respond) {
   Fields fields(request.body);
   if (!users_.FindUser(request.arguments.at(0)))
-    return respond(ErrorResponse(404, "no account of that name"));
+    return respond(ErrorResponse(404, "there is no account of this name"));
   UserChange change{.name = request.arguments.at(0),
                     .role = {},
                     .disabled = {},

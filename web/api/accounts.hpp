@@ -1,7 +1,6 @@
 // Set-up, login and accounts: everything that handles passwords.
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -9,8 +8,10 @@
 #include <vector>
 
 #include "web/api/displays.hpp"
+#include "web/api/json.hpp"
+#include "web/api/routes.hpp"
 #include "web/http/gate.hpp"
-#include "web/http/router.hpp"
+#include "web/http/server_options.hpp"
 #include "web/security/device_cookies.hpp"
 #include "web/security/login_limiter.hpp"
 #include "web/security/password_worker.hpp"
@@ -20,32 +21,23 @@
 
 namespace plumb::web {
 
-struct AccountOptions {
-  std::uint64_t password_operations = 3;
-  std::uint64_t password_memory_bytes = 64 << 20;
-  std::chrono::seconds session_limit{12 * 3600};
-  std::string device_key;                  ///< See DeviceCookies.
-  std::optional<TlsIdentity> certificate;  ///< Its fingerprint is shown at the first set-up.
-  std::function<std::chrono::steady_clock::time_point()> now;
-  std::vector<std::string> host_names;  ///< Names for a new certificate.
-  /// Stores and serves another certificate; throws DataError or IoError, after which the previous
-  /// one stays. Empty: it cannot be replaced.
-  std::function<void(const TlsIdentity&)> replace_certificate;
-};
-
 /// Used on the loop thread.
 class Accounts : public SessionLookup {
  public:
-  Accounts(const Services& services, AccountOptions options);
+  /// @param options  With a clock; outlives the accounts.
+  /// @param replace_certificate  Stores and serves another certificate; throws DataError or
+  /// IoError, after which the previous one stays. Empty: it cannot be replaced.
+  Accounts(const Services& services, const HttpServerOptions& options,
+           std::function<void(const TlsIdentity&)> replace_certificate);
 
-  void AddRoutes(Router& router);
+  void AddRoutes(Routes& routes);
 
   /// The session of a request, by its cookie. @param touch  Counts as a use.
   [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request, bool touch) override;
   [[nodiscard]] bool needs_setup() const override { return !setup_code_.empty(); }
   [[nodiscard]] const std::string& accounts_fault() const override { return accounts_fault_; }
   [[nodiscard]] std::string tls_fingerprint() const override {
-    return options_.certificate ? options_.certificate->fingerprint : std::string();
+    return certificate_ ? certificate_->fingerprint : std::string();
   }
   [[nodiscard]] std::optional<std::string> setup_code() const;
 
@@ -74,28 +66,19 @@ class Accounts : public SessionLookup {
                  const Respond& respond, std::function<void(const User&)> then);
   void LogOut(const Request& request, const Respond& respond);
   void SetPreferences(const Request& request, const Respond& respond);
-  void DescribeSession(const Request& request, const Respond& respond);
+  [[nodiscard]] Response DescribeSession(const Request& request);
   /// The login before this one, and failed attempts since.
   void ShowLastLogin(const Request& request, const Respond& respond);
   void ChangeOwnPassword(const Request& request, const Respond& respond);
-  /// Accepts a result that is not in tolerance: with a reason and the user's own password.
-  void AcceptOutside(const Request& request, const Respond& respond);
-  /// Approves the plan that was read, identified by its revision and digest.
-  void ApproveReference(const Request& request, const Respond& respond);
-  void WipePatient(const Request& request, const Respond& respond);
-  /// Calls `act` if the password is the user's own, and answers with the outcome.
-  void Signed(const Request& request, std::string password, const Respond& respond,
-              std::function<void(const Actor&, Done)> act);
-  /// Signs the room's calibration that was read, identified by its digest.
-  void SignRoomCalibration(const Request& request, const Respond& respond);
-  void ResetSensorProfile(const Request& request, const Respond& respond);
-  void RollBackSensorProfile(const Request& request, const Respond& respond);
-  /// Restarts the machine; requires the user's own password.
-  void RestartSystem(const Request& request, const Respond& respond);
-  /// Resets the appliance to the state of delivery; requires the user's own password.
-  void ResetToFactory(const Request& request, const Respond& respond);
+  /// An act that its person has signed with the own password.
+  using SignedAct = std::function<void(const Actor&, Done)>;
+  /// Adds a route for such an act.
+  /// @param parse  Reads the fields of the body besides the password, before the password is read.
+  void AddSigned(Routes& routes, const char* method, const char* pattern, Permission permission,
+                 std::function<SignedAct(const Request&, Fields&)> parse);
+  void AddSignedActs(Routes& routes);
   /// The certificate of the page.
-  void DescribeCertificate(const Request& request, const Respond& respond);
+  [[nodiscard]] Response DescribeCertificate() const;
   /// Replaces it by an uploaded one or a new self-signed one; requires the user's own password.
   void ReplaceCertificate(const Request& request, const Respond& respond);
   void MakeNewCertificate(const Request& request, const Respond& respond);
@@ -105,18 +88,18 @@ class Accounts : public SessionLookup {
   void ChangeUser(const Request& request, const Respond& respond);
   /// Opens a session and notifies the page.
   [[nodiscard]] Response Welcome(const User& user, bool form);
-  /// The cookie by which this browser is recognised from now on.
-  [[nodiscard]] std::string DeviceCookie(const std::string& user, const std::string& stored) const;
+  /// Sets the cookie by which this browser is recognised from now on.
+  void SetDeviceCookie(Response& response, const std::string& user,
+                       const std::string& stored) const;
   /// Calls `then` with the hash, or answers why there is none.
   void HashThen(std::string password, const Respond& respond,
                 std::function<void(const std::string&)> then);
   /// The same completion, which does nothing once this object is destroyed.
   [[nodiscard]] Done WhileAlive(Done done) const;
-  /// As the settings have it; nothing where they cannot be read.
+  /// The time in the settings; nothing where they cannot be read.
   [[nodiscard]] std::optional<int> IdleLogout_min() const;
-  [[nodiscard]] std::string Cookie(const std::string& token, bool end) const;
   [[nodiscard]] std::string cookie_name() const {
-    return options_.certificate ? "__Host-plumb_session" : "plumb_session";
+    return certificate_ ? "__Host-plumb_session" : "plumb_session";
   }
 
   AccountService& users_;
@@ -129,7 +112,9 @@ class Accounts : public SessionLookup {
   SensorProfileService& profiles_;
   UpdateService& updates_;
   BackgroundWork& background_;
-  AccountOptions options_;
+  const HttpServerOptions& options_;
+  std::function<void(const TlsIdentity&)> replace_certificate_;
+  std::optional<TlsIdentity> certificate_;  ///< The one that is served now.
   Sessions sessions_;
   Displays displays_;
   DeviceCookies devices_;
@@ -141,8 +126,5 @@ class Accounts : public SessionLookup {
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   PasswordWorker worker_;
 };
-
-/// The answer to a change as HTTP: 200, 201 with an id, or the error.
-[[nodiscard]] Response ChangeResponse(const Change& change);
 
 }  // namespace plumb::web

@@ -5,16 +5,13 @@
 #include <array>
 #include <charconv>
 #include <filesystem>
-#include <functional>
 #include <utility>
 
 #include "algo/base/errors.hpp"
-#include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
-#include "web/api/language.hpp"
 #include "web/api/look_back.hpp"
+#include "web/api/routes.hpp"
 #include "web/http/checks.hpp"
-#include "web/http/gate.hpp"
 #include "web/model/audit.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/patient.hpp"
@@ -51,29 +48,6 @@ constexpr std::array kScanFiles = {
     ScanFile{"trajectory.txt", "scene/trajectory.txt", "text/plain; charset=utf-8"},
 };
 
-Response JsonResponse(const Json& json) {
-  Response response;
-  response.body = Dump(json);
-  return response;
-}
-
-Done Answer(const Respond& respond) {
-  return [respond](const Change& change) { respond(ChangeResponse(change)); };
-}
-
-template <typename T>
-Json ListJson(const std::vector<T>& items) {
-  Json list = Json::array();
-  for (const T& item : items) list.push_back(ToJson(item));
-  return list;
-}
-
-Json ListJson(const std::vector<Scan>& scans) {
-  Json list = Json::array();
-  for (const Scan& scan : scans) list.push_back(ToJson(scan, WallClock::now()));
-  return list;
-}
-
 std::int64_t QueryNumber(const Request& request, const std::string& name, std::int64_t otherwise,
                          std::int64_t max) {
   const auto found = request.query.find(name);
@@ -87,13 +61,7 @@ std::int64_t QueryNumber(const Request& request, const std::string& name, std::i
   return value;
 }
 
-/// @param name  Of the downloaded file; empty: the browser shows it.
-void NameDownload(Response& response, const std::string& name) {
-  if (name.empty()) return;
-  response.headers.emplace_back("Content-Disposition",
-                                fmt::format("attachment; filename=\"{}\"", name));
-}
-
+/// @param download_name  Name of the downloaded file; empty: the browser shows it.
 Response FileResponse(const fs::path& file, std::string_view type,
                       const std::string& download_name) {
   Response response;
@@ -127,9 +95,7 @@ std::optional<Response> TranslatedPicture(ScanService& scans, const Request& req
   if (!picture || !request.query.contains("language")) return std::nullopt;
   auto png = scans.PictureOf(request.arguments[0], *picture, LanguageIn(request));
   if (!png) return std::nullopt;
-  Response response;
-  response.type = "image/png";
-  response.body = std::move(*png);
+  Response response = BodyResponse("image/png", std::move(*png));
   NameDownload(response, DownloadName(request));
   return response;
 }
@@ -140,359 +106,359 @@ Response ScanFileResponse(ScanService& scans, const std::string& scan_id, std::s
   if (!scan) return ErrorResponse(404, "no such scan");
   for (const ScanFile& file : kScanFiles) {
     if (file.name != name) continue;
-    if (scan->folder.empty()) return ErrorResponse(404, "the files of this scan are gone");
+    if (scan->folder.empty()) return ErrorResponse(404, "the files of this scan no longer exist");
     return FileResponse(scan->folder / file.path, file.type, download_name);
   }
   return ErrorResponse(404, "this scan has no such file");
 }
 
-/// Shorthands for adding routes.
-class Table {
- public:
-  Table(Router& router, BackgroundWork& background) : router_(router), background_(background) {}
-
-  using Get = std::function<Response(const Request&)>;
-
-  void Read(const char* pattern, Permission permission, Get get) {
-    router_.Add({"GET", pattern, permission, BodyKind::kNone,
-                 [get = std::move(get)](const Request& request, const Respond& respond) {
-                   respond(get(request));
-                 }});
-  }
-  /// For lists and files, which are not read on the loop.
-  void ReadAside(const char* pattern, Permission permission, Get get) {
-    AddAside(router_, background_, pattern, permission, std::move(get));
-  }
-  void Write(const char* method, const char* pattern, Permission permission, BodyKind body,
-             Handler change) {
-    router_.Add({method, pattern, permission, body, std::move(change)});
-  }
-
- private:
-  Router& router_;
-  BackgroundWork& background_;
-};
-
-void AddApplianceRoutes(Table& table, ApplianceService& appliance) {
-  table.Read("/health", Permission::kNone, [&appliance](const Request&) {
+void AddApplianceRoutes(Routes& routes, ApplianceService& appliance) {
+  routes.Read("/health", Permission::kNone, [&appliance](const Request&) {
     const Health health = appliance.GetHealth();
-    Response response = JsonResponse(
-        health.ok ? Json{{"status", "ok"}} : Json{{"status", "failed"}, {"reason", health.reason}});
-    if (!health.ok) response.status = 503;
-    return response;
+    return health.ok
+               ? JsonResponse({{"status", "ok"}})
+               : JsonResponse({{"status", "failed"}, {"reason", health.reason}}, /*status=*/503);
   });
-  table.Read("/api/v1/status", Permission::kRoom, [&appliance](const Request&) {
+  routes.Read("/api/v1/status", Permission::kRoom, [&appliance](const Request&) {
     return JsonResponse(ToJson(appliance.GetStatus(), WallClock::now()));
   });
-  table.Read("/api/v1/preview", Permission::kRoom, [&appliance](const Request&) {
-    const auto picture = appliance.Preview();
-    if (!picture) return ErrorResponse(404, "the camera shows nothing now");
-    Response response;
-    response.type = "image/jpeg";
-    response.body = *picture;
-    return response;
-  });
-  table.Read("/api/v1/scan/surface", Permission::kRoom, [&appliance](const Request&) {
-    const auto map = appliance.SweptSurface();
-    if (!map) return ErrorResponse(404, "no sweep shows a surface now");
-    Response response;
-    response.type = "application/octet-stream";
-    response.body = *map;
-    return response;
-  });
-  table.Write("POST", "/api/v1/press", Permission::kScan, BodyKind::kNone,
-              [&appliance](const Request& request, const Respond& respond) {
-                appliance.Press(request.actor(), Answer(respond));
-              });
-  table.Write("POST", "/api/v1/scan/start", Permission::kScan, BodyKind::kNone,
-              [&appliance](const Request& request, const Respond& respond) {
-                appliance.StartSweep(request.actor(), Answer(respond));
-              });
-  table.Write("POST", "/api/v1/scan/end", Permission::kScan, BodyKind::kNone,
-              [&appliance](const Request& request, const Respond& respond) {
-                appliance.EndSweep(request.actor(), Answer(respond));
-              });
-  table.Write("POST", "/api/v1/cancel", Permission::kScan, BodyKind::kNone,
-              [&appliance](const Request& request, const Respond& respond) {
-                appliance.Cancel(request.actor(), Answer(respond));
-              });
+  routes
+      .Read("/api/v1/preview", Permission::kRoom,
+            [&appliance](const Request&) {
+              const auto picture = appliance.Preview();
+              if (!picture) return ErrorResponse(404, "there is no camera image at the moment");
+              return BodyResponse("image/jpeg", *picture);
+            })
+      .Discloses("view.camera");
+  routes
+      .Read("/api/v1/scan/surface", Permission::kRoom,
+            [&appliance](const Request&) {
+              const auto map = appliance.SweptSurface();
+              if (!map) return ErrorResponse(404, "there is no surface of a sweep at the moment");
+              return BodyResponse("application/octet-stream", *map);
+            })
+      .Discloses("view.camera");
+  routes.Write("POST", "/api/v1/press", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.Press(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/scan/start", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.StartSweep(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/scan/end", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.EndSweep(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/cancel", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.Cancel(request.actor(), done);
+               });
 }
 
-void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& references,
+void AddPatientRoutes(Routes& routes, PatientService& patients, ReferenceService& references,
                       ScanService& scans) {
-  table.ReadAside("/api/v1/patients", Permission::kView, [&patients](const Request&) {
-    return JsonResponse({{"patients", ListJson(patients.Patients())}});
-  });
-  table.Write(
+  routes
+      .ReadInBackground("/api/v1/patients", Permission::kView,
+                        [&patients](const Request&) {
+                          return JsonResponse({{"patients", patients.Patients()}});
+                        })
+      .Discloses("view.patients");
+  routes.Write(
       "POST", "/api/v1/patients", Permission::kPatients, BodyKind::kJson,
-      [&patients](const Request& request, const Respond& respond) {
+      [&patients](const Request& request, const Done& done) {
         Fields fields(request.body);
         const std::string code = fields.Text("code", 1, kMaxName),
                           site = fields.Text("site", 0, kMaxSite);
         fields.Finish();
         if (!IsName(code))
           throw DataError("code must be letters, digits, '.', '-' or '_': a pseudonym, no name");
-        patients.AddPatient(request.actor(), code, site, Answer(respond));
+        patients.AddPatient(request.actor(), code, site, done);
       });
-  table.Read("/api/v1/patients/{id}", Permission::kRoom, [&patients](const Request& request) {
-    const auto patient = patients.FindPatient(request.arguments[0]);
-    return patient ? JsonResponse(ToJson(*patient)) : ErrorResponse(404, "no such patient");
-  });
-  table.Write("PUT", "/api/v1/patients/{id}", Permission::kPatients, BodyKind::kJson,
-              [&patients](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const CourseNotes wanted{.site = fields.Text("site", 0, kMaxSite),
-                                         .note = fields.Text("note", 0, kMaxNote)};
-                std::optional<CourseNotes> shown;
-                if (fields.Has("site_before") || fields.Has("note_before"))
-                  shown = {.site = fields.Text("site_before", 0, kMaxSite),
-                           .note = fields.Text("note_before", 0, kMaxNote)};
-                fields.Finish();
-                patients.ChangePatient(request.actor(), request.arguments[0], wanted, shown,
-                                       Answer(respond));
-              });
-  table.Write("POST", "/api/v1/patients/{id}/archive", Permission::kPlan, BodyKind::kJson,
-              [&patients](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const bool archived = fields.Flag("archived");
-                fields.Finish();
-                patients.ArchivePatient(request.actor(), request.arguments[0], archived,
-                                        Answer(respond));
-              });
-  table.Write("POST", "/api/v1/patients/{id}/open", Permission::kScan, BodyKind::kJson,
-              [&patients](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const ScanPurpose purpose = ParsePurpose(fields.Text("purpose", 1, 32));
-                const std::string reason = fields.Text("reason", 0, kMaxReason);
-                const std::string replaces =
-                    fields.Has("replaces") ? fields.Text("replaces", 0, 64) : std::string();
-                fields.Finish();
-                patients.OpenPatient(request.actor(), request.arguments[0], purpose, reason,
-                                     replaces, [respond](Change change) {
-                                       // the status states which session is open
-                                       change.id.clear();
-                                       respond(ChangeResponse(change));
-                                     });
-              });
-  table.Write("POST", "/api/v1/treatment/close", Permission::kScan, BodyKind::kJson,
-              [&patients](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const std::string session = fields.Text("session_id", 0, 64);
-                fields.Finish();
-                patients.CloseSession(request.actor(), session, Answer(respond));
-              });
-  table.ReadAside("/api/v1/patients/{id}/references", Permission::kView,
-                  [&patients, &references](const Request& request) {
-                    if (!patients.FindPatient(request.arguments[0]))
-                      return ErrorResponse(404, "no such patient");
-                    return JsonResponse(
-                        {{"references", ListJson(references.References(request.arguments[0]))}});
-                  });
-  table.ReadAside(
-      "/api/v1/patients/{id}/scans", Permission::kView,
-      [&patients, &scans](const Request& request) {
-        if (!patients.FindPatient(request.arguments[0]))
-          return ErrorResponse(404, "no such patient");
-        return JsonResponse({{"scans", ListJson(scans.Scans(request.arguments[0], kMaxListed))}});
-      });
+  routes
+      .Read("/api/v1/patients/{id}", Permission::kRoom,
+            [&patients](const Request& request) {
+              const auto patient = patients.FindPatient(request.arguments[0]);
+              return patient ? JsonResponse(*patient) : ErrorResponse(404, "no such patient");
+            })
+      .Discloses("view.patient")
+      .ShowsDisplays(ShownRecord::kPatient, "no such patient");
+  routes.Write("PUT", "/api/v1/patients/{id}", Permission::kPatients, BodyKind::kJson,
+               [&patients](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const CourseNotes wanted{.site = fields.Text("site", 0, kMaxSite),
+                                          .note = fields.Text("note", 0, kMaxNote)};
+                 std::optional<CourseNotes> shown;
+                 if (fields.Has("site_before") || fields.Has("note_before"))
+                   shown = {.site = fields.Text("site_before", 0, kMaxSite),
+                            .note = fields.Text("note_before", 0, kMaxNote)};
+                 fields.Finish();
+                 patients.ChangePatient(request.actor(), request.arguments[0], wanted, shown, done);
+               });
+  routes.Write("POST", "/api/v1/patients/{id}/archive", Permission::kPlan, BodyKind::kJson,
+               [&patients](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const bool archived = fields.Flag("archived");
+                 fields.Finish();
+                 patients.ArchivePatient(request.actor(), request.arguments[0], archived, done);
+               });
+  routes.Write("POST", "/api/v1/patients/{id}/open", Permission::kScan, BodyKind::kJson,
+               [&patients](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const ScanPurpose purpose = ParsePurpose(fields.Text("purpose", 1, 32));
+                 const std::string reason = fields.Text("reason", 0, kMaxReason);
+                 const std::string replaces =
+                     fields.Has("replaces") ? fields.Text("replaces", 0, 64) : std::string();
+                 fields.Finish();
+                 patients.OpenPatient(request.actor(), request.arguments[0], purpose, reason,
+                                      replaces, [done](Change change) {
+                                        // the status states which session is open
+                                        change.id.clear();
+                                        done(change);
+                                      });
+               });
+  routes.Write("POST", "/api/v1/treatment/close", Permission::kScan, BodyKind::kJson,
+               [&patients](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::string session = fields.Text("session_id", 0, 64);
+                 fields.Finish();
+                 patients.CloseSession(request.actor(), session, done);
+               });
+  routes
+      .ReadInBackground(
+          "/api/v1/patients/{id}/references", Permission::kView,
+          [&patients, &references](const Request& request) {
+            if (!patients.FindPatient(request.arguments[0]))
+              return ErrorResponse(404, "no such patient");
+            return JsonResponse({{"references", references.References(request.arguments[0])}});
+          })
+      .Discloses("view.patient");
+  routes
+      .ReadInBackground(
+          "/api/v1/patients/{id}/scans", Permission::kView,
+          [&patients, &scans](const Request& request) {
+            if (!patients.FindPatient(request.arguments[0]))
+              return ErrorResponse(404, "no such patient");
+            return JsonResponse({{"scans", ListJson(scans.Scans(request.arguments[0], kMaxListed),
+                                                    WallClock::now())}});
+          })
+      .Discloses("view.patient");
 }
 
-void AddTemplateRoutes(Table& table, SettingsService& settings) {
-  table.Read("/api/v1/templates", Permission::kView, [&settings](const Request&) {
-    return JsonResponse({{"templates", ListJson(settings.Templates())}});
+void AddTemplateRoutes(Routes& routes, SettingsService& settings) {
+  routes.Read("/api/v1/templates", Permission::kView, [&settings](const Request&) {
+    return JsonResponse({{"templates", settings.Templates()}});
   });
-  table.Write("PUT", "/api/v1/templates", Permission::kPlan, BodyKind::kJson,
-              [&settings](const Request& request, const Respond& respond) {
-                settings.SetTemplate(request.actor(), ParseTemplate(request.body), Answer(respond));
-              });
-  table.Write("POST", "/api/v1/templates/remove", Permission::kPlan, BodyKind::kJson,
-              [&settings](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const std::string site = fields.Text("site", 1, kMaxSite);
-                fields.Finish();
-                settings.RemoveTemplate(request.actor(), site, Answer(respond));
-              });
+  routes.Write("PUT", "/api/v1/templates", Permission::kPlan, BodyKind::kJson,
+               [&settings](const Request& request, const Done& done) {
+                 settings.SetTemplate(request.actor(), ParseTemplate(request.body), done);
+               });
+  routes.Write("POST", "/api/v1/templates/remove", Permission::kPlan, BodyKind::kJson,
+               [&settings](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::string site = fields.Text("site", 1, kMaxSite);
+                 fields.Finish();
+                 settings.RemoveTemplate(request.actor(), site, done);
+               });
 }
 
-void AddReferenceRoutes(Table& table, ReferenceService& references) {
-  table.Write("POST", "/api/v1/references", Permission::kPlan, BodyKind::kJson,
-              [&references](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const std::string scan_id = fields.Text("scan_id", 1, 64),
-                                  reason = fields.Text("reason", 0, kMaxReason);
-                fields.Finish();
-                references.AddReference(request.actor(), scan_id, reason, Answer(respond));
-              });
-  table.ReadAside("/api/v1/references/{id}", Permission::kRoom,
-                  [&references](const Request& request) {
-                    const auto reference = references.FindReference(request.arguments[0]);
-                    if (!reference) return ErrorResponse(404, "no such reference");
-                    Json json = ToJson(*reference);
-                    json["room"] = ToJson(references.RoomOfReference(*reference));
-                    return JsonResponse(json);
-                  });
-  table.Write("PUT", "/api/v1/references/{id}/plan", Permission::kPlan, BodyKind::kJson,
-              [&references](const Request& request, const Respond& respond) {
-                const auto [plan, revision] = ParsePlan(request.body);
-                references.PlanReference(request.actor(), request.arguments[0], revision, plan,
-                                         Answer(respond));
-              });
+void AddReferenceRoutes(Routes& routes, ReferenceService& references) {
+  routes.Write("POST", "/api/v1/references", Permission::kPlan, BodyKind::kJson,
+               [&references](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::string scan_id = fields.Text("scan_id", 1, 64),
+                                   reason = fields.Text("reason", 0, kMaxReason);
+                 fields.Finish();
+                 references.AddReference(request.actor(), scan_id, reason, done);
+               });
+  routes
+      .ReadInBackground("/api/v1/references/{id}", Permission::kRoom,
+                        [&references](const Request& request) {
+                          const auto reference = references.FindReference(request.arguments[0]);
+                          if (!reference) return ErrorResponse(404, "no such reference");
+                          Json json = *reference;
+                          json["room"] = references.RoomOfReference(*reference);
+                          return JsonResponse(json);
+                        })
+      .Discloses("view.reference")
+      .ShowsDisplays(ShownRecord::kReference, "no such reference");
+  routes.Write("PUT", "/api/v1/references/{id}/plan", Permission::kPlan, BodyKind::kJson,
+               [&references](const Request& request, const Done& done) {
+                 const auto [plan, revision] = ParsePlan(request.body);
+                 references.PlanReference(request.actor(), request.arguments[0], revision, plan,
+                                          done);
+               });
 }
 
-void AddScanRoutes(Table& table, ScanService& scans) {
-  table.ReadAside("/api/v1/scans", Permission::kView, [&scans](const Request& request) {
-    const auto limit = static_cast<int>(QueryNumber(request, "limit", kMaxListed, kMaxListed));
-    return JsonResponse({{"scans", ListJson(scans.Scans("", limit))}});
-  });
-  table.Read("/api/v1/scans/{id}", Permission::kRoom, [&scans](const Request& request) {
-    const auto scan = scans.FindScan(request.arguments[0]);
-    return scan ? JsonResponse(ToJson(*scan, WallClock::now()))
-                : ErrorResponse(404, "no such scan");
-  });
-  table.Write("DELETE", "/api/v1/scans/{id}", Permission::kWipe, BodyKind::kJson,
-              [&scans](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const std::string reason = fields.Text("reason", kMinReason, kMaxReason);
-                fields.Finish();
-                scans.RemoveScan(request.actor(), request.arguments[0], reason, Answer(respond));
-              });
-  table.Write("POST", "/api/v1/scans/{id}/accept", Permission::kAccept, BodyKind::kNone,
-              [&scans](const Request& request, const Respond& respond) {
-                scans.AcceptScan(request.actor(), request.arguments[0], /*reason=*/{},
-                                 Answer(respond));
-              });
-  table.ReadAside("/api/v1/scans/{id}/files/{name}", Permission::kRoom,
-                  [&scans](const Request& request) {
-                    if (auto picture = TranslatedPicture(scans, request))
-                      return std::move(*picture);
-                    return ScanFileResponse(scans, request.arguments[0], request.arguments[1],
-                                            DownloadName(request));
-                  });
-  table.ReadAside("/api/v1/scans/{id}/maps/{name}", Permission::kRoom,
-                  [&scans](const Request& request) {
-                    auto map = scans.CompactMap(request.arguments[0], request.arguments[1]);
-                    if (!map) return ErrorResponse(404, "this scan has no such map");
-                    Response response;
-                    response.type = "application/octet-stream";
-                    response.body = std::move(*map);
-                    return response;
-                  });
-  table.ReadAside("/api/v1/results/{id}", Permission::kRoom, [&scans](const Request& request) {
-    return ScanFileResponse(scans, request.arguments[0], "result.json", /*download_name=*/"");
-  });
+void AddScanRoutes(Routes& routes, ScanService& scans) {
+  routes
+      .ReadInBackground(
+          "/api/v1/scans", Permission::kView,
+          [&scans](const Request& request) {
+            const auto limit =
+                static_cast<int>(QueryNumber(request, "limit", kMaxListed, kMaxListed));
+            return JsonResponse({{"scans", ListJson(scans.Scans("", limit), WallClock::now())}});
+          })
+      .Discloses("view.scans");
+  routes
+      .Read("/api/v1/scans/{id}", Permission::kRoom,
+            [&scans](const Request& request) {
+              const auto scan = scans.FindScan(request.arguments[0]);
+              return scan ? JsonResponse(ToJson(*scan, WallClock::now()))
+                          : ErrorResponse(404, "no such scan");
+            })
+      .Discloses("view.scan")
+      .ShowsDisplays(ShownRecord::kScan, "no such scan");
+  routes.Write("DELETE", "/api/v1/scans/{id}", Permission::kWipe, BodyKind::kJson,
+               [&scans](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::string reason = fields.Text("reason", kMinReason, kMaxReason);
+                 fields.Finish();
+                 scans.RemoveScan(request.actor(), request.arguments[0], reason, done);
+               });
+  routes.Write("POST", "/api/v1/scans/{id}/accept", Permission::kAccept, BodyKind::kNone,
+               [&scans](const Request& request, const Done& done) {
+                 scans.AcceptScan(request.actor(), request.arguments[0], /*reason=*/{}, done);
+               });
+  routes
+      .ReadInBackground("/api/v1/scans/{id}/files/{name}", Permission::kRoom,
+                        [&scans](const Request& request) {
+                          if (auto picture = TranslatedPicture(scans, request))
+                            return std::move(*picture);
+                          return ScanFileResponse(scans, request.arguments[0], request.arguments[1],
+                                                  DownloadName(request));
+                        })
+      .Discloses("view.scan", "download.file")
+      .ShowsDisplays(ShownRecord::kScanFile, "no such scan");
+  routes
+      .ReadInBackground("/api/v1/scans/{id}/maps/{name}", Permission::kRoom,
+                        [&scans](const Request& request) {
+                          auto map = scans.CompactMap(request.arguments[0], request.arguments[1]);
+                          if (!map) return ErrorResponse(404, "this scan has no such map");
+                          return BodyResponse("application/octet-stream", std::move(*map));
+                        })
+      .Discloses("view.scan")
+      .ShowsDisplays(ShownRecord::kScan, "this scan has no such map");
+  routes
+      .ReadInBackground("/api/v1/results/{id}", Permission::kRoom,
+                        [&scans](const Request& request) {
+                          return ScanFileResponse(scans, request.arguments[0], "result.json",
+                                                  /*download_name=*/"");
+                        })
+      .Discloses("view.scan")
+      .ShowsDisplays(ShownRecord::kScan, "no such scan");
 }
 
-void AddCheckRoutes(Table& table, CheckService& checks) {
-  table.ReadAside("/api/v1/checks", Permission::kView, [&checks](const Request&) {
+void AddCheckRoutes(Routes& routes, CheckService& checks) {
+  routes.ReadInBackground("/api/v1/checks", Permission::kView, [&checks](const Request&) {
     return JsonResponse(ToJson(checks.GetChecks(), WallClock::now()));
   });
-  table.Write("POST", "/api/v1/checks/open", Permission::kScan, BodyKind::kNone,
-              [&checks](const Request& request, const Respond& respond) {
-                checks.OpenCheck(request.actor(), Answer(respond));
-              });
-  table.Write("POST", "/api/v1/checks/{id}/baseline", Permission::kPlan, BodyKind::kNone,
-              [&checks](const Request& request, const Respond& respond) {
-                checks.SetCheckBaseline(request.actor(), request.arguments[0], Answer(respond));
-              });
+  routes.Write("POST", "/api/v1/checks/open", Permission::kScan, BodyKind::kNone,
+               [&checks](const Request& request, const Done& done) {
+                 checks.OpenCheck(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/checks/{id}/baseline", Permission::kPlan, BodyKind::kNone,
+               [&checks](const Request& request, const Done& done) {
+                 checks.SetCheckBaseline(request.actor(), request.arguments[0], done);
+               });
 }
 
-void AddSettingsRoutes(Table& table, SettingsService& settings, AuditLog& audit) {
-  table.ReadAside("/api/v1/audit", Permission::kAudit, [&audit](const Request& request) {
-    const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
-    const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
-    const bool views = QueryNumber(request, "views", 1, 1) == 1;
-    return JsonResponse({{"entries", ListJson(audit.Audit({before, limit, "", views}))}});
-  });
-  table.ReadAside("/api/v1/audit.jsonl", Permission::kAudit, [&audit](const Request&) {
-    Response response;
-    response.type = "application/x-ndjson";
-    response.body = audit.ExportAudit();
-    NameDownload(response, "plumb_log.jsonl");
-    return response;
-  });
-  table.Read("/api/v1/settings", Permission::kView, [&settings](const Request&) {
+void AddSettingsRoutes(Routes& routes, SettingsService& settings, AuditLog& audit) {
+  routes
+      .ReadInBackground(
+          "/api/v1/audit", Permission::kAudit,
+          [&audit](const Request& request) {
+            const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
+            const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
+            const bool views = QueryNumber(request, "views", 1, 1) == 1;
+            return JsonResponse({{"entries", audit.Audit({before, limit, "", views})}});
+          })
+      .Discloses("view.log");
+  routes
+      .ReadInBackground("/api/v1/audit.jsonl", Permission::kAudit,
+                        [&audit](const Request&) {
+                          return Download("application/x-ndjson", audit.ExportAudit(),
+                                          "plumb_log.jsonl");
+                        })
+      .Discloses("", "download.log");
+  routes.Read("/api/v1/settings", Permission::kView, [&settings](const Request&) {
     return JsonResponse(SettingsAs<Json>(settings.GetSettings()));
   });
-  table.Write("PUT", "/api/v1/settings", Permission::kSettings, BodyKind::kJson,
-              [&settings](const Request& request, const Respond& respond) {
-                settings.ChangeSettings(request.actor(), ParseSettingsChange(request.body),
-                                        Answer(respond));
-              });
+  routes.Write("PUT", "/api/v1/settings", Permission::kSettings, BodyKind::kJson,
+               [&settings](const Request& request, const Done& done) {
+                 settings.ChangeSettings(request.actor(), ParseSettingsChange(request.body), done);
+               });
 }
 
-void AddUpdateRoutes(Table& table, UpdateService& updates) {
-  table.Read("/api/v1/update", Permission::kView, [&updates](const Request&) {
-    Json answer = ToJson(updates.GetUpdate());
+void AddUpdateRoutes(Routes& routes, UpdateService& updates) {
+  routes.Read("/api/v1/update", Permission::kView, [&updates](const Request&) {
+    Json answer = updates.GetUpdate();
     answer["stick"] = updates.StickBundles();
     return JsonResponse(answer);
   });
-  table.Write("POST", "/api/v1/update", Permission::kUpdate, BodyKind::kJson,
-              [&updates](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const std::string bundle = fields.Text("bundle", 1, 64);
-                const bool from_stick = fields.Has("from_stick") && fields.Flag("from_stick");
-                fields.Finish();
-                if (!IsName(bundle)) throw DataError("bundle must be one of the names listed");
-                if (from_stick)
-                  return updates.InstallFromStick(request.actor(), bundle, Answer(respond));
-                updates.InstallUpdate(request.actor(), bundle, Answer(respond));
-              });
-  table.Write("POST", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kFile,
-              [&updates](const Request& request, const Respond& respond) {
-                const std::string& name = request.arguments[0];
-                if (!name.ends_with(".raucb"))
-                  throw DataError("a bundle's name must end with .raucb");
-                updates.AddBundle(request.actor(), request.upload->path(), name,
-                                  [respond, kept = request.upload](const Change& change) {
-                                    respond(ChangeResponse(change));
-                                  });
-              });
-  table.Write("POST", "/api/v1/update/seen", Permission::kUpdate, BodyKind::kNone,
-              [&updates](const Request& request, const Respond& respond) {
-                updates.ForgetRollBack(request.actor(), Answer(respond));
-              });
-  table.Write("DELETE", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kNone,
-              [&updates](const Request& request, const Respond& respond) {
-                updates.RemoveBundle(request.actor(), request.arguments[0], Answer(respond));
-              });
+  routes.Write("POST", "/api/v1/update", Permission::kUpdate, BodyKind::kJson,
+               [&updates](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::string bundle = fields.Text("bundle", 1, 64);
+                 const bool from_stick = fields.Has("from_stick") && fields.Flag("from_stick");
+                 fields.Finish();
+                 if (!IsName(bundle)) throw DataError("bundle must be one of the names listed");
+                 if (from_stick) return updates.InstallFromStick(request.actor(), bundle, done);
+                 updates.InstallUpdate(request.actor(), bundle, done);
+               });
+  routes.Write("POST", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kFile,
+               [&updates](const Request& request, const Done& done) {
+                 const std::string& name = request.arguments[0];
+                 if (!name.ends_with(".raucb"))
+                   throw DataError("a bundle's name must end with .raucb");
+                 updates.AddBundle(
+                     request.actor(), request.upload->path(), name,
+                     [done, kept = request.upload](const Change& change) { done(change); });
+               });
+  routes.Write("POST", "/api/v1/update/seen", Permission::kUpdate, BodyKind::kNone,
+               [&updates](const Request& request, const Done& done) {
+                 updates.ForgetRollBack(request.actor(), done);
+               });
+  routes.Write("DELETE", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kNone,
+               [&updates](const Request& request, const Done& done) {
+                 updates.RemoveBundle(request.actor(), request.arguments[0], done);
+               });
 }
 
-void AddMaintenanceRoutes(Table& table, MaintenanceService& maintenance, AuditLog& audit) {
-  table.ReadAside("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
-    const std::optional<AuditEntry> last = LastBackup(audit);
-    return JsonResponse({{"last", last ? ToJson(*last) : Json(nullptr)}});
+void AddMaintenanceRoutes(Routes& routes, MaintenanceService& maintenance, AuditLog& audit) {
+  routes.ReadInBackground("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
+    return JsonResponse({{"last", LastBackup(audit)}});
   });
-  table.Write("POST", "/api/v1/backup", Permission::kSettings, BodyKind::kNone,
-              [&maintenance](const Request& request, const Respond& respond) {
-                maintenance.MakeBackup(request.actor(), Answer(respond));
-              });
-  table.Write("POST", "/api/v1/diagnostics", Permission::kDiagnostics, BodyKind::kNone,
-              [&maintenance](const Request& request, const Respond& respond) {
-                maintenance.WriteDiagnostics(request.actor(), [respond](const Change& change) {
-                  if (change.result != ChangeResult::kDone) return respond(ChangeResponse(change));
-                  Response response =
-                      FileResponse(change.file, "application/octet-stream",
-                                   "plumb-diagnostics" + change.file.extension().string());
-                  std::error_code ignored;
-                  fs::remove(change.file, ignored);  // stays readable through the open descriptor
-                  respond(std::move(response));
-                });
-              });
+  routes.Write("POST", "/api/v1/backup", Permission::kSettings, BodyKind::kNone,
+               [&maintenance](const Request& request, const Done& done) {
+                 maintenance.MakeBackup(request.actor(), done);
+               });
+  routes.Add("POST", "/api/v1/diagnostics", Permission::kDiagnostics, BodyKind::kNone,
+             [&maintenance](const Request& request, const Respond& respond) {
+               maintenance.WriteDiagnostics(request.actor(), [respond](const Change& change) {
+                 if (change.result != ChangeResult::kDone) return respond(ChangeResponse(change));
+                 Response response =
+                     FileResponse(change.file, "application/octet-stream",
+                                  "plumb-diagnostics" + change.file.extension().string());
+                 std::error_code ignored;
+                 fs::remove(change.file, ignored);  // stays readable through the open descriptor
+                 respond(std::move(response));
+               });
+             });
 }
 
 }  // namespace
 
-void AddApiRoutes(Router& router, const Services& services) {
-  Table table(router, services.background);
-  AddApplianceRoutes(table, services.appliance);
-  AddPatientRoutes(table, services.patients, services.references, services.scans);
-  AddTemplateRoutes(table, services.settings);
-  AddReferenceRoutes(table, services.references);
-  AddScanRoutes(table, services.scans);
-  AddCheckRoutes(table, services.checks);
-  AddSettingsRoutes(table, services.settings, services.audit);
-  AddUpdateRoutes(table, services.updates);
-  AddMaintenanceRoutes(table, services.maintenance, services.audit);
+void AddApiRoutes(Routes& routes, const Services& services) {
+  AddApplianceRoutes(routes, services.appliance);
+  AddPatientRoutes(routes, services.patients, services.references, services.scans);
+  AddTemplateRoutes(routes, services.settings);
+  AddReferenceRoutes(routes, services.references);
+  AddScanRoutes(routes, services.scans);
+  AddCheckRoutes(routes, services.checks);
+  AddSettingsRoutes(routes, services.settings, services.audit);
+  AddUpdateRoutes(routes, services.updates);
+  AddMaintenanceRoutes(routes, services.maintenance, services.audit);
 }
 
 }  // namespace plumb::web

@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <functional>
-#include <string_view>
 
 #include "web/http/router.hpp"
 #include "web/service/account_services.hpp"
@@ -14,11 +13,8 @@ namespace plumb::web {
 /// ("view.scan"), because a page requests the same thing again and again.
 inline constexpr std::chrono::minutes kSameView{60};
 
-/// True for routes that answer with patient data, including the camera picture. The status and its
-/// events do not count: they only name the open session.
-[[nodiscard]] bool DisclosesPatientData(std::string_view pattern);
-
-/// Logs the answers of these routes of `router`, for the routes that exist at the time of the call.
+/// Logs the answers of the routes of `router` that disclose patient data, for the routes that exist
+/// at the time of the call.
 /// Each download has an entry of its own ("download.report"). Refusals are not logged, nor are
 /// paired displays, which show the actions of others.
 /// @param log  Outlives the router.

@@ -1,30 +1,10 @@
 #include "web/api/display_view.hpp"
 
-#include <algorithm>
-#include <array>
 #include <string>
-#include <string_view>
 #include <utility>
 
 namespace plumb::web {
 namespace {
-
-enum class Subject : std::uint8_t { kPatient, kReference, kScan, kScanFile };
-
-struct ShownRoute {
-  std::string_view pattern;
-  Subject subject;
-  const char* absent;  ///< What the route answers where there is no such record.
-};
-
-constexpr std::array kShownRoutes = {
-    ShownRoute{"/api/v1/patients/{id}", Subject::kPatient, "no such patient"},
-    ShownRoute{"/api/v1/references/{id}", Subject::kReference, "no such reference"},
-    ShownRoute{"/api/v1/scans/{id}", Subject::kScan, "no such scan"},
-    ShownRoute{"/api/v1/scans/{id}/files/{name}", Subject::kScanFile, "no such scan"},
-    ShownRoute{"/api/v1/scans/{id}/maps/{name}", Subject::kScan, "this scan has no such map"},
-    ShownRoute{"/api/v1/results/{id}", Subject::kScan, "no such scan"},
-};
 
 /// Decides by one status. Used on the loop thread.
 class DisplayView {
@@ -33,16 +13,18 @@ class DisplayView {
       : status_(std::move(status)), patients_(patients), references_(references) {}
 
   /// @param arguments  The record, and the name of its file if it has one.
-  [[nodiscard]] bool Shows(Subject subject, const std::vector<std::string>& arguments) const {
+  [[nodiscard]] bool Shows(ShownRecord record, const std::vector<std::string>& arguments) const {
     const std::string& id = arguments.at(0);
-    switch (subject) {
-      case Subject::kPatient:
+    switch (record) {
+      case ShownRecord::kNone:
+        break;
+      case ShownRecord::kPatient:
         return IsOpenPatient(id) || (last() && last()->patient_id == id);
-      case Subject::kReference:
+      case ShownRecord::kReference:
         return (last() && last()->reference_id == id) || IsOfOpenPatient(id);
-      case Subject::kScan:
+      case ShownRecord::kScan:
         return last() && last()->id == id;
-      case Subject::kScanFile:
+      case ShownRecord::kScanFile:
         return (last() && last()->id == id) || IsSceneOfReference(id, arguments.at(1));
     }
     return false;
@@ -77,20 +59,17 @@ void LimitDisplays(Router& router, const Services& services) {
   router.Wrap([&](const Route& route) -> Handler {
     if (route.permission != Permission::kRoom || route.pattern.find('{') == std::string::npos)
       return route.handler;
-    const auto* const known = std::ranges::find(kShownRoutes, route.pattern, &ShownRoute::pattern);
-    const ShownRoute* const shown = known == kShownRoutes.end() ? nullptr : known;
-    return
-        [services, shown, answer = route.handler](const Request& request, const Respond& respond) {
-          if (request.session->role == Role::kDisplay) {
-            if (shown == nullptr)
-              return respond(ErrorResponse(404, "there is nothing at this address"));
-            const DisplayView view(services.appliance.GetStatus(), services.patients,
-                                   services.references);
-            if (!view.Shows(shown->subject, request.arguments))
-              return respond(ErrorResponse(404, shown->absent));
-          }
-          answer(request, respond);
-        };
+    return [services, shown = route.shown, absent = std::string(route.absent),
+            answer = route.handler](const Request& request, const Respond& respond) {
+      if (request.session->role == Role::kDisplay) {
+        if (shown == ShownRecord::kNone)
+          return respond(ErrorResponse(404, "nothing was found at this address"));
+        const DisplayView view(services.appliance.GetStatus(), services.patients,
+                               services.references);
+        if (!view.Shows(shown, request.arguments)) return respond(ErrorResponse(404, absent));
+      }
+      answer(request, respond);
+    };
   });
 }
 

@@ -1,4 +1,4 @@
-// What a display in the room may read: what the status names, and nothing else.
+// A display in the room may read what the status names, and nothing else.
 #pragma once
 
 #include "web/http/router.hpp"

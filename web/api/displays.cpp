@@ -1,12 +1,9 @@
 #include "web/api/displays.hpp"
 
-#include <fmt/format.h>
-#include <sodium.h>
-
 #include <algorithm>
+#include <functional>
 #include <utility>
 
-#include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
 #include "web/http/checks.hpp"
 #include "web/model/account.hpp"
@@ -20,19 +17,8 @@ constexpr std::size_t kMaxWaiting = 8;
 constexpr std::chrono::minutes kWaitsFor{10};
 constexpr std::chrono::seconds kReloadInterval{5};
 constexpr int kMaxWrongCodes = 20;
-constexpr int kCookieAge_s =
-    400 * 24 * 3600;  // the longest that browsers keep a cookie; renewed at each use
-
-/// Six letters that are not easily confused: 30 bits, for ten minutes.
-std::string MakeCode() {
-  constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";
-  std::string code;
-  for (int i = 0; i < 6; ++i) {
-    if (i == 3) code += '-';
-    code += kLetters[randombytes_uniform(static_cast<std::uint32_t>(kLetters.size()))];
-  }
-  return code;
-}
+/// The longest that browsers keep a cookie; it is renewed at each use.
+constexpr std::chrono::hours kCookieAge{400 * 24};
 
 }  // namespace
 
@@ -72,33 +58,26 @@ void Displays::Expire() {
   if (pairings_.empty()) wrong_codes_ = 0;
 }
 
-void Displays::AddRoutes(Router& router) {
-  const auto bind = [this](void (Displays::*handler)(const Request&, const Respond&)) {
-    return [this, handler](const Request& request, const Respond& respond) {
-      (this->*handler)(request, respond);
-    };
+void Displays::AddRoutes(Routes& routes) {
+  routes.Read("/api/v1/displays", Permission::kUsers, [this](const Request&) { return List(); });
+  const auto add = [&](const char* method, const char* pattern, Permission permission,
+                       BodyKind body, auto handler) {
+    routes.Add(method, pattern, permission, body, std::bind_front(handler, this));
   };
-  router.Add({"POST", "/api/v1/displays/pair", Permission::kNone, BodyKind::kNone,
-              bind(&Displays::Begin)});
-  router.Add({"POST", "/api/v1/displays/claim", Permission::kNone, BodyKind::kJson,
-              bind(&Displays::Claim)});
-  router.Add(
-      {"GET", "/api/v1/displays", Permission::kUsers, BodyKind::kNone, bind(&Displays::List)});
-  router.Add(
-      {"POST", "/api/v1/displays", Permission::kUsers, BodyKind::kJson, bind(&Displays::Approve)});
-  router.Add({"DELETE", "/api/v1/displays/{id}", Permission::kUsers, BodyKind::kNone,
-              bind(&Displays::Remove)});
+  add("POST", "/api/v1/displays/pair", Permission::kNone, BodyKind::kNone, &Displays::Begin);
+  add("POST", "/api/v1/displays/claim", Permission::kNone, BodyKind::kJson, &Displays::Claim);
+  add("POST", "/api/v1/displays", Permission::kUsers, BodyKind::kJson, &Displays::Approve);
+  add("DELETE", "/api/v1/displays/{id}", Permission::kUsers, BodyKind::kNone, &Displays::Remove);
 }
 
 void Displays::Begin(const Request&, const Respond& respond) {
   Expire();
   if (pairings_.size() >= kMaxWaiting)
-    return respond(ErrorResponse(503, "too many screens wait to be paired; try again later"));
+    return respond(
+        ErrorResponse(503, "too many screens are waiting to be paired; try again later"));
   const std::string token = RandomToken(32);
-  pairings_.push_back({.code = MakeCode(), .token_hash = StoredHashOf(token), .begun = now_()});
-  Response response;
-  response.body = Dump({{"code", pairings_.back().code}, {"secret", token}});
-  respond(std::move(response));
+  pairings_.push_back({.code = RandomCode(6), .token_hash = StoredHashOf(token), .begun = now_()});
+  respond(JsonResponse({{"code", pairings_.back().code}, {"secret", token}}));
 }
 
 void Displays::Claim(const Request& request, const Respond& respond) {
@@ -108,20 +87,15 @@ void Displays::Claim(const Request& request, const Respond& respond) {
   Expire();
   const std::string hash = StoredHashOf(token);
   if (sessions_.contains(hash)) {
-    Response response;
-    response.headers.emplace_back(
-        "Set-Cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}",
-                                  cookie_name(), token, kCookieAge_s, tls_ ? "; Secure" : ""));
-    response.body = Dump({{"paired", true}});
+    Response response = JsonResponse({{"paired", true}});
+    SetCookie(response, cookie_name(), token, tls_, kCookieAge);
     return respond(std::move(response));
   }
   const bool waits = std::any_of(pairings_.begin(), pairings_.end(), [&](const Pairing& pairing) {
     return pairing.token_hash == hash;
   });
-  if (!waits) return respond(ErrorResponse(404, "this pairing is over: begin again"));
-  Response response;
-  response.body = Dump({{"paired", false}});
-  respond(std::move(response));
+  if (!waits) return respond(ErrorResponse(404, "this pairing has expired: start again"));
+  respond(JsonResponse({{"paired", false}}));
 }
 
 void Displays::Approve(const Request& request, const Respond& respond) {
@@ -147,34 +121,30 @@ void Displays::Approve(const Request& request, const Respond& respond) {
                         .paired_at = WallClock::now(),
                         .paired_by = request.actor().user};
   pairings_.erase(found);
-  service_.AddDisplay(request.actor(), display,
-                      [this, alive = std::weak_ptr(alive_), respond](const Change& change) {
-                        if (alive.expired()) return;
-                        Load();
-                        respond(ChangeResponse(change));
-                      });
+  service_.AddDisplay(request.actor(), display, LoadThenAnswer(respond));
 }
 
-void Displays::List(const Request&, const Respond& respond) {
+Response Displays::List() {
   Json list = Json::array();
   for (const Display& display : service_.Displays()) {
     list.push_back(Json{{"id", display.id},
                         {"name", display.name},
-                        {"paired_at", TimeText(display.paired_at)},
+                        {"paired_at", display.paired_at},
                         {"paired_by", display.paired_by}});
   }
-  Response response;
-  response.body = Dump({{"displays", list}});
-  respond(std::move(response));
+  return JsonResponse({{"displays", list}});
 }
 
 void Displays::Remove(const Request& request, const Respond& respond) {
-  service_.RemoveDisplay(request.actor(), request.arguments.at(0),
-                         [this, alive = std::weak_ptr(alive_), respond](const Change& change) {
-                           if (alive.expired()) return;
-                           Load();
-                           respond(ChangeResponse(change));
-                         });
+  service_.RemoveDisplay(request.actor(), request.arguments.at(0), LoadThenAnswer(respond));
+}
+
+Done Displays::LoadThenAnswer(const Respond& respond) {
+  return [this, alive = std::weak_ptr(alive_), respond](const Change& change) {
+    if (alive.expired()) return;
+    Load();
+    respond(ChangeResponse(change));
+  };
 }
 
 }  // namespace plumb::web

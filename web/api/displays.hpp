@@ -5,12 +5,10 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "web/http/message.hpp"
-#include "web/http/router.hpp"
+#include "web/api/routes.hpp"
 #include "web/security/sessions.hpp"
 #include "web/service/account_services.hpp"
 
@@ -24,7 +22,7 @@ class Displays {
 
   Displays(DisplayService& service, bool tls, std::function<TimePoint()> now);
 
-  void AddRoutes(Router& router);
+  void AddRoutes(Routes& routes);
   /// Session of a request with a paired display's cookie; null for all others.
   [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request);
 
@@ -38,8 +36,10 @@ class Displays {
   void Begin(const Request& request, const Respond& respond);
   void Claim(const Request& request, const Respond& respond);
   void Approve(const Request& request, const Respond& respond);
-  void List(const Request& request, const Respond& respond);
+  [[nodiscard]] Response List();
   void Remove(const Request& request, const Respond& respond);
+  /// Reads the displays again after a change.
+  [[nodiscard]] Done LoadThenAnswer(const Respond& respond);
   void Expire();
   void Load();
   [[nodiscard]] std::string cookie_name() const {

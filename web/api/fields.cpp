@@ -111,7 +111,7 @@ void Fields::Finish() const {
   for (const auto& item : json_.items()) {
     if (!known_.contains(item.key()))
       throw DataError(
-          fmt::format("unknown field in the body; known are: {}", fmt::join(known_, ", ")));
+          fmt::format("unknown field in the body; known fields: {}", fmt::join(known_, ", ")));
   }
 }
 
@@ -190,7 +190,7 @@ SettingsChange ParseSettingsChange(const std::string& body) {
                    if (fields.Has(name)) Take(fields, name, wanted, limits...);
                  });
   fields.Finish();
-  if (change.is_empty()) throw DataError("the body states no setting to change");
+  if (change.is_empty()) throw DataError("the body names no setting to change");
   return change;
 }
 

@@ -28,18 +28,6 @@ constexpr std::chrono::milliseconds kExpireEvery{
 constexpr std::chrono::milliseconds kMinEventGap{100};
 constexpr std::chrono::milliseconds kCutEvery{1000};
 
-AccountOptions AccountsOptions(const HttpServerOptions& options,
-                               std::function<void(const TlsIdentity&)> replace_certificate) {
-  return {options.password_operations,
-          options.password_memory_bytes,
-          options.session_limit,
-          options.device_key,
-          options.tls,
-          options.now,
-          options.host_names,
-          std::move(replace_certificate)};
-}
-
 HttpServerOptions Completed(HttpServerOptions options) {
   if (!options.now) options.now = [] { return SteadyClock::now(); };
   return options;
@@ -67,21 +55,22 @@ class HttpServer::Impl {
   Impl(const Services& services, HttpServerOptions options)
       : appliance_(services.appliance),
         options_(Completed(std::move(options))),
-        accounts_(services, AccountsOptions(options_, CertificateReplacer())),
+        accounts_(services, options_, CertificateReplacer()),
         hub_({.all = options_.max_event_streams,
               .of_account = options_.max_streams_per_account,
               .of_session = options_.max_streams_per_session,
               .buffer_bytes = options_.event_buffer_bytes}),
         transport_(options_, services.background, router_, accounts_, hub_,
                    [this](EventStream& stream) { stream.Send(StatusEvent()); }) {
-    accounts_.AddRoutes(router_);
-    AddApiRoutes(router_, services);
-    AddResultPage(router_, services);
-    AddExportRoutes(router_, services);
-    AddRoomCalibrationRoutes(router_, services);
+    Routes routes(router_, services.background);
+    accounts_.AddRoutes(routes);
+    AddApiRoutes(routes, services);
+    AddResultPage(routes, services);
+    AddExportRoutes(routes, services);
+    AddRoomCalibrationRoutes(routes, services);
     LimitDisplays(router_, services);
     LogDisclosures(router_, services.audit, options_.now);
-    AddPageRoutes();
+    AddPageRoutes(routes);
     epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
     if (epoll_fd_ < 0)
       throw IoError(fmt::format("cannot make an epoll descriptor: {}", std::strerror(errno)));
@@ -161,10 +150,10 @@ class HttpServer::Impl {
       throw IoError(fmt::format("cannot watch a descriptor: {}", std::strerror(errno)));
   }
 
-  void AddPageRoutes() {
-    const auto serve = [](const Request& request, const Respond& respond) {
+  static void AddPageRoutes(Routes& routes) {
+    const auto serve = [](const Request& request) {
       const Asset* asset = FindAsset(request.path == "/room" ? "/" : request.path);
-      if (asset == nullptr) return respond(ErrorResponse(404, "no such file"));
+      if (asset == nullptr) return ErrorResponse(404, "no such file");
       const auto accepted = request.headers.find("accept-encoding");
       Response response;
       response.type = std::string(asset->type);
@@ -177,18 +166,15 @@ class HttpServer::Impl {
         response.constant_body = asset->gzip;
         response.headers.emplace_back("Content-Encoding", "gzip");
       }
-      respond(std::move(response));
+      return response;
     };
-    router_.Add({"GET", "/", Permission::kNone, BodyKind::kNone, serve});
-    router_.Add({"GET", "/room", Permission::kNone, BodyKind::kNone, serve});
-    router_.Add({"GET", "/assets/{name}", Permission::kNone, BodyKind::kNone, serve});
-    router_.Add({"GET", "/api/v1/events", Permission::kRoom, BodyKind::kNone,
-                 [](const Request&, const Respond& respond) {
-                   Response response;
-                   response.type = "text/event-stream";
-                   response.event_stream = true;
-                   respond(std::move(response));
-                 }});
+    for (const char* pattern : {"/", "/room", "/assets/{name}"})
+      routes.Read(pattern, Permission::kNone, serve);
+    routes.Read("/api/v1/events", Permission::kRoom, [](const Request&) {
+      Response response = BodyResponse("text/event-stream", "");
+      response.event_stream = true;
+      return response;
+    });
   }
 
   [[nodiscard]] std::string StatusEvent() {
@@ -235,12 +221,6 @@ void HttpServer::Run() { impl_->Run(); }
 std::optional<std::chrono::milliseconds> HttpServer::timeout() const { return impl_->timeout(); }
 std::uint16_t HttpServer::port() const { return impl_->transport().port(); }
 std::optional<std::string> HttpServer::setup_code() const { return impl_->accounts().setup_code(); }
-std::vector<std::string> HttpServer::RouteNames() const {
-  std::vector<std::string> names;
-  for (const Route& route : impl_->router().routes()) {
-    names.push_back(fmt::format("{} {} {}", route.method, route.pattern, Name(route.permission)));
-  }
-  return names;
-}
+const std::vector<Route>& HttpServer::routes() const { return impl_->router().routes(); }
 
 }  // namespace plumb::web

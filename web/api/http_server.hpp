@@ -3,14 +3,12 @@
 
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "web/http/router.hpp"
 #include "web/http/server_options.hpp"
 #include "web/service/services.hpp"
 
@@ -39,9 +37,7 @@ class HttpServer {
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
 
   [[nodiscard]] std::uint16_t port() const;
-  /// "GET /api/v1/status view" for each route: method, path and permission, for the documentation
-  /// and its test.
-  [[nodiscard]] std::vector<std::string> RouteNames() const;
+  [[nodiscard]] const std::vector<Route>& routes() const;
   /// "XXXX-XXXX" while there is no account: it permits creating the first one, an engineer. Print
   /// it where only the owner can see it.
   [[nodiscard]] std::optional<std::string> setup_code() const;

@@ -9,22 +9,13 @@
 namespace plumb::web {
 namespace {
 
-template <typename T>
-Json OrNull(const std::optional<T>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
 Json TextOrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 Json NumbersJson(const std::optional<ReportedNumbers>& numbers) {
   if (!numbers) return nullptr;
   Json json;
-  for (const NumberAxis& axis : kNumberAxes) json[axis.key] = OrNull(axis.In(numbers));
+  for (const NumberAxis& axis : kNumberAxes) json[axis.key] = axis.In(numbers);
   return json;
-}
-
-Json ToleranceJson(const Tolerance& tolerance) {
-  return {{"shift_mm", tolerance.shift_mm}, {"rotation_deg", tolerance.rotation_deg}};
 }
 
 Json LiveScanJson(const LiveScan& scan) {
@@ -32,7 +23,7 @@ Json LiveScanJson(const LiveScan& scan) {
           {"patient_id", TextOrNull(scan.patient_id)},
           {"purpose", Name(scan.purpose)},
           {"elapsed_s", scan.elapsed_s},
-          {"coverage", OrNull(scan.coverage)},
+          {"coverage", scan.coverage},
           {"without_new_surface_s", scan.without_new_surface_s},
           {"guidance", Name(scan.guidance)},
           {"keyframes", scan.keyframes},
@@ -47,6 +38,12 @@ Json LiveScanJson(const LiveScan& scan) {
 
 std::string Dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Response JsonResponse(const Json& json, int status) {
+  Response response = BodyResponse("application/json", Dump(json));
+  response.status = status;
+  return response;
 }
 
 std::string TimeText(WallClock::time_point time) {
@@ -80,20 +77,18 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
                {"purpose", Name(scan.purpose)},
                {"outcome", Name(scan.outcome)},
                {"failure", TextOrNull(scan.failure)},
-               {"started_at", TimeText(scan.started_at)},
-               {"finished_at", nullptr},
+               {"started_at", scan.started_at},
+               {"finished_at", scan.finished_at},
                {"age_s", nullptr},
                {"accepted_by", TextOrNull(scan.accepted_by)},
                {"accepted_reason", TextOrNull(scan.accepted_reason)},
-               {"accepted_at", nullptr},
+               {"accepted_at", scan.accepted_at},
                {"session_id", TextOrNull(scan.session_id)},
                {"fraction", scan.fraction > 0 ? Json(scan.fraction) : Json(nullptr)},
-               {"sensor_on_s", OrNull(scan.sensor_on_s)},
+               {"sensor_on_s", scan.sensor_on_s},
                {"result", nullptr}};
   AddDailyCheck(json, scan.daily_check, "check_overdue", "check_failed");
-  if (scan.accepted_at) json["accepted_at"] = TimeText(*scan.accepted_at);
   if (scan.finished_at) {
-    json["finished_at"] = TimeText(*scan.finished_at);
     // An end in the future: the clock has stepped, and the age is unknown.
     if (scan.age_s)
       json["age_s"] = static_cast<std::int64_t>(*scan.age_s);
@@ -115,13 +110,19 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
   return json;
 }
 
+Json ListJson(const std::vector<Scan>& scans, WallClock::time_point now) {
+  Json list = Json::array();
+  for (const Scan& scan : scans) list.push_back(ToJson(scan, now));
+  return list;
+}
+
 namespace {
 
 Json CheckJson(const CheckRecord& check, WallClock::time_point now) {
   Json items = Json::array();
   for (const CheckItem& item : check.items) {
     items.push_back(Json{{"name", item.name},
-                         {"value", item.value ? Json(*item.value) : Json(nullptr)},
+                         {"value", item.value},
                          {"limit", item.limit},
                          {"unit", item.unit},
                          {"passed", item.passed},
@@ -129,7 +130,7 @@ Json CheckJson(const CheckRecord& check, WallClock::time_point now) {
   }
   return {
       {"id", check.id},
-      {"time", TimeText(check.time)},
+      {"time", check.time},
       {"age_s", std::max<std::int64_t>(
                     0, std::chrono::duration_cast<std::chrono::seconds>(now - check.time).count())},
       {"user", check.user},
@@ -148,7 +149,7 @@ Json ToJson(const CheckStatus& checks, WallClock::time_point now) {
   for (const CheckRecord& check : checks.checks) json["checks"].push_back(CheckJson(check, now));
   if (checks.baseline) {
     json["baseline"] = {{"check_id", checks.baseline->check_id},
-                        {"set_at", TimeText(checks.baseline->set_at)},
+                        {"set_at", checks.baseline->set_at},
                         {"set_by", checks.baseline->set_by},
                         {"num_markers", checks.baseline->num_markers}};
   }
@@ -165,7 +166,7 @@ Json SessionJson(const TreatmentSession& session) {
           {"fraction", session.fraction > 0 ? Json(session.fraction) : Json(nullptr)},
           {"num_scans", session.num_scans},
           {"opened_by", session.opened_by},
-          {"opened_at", TimeText(session.opened_at)}};
+          {"opened_at", session.opened_at}};
 }
 
 Json WaitingJson(const std::vector<WaitingReference>& waiting) {
@@ -204,35 +205,46 @@ Json ToJson(const Status& status, WallClock::time_point now) {
       {"next_purpose", Name(status.next_purpose)},
       {"scans_today", status.scans_today},
       {"session", status.session ? SessionJson(*status.session) : Json(nullptr)},
-      {"room", ToJson(status.room)},
+      {"room", status.room},
       {"waiting", WaitingJson(status.waiting)},
       {"scan", status.scan ? LiveScanJson(*status.scan) : Json(nullptr)},
       {"reference_block", TextOrNull(status.reference_block)},
       {"last_check", status.last_check ? CheckJson(*status.last_check, now) : Json(nullptr)},
       {"last_result", status.last_result ? ToJson(*status.last_result, now) : Json(nullptr)},
-      {"time", TimeText(now)},
+      {"time", now},
       {"version", status.version},
       {"warnings", status.warnings},
       {"rolled_back", TextOrNull(status.rolled_back)}};
-  // What is acted on goes by this age, so the wall clock does not take the place of the steady one.
+  // This age decides what may be acted on, so the wall clock does not replace the steady one.
   if (status.last_result && !status.last_result->age_s) json["last_result"]["age_s"] = nullptr;
   AddDailyCheck(json, status.daily_check, "check_overdue", "check_failed");
   return json;
 }
 
-Json ToJson(const PlanTemplate& wanted) {
-  return {{"site", wanted.site},
+}  // namespace plumb::web
+
+namespace plumb {
+
+using web::Json;
+using web::TextOrNull;
+
+void to_json(Json& json, const Tolerance& tolerance) {
+  json = {{"shift_mm", tolerance.shift_mm}, {"rotation_deg", tolerance.rotation_deg}};
+}
+
+void to_json(Json& json, const PlanTemplate& wanted) {
+  json = {{"site", wanted.site},
           {"width_mm", wanted.width_mm},
           {"height_mm", wanted.height_mm},
-          {"tolerance", ToleranceJson(wanted.tolerance)},
+          {"tolerance", wanted.tolerance},
           {"changed_by", wanted.changed_by}};
 }
 
-Json ToJson(const Patient& patient) {
-  return {{"id", patient.id},
+void to_json(Json& json, const Patient& patient) {
+  json = {{"id", patient.id},
           {"code", patient.code},
           {"site", patient.site},
-          {"created_at", TimeText(patient.created_at)},
+          {"created_at", patient.created_at},
           {"approved_reference_id", TextOrNull(patient.approved_reference_id)},
           {"num_scans", patient.num_scans},
           {"draft_reference_id", TextOrNull(patient.draft_reference_id)},
@@ -246,60 +258,57 @@ Json PlanJson(const ReferencePlan& plan) {
   Json region = Json::array();
   for (const auto& [x, y] : plan.region_m) region.push_back({x, y});
   return {{"region_m", region},
-          {"isocentre_m", OrNull(plan.isocentre_m)},
-          {"tolerance", ToleranceJson(plan.tolerance)},
+          {"isocentre_m", plan.isocentre_m},
+          {"tolerance", plan.tolerance},
           {"posture", plan.posture},
           {"couch_markers", plan.couch_markers}};
 }
 
 }  // namespace
 
-Json ToJson(const RoomOnMap& room) {
-  return {{"gantry_xy", room.gantry_xy}, {"right_xy", room.right_xy}, {"known", room.is_known}};
+void to_json(Json& json, const RoomOnMap& room) {
+  json = {{"gantry_xy", room.gantry_xy}, {"right_xy", room.right_xy}, {"known", room.is_known}};
 }
 
-Json ToJson(const Reference& reference) {
-  return {{"id", reference.id},
+void to_json(Json& json, const Reference& reference) {
+  json = {{"id", reference.id},
           {"patient_id", reference.patient_id},
           {"version", reference.version},
           {"scan_id", reference.scan_id},
-          {"created_at", TimeText(reference.created_at)},
+          {"created_at", reference.created_at},
           {"created_by", reference.created_by},
           {"reason", reference.reason},
           {"revision", reference.revision},
           {"digest", reference.digest},
           {"planned_by", TextOrNull(reference.planned_by)},
           {"approved_by", TextOrNull(reference.approved_by)},
-          {"approved_at",
-           reference.approved_at ? Json(TimeText(*reference.approved_at)) : Json(nullptr)},
+          {"approved_at", reference.approved_at},
           {"plan", reference.unreadable.empty() ? PlanJson(reference.plan) : Json(nullptr)},
           {"unreadable", TextOrNull(reference.unreadable)}};
 }
 
-Json ToJson(const User& user) {
-  return {{"name", user.name},
+void to_json(Json& json, const User& user) {
+  json = {{"name", user.name},
           {"role", Name(user.role)},
           {"disabled", user.disabled},
-          {"created_at", TimeText(user.created_at)}};
+          {"created_at", user.created_at}};
 }
 
-Json ToJson(const AuditEntry& entry) {
-  Json json = {{"number", entry.number}, {"time", TimeText(entry.time)},
-               {"user", entry.user},     {"address", entry.address},
-               {"action", entry.action}, {"subject", entry.subject},
-               {"detail", entry.detail}, {"about", nullptr}};
+void to_json(Json& json, const AuditEntry& entry) {
+  json = {{"number", entry.number},   {"time", entry.time},     {"user", entry.user},
+          {"address", entry.address}, {"action", entry.action}, {"subject", entry.subject},
+          {"detail", entry.detail},   {"about", nullptr}};
   if (const auto& about = entry.about) {
     json["about"] = {{"kind", about->kind},
                      {"exists", about->exists},
                      {"patient_code", TextOrNull(about->patient_code)},
                      {"number", about->number > 0 ? Json(about->number) : Json(nullptr)},
-                     {"time", about->time ? Json(TimeText(*about->time)) : Json(nullptr)}};
+                     {"time", about->time}};
   }
-  return json;
 }
 
-Json ToJson(const UpdateStatus& update) {
-  return {{"supported", update.supported},
+void to_json(Json& json, const UpdateStatus& update) {
+  json = {{"supported", update.supported},
           {"message", update.message},
           {"slot", update.slot},
           {"installing", update.installing},
@@ -310,4 +319,4 @@ Json ToJson(const UpdateStatus& update) {
           {"rolled_back", TextOrNull(update.rolled_back)}};
 }
 
-}  // namespace plumb::web
+}  // namespace plumb

@@ -1,10 +1,15 @@
 // Conversion of the services' values to JSON, and of JSON from browsers to values.
 #pragma once
 
+#include <ctime>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "web/http/message.hpp"
 #include "web/model/account.hpp"
 #include "web/model/audit.hpp"
 #include "web/model/check.hpp"
@@ -14,29 +19,58 @@
 #include "web/model/settings.hpp"
 #include "web/model/status.hpp"
 #include "web/model/wall_clock.hpp"
-#include "web/security/sessions.hpp"
 
 namespace plumb::web {
 
 using Json = nlohmann::ordered_json;
 
+/// "2026-03-01T09:30:00Z"
+[[nodiscard]] std::string TimeText(WallClock::time_point time);
+/// Takes any year: a certificate's end may be past what a time_point holds.
+[[nodiscard]] std::string TimeText(std::time_t time);
+
+}  // namespace plumb::web
+
+// An absent value is null, a time is text.
+template <typename T>
+struct nlohmann::adl_serializer<std::optional<T>> {
+  static void to_json(plumb::web::Json& json, const std::optional<T>& value) {
+    if (value)
+      json = *value;
+    else
+      json = nullptr;
+  }
+};
+template <>
+struct nlohmann::adl_serializer<plumb::WallClock::time_point> {
+  static void to_json(plumb::web::Json& json, plumb::WallClock::time_point time) {
+    json = plumb::web::TimeText(time);
+  }
+};
+
+namespace plumb {
+
+// These make nlohmann::json convert the values, also in lists and optionals.
+void to_json(web::Json& json, const Patient& patient);
+void to_json(web::Json& json, const PlanTemplate& wanted);
+void to_json(web::Json& json, const Tolerance& tolerance);
+void to_json(web::Json& json, const Reference& reference);
+void to_json(web::Json& json, const RoomOnMap& room);
+void to_json(web::Json& json, const User& user);  ///< Without the hash.
+void to_json(web::Json& json, const AuditEntry& entry);
+void to_json(web::Json& json, const UpdateStatus& update);
+
+}  // namespace plumb
+
+namespace plumb::web {
+
 [[nodiscard]] Json ToJson(const Status& status, WallClock::time_point now);
 /// @param now  For age_s, so that a page does not rely on its own clock.
 [[nodiscard]] Json ToJson(const Scan& scan, WallClock::time_point now);
-[[nodiscard]] Json ToJson(const Patient& patient);
-[[nodiscard]] Json ToJson(const PlanTemplate& wanted);
-[[nodiscard]] Json ToJson(const Reference& reference);
-[[nodiscard]] Json ToJson(const RoomOnMap& room);
 [[nodiscard]] Json ToJson(const CheckStatus& checks, WallClock::time_point now);
-[[nodiscard]] Json ToJson(const User& user);  ///< Without the hash.
-[[nodiscard]] Json ToJson(const AuditEntry& entry);
-[[nodiscard]] Json ToJson(const UpdateStatus& update);
+[[nodiscard]] Json ListJson(const std::vector<Scan>& scans, WallClock::time_point now);
 [[nodiscard]] std::string Dump(const Json& json);
-
-/// "2026-03-01T09:30:00Z"
-[[nodiscard]] std::string TimeText(WallClock::time_point time);
-/// Of any year: a certificate's end may be past what a time_point holds.
-[[nodiscard]] std::string TimeText(std::time_t time);
+[[nodiscard]] Response JsonResponse(const Json& json, int status = 200);
 
 /// The fields of a request's body. Every accessor throws DataError naming the field, what was
 /// expected and what was found.

@@ -9,9 +9,7 @@
 
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
-#include "web/api/language.hpp"
 #include "web/api/zip_archive.hpp"
-#include "web/http/gate.hpp"
 
 namespace plumb::web {
 namespace {
@@ -61,54 +59,52 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
 }
 
 std::string NumbersJson(const Patient& patient, const std::vector<Scan>& scans) {
-  Json list = Json::array();
-  for (const Scan& scan : scans) list.push_back(ToJson(scan, WallClock::now()));
-  return Dump({{"patient", ToJson(patient)}, {"scans", list}});
+  return Dump({{"patient", patient}, {"scans", ListJson(scans, WallClock::now())}});
 }
 
-Response File(std::string body, std::string type, const std::string& name) {
-  Response response;
-  response.type = std::move(type);
-  response.body = std::move(body);
-  response.headers.emplace_back("Content-Disposition",
-                                fmt::format("attachment; filename=\"{}\"", name));
-  return response;
+void AddReports(Routes& routes, ScanService& scans) {
+  routes
+      .ReadInBackground("/api/v1/scans/{id}/report.pdf", Permission::kView,
+                        [&scans](const Request& request) {
+                          auto pdf = scans.ScanReport(request.arguments[0], LanguageIn(request));
+                          if (!pdf) return ErrorResponse(404, "there is no such scan");
+                          return Download("application/pdf", std::move(*pdf),
+                                          fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
+                        })
+      .Discloses("", "download.report");
+  routes
+      .ReadInBackground("/api/v1/patients/{id}/report.pdf", Permission::kView,
+                        [&scans](const Request& request) {
+                          auto pdf = scans.CourseReport(request.arguments[0], LanguageIn(request));
+                          if (!pdf) return ErrorResponse(404, "there is no such patient");
+                          return Download("application/pdf", std::move(*pdf),
+                                          fmt::format("plumb_course_{}.pdf", request.arguments[0]));
+                        })
+      .Discloses("", "download.course_report");
 }
 
-void AddReports(Router& router, BackgroundWork& background, ScanService& scans) {
-  AddAside(router, background, "/api/v1/scans/{id}/report.pdf", Permission::kView,
-           [&scans](const Request& request) {
-             auto pdf = scans.ScanReport(request.arguments[0], LanguageIn(request));
-             if (!pdf) return ErrorResponse(404, "there is no such scan");
-             return File(std::move(*pdf), "application/pdf",
-                         fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
-           });
-  AddAside(router, background, "/api/v1/patients/{id}/report.pdf", Permission::kView,
-           [&scans](const Request& request) {
-             auto pdf = scans.CourseReport(request.arguments[0], LanguageIn(request));
-             if (!pdf) return ErrorResponse(404, "there is no such patient");
-             return File(std::move(*pdf), "application/pdf",
-                         fmt::format("plumb_course_{}.pdf", request.arguments[0]));
-           });
-}
-
-void AddNumbers(Router& router, BackgroundWork& background, PatientService& patients,
-                ScanService& scans) {
-  AddAside(router, background, "/api/v1/patients/{id}/numbers.csv", Permission::kView,
-           [&patients, &scans](const Request& request) {
-             const auto patient = patients.FindPatient(request.arguments[0]);
-             if (!patient) return ErrorResponse(404, "there is no such patient");
-             return File(Csv(*patient, scans.Scans(patient->id, kMaxScans)),
-                         "text/csv; charset=utf-8",
-                         fmt::format("plumb_numbers_{}.csv", patient->code));
-           });
-  AddAside(router, background, "/api/v1/patients/{id}/numbers.json", Permission::kView,
-           [&patients, &scans](const Request& request) {
-             const auto patient = patients.FindPatient(request.arguments[0]);
-             if (!patient) return ErrorResponse(404, "there is no such patient");
-             return File(NumbersJson(*patient, scans.Scans(patient->id, kMaxScans)),
-                         "application/json", fmt::format("plumb_numbers_{}.json", patient->code));
-           });
+void AddNumbers(Routes& routes, PatientService& patients, ScanService& scans) {
+  routes
+      .ReadInBackground("/api/v1/patients/{id}/numbers.csv", Permission::kView,
+                        [&patients, &scans](const Request& request) {
+                          const auto patient = patients.FindPatient(request.arguments[0]);
+                          if (!patient) return ErrorResponse(404, "there is no such patient");
+                          return Download("text/csv; charset=utf-8",
+                                          Csv(*patient, scans.Scans(patient->id, kMaxScans)),
+                                          fmt::format("plumb_numbers_{}.csv", patient->code));
+                        })
+      .Discloses("", "download.numbers");
+  routes
+      .ReadInBackground("/api/v1/patients/{id}/numbers.json", Permission::kView,
+                        [&patients, &scans](const Request& request) {
+                          const auto patient = patients.FindPatient(request.arguments[0]);
+                          if (!patient) return ErrorResponse(404, "there is no such patient");
+                          return Download(
+                              "application/json",
+                              NumbersJson(*patient, scans.Scans(patient->id, kMaxScans)),
+                              fmt::format("plumb_numbers_{}.json", patient->code));
+                        })
+      .Discloses("", "download.numbers");
 }
 
 constexpr std::size_t kMostBytes = std::size_t{64} << 20;
@@ -151,22 +147,23 @@ void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files
 }
 
 /// All data of a course in one file.
-void AddCourse(Router& router, BackgroundWork& background, PatientService& patients,
-               ScanService& scans) {
-  AddAside(router, background, "/api/v1/patients/{id}/course.zip", Permission::kView,
-           [&patients, &scans](const Request& request) {
-             const auto patient = patients.FindPatient(request.arguments[0]);
-             if (!patient) return ErrorResponse(404, "there is no such patient");
-             const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
-             std::vector<ArchivedFile> files = {
-                 {.name = "numbers.csv", .bytes = Csv(*patient, list)},
-                 {.name = "numbers.json", .bytes = NumbersJson(*patient, list)}};
-             if (auto pdf = scans.CourseReport(patient->id, LanguageIn(request)))
-               files.push_back({.name = "course.pdf", .bytes = std::move(*pdf)});
-             AddResults(list, files);
-             return File(ZipOf(files), "application/zip",
-                         fmt::format("plumb_course_{}.zip", patient->code));
-           });
+void AddCourse(Routes& routes, PatientService& patients, ScanService& scans) {
+  routes
+      .ReadInBackground("/api/v1/patients/{id}/course.zip", Permission::kView,
+                        [&patients, &scans](const Request& request) {
+                          const auto patient = patients.FindPatient(request.arguments[0]);
+                          if (!patient) return ErrorResponse(404, "there is no such patient");
+                          const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
+                          std::vector<ArchivedFile> files = {
+                              {.name = "numbers.csv", .bytes = Csv(*patient, list)},
+                              {.name = "numbers.json", .bytes = NumbersJson(*patient, list)}};
+                          if (auto pdf = scans.CourseReport(patient->id, LanguageIn(request)))
+                            files.push_back({.name = "course.pdf", .bytes = std::move(*pdf)});
+                          AddResults(list, files);
+                          return Download("application/zip", ZipOf(files),
+                                          fmt::format("plumb_course_{}.zip", patient->code));
+                        })
+      .Discloses("", "download.course");
 }
 
 Json ProfilesJson(const SensorProfiles& profiles) {
@@ -174,7 +171,7 @@ Json ProfilesJson(const SensorProfiles& profiles) {
       {"serial", profiles.serial}, {"why_none", profiles.why_none}, {"versions", Json::array()}};
   for (const SensorProfileVersion& one : profiles.versions)
     json["versions"].push_back({{"version", one.version},
-                                {"made_at", TimeText(one.made_at)},
+                                {"made_at", one.made_at},
                                 {"cause", Name(one.cause)},
                                 {"num_sweeps", one.num_sweeps},
                                 {"values", one.values}});
@@ -187,29 +184,27 @@ int VersionIn(const std::string& text) {
   return error == std::errc() && end == text.data() + text.size() ? version : 0;
 }
 
-void AddProfiles(Router& router, BackgroundWork& background, SensorProfileService& profiles) {
-  AddAside(router, background, "/api/v1/sensor-profile", Permission::kView,
-           [&profiles](const Request&) {
-             Response response;
-             response.body = Dump(ProfilesJson(profiles.GetSensorProfiles()));
-             return response;
-           });
-  AddAside(router, background, "/api/v1/sensor-profile/{version}/file", Permission::kView,
-           [&profiles](const Request& request) {
-             auto text = profiles.SensorProfileFile(VersionIn(request.arguments[0]));
-             if (!text) return ErrorResponse(404, "there is no such profile");
-             return File(std::move(*text), "application/json",
-                         fmt::format("plumb_sensor_profile_{}.json", request.arguments[0]));
-           });
+void AddProfiles(Routes& routes, SensorProfileService& profiles) {
+  routes.ReadInBackground("/api/v1/sensor-profile", Permission::kView, [&profiles](const Request&) {
+    return JsonResponse(ProfilesJson(profiles.GetSensorProfiles()));
+  });
+  routes.ReadInBackground("/api/v1/sensor-profile/{version}/file", Permission::kView,
+                          [&profiles](const Request& request) {
+                            auto text = profiles.SensorProfileFile(VersionIn(request.arguments[0]));
+                            if (!text) return ErrorResponse(404, "there is no such profile");
+                            return Download(
+                                "application/json", std::move(*text),
+                                fmt::format("plumb_sensor_profile_{}.json", request.arguments[0]));
+                          });
 }
 
 }  // namespace
 
-void AddExportRoutes(Router& router, const Services& services) {
-  AddReports(router, services.background, services.scans);
-  AddNumbers(router, services.background, services.patients, services.scans);
-  AddCourse(router, services.background, services.patients, services.scans);
-  AddProfiles(router, services.background, services.profiles);
+void AddExportRoutes(Routes& routes, const Services& services) {
+  AddReports(routes, services.scans);
+  AddNumbers(routes, services.patients, services.scans);
+  AddCourse(routes, services.patients, services.scans);
+  AddProfiles(routes, services.profiles);
 }
 
 }  // namespace plumb::web

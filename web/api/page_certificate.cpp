@@ -20,17 +20,15 @@ Response NotReplaceable() {
 
 }  // namespace
 
-void Accounts::DescribeCertificate(const Request&, const Respond& respond) {
+Response Accounts::DescribeCertificate() const {
   Json json = {{"fingerprint", tls_fingerprint()},
-               {"replaceable", static_cast<bool>(options_.replace_certificate)}};
-  if (options_.certificate) {
-    const CertificateFacts facts = FactsOfCertificate(options_.certificate->certificate_pem);
+               {"replaceable", static_cast<bool>(replace_certificate_)}};
+  if (certificate_) {
+    const CertificateFacts facts = FactsOfCertificate(certificate_->certificate_pem);
     json["subject"] = facts.subject;
     json["valid_until"] = TimeText(facts.valid_until);
   }
-  Response response;
-  response.body = Dump(json);
-  respond(std::move(response));
+  return JsonResponse(json);
 }
 
 void Accounts::ReplaceCertificate(const Request& request, const Respond& respond) {
@@ -39,7 +37,7 @@ void Accounts::ReplaceCertificate(const Request& request, const Respond& respond
   const std::string key = fields.Text("key", 1, kMaxKeyBytes, /*allow_lines=*/true);
   std::string password = fields.Text("password", 1, kMaxPassword);
   fields.Finish();
-  if (!options_.replace_certificate) return respond(NotReplaceable());
+  if (!replace_certificate_) return respond(NotReplaceable());
   const TlsIdentity identity = UsableTlsIdentity(chain, key, WallClock::now());
   VerifyOwn(request, std::move(password), "the password is wrong", respond,
             [this, identity, actor = request.actor(), respond](const User&) {
@@ -51,7 +49,7 @@ void Accounts::MakeNewCertificate(const Request& request, const Respond& respond
   Fields fields(request.body);
   std::string password = fields.Text("password", 1, kMaxPassword);
   fields.Finish();
-  if (!options_.replace_certificate) return respond(NotReplaceable());
+  if (!replace_certificate_) return respond(NotReplaceable());
   VerifyOwn(request, std::move(password), "the password is wrong", respond,
             [this, actor = request.actor(), respond](const User&) {
               try {
@@ -67,17 +65,15 @@ void Accounts::ServeCertificate(const Actor& actor, const TlsIdentity& identity,
                                 const Respond& respond) {
   const std::string before = tls_fingerprint();
   try {
-    options_.replace_certificate(identity);
+    replace_certificate_(identity);
   } catch (const std::runtime_error& error) {
     return respond(
         ErrorResponse(500, fmt::format("the certificate was not replaced: {}", error.what())));
   }
-  options_.certificate = identity;
+  certificate_ = identity;
   audit_.Log(actor, is_self_made ? "certificate.new" : "certificate.replace", "",
              fmt::format("{} -> {}", before, identity.fingerprint));
-  Response response;
-  response.body = Dump({{"fingerprint", identity.fingerprint}});
-  respond(std::move(response));
+  respond(JsonResponse({{"fingerprint", identity.fingerprint}}));
 }
 
 }  // namespace plumb::web

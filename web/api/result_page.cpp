@@ -1,7 +1,6 @@
 // The last result as plain HTML: for browsers without script, and for printing.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -190,10 +189,10 @@ struct Records {
   ScanService& scans;
 };
 
-/// What was requested.
+/// A request for the page.
 struct Wanted {
   std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
-  Status status;                    ///< Of the appliance at the request.
+  Status status;                    ///< The appliance's at the request.
   bool is_display = false;          ///< Requested by a display in the room.
   Language language = Language::kEnglish;
   const ResultWords& words = ResultWordsOf(language);
@@ -328,22 +327,21 @@ Response ResultPage(const Records& records, const Wanted& wanted) {
     scan = records.scans.FindScan(*wanted.scan);
     if (scan && !may_show(*scan)) scan.reset();
   }
-  // Of a scan that is named, only that one is read or printed.
+  // If a scan is named, only that one is read or printed.
   if (wanted.scan) failed.reset();
   if (!scan) std::swap(scan, failed);
-  Response response;
-  response.type = "text/html; charset=utf-8";
   // A page for a named scan is read or printed, so it does not reload itself.
-  response.body =
+  Response response = BodyResponse(
+      "text/html; charset=utf-8",
       Document(wanted.words,
                scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, has_newer, wanted)
                     : fmt::format("<h1>{}</h1>", wanted.words.none),
-               scan && wanted.scan ? fmt::format("scan={}&amp;", scan->id) : "", !wanted.scan);
+               scan && wanted.scan ? fmt::format("scan={}&amp;", scan->id) : "", !wanted.scan));
   if (scan) response.about = scan->id;
   return response;
 }
 
-/// As the address says ("?language=es"), else as the browser does.
+/// The language that the address names ("?language=es"), else the one that the browser prefers.
 Language LanguageOf(const Request& request) {
   const auto found = request.query.find("language");
   if (found == request.query.end()) return PreferredLanguage(request.Header("accept-language"));
@@ -352,45 +350,40 @@ Language LanguageOf(const Request& request) {
 
 /// @param why_none  Why nobody can log in; empty: they can.
 Response LoginPage(const Request& request, const ResultWords& words, const std::string& why_none) {
-  Response response;
-  response.type = "text/html; charset=utf-8";
-  if (!why_none.empty()) {
-    response.status = 503;
-    response.body = Document(words,
-                             fmt::format("<h1>{}</h1><p role=\"alert\">{}</p>", words.out_of_order,
-                                         Filled(words.nobody_can, Said(why_none, words))),
-                             "");
-    return response;
-  }
-  response.body = Document(words,
-                           LoginForm(words, request.query.contains("failed")  ? words.wrong_password
-                                            : request.query.contains("first") ? words.first_password
-                                                                              : ""),
-                           "");
+  const std::string body =
+      !why_none.empty() ? fmt::format("<h1>{}</h1><p role=\"alert\">{}</p>", words.out_of_order,
+                                      Filled(words.nobody_can, Said(why_none, words)))
+                        : LoginForm(words, request.query.contains("failed")  ? words.wrong_password
+                                           : request.query.contains("first") ? words.first_password
+                                                                             : "");
+  Response response = BodyResponse("text/html; charset=utf-8", Document(words, body, ""));
+  if (!why_none.empty()) response.status = 503;
   return response;
 }
 
 }  // namespace
 
-void AddResultPage(Router& router, const Services& services) {
+void AddResultPage(Routes& routes, const Services& services) {
   const Records records{services.patients, services.references, services.scans};
-  router.Add(
-      {"GET", "/result", Permission::kNone, BodyKind::kNone,
-       [records, &appliance = services.appliance, &accounts = services.accounts,
-        &background = services.background](const Request& request, const Respond& respond) {
-         const Language language = LanguageOf(request);
-         if (!request.session)
-           return respond(LoginPage(request, ResultWordsOf(language), accounts.WhyUnreadable()));
-         const auto named = request.query.find("scan");
-         const Wanted wanted{
-             .scan = named == request.query.end() ? std::nullopt : std::optional(named->second),
-             .status = appliance.GetStatus(),
-             .is_display = request.session->role == Role::kDisplay,
-             .language = language};
-         RespondAside(
-             background, "GET /result", [records, wanted] { return ResultPage(records, wanted); },
-             respond);
-       }});
+  routes
+      .Add(
+          "GET", "/result", Permission::kNone, BodyKind::kNone,
+          [records, &appliance = services.appliance, &accounts = services.accounts,
+           &background = services.background](const Request& request, const Respond& respond) {
+            const Language language = LanguageOf(request);
+            if (!request.session)
+              return respond(LoginPage(request, ResultWordsOf(language), accounts.WhyUnreadable()));
+            const auto named = request.query.find("scan");
+            const Wanted wanted{
+                .scan = named == request.query.end() ? std::nullopt : std::optional(named->second),
+                .status = appliance.GetStatus(),
+                .is_display = request.session->role == Role::kDisplay,
+                .language = language};
+            RespondInBackground(
+                background, "GET /result",
+                [records, wanted] { return ResultPage(records, wanted); }, respond);
+          })
+      .Discloses("view.scan");
 }
 
 }  // namespace plumb::web

@@ -1,8 +1,7 @@
-// What the result page without script says, in each language.
+// The words of the result page without script, in each language.
 #pragma once
 
 #include <array>
-#include <string>
 #include <string_view>
 
 #include "web/service/result_terms.hpp"
@@ -27,7 +26,7 @@ struct ResultWords {
   std::string_view running, newer_failed, accepted_by, accepted_outside, accepted_unsure;
   std::string_view reference_line, no_reference;
   VerdictWords in_tolerance, unsure, move;
-  std::array<std::string_view, 6> heads;  ///< Of the table of the numbers.
+  std::array<std::string_view, 6> heads;  ///< Heads of the table of the numbers.
   std::string_view no_change;
   std::string_view to_apply, found_then, remaining, remained_then, measured, measured_then;
   std::string_view where, now;

@@ -1,19 +1,15 @@
 // The room's calibration: its state, and the board to print.
+#include <utility>
+
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
-#include "web/http/gate.hpp"
 
 namespace plumb::web {
 namespace {
 
-constexpr const char* kPath = "/api/v1/room-calibration";
-constexpr const char* kBoardPath = "/api/v1/room-calibration/board.pdf";
-
 Json ScanJson(const RoomBoardScan& scan) {
-  Json json = {{"check", scan.check_id},
-               {"time", TimeText(scan.time)},
-               {"user", scan.user},
-               {"fault", scan.fault}};
+  Json json = {
+      {"check", scan.check_id}, {"time", scan.time}, {"user", scan.user}, {"fault", scan.fault}};
   if (!scan.fault.empty()) return json;
   json["num_markers"] = scan.num_markers;
   json["rms_mm"] = scan.rms_mm;
@@ -24,13 +20,10 @@ Json ScanJson(const RoomBoardScan& scan) {
 }
 
 Json VersionJson(const RoomCalibrationVersion& one) {
-  return {{"version", one.version},     {"signed_at", TimeText(one.signed_at)},
-          {"signed_by", one.signed_by}, {"digest", one.digest},
-          {"shift_mm", one.shift_mm},   {"turn_deg", one.turn_deg},
+  return {{"version", one.version}, {"signed_at", one.signed_at}, {"signed_by", one.signed_by},
+          {"digest", one.digest},   {"shift_mm", one.shift_mm},   {"turn_deg", one.turn_deg},
           {"checks", one.check_ids}};
 }
-
-Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 Json StatusJson(const RoomCalibrationStatus& status) {
   Json json = {{"versions", Json::array()},
@@ -38,8 +31,8 @@ Json StatusJson(const RoomCalibrationStatus& status) {
                {"configured", status.is_configured},
                {"scans", Json::array()},
                {"num_wanted", status.num_wanted},
-               {"shift_mm", OrNull(status.shift_mm)},
-               {"turn_deg", OrNull(status.turn_deg)},
+               {"shift_mm", status.shift_mm},
+               {"turn_deg", status.turn_deg},
                {"max_shift_mm", status.max_shift_mm},
                {"max_turn_deg", status.max_turn_deg},
                {"why_not_sign", status.why_not_sign},
@@ -50,39 +43,20 @@ Json StatusJson(const RoomCalibrationStatus& status) {
   return json;
 }
 
-Response StatusResponse(RoomCalibrationService& service) {
-  Response response;
-  response.body = Dump(StatusJson(service.GetRoomCalibration()));
-  return response;
-}
-
-Response BoardResponse(RoomCalibrationService& service) {
-  std::string why_not;
-  auto pdf = service.RoomBoardPdf(why_not);
-  if (!pdf) return ErrorResponse(409, why_not);
-  Response response;
-  response.type = "application/pdf";
-  response.body = std::move(*pdf);
-  response.headers.emplace_back("Content-Disposition",
-                                "attachment; filename=\"plumb_room_board.pdf\"");
-  return response;
-}
-
-void Add(Router& router, const Services& services, const char* path,
-         Response (*make)(RoomCalibrationService&)) {
-  router.Add({"GET", path, Permission::kView, BodyKind::kNone,
-              [&background = services.background, &room = services.room,
-               name = std::string("GET ") + path, make](const Request&, const Respond& respond) {
-                RespondAside(
-                    background, name, [&room, make] { return make(room); }, respond);
-              }});
-}
-
 }  // namespace
 
-void AddRoomCalibrationRoutes(Router& router, const Services& services) {
-  Add(router, services, kPath, &StatusResponse);
-  Add(router, services, kBoardPath, &BoardResponse);
+void AddRoomCalibrationRoutes(Routes& routes, const Services& services) {
+  RoomCalibrationService& room = services.room;
+  routes.ReadInBackground("/api/v1/room-calibration", Permission::kView, [&room](const Request&) {
+    return JsonResponse(StatusJson(room.GetRoomCalibration()));
+  });
+  routes.ReadInBackground(
+      "/api/v1/room-calibration/board.pdf", Permission::kView, [&room](const Request&) {
+        std::string why_not;
+        auto pdf = room.RoomBoardPdf(why_not);
+        if (!pdf) return ErrorResponse(409, why_not);
+        return Download("application/pdf", std::move(*pdf), "plumb_room_board.pdf");
+      });
 }
 
 }  // namespace plumb::web

@@ -13,6 +13,7 @@ const kAnswer_ms = 20000;
 const kLongAnswer_ms = 60000;  // files, and what removes or packs many
 const kVeryLongAnswer_ms = 3600000;  // a backup of a full disk
 const kLogOut_ms = 5000;
+const kPicture_ms = 5000;
 const kSilent_s = 25;  // the appliance sends a beat every 5 s
 
 /// A moment, for since_s().
@@ -41,7 +42,7 @@ const asJson = (response) => response.json();
 const errorOf = async (response) => new ApiError(response.status,
   await response.json().catch(() => null));
 
-/// What `read` makes of the answer.
+/// Sends a request; returns what `read` makes of the answer.
 async function ask(method, path, body,
   { background = false, timeout_ms = kAnswer_ms, read = asJson } = {}) {
   const headers = {};
@@ -95,6 +96,24 @@ const readFile = async (response) => ({ blob: await response.blob(), name: nameO
 const orNothing = (response) => response.json().catch(() => ({}));
 const api = (path) => `/api/v1/${path}`;
 export const get = (path, background = false) => ask('GET', api(path), undefined, { background });
+export const getOrNull = (path) => get(path, true).catch(() => null);
+/// For pictures that are asked for again and again.
+export const fetchPicture = (path) => fetch(api(path), {
+  headers: { 'X-Plumb-Background': '1' }, cache: 'no-store',
+  signal: AbortSignal.timeout(kPicture_ms),
+});
+/// Calls `task` until the returned function is called; it returns after how many milliseconds
+/// again.
+export function repeat(task) {
+  let stopped = false;
+  const next = async () => {
+    if (stopped) return;
+    const wait_ms = await task();
+    setTimeout(next, wait_ms);
+  };
+  next();
+  return () => { stopped = true; };
+}
 export const getBytes = (path, onPart, timeout_ms = kLongAnswer_ms) =>
   ask('GET', api(path), undefined, {
     timeout_ms,
@@ -106,7 +125,7 @@ export const postForFile = (path) =>
 export const put = (path, body) => ask('PUT', api(path), body);
 export const removeFor = (path, body) => ask('DELETE', api(path), body,
   { timeout_ms: kLongAnswer_ms, read: orNothing });
-/// For what copies much: the answer comes when it is done.
+/// For requests that copy much: the answer comes when they are done.
 export const postLong = (path) => ask('POST', api(path), undefined,
   { timeout_ms: kVeryLongAnswer_ms, read: orNothing });
 export const remove = (path) => ask('DELETE', api(path), undefined, { timeout_ms: kLongAnswer_ms });
@@ -290,7 +309,7 @@ export const live = {
       endSession();
     } else this.notify(message.kind);
   },
-  /// What another tab says.
+  /// Takes a message of another tab.
   hear(message) {
     if (message.kind === 'used') {
       touched = now();

@@ -2,7 +2,7 @@
 import {
   currentSession, get, live, loadSession, logOut, may, now, setLoggedOffHandler, since_s, touchedAt,
 } from './api.js';
-import { clear, forgetWarning, h, say, warn } from './dom.js';
+import { clear, forgetWarning, h, hint, say, warn } from './dom.js';
 import { lastLogin, lastLoginWords } from './last_login.js';
 import { mayLeave } from './leave.js';
 import { drafts } from './plan_drafts.js';
@@ -116,7 +116,7 @@ async function show() {
   drawTop();
   watchSession();
   const screen = kScreens[name];
-  const place = h('div', { class: `screen ${name}` }, h('p', { class: 'hint' }, S.loading));
+  const place = h('div', { class: `screen ${name}` }, hint(S.loading));
   clear(main, place);
   document.title = `${S.nav[screen.parent ?? name]} · ${S.product}`;
   try {
@@ -231,7 +231,7 @@ async function followScan() {
   const { scans } = await get('scans?limit=1', true);
   if (scans[0]?.outcome === 'failed') {
     warn(`${S.result.failed}: ${translated(scans[0].failure)}`);
-  };
+  }
 }
 
 /// Pointer and keys count as use: who draws a plan is not logged out at Save. Two minutes before

@@ -87,7 +87,7 @@ const kDetails = {
   'config.reload': (detail) => configWords(JSON.parse(detail)),
 };
 
-/// What an entry says beside its action.
+/// The words of an entry beside its action.
 export function detailWords({ action, user, address, detail }) {
   if (!Object.hasOwn(kDetails, action)) return translated(detail);
   try {
@@ -101,7 +101,7 @@ export function detailWords({ action, user, address, detail }) {
 /// that name.
 export const userWords = ({ user, address }) => (address ? user : wordOf(S.audit.users, user));
 
-/// What an entry is about, as people know it: a code and a number instead of a row of the database.
+/// The subject of an entry as people know it: a code and a number instead of a row of the database.
 export function subjectWords({ subject, about }) {
   if (!about) return subject;
   const text = S.audit.about;

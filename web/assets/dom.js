@@ -26,14 +26,23 @@ export const clear = (element, ...children) => {
   return element;
 };
 
+export const hint = (...words) => h('p', { class: 'hint' }, words);
+/// A titled part of a screen.
+export const card = (title, ...content) =>
+  h('section', { class: 'card' }, h('h2', {}, title), content);
+/// A row of a table. A cell that has a class or is a heading is made by the caller.
+export const row = (...cells) => h('tr', {}, cells.map((cell) =>
+  (cell instanceof HTMLTableCellElement ? cell : h('td', {}, cell))));
+export const rowHead = (text) => h('th', { scope: 'row' }, text);
+
 let counter = 0;
 /// A label above its control, with an optional hint that belongs to it.
-export function field(label, control, hint) {
+export function field(label, control, words) {
   control.id ||= `f${++counter}`;
   const hintId = `${control.id}h`;
-  if (hint) control.setAttribute('aria-describedby', hintId);
+  if (words) control.setAttribute('aria-describedby', hintId);
   return h('div', { class: 'field' }, h('label', { for: control.id }, label), control,
-    hint && h('p', { class: 'hint', id: hintId }, hint));
+    words && h('p', { class: 'hint', id: hintId }, words));
 }
 
 export const checkbox = (label, checked, properties) => {
@@ -59,7 +68,7 @@ export function say(text, seen = false) {
   place.className = seen ? 'toast' : 'visually-hidden';
   if (seen) toastTimer = setTimeout(() => say(''), kToast_ms);
 }
-/// What a person just did has worked.
+/// Says that what a person just did has worked.
 export const done = (text) => say(text, true);
 
 export function warn(text) {
@@ -117,10 +126,23 @@ async function work(button, task) {
   }
 }
 
-/// For what is signed: the person types the own password again.
-export const signingPassword = () => h('input', {
-  type: 'password', required: true, autocomplete: 'current-password', ...kPassword,
+export const passwordInput = (autocomplete, properties) => h('input', {
+  type: 'password', autocomplete, ...kPassword, ...properties,
 });
+
+/// A form that a person signs by typing their own password again, below the other fields.
+/// @param send  Is called with a function that gives {password} and clears its field.
+/// @param button  With what is around it.
+export function signedForm(properties, send, button, ...fields) {
+  const password = passwordInput('current-password', { required: true });
+  const sign = () => {
+    const written = password.value;
+    password.value = '';
+    return { password: written };
+  };
+  return form(properties, () => send(sign), fields, field(S.result.acceptPassword, password),
+    button);
+}
 
 export function action(label, task, properties) {
   const button = h('button', { type: 'button', ...properties }, label);
@@ -128,7 +150,7 @@ export function action(label, task, properties) {
   return button;
 }
 
-/// What identifies a control after it was built again.
+/// Identifies a control after it was built again.
 const nameOf = (control) => [control.tagName, control.getAttribute('href'),
   control.getAttribute('aria-label') ?? control.textContent].join(' ');
 
@@ -155,8 +177,8 @@ export function redraw(element, ...children) {
 
 export function table(headings, rows, caption) {
   // A narrow window shows each cell with its heading, and not what is empty.
-  for (const row of rows.flat(2).filter(isShown)) {
-    [...row.children].forEach((cell, i) => {
+  for (const line of rows.flat(2).filter(isShown)) {
+    [...line.children].forEach((cell, i) => {
       cell.dataset.label = headings[i] ?? '';
       if (['', S.none].includes(cell.textContent) && !cell.children.length) cell.dataset.empty = '';
     });
@@ -165,6 +187,19 @@ export function table(headings, rows, caption) {
     h('table', {}, h('caption', { class: 'visually-hidden' }, caption),
       h('thead', {}, h('tr', {}, headings.map((text) => h('th', { scope: 'col' }, text)))),
       h('tbody', {}, rows)));
+}
+
+/// The direction of an arrow key, x right, y up; nothing for another key.
+export const arrowOf = ({ key }) => ({
+  ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
+}[key]);
+
+/// Lets the browser save what is at the address as a file.
+export const saveFrom = (href, name) => h('a', { href, download: name }).click();
+export function saveBlob(blob, name) {
+  const url = URL.createObjectURL(blob);
+  saveFrom(url, name);
+  setTimeout(() => URL.revokeObjectURL(url), 10000);
 }
 
 /// With the decimal sign of the language, and a minus that is one.

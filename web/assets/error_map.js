@@ -1,9 +1,7 @@
 // The error map with a cursor that reads millimetres, and the profile through it.
 import { fileUrl, get, live } from './api.js';
-import { clear, fixed, h, svg, warn } from './dom.js';
-import {
-  compassOf, drawCropped, mapFrame, markToward, marksNote, viewOf,
-} from './map_frame.js';
+import { arrowOf, clear, fixed, h, hint, svg, warn } from './dom.js';
+import { compassOf, drawCropped, mapFrame, marksNote, markToward, viewOf } from './map_frame.js';
 import { cellAt, errorColour, loadMap, paintErrors, paintOverlay } from './maps.js';
 import { signed } from './numbers.js';
 import { isAdvice, sidesOf } from './screens/common.js';
@@ -31,8 +29,7 @@ export function legend(tolerance_mm) {
     h('div', { class: 'scale-box' }, scale,
       h('div', { class: 'ticks', 'aria-hidden': 'true' }, kTicks.map((tick) =>
         h('span', { class: Math.abs(tick) === 1 ? 'limit' : '' }, label(tick))))),
-    h('p', { class: 'hint' },
-      `mm, ${text.tolerance(`${tolerance_mm}`.replace('.', S.decimal), 'mm')}`),
+    hint(`mm, ${text.tolerance(`${tolerance_mm}`.replace('.', S.decimal), 'mm')}`),
     h('p', { class: 'keys' }, h('span', { class: 'key low' }, text.lower),
       h('span', { class: 'key high' }, text.higher), h('span', { class: 'key gap' }, text.unknown),
       h('span', { class: 'key hole' }, text.hole_),
@@ -100,7 +97,7 @@ function profile(grid, view, reference, deviation, cursor, along, compass) {
 }
 
 /// Map and reading side by side; the map is never higher than three quarters of the window.
-function row(view, ...children) {
+function sideBySide(view, ...children) {
   const element = h('div', { class: 'map-row' }, ...children);
   element.style.setProperty('--map-width', `${75 * view.width / view.height}vh`);
   return element;
@@ -122,7 +119,7 @@ function around({ width, values }, cell) {
 /// Shows in `place` how much of all downloads begun so far has arrived.
 export function progressIn(place, words = S.loading) {
   const bar = h('progress', { max: 1, 'aria-label': words });
-  clear(place, h('p', { class: 'hint' }, words), bar);
+  clear(place, hint(words), bar);
   const parts = new Map();
   return (name) => (received, total) => {
     parts.set(name, [received, total]);
@@ -161,7 +158,7 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
     const picture = h('figure', {}, h('img', {
       src: fileUrl(scan.id, 'error_map.png'), alt: text.mapPicture, class: 'picture',
     }));
-    const element = h('div', {}, h('p', { class: 'hint' }, text.mapFailed), picture);
+    const element = h('div', {}, hint(text.mapFailed), picture);
     return { element, grid: null };
   }
   const { grid, region, heights } = loaded;
@@ -205,9 +202,7 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
   });
   canvas.addEventListener('keydown', (event) => {
     const by = (event.shiftKey ? 0.05 : 0.005);
-    const direction = {
-      ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
-    }[event.key];
+    const direction = arrowOf(event);
     if (!direction) return;
     event.preventDefault();
     move(cursor.x + by * direction[0], cursor.y + by * direction[1]);
@@ -248,7 +243,7 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
     h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.where),
       choose('map', 'before', text.before, both),
       isAdvice(scan) && choose('map', 'after', text.after, both)),
-    row(view, h('div', {}, box, marksNote(compass)),
+    sideBySide(view, h('div', {}, box, marksNote(compass)),
       h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
   const overlay = () => {
     const still = h('canvas', { class: 'still-map', role: 'img', 'aria-label': text.overlayAlt });

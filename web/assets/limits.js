@@ -1,5 +1,5 @@
-// What may be entered, for the fields of forms. The server checks it again; a test compares this
-// with its limits (web/service/limits.hpp).
+// Limits of the values in forms. The server checks them again; a test compares these with its own
+// limits (web/model/limits.hpp).
 
 export const kBounds = {
   shift_tolerance_mm: { min: 0.1, max: 50, step: 0.1 },

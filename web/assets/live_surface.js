@@ -1,21 +1,17 @@
 // The surface that a sweep has seen so far, from above, and what of the region is still missing.
-import { get, live } from './api.js';
-import { clear, h } from './dom.js';
+import { fetchPicture, get, live, repeat } from './api.js';
+import { clear, h, hint } from './dom.js';
 import { compassOfPlan, drawCropped, mapFrame, marksNote, viewOf } from './map_frame.js';
 import { paintHeights, paintMissing, readPacked } from './maps.js';
 import { S } from './strings.js';
 
 const kEvery_ms = 500;
-const kAnswer_ms = 5000;
 const kStep_m = 0.02;
 const kMissing = 32767;
 
 /// Heights in metres, and where the region was not seen yet: 1, else NaN.
 async function fetchSurface() {
-  const response = await fetch('/api/v1/scan/surface', {
-    headers: { 'X-Plumb-Background': '1' }, cache: 'no-store',
-    signal: AbortSignal.timeout(kAnswer_ms),
-  });
+  const response = await fetchPicture('scan/surface');
   if (!response.ok) return null;
   const { width, height, values } = await readPacked(await response.arrayBuffer(), 1);
   const missing = values.map((value) => (value === kMissing ? 1 : NaN));
@@ -30,7 +26,7 @@ async function fetchSurface() {
   };
 }
 
-/// Of the plan that this sweep will be compared with; null where there is none.
+/// The posture in the plan that this sweep will be compared with; null where there is none.
 async function plannedPosture() {
   const { session, scan } = live.status ?? {};
   if (session?.purpose !== 'fraction' || scan?.purpose !== 'fraction') return null;
@@ -44,12 +40,11 @@ export function liveSurface() {
   const text = S.scan;
   const canvas = h('canvas', { class: 'still-map', role: 'img', 'aria-label': text.surfaceMap });
   const box = h('div', { class: 'live-box' });
-  const note = h('p', { class: 'hint' }, text.surfaceWaits);
+  const note = hint(text.surfaceWaits);
   const keys = h('p', { class: 'keys', hidden: true },
     h('span', { class: 'key seen' }, text.surfaceSeen),
     h('span', { class: 'key hole' }, text.surfaceMissing));
   const marksPlace = h('div', {});
-  let stopped = false;
   let posture = null;
   plannedPosture().then((found) => { posture = found; }, () => {});  // then the room's axes only
   const draw = ({ heights, missing, grid }) => {
@@ -69,16 +64,12 @@ export function liveSurface() {
     keys.hidden = false;
     keys.lastElementChild.hidden = !missing.values.some((value) => value === 1);
   };
-  const next = async () => {
-    if (stopped) return;
+  const element = h('figure', { class: 'live-surface' }, box, marksPlace, note, keys);
+  let stopped = false;
+  const end = repeat(async () => {
     const surface = await fetchSurface().catch(() => null);
-    if (stopped) return;
-    if (surface) draw(surface);
-    setTimeout(next, kEvery_ms);
-  };
-  next();
-  return {
-    element: h('figure', { class: 'live-surface' }, box, marksPlace, note, keys),
-    stop: () => { stopped = true; },
-  };
+    if (surface && !stopped) draw(surface);
+    return kEvery_ms;
+  });
+  return { element, stop: () => { stopped = true; end(); } };
 }

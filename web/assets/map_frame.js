@@ -9,10 +9,10 @@ const kMargin_m = 0.1;
 
 const times = ([x, y], k) => [k * x, k * y];
 
-/// What the marks on a picture are, and where they lie: {by, ways: {NAME: [x, y]}}, unit vectors of
-/// the map, x right, y up.
+/// Returns whose the marks on a picture are, and where they lie: {by, ways: {NAME: [x, y]}}, unit
+/// vectors of the map, x right, y up.
 ///
-/// Which side is the patient's was decided where the words were made: only a result whose body
+/// The patient's sides were decided where the words were made: only a result whose body
 /// "named_by" is "posture" shows head, feet, left and right, where the comparison found them. Else
 /// the marks are the axes of the room, as in the words; where that is not known, the map's own.
 /// @param room  Of the status: as it is known now.
@@ -148,6 +148,11 @@ function marks(view, compass) {
 export const setMarks = (box, view, compass) =>
   clear(box.querySelector('.all-ways'), marks(view, compass));
 
+/// @param reach  Half the length of its arms.
+export const crossAt = ([x, y], reach, look) => svg('path', {
+  d: `M${x - reach} ${y}h${2 * reach}M${x} ${y - reach}v${2 * reach}`, class: look,
+});
+
 /// @param canvas  Shows the view; what stands over it is drawn beside it.
 export function mapFrame({ grid, view, canvas, region, compass, isocentre, cross }) {
   const size = sizeOf(view);
@@ -156,13 +161,8 @@ export function mapFrame({ grid, view, canvas, region, compass, isocentre, cross
     transform: `translate(${-view.crop.left * grid.width * grid.step} `
       + `${-view.crop.top * grid.height * grid.step})`,
   }, outline && svg('path', { d: outline, class: 'outline' }),
-  isocentre && (() => {
-    const x = isocentre[0] - grid.x_min;
-    const y = grid.height * grid.step - (isocentre[1] - grid.y_min);
-    return svg('path', {
-      d: `M${x - size} ${y}h${2 * size}M${x} ${y - size}v${2 * size}`, class: 'isocentre',
-    });
-  })());
+  isocentre && crossAt([isocentre[0] - grid.x_min,
+    grid.height * grid.step - (isocentre[1] - grid.y_min)], size, 'isocentre'));
   const bar = Math.min(0.1, view.width / 3);
   const drawing = svg('svg', {
     viewBox: `0 0 ${view.width} ${view.height}`, class: 'frame', 'aria-hidden': 'true',

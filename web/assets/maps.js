@@ -46,8 +46,8 @@ export function errorColour(tolerances) {
   let i = 1;
   while (i < kStops.length - 1 && kStops[i][0] < value) ++i;
   const [a, b] = [kStops[i - 1], kStops[i]];
-  const share = (value - a[0]) / (b[0] - a[0]);
-  return [1, 2, 3].map((k) => a[k] + (b[k] - a[k]) * share);
+  const fraction = (value - a[0]) / (b[0] - a[0]);
+  return [1, 2, 3].map((k) => a[k] + (b[k] - a[k]) * fraction);
 }
 
 const kSteps = 1024;
@@ -139,30 +139,28 @@ export function outlineOf(region, grid) {
     ? inside[row * columns + column] : 0);
   const x = (column) => (Math.min(column * kBlock, grid.width) * grid.step).toFixed(4);
   const y = (row) => ((grid.height - Math.min(row * kBlock, grid.height)) * grid.step).toFixed(4);
-  let path = '';
-  for (let row = 0; row <= rows; ++row) {
-    for (let column = 0, begun = -1; column <= columns; ++column) {
-      const edge = column < columns && at(row, column) !== at(row - 1, column);
-      if (edge && begun < 0) begun = column;
-      if (edge || begun < 0) continue;
-      path += `M${x(begun)} ${y(row)}H${x(column)}`;
-      begun = -1;
+  /// A line for each run of edges: `isEdge(line, i)` for i below `length`.
+  const runs = (lines, length, isEdge, draw) => {
+    let path = '';
+    for (let line = 0; line <= lines; ++line) {
+      for (let i = 0, begun = -1; i <= length; ++i) {
+        const edge = i < length && isEdge(line, i);
+        if (edge && begun < 0) begun = i;
+        if (edge || begun < 0) continue;
+        path += draw(line, begun, i);
+        begun = -1;
+      }
     }
-  }
-  for (let column = 0; column <= columns; ++column) {
-    for (let row = 0, begun = -1; row <= rows; ++row) {
-      const edge = row < rows && at(row, column) !== at(row, column - 1);
-      if (edge && begun < 0) begun = row;
-      if (edge || begun < 0) continue;
-      path += `M${x(column)} ${y(begun)}V${y(row)}`;
-      begun = -1;
-    }
-  }
-  return path;
+    return path;
+  };
+  return runs(rows, columns, (row, column) => at(row, column) !== at(row - 1, column),
+    (row, begun, end) => `M${x(begun)} ${y(row)}H${x(end)}`)
+    + runs(columns, rows, (column, row) => at(row, column) !== at(row, column - 1),
+      (column, begun, end) => `M${x(column)} ${y(begun)}V${y(end)}`);
 }
 
 /// The part of the grid that holds the region and `margin_m` around it: {left, top, width, height}
-/// as shares of the whole picture (y down); the whole where there is no region.
+/// as fractions of the whole picture (y down); the whole where there is no region.
 export function cropOf(region, grid, margin_m = 0.1) {
   const { width, height, values } = region;
   let [x0, x1, y0, y1] = [width, -1, height, -1];

@@ -1,9 +1,10 @@
 // The 3-D view; loaded only when it is opened.
+import { arrowOf } from './dom.js';
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { cellAt, errorIndex, errorTable, kOutside } from './maps.js';
 import { orientationCube } from './mesh_cube.js';
-import { correctionOf, matrixOf, shareOf } from './mesh_motion.js';
+import { correctionOf, fractionOf, mapFrameOf } from './mesh_motion.js';
 
 function geometryOf({ positions, corners }) {
   const geometry = new THREE.BufferGeometry();
@@ -16,6 +17,13 @@ function geometryOf({ positions, corners }) {
 const rowsOf = ({ elements }) => [0, 1, 2, 3].map((row) =>
   [0, 1, 2, 3].map((column) => elements[4 * column + row]));
 
+/// The cell of the map under a point of the mesh, or -1.
+function cellOf(grid, T, x, y, z) {
+  if (!grid) return -1;
+  return T ? cellAt(grid, T[0][0] * x + T[0][1] * y + T[0][2] * z + T[0][3],
+    T[1][0] * x + T[1][1] * y + T[1][2] * z + T[1][3]) : cellAt(grid, x, y);
+}
+
 /// Colours of the vertices by the error map; T maps the mesh's frame to the map's.
 /// @param region  NaN outside the region of interest: dimmed there, as the map is.
 function coloursByError(geometry, grid, deviation, region, T, tolerance_m) {
@@ -23,10 +31,7 @@ function coloursByError(geometry, grid, deviation, region, T, tolerance_m) {
   const colours = new Uint8Array(3 * position.count);
   const scale = errorTable();
   for (let i = 0; i < position.count; ++i) {
-    const [x, y, z] = [position.getX(i), position.getY(i), position.getZ(i)];
-    const u = T ? T[0][0] * x + T[0][1] * y + T[0][2] * z + T[0][3] : x;
-    const v = T ? T[1][0] * x + T[1][1] * y + T[1][2] * z + T[1][3] : y;
-    const cell = grid ? cellAt(grid, u, v) : -1;
+    const cell = cellOf(grid, T, position.getX(i), position.getY(i), position.getZ(i));
     const value = cell < 0 ? NaN : deviation.values[cell];
     const at = 3 * errorIndex(value / tolerance_m);
     const light = cell >= 0 && region && Number.isNaN(region.values[cell]) ? kOutside : 1;
@@ -38,6 +43,7 @@ function coloursByError(geometry, grid, deviation, region, T, tolerance_m) {
 }
 
 const kGround = 0x0d1216;
+const kTurn = 0.1;  // radians for each arrow key
 
 /// A word that faces the viewer and hides behind nothing.
 function label(text, height) {
@@ -61,7 +67,7 @@ function label(text, height) {
   return sprite;
 }
 
-/// What lies where, around the box that is looked at: the marks of the maps.
+/// The marks of the maps, around the box that is looked at: they show what lies where.
 function marksAround(compass, words, box, radius) {
   const group = new THREE.Group();
   const centre = box.getCenter(new THREE.Vector3());
@@ -85,10 +91,7 @@ function boxOfInterest(geometry, grid, region, T) {
   const point = new THREE.Vector3();
   for (let i = 0; i < position.count; i += 3) {
     point.fromBufferAttribute(position, i);
-    const { x, y, z } = point;
-    const u = T ? T[0][0] * x + T[0][1] * y + T[0][2] * z + T[0][3] : x;
-    const v = T ? T[1][0] * x + T[1][1] * y + T[1][2] * z + T[1][3] : y;
-    const cell = grid && region ? cellAt(grid, u, v) : -1;
+    const cell = region ? cellOf(grid, T, point.x, point.y, point.z) : -1;
     if (cell >= 0 && !Number.isNaN(region.values[cell])) box.expandByPoint(point);
   }
   if (!box.isEmpty()) return box;
@@ -100,8 +103,8 @@ function boxOfInterest(geometry, grid, region, T) {
 /// @param surface  {positions, corners}.
 /// @param motion  Of the body, in the map's frame; null: there is no correction to show.
 /// @param words  Of the compass's marks.
-/// Gives setGhost(load, share), setShare(share), correct(share, deviationAfter), look(name),
-/// cut(way, share), picture(), stop().
+/// Gives setGhost(load, fraction), setFraction(fraction), correct(fraction, deviationAfter),
+/// look(name), cut(way, fraction), picture(), stop().
 export function openMesh(canvas, {
   surface, grid, deviation, region, T, motion, tolerance_m, compass, words,
 }) {
@@ -168,17 +171,15 @@ export function openMesh(canvas, {
     request();
   };
   canvas.addEventListener('keydown', (event) => {
-    const turn = {
-      ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1],
-    }[event.key];
+    const turn = arrowOf(event);
     const zoom = { '+': 0.9, '=': 0.9, '-': 1.1 }[event.key];
     if (!turn && !zoom) return;
     event.preventDefault();
     const offset = camera.position.clone().sub(controls.target);
     if (turn) {
-      offset.applyAxisAngle(new THREE.Vector3(0, 0, 1), turn[0]);
+      offset.applyAxisAngle(new THREE.Vector3(0, 0, 1), kTurn * turn[0]);
       const side = new THREE.Vector3().crossVectors(camera.up, offset).normalize();
-      const tilted = offset.clone().applyAxisAngle(side, turn[1]);
+      const tilted = offset.clone().applyAxisAngle(side, -kTurn * turn[1]);
       if (Math.abs(tilted.clone().normalize().z) < 0.99) offset.copy(tilted);
     }
     if (zoom) offset.multiplyScalar(zoom);
@@ -192,17 +193,17 @@ export function openMesh(canvas, {
   let isGhostWanted = false;
   // Both surfaces are drawn solid in turn by a screen-door pattern: nothing flickers where they lie
   // in each other, as it does with transparency.
-  const setShare = (share) => {
+  const setFraction = (fraction) => {
     if (!ghost) return;
-    ghost.material.opacity = Math.max(0.02, 1 - share);
-    material.opacity = Math.max(0.02, share);
+    ghost.material.opacity = Math.max(0.02, 1 - fraction);
+    material.opacity = Math.max(0.02, fraction);
     material.alphaHash = ghost.visible;
     material.needsUpdate = true;
     request();
   };
   /// Takes away what lies beyond a plane: above it ("height"), or toward the first mark ("along")
-  /// or to the right of that ("across"). `share` of the box stays; nothing is cut without a way.
-  const cut = (way, share) => {
+  /// or to the right of that ("across"). `fraction` of the box stays; nothing is cut without a way.
+  const cut = (way, fraction) => {
     const [ux, uy] = Object.values(compass?.ways ?? {})[0] ?? [0, 1];
     const normal = { height: [0, 0, -1], along: [-ux, -uy, 0], across: [-uy, ux, 0] }[way];
     let planes = null;
@@ -212,7 +213,7 @@ export function openMesh(canvas, {
         i & 1 ? box.max.x : box.min.x, i & 2 ? box.max.y : box.min.y,
         i & 4 ? box.max.z : box.min.z)));
       const [least, most] = [Math.min(...ends), Math.max(...ends)];
-      plane.constant = -(most + share * (least - most));
+      plane.constant = -(most + fraction * (least - most));
       planes = [plane];
     }
     for (const one of [material, ghost?.material]) {
@@ -226,25 +227,24 @@ export function openMesh(canvas, {
   let corrected = null;
   return {
     look,
-    setShare,
+    setFraction,
     cut,
-    /// Moves the surface by a share of the correction, 0 to 1. Its colours are those of the nearer
-    /// end.
+    /// Moves the surface by a fraction of the correction, 0 to 1. Its colours are those of the
+    /// nearer end.
     /// @param deviationAfter  The error map after the correction.
-    correct(share, deviationAfter) {
+    correct(fraction, deviationAfter) {
       if (!correction) return;
-      body.matrix.copy(shareOf(correction, share, center));
+      body.matrix.copy(fractionOf(correction, fraction, center));
       body.matrixWorldNeedsUpdate = true;
-      if (share > 0.5) {
-        const toMap = T ? matrixOf(T) : new THREE.Matrix4();
+      if (fraction > 0.5) {
         corrected ??= coloursByError(geometry, grid, deviationAfter, region,
-          rowsOf(toMap.multiply(correction)), tolerance_m);
+          rowsOf(mapFrameOf(T).multiply(correction)), tolerance_m);
       }
-      geometry.setAttribute('color', share > 0.5 ? corrected : measured);
+      geometry.setAttribute('color', fraction > 0.5 ? corrected : measured);
       request();
     },
     /// @param load  Gives the reference's surface; null: it is hidden.
-    async setGhost(load, share) {
+    async setGhost(load, fraction) {
       isGhostWanted = Boolean(load);
       const reference = !ghost && load ? await load() : null;
       // Meanwhile it may have been hidden again, or have come by another call.
@@ -253,7 +253,7 @@ export function openMesh(canvas, {
           color: 0x6ea8ff, alphaHash: true, side: THREE.DoubleSide,
           clippingPlanes: material.clippingPlanes,
         }));
-        if (T) ghost.applyMatrix4(new THREE.Matrix4().set(...T.flat()).invert());
+        if (T) ghost.applyMatrix4(mapFrameOf(T).invert());
         scene.add(ghost);
       }
       if (ghost) ghost.visible = isGhostWanted;
@@ -261,7 +261,7 @@ export function openMesh(canvas, {
         material.opacity = 1;
         material.alphaHash = false;
         material.needsUpdate = true;
-      } else setShare(share);
+      } else setFraction(fraction);
       request();
     },
     picture() {

@@ -1,7 +1,7 @@
 // The cube in the corner of the 3-D view: which way is which, from wherever it is looked at.
 import * as THREE from 'three';
 
-const kShare = 0.24;  // of the view's shorter side
+const kFraction = 0.24;  // of the view's shorter side
 const kLeast = 72;    // pixels of the page
 const kFace = 128;
 
@@ -47,8 +47,8 @@ function face(text) {
   return texture;
 }
 
-// What is written on a face stands upright for who looks at it with z up, and on the top for who
-// stands at the feet.
+// The writing on a face stands upright for a person who looks at it with z up, and the writing on
+// the top for one who stands at the feet.
 const kTurns = [Math.PI / 2, -Math.PI / 2, Math.PI, 0, 0, Math.PI];
 
 /// Gives draw(renderer, camera, target), which adds the cube to what is drawn, and dispose().
@@ -70,7 +70,7 @@ export function orientationCube(compass, words) {
   return {
     draw(renderer, camera, target) {
       const { clientWidth, clientHeight } = renderer.domElement;
-      const side = Math.max(kLeast, kShare * Math.min(clientWidth, clientHeight));
+      const side = Math.max(kLeast, kFraction * Math.min(clientWidth, clientHeight));
       eye.position.copy(camera.position).sub(target).normalize().multiplyScalar(4);
       eye.quaternion.copy(camera.quaternion);
       renderer.autoClear = false;

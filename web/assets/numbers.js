@@ -41,8 +41,8 @@ export function judge(value, u95, tolerance) {
   return Math.abs(value) <= tolerance ? 'unsure' : 'out';
 }
 
-// What the couch does, drawn for a positive value; a negative one is turned or mirrored. The gantry
-// is the ring.
+// The couch's movement, drawn for a positive value; for a negative one it is turned or mirrored.
+// The gantry is the ring.
 const stroke = (d) => svg('path', { d, class: 'stroke' });
 const ring = (d) => svg('path', { d, class: 'ring' });
 const kDrawings = {

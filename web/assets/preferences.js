@@ -1,4 +1,4 @@
-// What a person chooses: language and theme. They belong to the account; this browser keeps a
+// A person's choice of language and theme. They belong to the account; this browser keeps a
 // copy for when the account cannot be read.
 import { put } from './api.js';
 import { field, select } from './dom.js';

@@ -1,5 +1,5 @@
 // The six numbers over the fractions of a patient: the first and the last scan of each.
-import { h, localDay, svg } from './dom.js';
+import { h, hint, localDay, svg } from './dom.js';
 import { digitsOf, judge, kAxes, mostDigits, signed } from './numbers.js';
 import { S } from './strings.js';
 
@@ -100,9 +100,9 @@ function chart(axis, fractions, limit) {
 export function trend(scans, tolerance) {
   const fractions = fractionsOf(scans);
   const shown = new Set(fractions.flatMap(({ first, last }) => [first.id, last.id]));
-  if (shown.size < 2) return h('p', { class: 'hint' }, S.result.trendEmpty);
+  if (shown.size < 2) return hint(S.result.trendEmpty);
   const charts = kAxes.map((axis) =>
     chart(axis, fractions, axis.shift ? tolerance.shift_mm : tolerance.rotation_deg));
-  return h('div', {}, h('p', { class: 'hint' }, S.result.trendHint),
+  return h('div', {}, hint(S.result.trendHint),
     h('div', { class: 'trends' }, charts));
 }

@@ -43,7 +43,7 @@ class ConnectionTable {
   /// first. A stranger's few connections from the address of a logged-in browser stay while there
   /// are others.
   [[nodiscard]] Connection* NextOverLimit(Connection::TimePoint now);
-  /// Likewise a connection whose request has not arrived in time.
+  /// Returns in the same way a connection whose request has not arrived in time.
   [[nodiscard]] Connection* NextLate(Connection::TimePoint now);
 
  private:

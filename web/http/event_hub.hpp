@@ -51,7 +51,7 @@ class EventHub {
 
   struct Limits {
     std::size_t all = 32, of_account = 16, of_session = 6;
-    std::size_t buffer_bytes = 64 << 10;  ///< Of one stream.
+    std::size_t buffer_bytes = 64 << 10;  ///< Buffer of one stream.
   };
 
   explicit EventHub(Limits limits) : limits_(limits) {}

@@ -1,9 +1,9 @@
 #include "web/http/gate.hpp"
 
-#include <fmt/format.h>
 #include <sodium.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -21,10 +21,11 @@ bool IsType(std::string_view header, std::string_view type) {
 
 Response InternalError(std::string_view name, const std::exception& error) {
   std::fprintf(stderr, "web: %.*s: %s\n", static_cast<int>(name.size()), name.data(), error.what());
-  return ErrorResponse(500, "internal error; the journal says more");
+  return ErrorResponse(500, "internal error; the journal has the details");
 }
 
-/// Of what a handler throws. What the disk refuses is said, as it is in safe mode.
+/// Turns a handler's exception into an answer. A refusal by the disk is stated, as it is in safe
+/// mode.
 Response AnswerOf(std::string_view name, const std::exception& error) {
   if (dynamic_cast<const DataError*>(&error) != nullptr) return ErrorResponse(400, error.what());
   if (dynamic_cast<const IoError*>(&error) != nullptr) return ErrorResponse(500, error.what());
@@ -72,8 +73,8 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   request.session = sessions_.SessionOf(request, touch);
   if (match.route == nullptr) {
     if (api && !request.session) return NotLoggedIn();
-    if (match.allowed.empty()) return ErrorResponse(404, "there is nothing at this address");
-    Response response = ErrorResponse(405, "this address takes " + match.allowed);
+    if (match.allowed.empty()) return ErrorResponse(404, "nothing was found at this address");
+    Response response = ErrorResponse(405, "this address accepts only " + match.allowed);
     response.headers.emplace_back("Allow", match.allowed);
     return response;
   }
@@ -82,7 +83,7 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   if (route.permission != Permission::kNone) {
     if (!request.session) return NotLoggedIn();
     if (!May(request.session->role, route.permission))
-      return ErrorResponse(403, "your role may not do this");
+      return ErrorResponse(403, "your role is not allowed to do this");
     if (request.session->must_change_password && route.permission != Permission::kLogin)
       return ErrorResponse(403, "choose a password of your own first");
   } else if (request.session && request.session->must_change_password) {
@@ -90,7 +91,7 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   }
   if (request.method != "GET") {
     if (!IsOwnPage(request))
-      return ErrorResponse(403, "this change was asked for by a page from elsewhere");
+      return ErrorResponse(403, "this request was made by a page of another site");
     if (route.permission != Permission::kNone &&
         !SameToken(request.Header("x-csrf-token"), request.session->csrf_token)) {
       return ErrorResponse(403,
@@ -126,8 +127,8 @@ void RespondGuarded(const std::string& name, const std::function<void()>& rest,
   }
 }
 
-void RespondAside(BackgroundWork& background, const std::string& name,
-                  std::function<Response()> make, const Respond& respond) {
+void RespondInBackground(BackgroundWork& background, const std::string& name,
+                         std::function<Response()> make, const Respond& respond) {
   auto made = std::make_shared<Response>();
   const auto work = [made, name, make = std::move(make)] {
     try {
@@ -139,19 +140,8 @@ void RespondAside(BackgroundWork& background, const std::string& name,
   if (background.RunInBackground(BackgroundPool::kReads, work,
                                  [made, respond] { respond(std::move(*made)); }))
     return;
-  Response busy = ErrorResponse(503, "too much is asked at once; try again in a few seconds");
-  busy.headers.emplace_back("Retry-After", "2");
-  respond(std::move(busy));
-}
-
-void AddAside(Router& router, BackgroundWork& background, const char* pattern,
-              Permission permission, std::function<Response(const Request&)> make) {
-  router.Add({"GET", pattern, permission, BodyKind::kNone,
-              [&background, name = std::string("GET ") + pattern, make = std::move(make)](
-                  const Request& request, const Respond& respond) {
-                RespondAside(
-                    background, name, [make, request] { return make(request); }, respond);
-              }});
+  respond(RetryLater(503, "too many requests at once; try again in a few seconds",
+                     std::chrono::seconds(2)));
 }
 
 void AddSecurityHeaders(Response& response, bool tls) {

@@ -57,13 +57,8 @@ void RespondGuarded(const std::string& name, const std::function<void()>& rest,
 /// A slow answer: made by `make` on the background thread for reads; its exceptions become an
 /// answer as in Gate::Handle().
 /// @param name  Of the route.
-void RespondAside(BackgroundWork& background, const std::string& name,
-                  std::function<Response()> make, const Respond& respond);
-
-/// Adds a GET route for lists or files, which are not read on the loop. `background` must outlive
-/// the router.
-void AddAside(Router& router, BackgroundWork& background, const char* pattern,
-              Permission permission, std::function<Response(const Request&)> make);
+void RespondInBackground(BackgroundWork& background, const std::string& name,
+                         std::function<Response()> make, const Respond& respond);
 
 /// The headers of every answer.
 /// @param tls  The answer is sent over TLS, and the browser must use TLS from now on.

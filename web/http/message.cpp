@@ -35,7 +35,7 @@ void UploadFile::Append(std::string_view bytes) {
     const ssize_t count = ::write(fd_, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0)
-      throw IoError(fmt::format("the disk takes no more of the upload: {}", std::strerror(errno)));
+      throw IoError(fmt::format("cannot write the upload to the disk: {}", std::strerror(errno)));
     bytes.remove_prefix(static_cast<std::size_t>(count));
     written_ += count;
   }
@@ -79,6 +79,40 @@ Response ErrorResponse(int status, const std::string& message) {
   response.body = nlohmann::json{{"error", message}}.dump(-1, ' ', false,
                                                           nlohmann::json::error_handler_t::replace);
   return response;
+}
+
+Response RetryLater(int status, const std::string& message, std::chrono::seconds wait) {
+  Response response = ErrorResponse(status, message);
+  response.headers.emplace_back("Retry-After", std::to_string(wait.count()));
+  return response;
+}
+
+Response BodyResponse(std::string type, std::string body) {
+  Response response;
+  response.type = std::move(type);
+  response.body = std::move(body);
+  return response;
+}
+
+void NameDownload(Response& response, const std::string& name) {
+  if (name.empty()) return;
+  response.headers.emplace_back("Content-Disposition",
+                                fmt::format("attachment; filename=\"{}\"", name));
+}
+
+Response Download(std::string type, std::string body, const std::string& name) {
+  Response response = BodyResponse(std::move(type), std::move(body));
+  NameDownload(response, name);
+  return response;
+}
+
+void SetCookie(Response& response, const std::string& name, const std::string& value, bool secure,
+               std::optional<std::chrono::seconds> max_age) {
+  response.headers.emplace_back(
+      "Set-Cookie",
+      fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}{}", name, value,
+                  max_age ? fmt::format("; Max-Age={}", max_age->count()) : std::string(),
+                  secure ? "; Secure" : ""));
 }
 
 }  // namespace plumb::web

@@ -1,6 +1,7 @@
 // One request and one answer, independent of the HTTP library.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -85,6 +86,18 @@ struct Response {
 
 /// {"error": message}
 [[nodiscard]] Response ErrorResponse(int status, const std::string& message);
+/// The same, with the time after which the client may try again.
+[[nodiscard]] Response RetryLater(int status, const std::string& message,
+                                  std::chrono::seconds wait);
+[[nodiscard]] Response BodyResponse(std::string type, std::string body);
+/// Makes the browser save the answer as a file of this name; empty: the browser shows it.
+void NameDownload(Response& response, const std::string& name);
+[[nodiscard]] Response Download(std::string type, std::string body, const std::string& name);
+/// Sets a cookie for the whole site that scripts cannot read.
+/// @param secure  It is sent over TLS only.
+/// @param max_age  Without it the browser forgets the cookie when it is closed.
+void SetCookie(Response& response, const std::string& name, const std::string& value, bool secure,
+               std::optional<std::chrono::seconds> max_age = {});
 
 /// Sends the answer, once; ignored if the connection is closed.
 using Respond = std::function<void(Response)>;

@@ -1,6 +1,7 @@
 // The table of routes: handler and permission of each.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -18,20 +19,43 @@ enum class BodyKind {
   kFile,  ///< Written directly to the disk: Request::upload.
 };
 
+/// The record that a route names by its first placeholder: displays in the room may read it while
+/// the status names it.
+enum class ShownRecord : std::uint8_t { kNone, kPatient, kReference, kScan, kScanFile };
+
 struct Route {
   std::string method;
   std::string pattern;  ///< "/api/v1/scans/{id}"; a placeholder is a whole segment.
   Permission permission = Permission::kView;
   BodyKind body = BodyKind::kNone;
   Handler handler;
+  /// Actions for the audit log if the answer contains patient data, including the camera picture: a
+  /// view is logged once per hour, a download each time. Both empty: it contains none. The status
+  /// and its events do not count: they only name the open session.
+  std::string_view view = {}, download = {};
+  /// Without a record, a route with placeholders is refused to displays in the room.
+  ShownRecord shown = ShownRecord::kNone;
+  std::string_view absent = {};  ///< The refusal to a display: as if there were no such record.
 
   [[nodiscard]] std::string Name() const { return method + " " + pattern; }
+  [[nodiscard]] bool DisclosesPatientData() const { return !view.empty() || !download.empty(); }
+  Route& Discloses(std::string_view view_action, std::string_view download_action = {}) {
+    view = view_action;
+    download = download_action;
+    return *this;
+  }
+  Route& ShowsDisplays(ShownRecord record, std::string_view when_absent) {
+    shown = record;
+    absent = when_absent;
+    return *this;
+  }
 };
 
 /// The table; filled once and only read afterwards.
 class Router {
  public:
-  void Add(Route route) { routes_.push_back(std::move(route)); }
+  /// The result is valid until the next call.
+  Route& Add(Route route) { return routes_.emplace_back(std::move(route)); }
   /// Replaces the handler of each present route by the one that `wrap` makes from it.
   void Wrap(const std::function<Handler(const Route&)>& wrap) {
     for (Route& route : routes_) route.handler = wrap(route);

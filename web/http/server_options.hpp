@@ -40,8 +40,8 @@ struct HttpServerOptions {
   std::filesystem::path upload_folder;  ///< Folder for incoming bundles; empty: none are accepted.
   std::uint64_t max_upload_bytes = std::uint64_t{2} << 30;
   std::chrono::seconds upload_limit{15 * 60};  ///< Replaces request_limit for uploads.
-  /// Of all answers in memory that have not been sent yet: slow readers of large ones must not use
-  /// up the memory. Beyond it answers are refused with 503, except small ones.
+  /// Limit of all answers in memory that have not been sent yet: slow readers of large ones must
+  /// not use up the memory. Beyond it answers are refused with 503, except small ones.
   std::size_t max_unsent_bytes = std::size_t{256} << 20;
   std::size_t small_answer_bytes = std::size_t{1} << 20;
   std::size_t connection_memory_bytes = 32 << 10;  ///< For request line, headers and their parsing.

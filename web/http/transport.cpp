@@ -146,7 +146,7 @@ struct Transport::Callbacks {
       return ErrorResponse(400, "malformed request");
     const std::string_view length = request.Header("content-length");
     if (!length.empty() && !request.Header("transfer-encoding").empty())
-      return ErrorResponse(400, "two lengths for one body");
+      return ErrorResponse(400, "the length of the body is stated twice");
     std::uint64_t bytes = 0;
     if (!length.empty() &&
         std::from_chars(length.data(), length.data() + length.size(), bytes).ec != std::errc()) {
@@ -166,11 +166,11 @@ struct Transport::Callbacks {
   static std::optional<Response> BeginUpload(Exchange& exchange, std::uint64_t bytes) {
     Transport& transport = *exchange.owner;
     const HttpServerOptions& options = transport.options_;
-    if (options.upload_folder.empty())
-      return ErrorResponse(409, "no files are taken on this machine");
+    if (options.upload_folder.empty()) return ErrorResponse(409, "this machine accepts no uploads");
     if (!transport.upload_.expired())
-      return ErrorResponse(409, "another file is being sent: wait until it is here");
-    if (bytes == 0) return ErrorResponse(411, "a file must say its length, and have one");
+      return ErrorResponse(409, "another file is being uploaded: wait until it has arrived");
+    if (bytes == 0)
+      return ErrorResponse(411, "an upload must state its length and must not be empty");
     if (bytes > options.max_upload_bytes)
       return ErrorResponse(
           413, fmt::format("the file is too large: at most {} MB", options.max_upload_bytes >> 20));
@@ -315,8 +315,8 @@ struct Transport::Callbacks {
     if (size <= options.small_answer_bytes ||
         (unsent <= options.max_unsent_bytes && size <= options.max_unsent_bytes - unsent))
       return;
-    exchange.response = ErrorResponse(503, "too much is being sent; try again in a few seconds");
-    exchange.response->headers.emplace_back("Retry-After", "5");
+    exchange.response = RetryLater(503, "too much data is being sent; try again in a few seconds",
+                                   std::chrono::seconds(5));
   }
 
   /// Takes the body: there is never a second copy of it.

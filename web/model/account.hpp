@@ -22,7 +22,7 @@ struct Actor {
   std::string address;  ///< Address of the browser.
 };
 
-/// What a person chose of the page; empty: the browser's language, the default theme.
+/// A person's choices for the page; empty: the browser's language, the default theme.
 struct Preferences {
   std::string language;  ///< "en" or "es".
   std::string theme;     ///< "dark", "light" or "auto".

@@ -9,13 +9,13 @@
 
 namespace plumb {
 
-/// What people know of an entry's subject, as the records are now.
+/// An entry's subject in terms that people know, as the records are now.
 struct AuditSubject {
   std::string kind;          ///< "patient", "session", "scan", "reference" or "check".
   bool exists = false;       ///< False: it was deleted since.
   std::string patient_code;  ///< Empty: none.
-  int number = 0;            ///< Of a session its fraction, of a reference its version; 0: none.
-  std::optional<WallClock::time_point> time = {};  ///< Of a check.
+  int number = 0;            ///< Fraction of a session, version of a reference; 0: none.
+  std::optional<WallClock::time_point> time = {};  ///< Time of a check.
 };
 
 struct AuditEntry {
@@ -26,7 +26,7 @@ struct AuditEntry {
   std::string action;   ///< "login", "reference.approve".
   std::string subject;  ///< Id of the changed object.
   std::string detail;
-  std::optional<AuditSubject> about = {};  ///< Of the subject; nothing: its id is what people know.
+  std::optional<AuditSubject> about = {};  ///< Not set: people know the subject by its id.
 };
 
 /// Selection of entries.

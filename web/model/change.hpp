@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 
 namespace plumb {
 
@@ -24,6 +25,14 @@ struct Change {
   std::string id;              ///< Id of a new record, if any.
   std::filesystem::path file;  ///< Path of a new file, if any.
 };
+/// An answer with a message, mostly for a change that was not made.
+[[nodiscard]] inline Change Refused(ChangeResult result, std::string message) {
+  return {.result = result, .message = std::move(message), .id = {}, .file = {}};
+}
+[[nodiscard]] inline Change DoneWith(std::string id) {
+  return {.result = ChangeResult::kDone, .message = {}, .id = std::move(id), .file = {}};
+}
+
 /// Called exactly once, on the loop thread: during the request or later.
 using Done = std::function<void(const Change&)>;
 

@@ -16,9 +16,10 @@ struct Range {
   [[nodiscard]] constexpr bool Holds(double value) const { return value >= least && value <= most; }
 };
 
-/// What a person may enter, and what is accepted when it is read from the store. The latter is
-/// wider, so that a version that accepts less still reads what was entered before, above all an
-/// approved plan. A value beyond it was not entered: the database was changed or damaged.
+/// The values that a person may enter, and those that are accepted when they are read from the
+/// store. The latter range is wider, so that a version that accepts less still reads what was
+/// entered before, above all an approved plan. A value beyond it was not entered: the database was
+/// changed or damaged.
 struct Limits {
   Range entered, stored;
 };

@@ -18,7 +18,7 @@ struct ReportedNumbers {
   std::optional<double> yaw_deg = 0.0;
 };
 
-/// What one of the six is called, and where it is found.
+/// The names of one of the six numbers, and where it is found.
 struct NumberAxis {
   const char* name;  ///< In result.json and in the log.
   const char* key;   ///< In JSON and CSV.

@@ -24,7 +24,7 @@ struct Patient {
   bool archived = false;  ///< Not in the list and not to be opened; nothing is deleted.
 };
 
-/// What people write about a patient's course.
+/// People write these about a patient's course.
 struct CourseNotes {
   std::string site, note;
   bool operator==(const CourseNotes&) const = default;

@@ -59,7 +59,7 @@ struct Scan {
   /// Time that the sensor was on when the scan began, for warm-up.
   std::optional<double> sensor_on_s = {};
   DailyCheck daily_check = DailyCheck::kPassed;  ///< When the scan began.
-  std::string sensor_serial = {};                ///< Of the unit that was swept.
+  std::string sensor_serial = {};                ///< Names the unit that was swept.
   std::string session_by = {};  ///< Who opened its session; empty if there is none.
   /// Time since its end by a monotonic clock; not set if only the wall clock is available.
   std::optional<double> age_s = {};

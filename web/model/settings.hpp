@@ -93,7 +93,7 @@ template <typename Json>
   return json;
 }
 
-/// What it keeps.
+/// States what a factory reset keeps.
 enum class FactoryReset { kKeepRecords, kWipe };
 
 }  // namespace plumb

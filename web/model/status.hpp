@@ -33,7 +33,7 @@ template <>
 inline constexpr auto kNamesOf<FaultKind> = NamesUpTo<FaultKind::kStorage>({"none", "sensor",
                                                                             "scan", "storage"});
 
-/// What the person who sweeps should do.
+/// Advice to the person who sweeps.
 enum class SweepAdvice {
   kNone,
   kSlower,
@@ -98,20 +98,20 @@ struct Status {
   std::string light;       ///< Name of the shown pattern: "ready", "too_fast".
   std::string patient_id;  ///< Patient of the next scan; empty if there is none.
   ScanPurpose next_purpose = ScanPurpose::kFraction;
-  int scans_today = 0;                      ///< Of the open patient; counts rescans.
+  int scans_today = 0;                      ///< Scans of the open patient, rescans included.
   std::optional<TreatmentSession> session;  ///< The open session.
   RoomOnMap room;  ///< In the reference marker's frame as it lay when the room was calibrated.
   /// References that wait for a plan or an approval; at most 20.
   std::vector<WaitingReference> waiting;
   std::optional<LiveScan> scan;  ///< Set in states scanning and working.
   std::optional<CheckRecord> last_check;
-  DailyCheck daily_check = DailyCheck::kOverdue;  ///< Of today.
+  DailyCheck daily_check = DailyCheck::kOverdue;  ///< Today's check.
   /// Why no reference may be scanned or approved now, with the next step; empty if it may.
   std::string reference_block = {};
   std::optional<Scan> last_result;  ///< The newest finished scan since the start.
   std::string version;
   std::vector<std::string> warnings;  ///< About the set-up of the appliance.
-  std::string rolled_back;            ///< As in UpdateStatus.
+  std::string rolled_back;            ///< The same as in UpdateStatus.
 };
 
 struct UpdateStatus {

@@ -35,7 +35,7 @@ std::vector<Certificate> ChainOf(const std::string& pem) {
   return held;
 }
 
-/// As in the certificate, without control characters, because the text comes from outside.
+/// The subject in the certificate, without control characters, because the text comes from outside.
 std::string SubjectOf(const Certificate& certificate) {
   std::array<char, 512> text{};
   std::size_t size = text.size();
@@ -123,7 +123,7 @@ TlsIdentity UsableTlsIdentity(const std::string& certificate_pem, const std::str
   for (const Certificate& certificate : chain) {
     const std::time_t begin = gnutls_x509_crt_get_activation_time(certificate.get());
     const std::time_t end = gnutls_x509_crt_get_expiration_time(certificate.get());
-    if (time >= end) refuse(certificate, fmt::format("ended on {}: hand in a newer one", Day(end)));
+    if (time >= end) refuse(certificate, fmt::format("ended on {}: upload a newer one", Day(end)));
     if (time < begin)
       refuse(certificate, fmt::format("is valid only from {}: check the clock", Day(begin)));
   }

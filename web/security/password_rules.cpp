@@ -100,11 +100,11 @@ std::string WhyNotPassword(std::string_view password, std::string_view user) {
   const std::string small = InSmallLetters(password), name = InSmallLetters(user);
   const std::string_view core = WithoutTail(small);
   if (IsCommon(small) || IsCommon(core))
-    return "the password is one of those that are tried first; take some words that do not belong "
-           "together";
+    return "this password is one of the first that are guessed; choose several words that do not "
+           "belong together";
   if (!name.empty() && (small == name || core == WithoutTail(name) || small == name + name))
     return "the password must not be the name of the account";
-  if (IsRepetition(small)) return "the password repeats one short piece; take a longer one";
+  if (IsRepetition(small)) return "the password repeats one short piece; choose a longer one";
   return {};
 }
 

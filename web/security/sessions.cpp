@@ -3,7 +3,6 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <vector>
 
 #include "algo/base/errors.hpp"
 
@@ -28,6 +27,16 @@ std::string RandomBytes(std::size_t bytes) {
   std::string random(bytes, '\0');
   randombytes_buf(random.data(), random.size());
   return random;
+}
+
+std::string RandomCode(int letters) {
+  constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";
+  std::string code;
+  for (int i = 0; i < letters; ++i) {
+    if (i == letters / 2) code += '-';
+    code += kLetters[randombytes_uniform(static_cast<std::uint32_t>(kLetters.size()))];
+  }
+  return code;
 }
 
 std::string RandomToken(std::size_t bytes) {

@@ -25,6 +25,10 @@ struct Session {
 /// Random text from that many bytes of the system's generator, in letters, digits, '-' and '_'.
 [[nodiscard]] std::string RandomToken(std::size_t bytes);
 
+/// That many letters and digits that are not easily confused, of 5 bits each, with a hyphen in the
+/// middle: "XXXX-XXXX". For people to type.
+[[nodiscard]] std::string RandomCode(int letters);
+
 /// The hash by which a display's token is stored, in hexadecimal digits.
 [[nodiscard]] std::string StoredHashOf(const std::string& token);
 

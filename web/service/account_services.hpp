@@ -1,7 +1,6 @@
 // Accounts of people, displays in the room, and the record of all actions.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>

@@ -13,7 +13,7 @@ namespace plumb::web {
 
 enum class EventKind {
   kStatus,    ///< State, sensor, light, storage: ask GetStatus().
-  kProgress,  ///< Of a scan: ask GetStatus().
+  kProgress,  ///< A scan goes on: ask GetStatus().
   kResult,    ///< A scan ended: ask GetStatus().
   kData,      ///< Patients, references, scans, users or settings changed.
   kUpdate,    ///< Ask GetUpdate().

@@ -54,8 +54,8 @@ class ReferenceService {
   [[nodiscard]] virtual std::vector<Reference> References(
       const std::string& patient_id) = 0;  ///< Newest version first (background).
   [[nodiscard]] virtual std::optional<Reference> FindReference(const std::string& id) = 0;
-  /// Of the maps of its scan, by the room's markers that the scan contains: the reference marker
-  /// may have lain otherwise than when the room was calibrated (background).
+  /// The room on the maps of its scan, by the room's markers that the scan contains: the reference
+  /// marker may have lain otherwise than when the room was calibrated (background).
   [[nodiscard]] virtual RoomOnMap RoomOfReference(const Reference& reference) = 0;
   /// Creates a draft from a scan with a scene. Returns the id.
   virtual void AddReference(const Actor& actor, const std::string& scan_id,

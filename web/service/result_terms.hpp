@@ -1,4 +1,4 @@
-// What every presentation of a result says in the same words: the page without script, the reports.
+// Words that every presentation of a result shares: the page without script and the reports.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ struct AxisTerms {
 struct ResultTerms {
   std::string_view notice;
   std::array<std::string_view, 6> axes;
-  AxisTerms lines, tilts;                        ///< Of shifts and rotations without a known room.
+  AxisTerms lines, tilts;                        ///< For shifts and rotations without a known room.
   std::string_view within, not_surely, outside;  ///< The assessment of one number.
   std::string_view no_answer;                    ///< As a verdict.
   std::string_view not_known, no_move, scan_again, insignificant;  ///< In place of a direction.

@@ -18,7 +18,7 @@ enum class Language { kEnglish, kSpanish };
 /// Pictures that are made of a comparison.
 enum class ComparisonPicture { kErrorMap, kOverlay };
 
-/// What is read beside the numbers of a result.
+/// Texts to read beside the numbers of a result.
 struct ResultNotes {
   std::array<std::string, 6> axes;    ///< Names of the six numbers.
   std::vector<std::string> cautions;  ///< Whole sentences.
@@ -48,7 +48,7 @@ class ScanService {
   ///         surface.
   [[nodiscard]] virtual std::optional<std::string> CompactMap(const std::string& scan_id,
                                                               const std::string& name) = 0;
-  /// What to read beside the verdict and the numbers of a scan (background).
+  /// Texts to read beside the verdict and the numbers of a scan (background).
   [[nodiscard]] virtual ResultNotes Notes(const std::string& scan_id, Language language) = 0;
   /// A picture of a comparison as a PNG file, with texts and marks in a language; nothing if there
   /// is no such comparison, or it cannot be drawn (background).

@@ -36,15 +36,13 @@ class ApiTest : public WebTest {
 
 TEST_F(ApiTest, NothingUnderTheApiAnswersWithoutLogin) {
   HttpClient stranger(port_);
-  for (const std::string& route : server_->RouteNames()) {
-    const std::string method = route.substr(0, route.find(' '));
-    std::string path = route.substr(method.size() + 1);
-    const std::string permission = path.substr(path.rfind(' ') + 1);
-    path = path.substr(0, path.rfind(' '));
-    if (permission == "none") continue;
+  for (const web::Route& route : server_->routes()) {
+    if (route.permission == web::Permission::kNone) continue;
+    std::string path = route.pattern;
     for (std::size_t at; (at = path.find('{')) != std::string::npos;)
       path.replace(at, path.find('}') - at + 1, "x1");
-    EXPECT_EQ(stranger.Ask(method, path, method == "GET" ? "" : "{}").status, 401) << route;
+    EXPECT_EQ(stranger.Ask(route.method, path, route.method == "GET" ? "" : "{}").status, 401)
+        << route.Name();
   }
   EXPECT_EQ(stranger.Get("/api/v1/nothing").status, 401);
   EXPECT_EQ(stranger.Get("/health").status, 200);

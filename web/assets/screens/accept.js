@@ -1,6 +1,6 @@
-// What users do with a result: scan again, accept it, make it a reference, download it.
+// Lets users act on a result: scan again, accept it, make it a reference, download it.
 import { fileUrl, live, may, post } from '../api.js';
-import { action, clear, done, field, form, h, signedTime, signingPassword } from '../dom.js';
+import { action, clear, done, field, form, h, hint, signedForm, signedTime } from '../dom.js';
 import { kReason } from '../limits.js';
 import { S } from '../strings.js';
 import { closeSession } from '../treatment.js';
@@ -24,17 +24,13 @@ function outsideForm(scan, reload) {
   const isUnsure = scan.result.verdict === 'unsure';
   const label = isUnsure ? text.acceptUnsure : text.acceptOutside;
   const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
-  const password = signingPassword();
   return h('details', { class: 'accept-outside' }, h('summary', {}, `${label}…`),
-    h('p', { class: 'hint' }, text.acceptOutsideHint),
-    form({ class: 'form inline' }, async () => {
-      const body = { reason: reason.value.trim(), password: password.value };
-      password.value = '';
-      await post(`scans/${scan.id}/accept-outside`, body);
+    hint(text.acceptOutsideHint),
+    signedForm({ class: 'form inline' }, async (sign) => {
+      await post(`scans/${scan.id}/accept-outside`, { reason: reason.value.trim(), ...sign() });
       done(S.saved);
       await reload();
-    }, field(text.acceptReason, reason), field(text.acceptPassword, password),
-    h('button', { class: 'danger' }, label)));
+    }, h('button', { class: 'danger' }, label), field(text.acceptReason, reason)));
 }
 
 /// Only a valid result can be accepted: one tap in tolerance, else a reason and the password.
@@ -52,7 +48,7 @@ function acceptance({ scan, received }, reload) {
     if (shown === valid) return;
     shown = valid;
     if (!valid) {
-      clear(element, h('p', { class: 'hint' }, text.cannotAccept));
+      clear(element, hint(text.cannotAccept));
       return;
     }
     offer ??= scan.result.verdict === 'in_tolerance' ? action(text.accept, async () => {

@@ -1,7 +1,7 @@
 // The audit log: what was done, by whom and from where. It can be filtered and exported as CSV.
 import { get } from '../api.js';
 import { detailWords, subjectWords, userWords } from '../audit_words.js';
-import { action, checkbox, clear, field, h, redraw, table } from '../dom.js';
+import { action, checkbox, clear, field, h, hint, redraw, row, saveBlob, table } from '../dom.js';
 import { S } from '../strings.js';
 
 const kPage = 100;
@@ -14,7 +14,7 @@ export function csvField(value) {
 }
 
 const csvOf = (heads, rows) => [heads, ...rows]
-  .map((row) => `${row.map(csvField).join(',')}\r\n`).join('');
+  .map((words) => `${words.map(csvField).join(',')}\r\n`).join('');
 
 export async function showAudit(place) {
   const text = S.audit;
@@ -28,13 +28,13 @@ export async function showAudit(place) {
   let oldest = 0;
   const matching = () => {
     const wanted = filter.value.trim().toLowerCase();
-    return rows.filter((row) => row.join(' ').toLowerCase().includes(wanted));
+    return rows.filter((words) => words.join(' ').toLowerCase().includes(wanted));
   };
   const draw = () => {
     const found = matching();
     count.textContent = text.shown(found.length, rows.length);
-    redraw(list, found.length ? table(heads, found.map((row) => h('tr', {}, row.map((cell) =>
-      h('td', {}, cell || S.none)))), text.title) : h('p', { class: 'hint' }, text.empty));
+    redraw(list, found.length ? table(heads, found.map((words) =>
+      row(...words.map((word) => word || S.none))), text.title) : hint(text.empty));
   };
   const load = async () => {
     const { entries } = await get(
@@ -55,9 +55,7 @@ export async function showAudit(place) {
   };
   const more = action(text.more, load, {});
   const take = action(text.csv, async () => {
-    const url = URL.createObjectURL(new Blob([csvOf(heads, matching())], { type: 'text/csv' }));
-    h('a', { href: url, download: 'plumb-log.csv' }).click();
-    setTimeout(() => URL.revokeObjectURL(url), 10000);
+    saveBlob(new Blob([csvOf(heads, matching())], { type: 'text/csv' }), 'plumb-log.csv');
   }, {});
   filter.addEventListener('input', draw);
   clear(place, h('h1', {}, text.title), h('section', { class: 'card' },
@@ -65,6 +63,6 @@ export async function showAudit(place) {
     views.element, count, list,
     h('div', { class: 'row' }, more, take, h('a', {
       class: 'button', href: '/api/v1/audit.jsonl', download: '',
-    }, text.whole)), h('p', { class: 'hint' }, text.wholeHint)));
+    }, text.whole)), hint(text.wholeHint)));
   await load();
 }

@@ -1,6 +1,6 @@
 // Shows and replaces the TLS certificate.
 import { get, post, put } from '../api.js';
-import { clear, done, field, form, h, localTime, signingPassword, select } from '../dom.js';
+import { clear, done, field, h, hint, localTime, select, signedForm } from '../dom.js';
 import { S } from '../strings.js';
 
 const kMaxChain = 32 * 1024;
@@ -30,10 +30,8 @@ function change(load) {
       for (const input of [chain, key]) input.disabled = !given;
     },
   });
-  const password = signingPassword();
-  return form({ class: 'form' }, async () => {
-    const body = { password: password.value };
-    password.value = '';
+  return signedForm({ class: 'form' }, async (sign) => {
+    const body = sign();
     if (choice.value === 'given') {
       body.certificate = await pemOf(chain, kMaxChain);
       body.key = await pemOf(key, kMaxKey);
@@ -43,8 +41,8 @@ function change(load) {
     }
     done(text.replaced);
     await load();
-  }, field(text.which, choice), files, field(S.result.acceptPassword, password),
-  h('div', { class: 'row' }, h('button', { class: 'danger' }, text.submit)));
+  }, h('div', { class: 'row' }, h('button', { class: 'danger' }, text.submit)),
+  field(text.which, choice), files);
 }
 
 export function certificateCard() {
@@ -52,7 +50,7 @@ export function certificateCard() {
   const place = h('section', { class: 'card certificate' });
   const load = async () => {
     const now = await get('certificate', true);
-    clear(place, h('h2', {}, text.title), h('p', { class: 'hint' }, text.hint),
+    clear(place, h('h2', {}, text.title), hint(text.hint),
       now.fingerprint && h('p', {}, `${text.fingerprint}: `, h('code', {}, now.fingerprint)),
       now.subject && h('p', {}, `${text.subject}: ${now.subject}. ${text.validUntil}: `,
         `${localTime(now.valid_until)}.`),

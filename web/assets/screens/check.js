@@ -1,7 +1,8 @@
 // The daily check of the room's markers: today's, its numbers over time, and the baseline.
 import { currentSession, get, live, may, post } from '../api.js';
 import {
-  action, done, fixed, h, localDay, localTime, redraw, signedTime, svg, table,
+  action, card, done, fixed, h, hint, localDay, localTime, redraw, row, rowHead, signedTime, svg,
+  table,
 } from '../dom.js';
 import { signed } from '../numbers.js';
 import { S, translated } from '../strings.js';
@@ -24,9 +25,9 @@ function itemRow(item) {
     : isCount(item) ? `${item.value}` : `${written(item)} ${item.unit}`;
   const limit = isCount(item) ? text.atLeast(item.limit)
     : text.atMost(isSize(item) ? '' : '±', plain(item.limit), item.unit);
-  return h('tr', {}, h('th', { scope: 'row' }, text.items[item.name] ?? item.name),
+  return row(rowHead(text.items[item.name] ?? item.name),
     h('td', { class: 'figure' }, value, item.note && h('small', {}, ` ${translated(item.note)}`)),
-    h('td', {}, limit),
+    limit,
     h('td', { class: item.passed ? 'judged-in' : 'judged-out' },
       item.passed ? `✓ ${text.within}` : `▲ ${text.outside}`));
 }
@@ -51,18 +52,18 @@ function verdict(check, overdue) {
 function baselineButton(check, load) {
   const text = S.check;
   const own = check.user === currentSession()?.user;
-  return h('div', { class: 'row below' }, own ? h('p', { class: 'hint' }, text.secondPerson)
+  return h('div', { class: 'row below' }, own ? hint(text.secondPerson)
     : [action(text.takeBaseline, async () => {
       await post(`checks/${check.id}/baseline`);
       done(text.baselineTaken);
       await load();
-    }, { 'data-check': check.id }), h('p', { class: 'hint' }, text.takeHint)]);
+    }, { 'data-check': check.id }), hint(text.takeHint)]);
 }
 
 function newest(check, load) {
   const text = S.check;
   const more = check.reasons.slice(1).map((reason) => h('li', {}, sentence(reason)));
-  return h('section', { class: 'card' }, h('h2', {}, localTime(check.time)),
+  return card(localTime(check.time),
     table([text.number, text.value, text.limit, text.judged], check.items.map(itemRow), text.title),
     more.length > 0 && h('ul', { class: 'findings small' }, more),
     may('plan') && check.num_markers >= 3 && baselineButton(check, load));
@@ -110,7 +111,7 @@ function trends(checks) {
   const names = Object.keys(S.check.items);
   const charts = names.map((name) => chart(name, checks)).filter(Boolean);
   if (!charts.length) return null;
-  return h('section', { class: 'card' }, h('h2', {}, S.check.trend),
+  return card(S.check.trend,
     h('div', { class: 'trends' }, charts));
 }
 
@@ -121,15 +122,14 @@ function earlier(checks) {
     return item?.value === null || item?.value === undefined ? S.none
       : `${fixed(item.value, 1)} ${item.unit}`;
   };
-  const rows = checks.map((check) => h('tr', {}, h('td', {}, localTime(check.time)),
-    h('td', {}, h('span', { class: `badge ${kTones[check.status]}` },
-      `${kIcons[check.status]} ${text.verdicts[check.status]}`)),
-    h('td', {}, check.num_markers), h('td', {}, value(check, 'misfit')),
-    h('td', {}, value(check, 'moved')), h('td', {}, check.sensor_serial || S.none),
-    h('td', {}, check.user)));
+  const rows = checks.map((check) => row(localTime(check.time),
+    h('span', { class: `badge ${kTones[check.status]}` },
+      `${kIcons[check.status]} ${text.verdicts[check.status]}`),
+    check.num_markers, value(check, 'misfit'), value(check, 'moved'),
+    check.sensor_serial || S.none, check.user));
   const heads = [S.patients.when, S.patients.outcome, text.markers, text.items.misfit,
     text.items.moved, text.sensor, text.by];
-  return h('section', { class: 'card' }, h('h2', {}, text.history),
+  return card(text.history,
     table(heads, rows, text.history));
 }
 
@@ -147,7 +147,7 @@ export async function showCheck(place) {
       : text.noBaseline;
     redraw(place, h('h1', { class: 'visually-hidden' }, text.title), verdict(checks[0], overdue),
       h('section', { class: 'card split' },
-        h('div', {}, h('p', {}, text.how), h('p', { class: 'hint' }, `${text.baseline}: ${of}`)),
+        h('div', {}, h('p', {}, text.how), hint(`${text.baseline}: ${of}`)),
         may('scan') && action(text.start, async () => {
           await post('checks/open');
           location.hash = '#/scan';

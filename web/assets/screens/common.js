@@ -1,10 +1,11 @@
-// What several screens show.
-import { get, live, since_s } from '../api.js';
+// Parts that several screens show.
+import { get, getOrNull, live, since_s } from '../api.js';
 import { clear, h } from '../dom.js';
 import { kJudgements } from '../numbers.js';
 import { S, translated } from '../strings.js';
 
-/// Of a time that the sensor has been on; how long it must be on is a setting of the appliance.
+/// Whether a sensor is cold that has been on for this time; how long it must be on is a setting of
+/// the appliance.
 export const isCold = (on_s) => on_s < live.status?.sensor.warm_up_s;
 export const minutesOf = (seconds) => Math.round(seconds / 6) / 10;
 export const kOldAfter_s = 120;
@@ -16,7 +17,7 @@ export const sentence = (reason = '') => {
   return `${capital(text).replaceAll('+-', '±')}${/[.!]$/.test(text) || !text ? '' : '.'}`;
 };
 
-/// What is wrong and what to do about it; nothing where nothing is.
+/// Says what is wrong and what to do about it; null where nothing is.
 export function faultWords({ fault, fault_kind: kind }) {
   if (!fault) return null;
   const words = capital(translated(fault)).replace(/[.!]$/, '');
@@ -92,6 +93,30 @@ export function lastKnownNote(look, role = 'status', before = () => '') {
   };
   return { element, draw };
 }
+
+/// As live.listen(); calls `tick` regularly besides. Returns what ends both.
+export function follow(listener, tick, every_ms = 1000) {
+  const stop = live.listen(listener);
+  const timer = setInterval(tick, every_ms);
+  return () => {
+    clearInterval(timer);
+    stop();
+  };
+}
+
+/// What belongs to a scan; null where there is none, or it cannot be had.
+export async function partsOf(scan) {
+  const [reference, details, scene] = await Promise.all([
+    scan.reference_id ? getOrNull(`references/${scan.reference_id}`) : null,
+    scan.result ? getOrNull(`results/${scan.id}`) : null,
+    getOrNull(`scans/${scan.id}/files/scene.json`)]);
+  return { reference, details, scene };
+}
+
+/// Parts of the body, in words; none: every part is as in the reference.
+export const findings = (parts) => h('ul', { class: 'findings' }, parts.length
+  ? parts.map((part) => h('li', {}, translated(part)))
+  : h('li', { class: 'fine-part' }, `✓ ${S.result.asReference}`));
 
 /// Codes by patient id, for lists.
 export async function patientCodes() {

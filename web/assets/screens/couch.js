@@ -1,6 +1,6 @@
 // Computes the couch readings to set from the present ones: nobody has to add in their head.
 import { live } from '../api.js';
-import { clear, field, h } from '../dom.js';
+import { clear, field, h, hint } from '../dom.js';
 import { isStill, kAxes } from '../numbers.js';
 import { S } from '../strings.js';
 
@@ -14,8 +14,8 @@ export function readingOf(text) {
   return Math.abs(value) <= kMax_cm ? value : null;
 }
 
-/// What the axis is set to, in centimetres with one digit as couches show it; a shift that is not
-/// known to differ from nothing leaves it where it is.
+/// The value to set the axis to, in centimetres with one digit as couches show it; a shift that is
+/// not known to differ from nothing leaves the axis where it is.
 export function targetOf(reading_cm, correction_mm, u95_mm) {
   const shift_cm = isStill(correction_mm, u95_mm) ? 0 : correction_mm / 10;
   return Math.round(10 * (reading_cm + shift_cm)) / 10;
@@ -48,5 +48,5 @@ export function couchReadings({ result, details }) {
     return h('div', { class: 'couch-axis' }, field(`${text.axes[axis.name]} (cm)`, input), target);
   });
   return h('details', { class: 'couch' }, h('summary', {}, text.couch),
-    h('p', { class: 'hint' }, text.couchHint), h('div', { class: 'couch-axes' }, rows));
+    hint(text.couchHint), h('div', { class: 'couch-axes' }, rows));
 }

@@ -1,6 +1,6 @@
 import { get, loadSession, post, put } from '../api.js';
-import { clear, field, form, h, select } from '../dom.js';
-import { kName, kNewPassword, kPassword } from '../limits.js';
+import { clear, field, form, h, hint, passwordInput, select } from '../dom.js';
+import { kName, kNewPassword } from '../limits.js';
 import { S, translated } from '../strings.js';
 
 const kAskAgain_ms = 5000;
@@ -25,11 +25,8 @@ export function showLogin(main, setupRequired, certificate, done) {
     name: 'name', autocomplete: 'username', required: true, spellcheck: 'false',
     autocapitalize: 'none', ...kName,
   });
-  const password = h('input', {
-    name: 'password', type: 'password', required: true,
-    autocomplete: setupRequired ? 'new-password' : 'current-password',
-    ...(setupRequired ? kNewPassword : kPassword),
-  });
+  const password = passwordInput(setupRequired ? 'new-password' : 'current-password',
+    { name: 'password', required: true, ...(setupRequired && kNewPassword) });
   const finish = async () => {
     await loadSession();
     await done();
@@ -49,13 +46,11 @@ export function showLogin(main, setupRequired, certificate, done) {
     autocomplete: 'off', autocapitalize: 'characters', class: 'code',
   });
   code.addEventListener('input', () => { code.value = code.value.toUpperCase(); });
-  const repeat = h('input', {
-    type: 'password', required: true, autocomplete: 'new-password', ...kPassword,
-  });
+  const repeat = passwordInput('new-password', { required: true });
   const retention = select(text.retentions, '0');
   clear(main, h('section', { class: 'login card' }, h('h1', {}, text.setupTitle),
     h('p', {}, text.setupText),
-    certificate && h('p', { class: 'hint' }, text.certificate, ' ',
+    certificate && hint(text.certificate, ' ',
       h('code', { class: 'fingerprint' }, certificate)),
     form({ class: 'form' }, async () => {
       if (password.value !== repeat.value) throw new Error(text.differ);
@@ -78,12 +73,9 @@ export function showLogin(main, setupRequired, certificate, done) {
 export function showFirstPassword(main, user, done) {
   const text = S.login;
   const name = h('input', { name: 'name', autocomplete: 'username', readonly: true, value: user });
-  const secret = (autocomplete, more) => h('input', {
-    type: 'password', required: true, autocomplete, ...kPassword, ...more,
-  });
-  const old = secret('current-password');
-  const fresh = secret('new-password', kNewPassword);
-  const repeat = secret('new-password');
+  const old = passwordInput('current-password', { required: true });
+  const fresh = passwordInput('new-password', { required: true, ...kNewPassword });
+  const repeat = passwordInput('new-password', { required: true });
   clear(main, h('section', { class: 'login card' }, h('h1', {}, text.firstTitle),
     h('p', {}, text.firstText),
     form({ class: 'form' }, async () => {

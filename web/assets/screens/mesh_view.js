@@ -1,6 +1,6 @@
 // The card of the 3-D view, which is loaded only when it is opened.
 import { ApiError, getBytes } from '../api.js';
-import { action, checkbox, clear, h, select, warn } from '../dom.js';
+import { action, checkbox, clear, h, hint, saveFrom, select, warn } from '../dom.js';
 import { progressIn } from '../error_map.js';
 import { marksNote } from '../map_frame.js';
 import { loadMap } from '../maps.js';
@@ -41,7 +41,7 @@ function cutControls(view) {
 }
 
 const kSurface_ms = 600000;  // on a slow line
-/// What arrived is no surface.
+/// The bytes that arrived are no surface.
 class DamagedSurface extends Error {}
 
 async function surfaceOf(scanId, onPart) {
@@ -65,12 +65,12 @@ const motionOf = (scan, details) => (isAdvice(scan) && details?.correction?.vert
 /// @param showReference  Shows it, once.
 function correctionControls(view, canvas, scan, showReference) {
   const text = S.result;
-  const share = h('input', {
-    type: 'range', min: 0, max: 1, step: 0.05, value: 0, 'aria-label': text.correctionShare,
+  const fraction = h('input', {
+    type: 'range', min: 0, max: 1, step: 0.05, value: 0, 'aria-label': text.correctionFraction,
   });
   let after = null;  // loaded once, however many steps the slider makes meanwhile
   let shown = false;
-  share.addEventListener('input', async () => {
+  fraction.addEventListener('input', async () => {
     if (!shown) showReference();
     shown = true;
     after ??= loadMap(scan.id, 'deviation_after');
@@ -79,14 +79,14 @@ function correctionControls(view, canvas, scan, showReference) {
       map = await after;
     } catch (error) {
       after = null;
-      share.value = 0;
+      fraction.value = 0;
       warn(`${text.mapMissing} ${error.message}`);
       return;
     }
-    view.correct(Number(share.value), map);
-    canvas.dataset.corrected = share.value;
+    view.correct(Number(fraction.value), map);
+    canvas.dataset.corrected = fraction.value;
   });
-  return slider(text.before, share, text.after);
+  return slider(text.before, fraction, text.after);
 }
 
 function controls(view, canvas, { reference, scan, details }, compass) {
@@ -94,15 +94,15 @@ function controls(view, canvas, { reference, scan, details }, compass) {
   const buttons = viewsOf(compass).map((name) =>
     action(nameOf(name, compass), async () => view.look(name), {}));
   const picture = action(text.screenshot, async () => {
-    h('a', { href: view.picture(), download: `plumb_${scan.id}_3d.png` }).click();
+    saveFrom(view.picture(), `plumb_${scan.id}_3d.png`);
   }, {});
   const cut = cutControls(view);
   if (!reference) return h('div', { class: 'row' }, buttons, picture, cut);
   const ghost = checkbox(text.ghost, false, {});
-  const share = h('input', {
-    type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': text.ghostShare,
+  const fraction = h('input', {
+    type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': text.ghostFraction,
   });
-  const blend = slider(text.ghostShare, share);
+  const blend = slider(text.ghostFraction, fraction);
   blend.hidden = true;
   const state = h('span', { class: 'hint', role: 'status' });
   ghost.box.addEventListener('change', async () => {
@@ -110,7 +110,7 @@ function controls(view, canvas, { reference, scan, details }, compass) {
     state.textContent = ghost.box.checked ? text.ghostLoading : '';
     try {
       await view.setGhost(ghost.box.checked ? () => surfaceOf(reference.scan_id) : null,
-        Number(share.value));
+        Number(fraction.value));
     } catch (error) {
       ghost.box.checked = false;
       blend.hidden = true;
@@ -119,7 +119,7 @@ function controls(view, canvas, { reference, scan, details }, compass) {
     state.textContent = '';
     canvas.dataset.ghost = ghost.box.checked ? 'yes' : '';
   });
-  share.addEventListener('input', () => view.setShare(Number(share.value)));
+  fraction.addEventListener('input', () => view.setFraction(Number(fraction.value)));
   const correction = motionOf(scan, details) && correctionControls(view, canvas, scan, () => {
     if (!ghost.box.checked) ghost.box.click();
   });
@@ -154,13 +154,13 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
       clear(below, marksNote(map?.compass),
         controls(view, canvas, { reference, scan, details }, map?.compass));
     } catch (error) {
-      // What did not arrive, or not whole, may arrive the next time; what the browser cannot show,
-      // it never can.
+      // A surface that did not arrive, or not whole, may arrive the next time; one that the browser
+      // cannot show never will be.
       if (error instanceof ApiError || error instanceof DamagedSurface) offer(error.message);
-      else clear(place, h('p', { class: 'hint' }, text.meshFailed));
+      else clear(place, hint(text.meshFailed));
     }
   }, {});
-  const offer = (words) => clear(place, open, h('p', { class: 'hint' }, words));
+  const offer = (words) => clear(place, open, hint(words));
   place.classList.add('waiting');
   offer(text.meshHint);
   return { element: place, stop: () => view?.stop() };

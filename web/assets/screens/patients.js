@@ -1,8 +1,8 @@
 // Patients, their references and scans, and the treatment session that people open here.
 import { get, live, may, post, put, removeFor } from '../api.js';
 import {
-  action, clear, done, enable, field, form, h, localTime, redraw, say, signedTime, signingPassword,
-  table, warn,
+  action, card, clear, done, enable, field, form, h, hint, localTime, redraw, row, say, signedForm,
+  signedTime, table, warn,
 } from '../dom.js';
 import { kName, kNote, kReason, kSite } from '../limits.js';
 import { numbersLine } from '../numbers.js';
@@ -39,20 +39,21 @@ export async function showPatients(place) {
   const wanted = () => search.value.trim().toLowerCase();
   const matching = () => patients.filter((patient) => (archived.checked || !patient.archived)
     && patient.code.toLowerCase().includes(wanted()));
-  const row = (patient) => {
+  const patientRow = (patient) => {
     const isOpen = patient.id === live.status?.session?.patient_id;
-    return h('tr', { class: isOpen ? 'chosen' : '' },
-      h('td', {}, h('a', { href: `#/patient/${patient.id}` }, patient.code),
-        isOpen && h('span', { class: 'badge here' }, text.isOpen),
-        patient.archived && h('span', { class: 'badge' }, text.archived)),
-      h('td', {}, patient.site || S.none), h('td', {}, patient.num_scans),
-      h('td', {}, referenceState(patient)), h('td', {}, localTime(patient.created_at)));
+    const element = row([h('a', { href: `#/patient/${patient.id}` }, patient.code),
+      isOpen && h('span', { class: 'badge here' }, text.isOpen),
+      patient.archived && h('span', { class: 'badge' }, text.archived)],
+    patient.site || S.none, patient.num_scans, referenceState(patient),
+    localTime(patient.created_at));
+    element.classList.toggle('chosen', isOpen);
+    return element;
   };
   const draw = () => {
-    const rows = matching().map(row);
+    const rows = matching().map(patientRow);
     redraw(list, rows.length
       ? table([text.code, text.site, text.scans, text.reference, text.added], rows, text.title)
-      : h('p', { class: 'hint' }, wanted() ? text.noMatch(search.value.trim()) : text.empty));
+      : hint(wanted() ? text.noMatch(search.value.trim()) : text.empty));
   };
   const load = async () => {
     // The state says which drafts wait for what.
@@ -80,7 +81,7 @@ export async function showPatients(place) {
   clear(place, h('h1', {}, text.title),
     h('section', { class: 'card' }, field(text.search, search), missed, list,
       h('label', { class: 'check below' }, archived, ' ', text.showArchived)),
-    may('patients') && h('section', { class: 'card' }, h('h2', {}, text.add),
+    may('patients') && card(text.add,
       form({ class: 'form inline' }, async () => {
         const body = { code: code.value.trim(), site: site.value.trim() };
         const { id } = await post('patients', body);
@@ -148,7 +149,7 @@ function openButtons(patient) {
   const element = h('div', { class: 'form' },
     confirm,
     h('div', { class: 'row' }, fraction, reference), block, question,
-    !patient.approved_reference_id && h('p', { class: 'hint' }, text.needsReference),
+    !patient.approved_reference_id && hint(text.needsReference),
     why);
   return { element, draw };
 }
@@ -160,7 +161,7 @@ function aboutPatient(patient, reload) {
   const note = h('textarea', { rows: 3, ...kNote });
   note.value = patient.note;
   const editable = may('patients');
-  return h('section', { class: 'card' }, h('h2', {}, text.about),
+  return card(text.about,
     editable ? form({ class: 'form' }, async () => {
       const body = {
         site: site.value.trim(), note: note.value.replace(/\s+/g, ' ').trim(),
@@ -182,44 +183,40 @@ function aboutPatient(patient, reload) {
       action(patient.archived ? text.unarchive : text.archive, async () => {
         await post(`patients/${patient.id}/archive`, { archived: !patient.archived });
         await reload();
-      }, {}), !patient.archived && h('p', { class: 'hint' }, text.archiveHint)));
+      }, {}), !patient.archived && hint(text.archiveHint)));
 }
 
 function referenceTable(references) {
   const text = S.patients;
-  if (!references.length) return h('p', { class: 'hint' }, text.noReferences);
+  if (!references.length) return hint(text.noReferences);
   const plan = may('plan') ? text.plan : text.planView;
-  const rows = references.map((reference) => h('tr', {},
-    h('td', {}, reference.version),
-    h('td', {}, `${localTime(reference.created_at)}, ${reference.created_by}`),
-    h('td', {}, reference.reason || S.none),
-    h('td', {}, reference.approved_by
+  const rows = references.map((reference) => row(reference.version,
+    `${localTime(reference.created_at)}, ${reference.created_by}`, reference.reason || S.none,
+    reference.approved_by
       ? `✓ ${text.approvedBy(reference.approved_by, signedTime(reference.approved_at))}`
-      : h('span', { class: 'badge move' }, `${text.draft}, ${waitsFor(reference)}`)),
-    h('td', {}, h('a', {
+      : h('span', { class: 'badge move' }, `${text.draft}, ${waitsFor(reference)}`),
+    h('a', {
       class: 'button', href: `#/plan/${reference.id}`,
       'aria-label': `${plan}, ${text.version} ${reference.version}`,
-    }, plan))));
+    }, plan)));
   return table([text.version, text.made, text.reasonShort, text.state, S.action], rows,
     text.references);
 }
 
 function scanTable(scans) {
   const text = S.patients;
-  if (!scans.length) return h('p', { class: 'hint' }, S.status.noScans);
+  if (!scans.length) return hint(S.status.noScans);
   const signed = (scan) => (scan.accepted_at
     ? `${scan.accepted_by}, ${signedTime(scan.accepted_at)}` : scan.accepted_by);
   const accepted = (scan) => (!scan.accepted_by ? S.none : `${acceptanceMark(scan)} ${signed(scan)}`
     + `${scan.accepted_reason ? `: ${scan.accepted_reason}` : ''}`);
-  const rows = scans.map((scan) => h('tr', {},
-    h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))),
-    h('td', {}, scan.fraction ?? S.none),
-    h('td', {}, S.purposes[scan.purpose]),
-    h('td', {}, outcomeBadge(scan), scan.check_overdue
-      && h('span', { class: 'badge move overdue' },
-        `▲ ${scan.check_failed ? text.checkFailed : text.checkOverdue}`)),
+  const rows = scans.map((scan) => row(
+    h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at)),
+    scan.fraction ?? S.none, S.purposes[scan.purpose],
+    [outcomeBadge(scan), scan.check_overdue && h('span', { class: 'badge move overdue' },
+      `▲ ${scan.check_failed ? text.checkFailed : text.checkOverdue}`)],
     h('td', { class: 'digits' }, isAdvice(scan) ? numbersLine(scan.result) : S.none),
-    h('td', {}, accepted(scan))));
+    accepted(scan)));
   const heads = [text.when, text.fraction, text.purpose, text.outcome, text.numbers,
     text.accepted];
   return table(heads, rows, text.history);
@@ -228,17 +225,13 @@ function scanTable(scans) {
 function wipe(patient) {
   const text = S.patients;
   const code = h('input', { required: true, autocomplete: 'off', spellcheck: 'false' });
-  const password = signingPassword();
   return h('details', { class: 'card' }, h('summary', {}, text.wipe), h('p', {}, text.wipeText),
-    form({ class: 'form inline' }, async () => {
+    signedForm({ class: 'form inline' }, async (sign) => {
       const isSame = code.value.trim().toLowerCase() === patient.code.toLowerCase();
       if (!isSame) throw new Error(text.wipeDiffers);
-      const body = { password: password.value };
-      password.value = '';
-      await removeFor(`patients/${patient.id}`, body);
+      await removeFor(`patients/${patient.id}`, sign());
       location.hash = '#/patients';
-    }, field(text.code, code), field(S.result.acceptPassword, password),
-    h('button', { class: 'danger' }, text.wipeSubmit)));
+    }, h('button', { class: 'danger' }, text.wipeSubmit), field(text.code, code)));
 }
 
 function openNow(patient) {
@@ -260,18 +253,18 @@ export async function showPatient(place, id) {
   let approved;
   let told;
   let buttons = null;
-  /// What begins a session is the first thing to press only where this patient's is not open.
+  /// The button that begins a session is the primary one only where this patient's is not open.
   const weigh = () => opening.querySelector('.start-session')
     ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
   const load = async () => {
     const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
       get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
-    // What is typed as a reason stays as long as nothing else is offered.
+    // A reason that was typed stays as long as nothing else is offered.
     const opens = `${patient.approved_reference_id} ${patient.archived}`;
     if (approved !== opens) {
       approved = opens;
       buttons = patient.archived ? null : openButtons(patient);
-      clear(opening, buttons?.element ?? h('p', { class: 'hint' }, text.isArchived));
+      clear(opening, buttons?.element ?? hint(text.isArchived));
       weigh();
     }
     const says = JSON.stringify([patient.site, patient.note, patient.archived]);
@@ -289,9 +282,9 @@ export async function showPatient(place, id) {
     class: 'button', href: `/api/v1/patients/${id}/${name}`, download: '',
   }, label);
   clear(place, heading,
-    may('scan') && h('section', { class: 'card' }, h('h2', {}, text.open), session, opening),
-    h('section', { class: 'card' }, h('h2', {}, text.references), references),
-    h('section', { class: 'card' }, h('h2', {}, text.history), scans,
+    may('scan') && card(text.open, session, opening),
+    card(text.references, references),
+    card(text.history, scans,
       h('div', { class: 'row below' },
         file(`report.pdf?language=${document.documentElement.lang}`, text.report),
         file('numbers.csv', text.csv), file('numbers.json', text.json),

@@ -2,8 +2,8 @@
 // what is stored.
 import { currentSession, get, live, may, post, put } from '../api.js';
 import {
-  action, checkbox, clear, done, enable, field, fixed, form, h, keepFocus, localTime, say, select,
-  signedTime, signingPassword, warn,
+  action, card, checkbox, clear, done, enable, field, fixed, h, hint, keepFocus, localTime, say,
+  select, signedForm, signedTime, warn,
 } from '../dom.js';
 import { guardLeaving } from '../leave.js';
 import { kBounds } from '../limits.js';
@@ -106,7 +106,7 @@ function whyNotApprove(reference) {
   return isOwn && may('approve') ? S.plan.secondPerson : null;
 }
 
-/// What an approval signs, read-only and complete, with the checksum that goes into the log.
+/// Shows what an approval signs, read-only and complete, with the checksum that goes into the log.
 function summary(reference, patient, { scan, scene, picture }, approve) {
   const text = S.plan;
   const { plan } = reference;
@@ -115,14 +115,9 @@ function summary(reference, patient, { scan, scene, picture }, approve) {
   const number = (value) => `${value}`.replace('.', S.decimal);
   const size = measure(plan.region_m);
   const frames = scene?.frames;
-  const password = signingPassword();
-  const signature = form({ class: 'form inline below' }, async () => {
-    const written = password.value;
-    password.value = '';
-    await approve(written);
-  }, field(S.result.acceptPassword, password),
-  h('button', { class: 'primary' }, text.summarySubmit));
-  const element = h('section', { class: 'card summary', 'aria-label': text.summary },
+  const signature = signedForm({ class: 'form inline below' }, (sign) => approve(sign()),
+    h('button', { class: 'primary' }, text.summarySubmit));
+  return h('section', { class: 'card summary', 'aria-label': text.summary },
     h('h2', {}, text.summary), h('div', { class: 'summary-grid' },
       picture, h('dl', { class: 'facts' },
       row(S.patients.code, patient.code), row(S.patients.version, `${reference.version}`),
@@ -143,8 +138,7 @@ function summary(reference, patient, { scan, scene, picture }, approve) {
           + `${S.result.views} ${scene.keyframes}`),
       row(text.signature, h('code', {}, reference.digest)))),
     scan && flagList(scan, scene),
-    h('p', { class: 'hint' }, text.approveHint), signature);
-  return { element, password };
+    hint(text.approveHint), signature);
 }
 
 /// One stored plan and what is edited of it. `store(request)` sends a change, `reload` shows what
@@ -158,7 +152,7 @@ async function draft(place, reference, store, reload) {
   const plan = kept ?? storedPlan(reference);
   const model = { region: plan.region_m.map((point) => [...point]), isocentre: plan.isocentre_m };
   const inputs = controls(reference, model, plan, editable);
-  const corners = h('p', { class: 'hint' });
+  const corners = hint();
   const outside = h('p', { class: 'caution' });
   const mapPlace = h('div', {});
   const signPlace = h('div', {});
@@ -215,7 +209,7 @@ async function draft(place, reference, store, reload) {
     });
     clear(mapPlace, drawing.element, marksPlace);
   } catch (error) {
-    clear(mapPlace, h('p', { class: 'hint' }, error.message));
+    clear(mapPlace, hint(error.message));
   }
   const picture = () => {
     if (!loaded) return null;
@@ -225,15 +219,15 @@ async function draft(place, reference, store, reload) {
       marksNote(compass));
   };
   const showSummary = () => {
-    const approve = (written) => store(() => post(`references/${reference.id}/approve`, {
-      revision: reference.revision, digest: reference.digest, password: written,
+    const approve = (signature) => store(() => post(`references/${reference.id}/approve`, {
+      revision: reference.revision, digest: reference.digest, ...signature,
     }), text.approved);
-    const { element, password } = summary(reference, patient, {
+    const element = summary(reference, patient, {
       scan, scene: loaded?.scene, picture: picture(),
     }, approve);
     clear(signPlace, element);
     element.scrollIntoView({ block: 'nearest' });
-    password.focus();
+    element.querySelector('input[type=password]').focus();
   };
   inputs.axes.forEach((input) => input.addEventListener('input', () => {
     model.isocentre = inputs.isocentre();
@@ -272,12 +266,12 @@ async function draft(place, reference, store, reload) {
     h('p', { class: 'lead' }, approval),
     kept && h('p', { class: 'old-note row' }, h('span', {}, text.draftKept), discard),
     h('div', { class: 'plan-grid' },
-      h('section', { class: 'card' }, h('h2', {}, text.region),
-        editable && h('p', { class: 'hint' }, text.regionHint), mapPlace, corners, tools),
+      card(text.region,
+        editable && hint(text.regionHint), mapPlace, corners, tools),
       h('section', { class: 'card form' },
         h('fieldset', {}, h('legend', {}, text.isocentre),
-          h('p', { class: 'hint' }, text.isocentreHint),
-          editable && h('p', { class: 'hint' }, text.pickHint),
+          hint(text.isocentreHint),
+          editable && hint(text.pickHint),
           h('div', { class: 'triple' }, inputs.axes.map((input, i) =>
             field(`${'xyz'[i]} (m)`, input))), inputs.bad, outside,
           editable && drawing && action(text.pick, async () => drawing.pick(), {}),
@@ -288,8 +282,7 @@ async function draft(place, reference, store, reload) {
         h('fieldset', {}, h('legend', {}, text.tolerance), field(text.shift, inputs.shift),
           field(text.rotation, inputs.rotation)),
         templatePlace, field(text.posture, inputs.posture), inputs.couch.element,
-        editable && h('p', { class: 'hint' },
-          reference.approved_by ? text.approvedHint : text.approveHint),
+        editable && hint(reference.approved_by ? text.approvedHint : text.approveHint),
         refusal && h('p', { class: 'caution refusal' }, refusal),
         unsaved, block, h('div', { class: 'row' }, editable && save, sign))),
     signPlace));
@@ -298,7 +291,7 @@ async function draft(place, reference, store, reload) {
       .then((element) => clear(templatePlace, element), (error) => warn(error.message));
   }
   if (kept) {
-    // What was stored is what an edit is compared with, not what was kept.
+    // An edit is compared with what was stored, not with what was kept.
     const blank = controls(reference,
       { region: reference.plan.region_m, isocentre: reference.plan.isocentre_m },
       storedPlan(reference), editable);

@@ -1,6 +1,6 @@
 // The map of a plan on which region and isocentre are drawn, by pointer or by keys.
-import { clear, h, say, svg } from '../dom.js';
-import { mapFrame, setMarks, viewOf } from '../map_frame.js';
+import { arrowOf, clear, h, say, svg } from '../dom.js';
+import { crossAt, mapFrame, setMarks, viewOf } from '../map_frame.js';
 import { cellAt, outlineOf, paintHeights } from '../maps.js';
 import { S } from '../strings.js';
 
@@ -96,20 +96,9 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
         cx: x, cy: y, r: size, class: i === state.chosen ? 'corner chosen' : 'corner',
         'data-corner': i,
       })),
-      model.isocentre && (() => {
-        const [x, y] = toMap(model.isocentre);
-        return svg('path', {
-          d: `M${x - 2 * size} ${y}h${4 * size}M${x} ${y - 2 * size}v${4 * size}`,
-          class: state.onIsocentre ? 'isocentre chosen' : 'isocentre',
-        });
-      })(),
-      state.crosshair && (() => {
-        const [x, y] = toMap(state.crosshair);
-        return svg('path', {
-          d: `M${x - 3 * size} ${y}h${6 * size}M${x} ${y - 3 * size}v${6 * size}`,
-          class: 'crosshair',
-        });
-      })());
+      model.isocentre && crossAt(toMap(model.isocentre), 2 * size,
+        state.onIsocentre ? 'isocentre chosen' : 'isocentre'),
+      state.crosshair && crossAt(toMap(state.crosshair), 3 * size, 'crosshair'));
   };
   const skinAt = (point) => {
     const cell = cellAt(grid, ...point);
@@ -216,9 +205,7 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
     overlay.addEventListener('pointerup', () => { state.grabbed = null; });
     overlay.addEventListener('keydown', (event) => {
       const chosen = model.region[state.chosen];
-      const direction = {
-        ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
-      }[event.key];
+      const direction = arrowOf(event);
       const by = kStep_m * (event.shiftKey ? 10 : 1);
       const isDelete = event.key === 'Delete' || event.key === 'Backspace';
       const key = event.key.toLowerCase();
@@ -297,8 +284,8 @@ function nearestEdge(region, [x, y]) {
     const [bx, by] = region[(i + 1) % region.length];
     const length2 = (bx - ax) ** 2 + (by - ay) ** 2 || 1e-9;
     const along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length2;
-    const share = Math.max(0, Math.min(1, along));
-    const away = distance([x, y], [ax + share * (bx - ax), ay + share * (by - ay)]);
+    const fraction = Math.max(0, Math.min(1, along));
+    const away = distance([x, y], [ax + fraction * (bx - ax), ay + fraction * (by - ay)]);
     if (away < best[0]) best = [away, i + 1];
   });
   return best[1];

@@ -1,6 +1,6 @@
-// What plans of one site begin with: size of the region and tolerances.
+// Templates, with which plans of one site begin: size of the region and tolerances.
 import { get, post, put } from '../api.js';
-import { action, clear, done, h } from '../dom.js';
+import { action, clear, done, h, hint } from '../dom.js';
 import { S } from '../strings.js';
 
 const boundsOf = (region) => {
@@ -13,7 +13,7 @@ const boundsOf = (region) => {
 export async function templateOf(patient, grid, model, inputs, drawing, changed) {
   const text = S.plan;
   const { site } = patient;
-  if (!site) return h('p', { class: 'hint' }, text.templateNoSite);
+  if (!site) return hint(text.templateNoSite);
   const element = h('div', { class: 'plan-template' });
   const load = async () => {
     const { templates } = await get('templates', true);
@@ -48,7 +48,7 @@ export async function templateOf(patient, grid, model, inputs, drawing, changed)
     }, {});
     const says = found ? text.templateIs(found.width_mm / 10, found.height_mm / 10,
       found.tolerance.shift_mm, found.tolerance.rotation_deg) : text.templateNone;
-    clear(element, h('p', { class: 'hint' }, says), h('div', { class: 'row' }, use, keep, drop));
+    clear(element, hint(says), h('div', { class: 'row' }, use, keep, drop));
   };
   await load();
   return h('fieldset', {}, h('legend', {}, text.template(site)), element);

@@ -1,6 +1,6 @@
 // Deleting one scan for good: a reason, the scan's number typed, and what stays said before.
 import { get, may, removeFor } from '../api.js';
-import { clear, done, field, form, h } from '../dom.js';
+import { clear, done, field, form, h, hint } from '../dom.js';
 import { kReason } from '../limits.js';
 import { S } from '../strings.js';
 
@@ -8,7 +8,7 @@ import { S } from '../strings.js';
 export function removeScan({ scan, patient }) {
   if (!may('wipe') || scan.outcome === 'running') return null;
   const text = S.removeScan;
-  const body = h('div', {}, h('p', { class: 'hint' }, S.loading));
+  const body = h('div', {}, hint(S.loading));
   const element = h('details', { class: 'remove-scan' }, h('summary', {}, `${text.open}…`), body);
   const draw = async () => {
     const references = patient
@@ -20,7 +20,7 @@ export function removeScan({ scan, patient }) {
     }
     const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
     const number = h('input', { required: true, autocomplete: 'off', spellcheck: 'false' });
-    clear(body, h('p', {}, text.goes), h('p', { class: 'hint' }, text.stays),
+    clear(body, h('p', {}, text.goes), hint(text.stays),
       form({ class: 'form inline' }, async () => {
         if (number.value.trim() !== scan.id) throw new Error(text.differs(scan.id));
         await removeFor(`scans/${scan.id}`, { reason: reason.value.trim() });

@@ -1,20 +1,19 @@
 // One result, from its verdict down to the pictures.
-import { fileUrl, get, live, now } from '../api.js';
-import { clear, fixed, h, keepFocus, warn } from '../dom.js';
+import { fileUrl, get, getOrNull, live, now } from '../api.js';
+import { card, clear, fixed, h, hint, keepFocus, warn } from '../dom.js';
 import { errorMap } from '../error_map.js';
 import { compassOf, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { loadMap, paintHeights } from '../maps.js';
 import { axisTitle, sixNumbers, toleranceOf } from '../numbers.js';
-import { S, translated } from '../strings.js';
+import { S } from '../strings.js';
 import { trend } from '../trend.js';
 import { actions } from './accept.js';
-import { isAdvice, sentence } from './common.js';
+import { findings, follow, isAdvice, partsOf, sentence } from './common.js';
 import { couchReadings } from './couch.js';
 import { meshView } from './mesh_view.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
 
 const mm = (metres, digits = 1) => fixed(1000 * metres, digits);
-const optional = (path) => get(path, true).catch(() => null);
 
 /// The newest finished scan: of this run of the appliance, else the newest that is stored.
 const newest = async (last) => last
@@ -26,15 +25,12 @@ const find = (id) => get(`scans/${id}`).catch((error) => {
 /// Everything that the screen shows of one scan, which came at `received`.
 async function collect(scan, received) {
   const isReference = scan.purpose === 'reference' && scan.patient_id && scan.outcome === 'done';
-  const [patient, reference, details, scene, history, references] = await Promise.all([
-    scan.patient_id ? optional(`patients/${scan.patient_id}`) : null,
-    scan.reference_id ? optional(`references/${scan.reference_id}`) : null,
-    scan.result ? optional(`results/${scan.id}`) : null,
-    optional(`scans/${scan.id}/files/scene.json`),
-    scan.patient_id ? optional(`patients/${scan.patient_id}/scans`) : null,
-    isReference ? optional(`patients/${scan.patient_id}/references`) : null]);
+  const [parts, patient, history, references] = await Promise.all([partsOf(scan),
+    scan.patient_id ? getOrNull(`patients/${scan.patient_id}`) : null,
+    scan.patient_id ? getOrNull(`patients/${scan.patient_id}/scans`) : null,
+    isReference ? getOrNull(`patients/${scan.patient_id}/references`) : null]);
   return {
-    scan: { ...scan, details }, received, patient, reference, details, scene,
+    scan: { ...scan, details: parts.details }, received, patient, ...parts,
     history: history?.scans ?? [],
     draft: references?.references.find(({ scan_id: id }) => id === scan.id) ?? null,
   };
@@ -59,9 +55,9 @@ function trust({ scan, details, scene }) {
   add(text.views, scene && `${scene.keyframes}`);
   add(text.frames, scene && `${scene.frames.tracked} / ${scene.frames.total}`);
   const lost = scene?.frames.dropped ?? 0;
-  const share = lost > 0 ? Math.round(100 * lost / Math.max(1, scene.frames.total)) : 0;
-  add(text.framesLost, lost > 0 ? text.framesLostOf(lost, share) : null,
-    share >= 5 ? 'caution' : '');
+  const percent = lost > 0 ? Math.round(100 * lost / Math.max(1, scene.frames.total)) : 0;
+  add(text.framesLost, lost > 0 ? text.framesLostOf(lost, percent) : null,
+    percent >= 5 ? 'caution' : '');
   add(text.lost, scene?.longest_lost_s > 0 ? `${fixed(scene.longest_lost_s, 1)} s` : null,
     'caution');
   add(text.depthScale, scene?.calibration?.depth_scale
@@ -104,11 +100,8 @@ function bodyWords({ scan, details }, valid) {
   const text = S.result;
   if (!scan.result?.body || !details?.body || !isAdvice(scan)) return null;
   const { after, now: before } = scan.result.body;
-  const list = (title, hint, words) => h('div', {}, h('h3', {}, title),
-    hint && h('p', { class: 'hint' }, hint),
-    h('ul', { class: 'findings' }, words.length
-      ? words.map((word) => h('li', {}, translated(word)))
-      : h('li', { class: 'fine-part' }, `✓ ${text.asReference}`)));
+  const list = (title, note, words) => h('div', {}, h('h3', {}, title), note && hint(note),
+    findings(words));
   return h('div', { class: 'body-part-words' },
     h('div', { class: 'body-words' },
       list(valid ? text.bodyAfter : text.bodyAfterThen,
@@ -119,17 +112,17 @@ function bodyWords({ scan, details }, valid) {
     details.body.named_by === 'axes' && h('p', { class: 'caution' }, text.bodyByAxes));
 }
 
-/// What the sweep saw, where there is nothing to compare it with.
+/// Shows what the sweep saw, where there is nothing to compare it with.
 function seen({ scan, scene }) {
   const canvas = h('canvas', { class: 'map', role: 'img', 'aria-label': S.result.heights });
   const grid = scene.heightmap;
   const compass = compassOf(live.status?.room, null);
-  const place = h('div', {}, h('p', { class: 'hint' }, S.loading));
+  const place = h('div', {}, hint(S.loading));
   loadMap(scan.id, 'heightmap').then((map) => {
     paintHeights(canvas, map, grid.step);
     clear(place, mapFrame({ grid, view: viewOf(grid, null), canvas, compass }),
       marksNote(compass));
-  }, (error) => clear(place, h('p', { class: 'hint' }, error.message)));
+  }, (error) => clear(place, hint(error.message)));
   return place;
 }
 
@@ -156,16 +149,14 @@ function build(data, reload, id) {
   const text = S.result;
   const { scan, history, reference } = data;
   const mapped = Boolean(data.details?.alignment);
-  const card = (title, ...content) =>
-    h('section', { class: 'card' }, h('h2', {}, title), ...content);
   const parts = {
     who: identity(data),
     note: validityNote(scan, data.received, Boolean(id)),
     other: h('p', { class: 'caution' }),
     words: h('div', {}),
-    map: h('div', {}, h('p', { class: 'hint' }, S.loading)),
+    map: h('div', {}, hint(S.loading)),
     mesh: h('div', {}),
-    overlay: h('div', {}, h('p', { class: 'hint' }, S.loading)),
+    overlay: h('div', {}, hint(S.loading)),
     actions: actions(data, reload),
     fresh: h('div', { class: 'fresh' }),
     isValid: null,
@@ -256,26 +247,23 @@ export async function showResult(place, id) {
     clear(parts.mesh, mesh.element);
     stopMesh = mesh.stop;
   };
-  const timer = setInterval(() => tick(), 1000);
-  const follow = () => load().catch((error) => {
+  const reload = () => load().catch((error) => {
     latest = '';  // the next status tries again
     warn(error.message);
   });
-  const stop = live.listen((kind) => {
+  const stop = follow((kind) => {
     const missed = kind === 'status' && latest !== undefined
       && (live.status.last_result?.id ?? null) !== latest;
-    if (!id && (kind === 'result' || missed)) follow();
+    if (!id && (kind === 'result' || missed)) reload();
     else if (kind === 'status' || kind === 'connection') tick();
-  });
+  }, () => tick());
   try {
     await load();
   } catch (error) {
-    clearInterval(timer);
     stop();
     throw error;
   }
   return () => {
-    clearInterval(timer);
     stop();
     stopMesh();
   };

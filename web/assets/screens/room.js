@@ -2,15 +2,16 @@
 import {
   currentSession, get, live, loadSession, may, now, setLoggedOffHandler, since_s,
 } from '../api.js';
-import { clear, h, say } from '../dom.js';
+import { clear, h, hint, say } from '../dom.js';
 import { legend } from '../error_map.js';
 import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { loadMap, paintErrors } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseTheme } from '../preferences.js';
-import { chooseLanguage, kLanguages, languageOf, S, translated } from '../strings.js';
+import { chooseLanguage, kLanguages, languageOf, S } from '../strings.js';
 import {
-  ageText, faultWords, flagList, isAdvice, isCold, lastKnownNote, minutesOf, sentence, sidesOf,
+  ageText, faultWords, findings, flagList, isAdvice, isCold, lastKnownNote, minutesOf, partsOf,
+  sentence, sidesOf,
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { preview, surfaceIn } from './scan.js';
@@ -21,7 +22,6 @@ const kWho = 'room';
 const kPartsShown = 3;
 const kReasonsBelow = 2;  // besides the first, which is part of the verdict
 const kSwap_s = 8;
-const optional = (path) => get(path, true).catch(() => null);
 const wait = (ms) => new Promise((ready) => { setTimeout(ready, ms); });
 
 /// Null without a connection.
@@ -58,7 +58,7 @@ async function pair(main, logIn) {
     const { code, secret } = await asked.json();
     clear(main, h('section', { class: 'room pairing' }, h('h1', {}, text.pairTitle),
       h('p', { class: 'pair-code' }, code), h('p', { class: 'lead' }, text.pairText),
-      h('p', { class: 'hint' }, text.pairWaiting),
+      hint(text.pairWaiting),
       logIn && h('button', { class: 'quiet', type: 'button', onclick: logIn }, S.login.title)));
     for (;;) {
       await wait(kAsk_ms);
@@ -155,9 +155,7 @@ function posture(scan) {
   if (!parts) return null;
   return h('section', { class: 'room-posture' }, h('h2', {}, S.result.bodyAfter),
     parts.length > 0 && h('p', {}, S.result.bodyAfterHint),
-    h('ul', { class: 'findings' }, parts.length
-      ? parts.slice(0, kPartsShown).map((part) => h('li', {}, translated(part)))
-      : h('li', { class: 'fine-part' }, `✓ ${S.result.asReference}`)));
+    findings(parts.slice(0, kPartsShown)));
 }
 
 /// The result of the scan that has just ended, as large as it can be read.
@@ -187,10 +185,7 @@ function result() {
   };
   const load = async (scan) => {
     const received = now();
-    const [reference, details, scene] = await Promise.all([
-      scan.reference_id ? optional(`references/${scan.reference_id}`) : null,
-      scan.result ? optional(`results/${scan.id}`) : null,
-      optional(`scans/${scan.id}/files/scene.json`)]);
+    const { reference, details, scene } = await partsOf(scan);
     if (shown !== scan.id) return;
     const data = { scan, reference, details, scene, received, patient: scan.patient_id };
     note = validityNote(scan, received, false);
@@ -341,7 +336,7 @@ function display(main) {
     clear(body, parts);
     say(parts[0].textContent);
   };
-  /// What grows while the rest stays as it is.
+  /// Updates what grows while the rest stays as it is.
   const update = (fraction) => {
     const bar = body.querySelector('progress');
     if (bar && fraction !== null && fraction !== undefined) bar.value = fraction;
@@ -380,7 +375,7 @@ export async function showRoom(main, { speak, applyTheme }) {
         await loadSession();
         break;
       }
-      await pair(main, () => showLogin(main, false, () => location.reload()));
+      await pair(main, () => showLogin(main, false, null, () => location.reload()));
       break;
     } catch {
       clear(main, h('h1', { class: 'visually-hidden' }, S.room.title),

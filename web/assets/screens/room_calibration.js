@@ -2,21 +2,19 @@
 // signed.
 import { get, live, may, post } from '../api.js';
 import {
-  action, clear, done, field, fixed, form, h, localTime, signedTime, signingPassword, table,
+  action, clear, done, fixed, h, hint, localTime, row, rowHead, signedForm, signedTime, table,
 } from '../dom.js';
 import { S } from '../strings.js';
 import { sentence } from './common.js';
 
 function scanRow(scan) {
   if (scan.fault) {
-    return h('tr', {}, h('th', { scope: 'row' }, localTime(scan.time)),
+    return row(rowHead(localTime(scan.time)),
       h('td', { colspan: 4, class: 'judged-out' }, `▲ ${sentence(scan.fault)}`));
   }
-  return h('tr', {}, h('th', { scope: 'row' }, localTime(scan.time)),
-    h('td', {}, scan.num_markers), h('td', {}, `${fixed(scan.rms_mm, 2)} mm`),
-    h('td', {}, `${fixed(scan.scale_percent, 1)} %`),
-    h('td', {}, `±${fixed(scan.shift_uncertainty_mm, 1)} mm, `
-      + `±${fixed(scan.turn_uncertainty_deg, 2)}°`));
+  return row(rowHead(localTime(scan.time)), scan.num_markers, `${fixed(scan.rms_mm, 2)} mm`,
+    `${fixed(scan.scale_percent, 1)} %`,
+    `±${fixed(scan.shift_uncertainty_mm, 1)} mm, ±${fixed(scan.turn_uncertainty_deg, 2)}°`);
 }
 
 function state({ versions: [newest], due, configured }) {
@@ -51,22 +49,16 @@ function spread(room) {
 /// With the password again: from then on it gives every comparison its directions.
 function signature(room, load) {
   const text = S.room_calibration;
-  const password = signingPassword();
-  return form({ class: 'form inline below' }, async () => {
-    const body = { digest: room.digest, password: password.value };
-    password.value = '';
-    await post('room-calibration/sign', body);
+  return signedForm({ class: 'form inline below' }, async (sign) => {
+    await post('room-calibration/sign', { digest: room.digest, ...sign() });
     done(text.signed);
     await load();
-  }, field(S.result.acceptPassword, password), h('button', { class: 'primary' }, text.sign));
+  }, h('button', { class: 'primary' }, text.sign));
 }
 
-function versionRow(one) {
-  return h('tr', {}, h('th', { scope: 'row' }, one.version), h('td', {}, signedTime(one.signed_at)),
-    h('td', {}, one.signed_by), h('td', {}, `${fixed(one.shift_mm, 2)} mm`),
-    h('td', {}, `${fixed(one.turn_deg, 2)}°`),
-    h('td', {}, h('code', {}, one.digest.slice(0, 12))));
-}
+const versionRow = (one) => row(rowHead(one.version), signedTime(one.signed_at), one.signed_by,
+  `${fixed(one.shift_mm, 2)} mm`, `${fixed(one.turn_deg, 2)}°`,
+  h('code', {}, one.digest.slice(0, 12)));
 
 /// @returns the card, and what ends it.
 export function roomCard() {
@@ -87,12 +79,12 @@ export function roomCard() {
         await post('checks/open');
         location.hash = '#/scan/board';
       }, {}),
-      h('p', { class: 'hint' }, text.isCheck),
+      hint(text.isCheck),
     ], scans.length > 0 && table([text.when, text.markers, text.misfit, text.size,
       text.uncertainty], scans.map(scanRow), text.scans),
     spread(room),
     scans.length > 0 && room.why_not_sign
-      && h('p', { class: 'hint' }, sentence(room.why_not_sign)),
+      && hint(sentence(room.why_not_sign)),
     may('calibrate') && !room.why_not_sign && signature(room, load),
     versions.length > 0 && table([text.version, text.signedAt, text.signedBy, text.shift,
       text.turn, text.digest], versions.map(versionRow), text.versions));

@@ -1,29 +1,26 @@
 // The sweep: guidance, coverage, the camera, and the button.
-import { currentSession, get, live, may, now, post, since_s } from '../api.js';
-import { action, clear, done, enable, h, redraw, say } from '../dom.js';
+import {
+  currentSession, fetchPicture, get, live, may, now, post, repeat, since_s,
+} from '../api.js';
+import { action, card, clear, done, enable, h, hint, redraw, say } from '../dom.js';
 import { liveSurface } from '../live_surface.js';
 import { S } from '../strings.js';
 import { isAcknowledged, sessionLine } from '../treatment.js';
-import { faultWords, lastKnownNote, sentence } from './common.js';
+import { faultWords, follow, lastKnownNote, sentence } from './common.js';
 
 const kPreviewEvery_ms = 250;
-const kPreviewAnswer_ms = 5000;
+const kPreviewAgain_ms = 2000;  // without a picture
 const kSecondTap_s = 0.8;
 
 /// The camera's picture, as long as there is one.
 export function preview() {
   const text = S.status;
   const picture = h('img', { alt: text.previewAlt, hidden: true });
-  const none = h('p', { class: 'hint' }, text.noPreview);
-  let stopped = false;
+  const none = hint(text.noPreview);
   let url = null;
-  const next = async () => {
-    if (stopped) return;
+  const stop = repeat(async () => {
     try {
-      const response = await fetch('/api/v1/preview', {
-        headers: { 'X-Plumb-Background': '1' }, cache: 'no-store',
-        signal: AbortSignal.timeout(kPreviewAnswer_ms),
-      });
+      const response = await fetchPicture('preview');
       if (!response.ok) throw new Error();
       const fresh = URL.createObjectURL(await response.blob());
       picture.src = fresh;
@@ -32,17 +29,14 @@ export function preview() {
       url = fresh;
       picture.hidden = false;
       none.hidden = true;
-      setTimeout(next, kPreviewEvery_ms);
+      return kPreviewEvery_ms;
     } catch {
       picture.hidden = true;
       none.hidden = false;
-      setTimeout(next, 2000);
+      return kPreviewAgain_ms;
     }
-  };
-  next();
-  return {
-    element: h('figure', { class: 'preview' }, picture, none), stop: () => { stopped = true; },
-  };
+  });
+  return { element: h('figure', { class: 'preview' }, picture, none), stop };
 }
 
 /// In `place` while a sweep goes on: the surface that grows. `follow(wanted)` with every status.
@@ -56,7 +50,7 @@ export function surfaceIn(place) {
   };
 }
 
-/// What the large button does now: its words and its request; nothing where it is off.
+/// Returns what the large button does now: its words and its request; nothing where it is off.
 function offer({ state, fault_kind: fault }) {
   const text = S.scan;
   if (state === 'scanning') return { label: text.stop, request: 'scan/end' };
@@ -99,8 +93,10 @@ function buttons() {
 /// The tone and words of what the person who sweeps should do.
 export function adviceOf(status) {
   if (status.state !== 'scanning') return { hint: '', words: S.stateHints[status.state], tone: '' };
-  const hint = status.scan?.guidance ?? 'none';
-  return { hint, words: S.scan.guidance[hint], tone: hint === 'none' ? 'good' : 'bad' };
+  const advice = status.scan?.guidance ?? 'none';
+  return {
+    hint: advice, words: S.scan.guidance[advice], tone: advice === 'none' ? 'good' : 'bad',
+  };
 }
 
 /// @param what  "board" for a check that was opened to calibrate the room.
@@ -125,7 +121,7 @@ export async function showScan(place, what) {
     h('div', { class: 'scan-grid' },
       h('section', { class: 'card sweep' }, who, known.element, headline, guidance, caution,
         h('div', { class: 'bar' }, bar, barText), control.element),
-      h('section', { class: 'card' }, h('h2', {}, S.status.preview), camera.element, seen, facts)));
+      card(S.status.preview, camera.element, seen, facts)));
 
   const drawWho = (status) => {
     const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
@@ -178,10 +174,8 @@ export async function showScan(place, what) {
   };
   draw();
   if (!live.status) get('status', true).then((status) => live.take(status), () => {});
-  const stop = live.listen(draw);
-  const timer = setInterval(known.draw, 1000);
+  const stop = follow(draw, known.draw);
   return () => {
-    clearInterval(timer);
     stop();
     showSurface(false);
     camera.stop();

@@ -1,6 +1,8 @@
 // The profile learned from good scans by the connected sensor unit, and its earlier versions.
 import { get, may, post } from '../api.js';
-import { clear, done, field, form, h, localTime, signingPassword, select, table } from '../dom.js';
+import {
+  clear, done, field, h, hint, localTime, row, rowHead, select, signedForm, table,
+} from '../dom.js';
 import { S, translated } from '../strings.js';
 
 const number = (value, digits) =>
@@ -12,16 +14,15 @@ const kValues = [
   ['readout', ({ color_readout_s: readout }) => `${number(1000 * readout, 1)} ms`],
 ];
 
-function row(one) {
+function versionRow(one) {
   const text = S.profile;
   const known = one.num_sweeps > 0;
-  return h('tr', {}, h('th', { scope: 'row' }, one.version), h('td', {}, localTime(one.made_at)),
-    h('td', {}, text.causes[one.cause] ?? one.cause),
-    h('td', {}, known ? one.num_sweeps : S.none),
-    kValues.map(([, words]) => h('td', {}, known ? words(one.values) : S.none)),
-    h('td', {}, known && h('a', {
+  return row(rowHead(one.version), localTime(one.made_at), text.causes[one.cause] ?? one.cause,
+    known ? one.num_sweeps : S.none,
+    ...kValues.map(([, words]) => (known ? words(one.values) : S.none)),
+    known && h('a', {
       href: `/api/v1/sensor-profile/${one.version}/file`, download: '',
-    }, text.download)));
+    }, text.download));
 }
 
 /// Needs the permission and the password again: every later scan starts from this profile.
@@ -31,10 +32,8 @@ function change({ serial, versions }, load) {
   const choices = { reset: text.resetChoice };
   for (const { version } of earlier) choices[`v${version}`] = text.takeBackChoice(version);
   const choice = select(choices, 'reset', {});
-  const password = signingPassword();
-  return form({ class: 'form inline below' }, async () => {
-    const body = { serial, password: password.value };
-    password.value = '';
+  return signedForm({ class: 'form inline below' }, async (sign) => {
+    const body = { serial, ...sign() };
     if (choice.value === 'reset') {
       await post('sensor-profile/reset', body);
       done(text.resetDone);
@@ -43,8 +42,7 @@ function change({ serial, versions }, load) {
       done(text.takenBack);
     }
     await load();
-  }, field(text.which, choice), field(S.result.acceptPassword, password),
-  h('button', { class: 'danger' }, text.submit));
+  }, h('button', { class: 'danger' }, text.submit), field(text.which, choice));
 }
 
 export function profileCard() {
@@ -54,11 +52,11 @@ export function profileCard() {
     const profile = await get('sensor-profile', true);
     const heads = [text.version, text.made, text.cause, text.sweeps,
       ...kValues.map(([name]) => text[name]), text.download];
-    clear(place, h('h2', {}, text.title), h('p', { class: 'hint' }, text.hint),
+    clear(place, h('h2', {}, text.title), hint(text.hint),
       profile.serial && h('p', {}, `${text.serial}: `, h('code', {}, profile.serial)),
       profile.why_none ? h('p', {}, text.noneKept, translated(profile.why_none))
         : profile.versions.length === 0 && h('p', {}, text.none),
-      profile.versions.length > 0 && table(heads, profile.versions.map(row), text.title),
+      profile.versions.length > 0 && table(heads, profile.versions.map(versionRow), text.title),
       profile.versions.length > 0 && may('settings') && change(profile, load));
   };
   load().catch((error) => clear(place, error.message));

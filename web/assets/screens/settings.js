@@ -1,5 +1,7 @@
 import { get, live, may, postLong, put } from '../api.js';
-import { action, checkbox, clear, done, field, form, h, localTime, select } from '../dom.js';
+import {
+  action, card, checkbox, clear, done, field, form, h, hint, localTime, select,
+} from '../dom.js';
 import { kBounds } from '../limits.js';
 import { S, translated } from '../strings.js';
 import { certificateCard } from './certificate.js';
@@ -30,14 +32,14 @@ function backupCard() {
     }
   }, {});
   draw().catch((error) => clear(last, error.message));
-  return h('section', { class: 'card' }, h('h2', {}, text.backup),
-    h('p', { class: 'hint' }, text.backupHint), last, now, running);
+  return card(text.backup,
+    hint(text.backupHint), last, now, running);
 }
 
 const kCannotRead = /the stored settings cannot be read/;
 
-/// What is stored, or why it cannot be read: then nothing is filled in, since a default would look
-/// like a value that somebody set.
+/// Returns what is stored, or why it cannot be read: then nothing is filled in, since a default
+/// would look like a value that somebody set.
 async function readSettings() {
   try {
     return { settings: await get('settings'), fault: null };

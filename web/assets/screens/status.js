@@ -1,11 +1,11 @@
-// What the appliance does, what waits, and what lets people scan.
+// Shows what the appliance does, what waits, and what lets people scan.
 import { get, live, may } from '../api.js';
-import { clear, h, localTime, redraw, table } from '../dom.js';
+import { card, clear, h, hint, localTime, redraw, row, table } from '../dom.js';
 import { lastLogin, lastLoginWords } from '../last_login.js';
 import { S, translated } from '../strings.js';
 import { sessionName } from '../treatment.js';
 import {
-  faultWords, isCold, lastKnownNote, minutesOf, outcomeBadge, patientCodes,
+  faultWords, follow, isCold, lastKnownNote, minutesOf, outcomeBadge, patientCodes,
 } from './common.js';
 
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
@@ -65,7 +65,7 @@ function tiles(status) {
 export async function showStatus(place) {
   const text = S.status;
   const headline = h('p', { class: 'headline' });
-  const hint = h('p', { class: 'lead' });
+  const advice = h('p', { class: 'lead' });
   const known = lastKnownNote('old-note');
   const warnings = h('div', {});
   const grid = h('div', { class: 'tiles' });
@@ -79,10 +79,10 @@ export async function showStatus(place) {
   let codes = await patientCodes();
   clear(place,
     h('h1', { class: 'visually-hidden' }, text.title),
-    h('section', { class: 'card hero' }, h('div', {}, known.element, headline, hint),
+    h('section', { class: 'card hero' }, h('div', {}, known.element, headline, advice),
       may('scan') && h('a', { class: 'button primary', href: '#/scan' }, text.goScan)),
     warnings, grid,
-    h('section', { class: 'card' }, h('h2', {}, text.lastScans), list), login);
+    card(text.lastScans, list), login);
 
   const draw = () => {
     const { status } = live;
@@ -93,31 +93,25 @@ export async function showStatus(place) {
       .map((one) => h('p', { class: 'caution' }, translated(one))));
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
-    hint.textContent = live.connected ? faultWords(status) ?? S.stateHints[status.state] : '';
+    advice.textContent = live.connected ? faultWords(status) ?? S.stateHints[status.state] : '';
     redraw(grid, tiles(status));
   };
   const load = async () => {
     codes = await patientCodes();
     const { scans } = await get('scans?limit=8', true);
-    const rows = scans.map((scan) => h('tr', {},
-      h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))),
-      h('td', {}, codes.get(scan.patient_id) ?? S.none), h('td', {}, S.purposes[scan.purpose]),
-      h('td', {}, outcomeBadge(scan))));
+    const rows = scans.map((scan) => row(
+      h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at)),
+      codes.get(scan.patient_id) ?? S.none, S.purposes[scan.purpose], outcomeBadge(scan)));
     const heads = [S.patients.when, S.result.patient, S.patients.purpose, S.patients.outcome];
     redraw(list, rows.length ? table(heads, rows, text.lastScans)
-      : h('p', { class: 'hint' }, text.noScans));
+      : hint(text.noScans));
     draw();
   };
   draw();  // what is known already; the list may take a moment
   await load();
-  const stop = live.listen((kind) => {
+  return follow((kind) => {
     if (kind === 'status' || kind === 'connection') draw();
     if (kind === 'data') live.refresh();  // a plan or an approval changes what waits
     if (kind === 'data' || kind === 'result') load().catch(() => {});
-  });
-  const timer = setInterval(known.draw, 1000);
-  return () => {
-    clearInterval(timer);
-    stop();
-  };
+  }, known.draw);
 }

@@ -1,9 +1,10 @@
 // Which system runs, updates of it, the restart into them, and the diagnostics.
 import { currentSession, get, live, may, post, postForFile, remove } from '../api.js';
 import {
-  action, clear, done, enable, field, form, h, redraw, signingPassword,
+  action, card, clear, done, enable, field, form, h, hint, redraw, saveBlob, signedForm,
 } from '../dom.js';
 import { S, translated } from '../strings.js';
+import { follow } from './common.js';
 
 function refusalIn(answer) {
   try { return JSON.parse(answer).error; } catch { return undefined; }
@@ -28,7 +29,7 @@ function upload() {
     request.send(file);
   });
   return h('section', { class: 'card', hidden: true }, h('h2', {}, text.upload),
-    h('p', { class: 'hint' }, text.uploadHint),
+    hint(text.uploadHint),
     form({ class: 'form inline' }, async () => {
       bar.hidden = false;
       try {
@@ -44,28 +45,23 @@ function upload() {
 /// Only for who may, and with the password again: the machine goes down.
 function restart() {
   const text = S.update;
-  const password = signingPassword();
   return h('section', { class: 'card restart', hidden: true }, h('h2', {}, text.restart),
-    h('p', { class: 'lead' }, text.restartNeeded), h('p', { class: 'hint' }, text.restartHint),
-    form({ class: 'form inline' }, async () => {
-      const body = { password: password.value };
-      password.value = '';
-      await post('update/restart', body);
+    h('p', { class: 'lead' }, text.restartNeeded), hint(text.restartHint),
+    signedForm({ class: 'form inline' }, async (sign) => {
+      await post('update/restart', sign());
       done(text.restarting);
-    }, field(S.result.acceptPassword, password),
-    h('button', { class: 'danger' }, text.restartSubmit)));
+    }, h('button', { class: 'danger' }, text.restartSubmit)));
 }
 
 /// Both kinds ask for the password again; wiping, which cannot be undone, also for a typed word.
 function factoryReset() {
   const text = S.update;
-  const password = signingPassword();
   const kind = h('select', { required: true }, h('option', { value: '' }, text.resetChoose),
     h('option', { value: 'keep_records' }, text.resetKeep),
     h('option', { value: 'wipe' }, text.resetWipe));
   const word = h('input', { autocomplete: 'off', pattern: text.resetWord, required: true });
   const typed = field(text.resetType, word);
-  const effect = h('p', { class: 'hint' });
+  const effect = hint();
   const show = () => {
     const wipe = kind.value === 'wipe';
     typed.hidden = !wipe;
@@ -75,24 +71,20 @@ function factoryReset() {
   };
   kind.addEventListener('change', show);
   show();
-  return h('section', { class: 'card' }, h('h2', {}, text.reset),
-    h('p', { class: 'hint' }, text.resetHint), form({ class: 'form' }, async () => {
-      const body = { kind: kind.value, password: password.value };
-      password.value = '';
-      await post('system/factory-reset', body);
+  return card(text.reset,
+    hint(text.resetHint), signedForm({ class: 'form' }, async (sign) => {
+      await post('system/factory-reset', { kind: kind.value, ...sign() });
       done(text.resetting);
-    }, field(text.resetKind, kind), effect, typed, field(S.result.acceptPassword, password),
-    h('button', { class: 'danger' }, text.resetSubmit)));
+    }, h('button', { class: 'danger' }, text.resetSubmit), field(text.resetKind, kind), effect,
+    typed));
 }
 
 function diagnostics() {
   const text = S.update;
-  return h('section', { class: 'card' }, h('h2', {}, text.diagnostics),
+  return card(text.diagnostics,
     h('p', {}, text.diagnosticsText), action(text.download, async () => {
       const { blob, name } = await postForFile('diagnostics');
-      const url = URL.createObjectURL(blob);
-      h('a', { href: url, download: name }).click();
-      setTimeout(() => URL.revokeObjectURL(url), 10000);
+      saveBlob(blob, name);
     }, {}));
 }
 
@@ -125,7 +117,7 @@ function bundles(update, button) {
         { class: 'primary', isOff }),
       button(text.remove, name, () => remove(`update/bundles/${name}`), { isOff })]));
   return [h('h2', {}, text.bundles),
-    rows.length ? h('ul', { class: 'files' }, rows) : h('p', { class: 'hint' }, text.noBundles)];
+    rows.length ? h('ul', { class: 'files' }, rows) : hint(text.noBundles)];
 }
 
 /// Bundles on a USB stick are only offered: the user decides whether to install one.
@@ -168,9 +160,7 @@ export async function showUpdate(place) {
   clear(place, h('h1', {}, text.title), h('section', { class: 'card' }, body), starter, sender,
     may('diagnostics') && diagnostics(), may('update') && factoryReset());
   await draw();
-  const looking = setInterval(() => draw().catch(() => {}), 5000);  // a stick sends no event
-  const stop = live.listen((kind) => {
+  return follow((kind) => {
     if (kind === 'update' || kind === 'connection') draw().catch(() => {});
-  });
-  return () => { clearInterval(looking); stop(); };
+  }, () => draw().catch(() => {}), 5000);  // a stick sends no event
 }

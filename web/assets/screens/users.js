@@ -1,21 +1,19 @@
 // Accounts, one's own password and preferences, and the screens in the room.
 import { currentSession, get, may, post, put, remove } from '../api.js';
 import {
-  action, checkbox, clear, done, field, form, h, localTime, select, table, warn,
+  action, card, checkbox, clear, done, field, form, h, hint, localTime, passwordInput, row, select,
+  table, warn,
 } from '../dom.js';
-import { kName, kNewPassword, kPassword } from '../limits.js';
+import { kName, kNewPassword } from '../limits.js';
 import { preferences } from '../preferences.js';
 import { S } from '../strings.js';
 
-const password = (properties) => h('input', {
-  type: 'password', autocomplete: 'new-password', ...kPassword, ...properties,
-});
 const accountRoles = () => Object.fromEntries(
   Object.entries(S.roles).filter(([name]) => name !== 'display'));
 
 function ownPreferences() {
   const again = () => window.dispatchEvent(new Event('plumb-language'));
-  return h('section', { class: 'card' }, h('h2', {}, S.users.preferences),
+  return card(S.users.preferences,
     h('div', { class: 'form inline' }, preferences(currentSession().user, again)));
 }
 
@@ -29,18 +27,17 @@ function displays() {
   const list = h('div', {});
   const load = async () => {
     const { displays: paired } = await get('displays');
-    const rows = paired.map((one) => h('tr', {}, h('td', {}, one.name),
-      h('td', {}, localTime(one.paired_at)), h('td', {}, one.paired_by),
-      h('td', {}, action(text.remove, async () => {
+    const rows = paired.map((one) => row(one.name, localTime(one.paired_at), one.paired_by,
+      action(text.remove, async () => {
         await remove(`displays/${one.id}`);
         await load();
-      }, { 'aria-label': `${text.remove} ${one.name}` }))));
+      }, { 'aria-label': `${text.remove} ${one.name}` })));
     clear(list, rows.length ? table([text.name, text.when, text.by, S.action], rows, text.title)
-      : h('p', { class: 'hint' }, text.none));
+      : hint(text.none));
   };
   load().catch((error) => warn(error.message));
-  return h('section', { class: 'card' }, h('h2', {}, text.title),
-    h('p', { class: 'hint' }, text.hint), list, form({ class: 'form inline' }, async () => {
+  return card(text.title,
+    hint(text.hint), list, form({ class: 'form inline' }, async () => {
       await post('displays', { code: code.value.trim(), name: name.value.trim() });
       code.value = name.value = '';
       done(text.paired);
@@ -50,14 +47,14 @@ function displays() {
 
 function ownPassword() {
   const text = S.users;
-  const old = password({ required: true, autocomplete: 'current-password' });
-  const fresh = password({ required: true, ...kNewPassword });
+  const old = passwordInput('current-password', { required: true });
+  const fresh = passwordInput('new-password', { required: true, ...kNewPassword });
   const change = async () => {
     await post('session/password', { old_password: old.value, password: fresh.value });
     old.value = fresh.value = '';
     done(S.saved);
   };
-  return h('section', { class: 'card' }, h('h2', {}, text.own),
+  return card(text.own,
     form({ class: 'form inline' }, change, field(text.oldPassword, old),
       field(text.password, fresh, S.login.passwordHint), h('button', {}, text.changeOwn)));
 }
@@ -66,7 +63,7 @@ function userRow(user, reload) {
   const text = S.users;
   const role = select(accountRoles(), user.role, { 'aria-label': `${text.role}, ${user.name}` });
   const disabled = checkbox(text.disable, user.disabled, {});
-  const fresh = password(kNewPassword);
+  const fresh = passwordInput('new-password', kNewPassword);
   const change = async () => {
     // Only what this person changed: somebody else may have changed the rest since it was read.
     const changes = {};
@@ -82,9 +79,8 @@ function userRow(user, reload) {
     h('summary', { 'aria-label': `${text.change} ${user.name}` }, text.change),
     form({ class: 'form' }, change, field(text.role, role), disabled.element,
       field(text.newPassword, fresh), h('button', { class: 'primary' }, S.save)));
-  return h('tr', {}, h('td', {}, user.name), h('td', {}, S.roles[user.role]),
-    h('td', {}, user.disabled ? text.disabled : `✓ ${text.active}`),
-    h('td', {}, localTime(user.created_at)), h('td', {}, editor));
+  return row(user.name, S.roles[user.role], user.disabled ? text.disabled : `✓ ${text.active}`,
+    localTime(user.created_at), editor);
 }
 
 export async function showUsers(place) {
@@ -95,7 +91,7 @@ export async function showUsers(place) {
     ...kName,
   });
   const role = select(accountRoles(), 'technician', {});
-  const fresh = password({ required: true, ...kNewPassword });
+  const fresh = passwordInput('new-password', { required: true, ...kNewPassword });
   const load = async () => {
     const { users } = await get('users');
     const heads = [text.name, text.role, text.state, S.patients.added, S.action];
@@ -109,7 +105,7 @@ export async function showUsers(place) {
   };
   clear(place, h('h1', {}, text.title),
     may('users') && h('section', { class: 'card' }, list),
-    may('users') && h('section', { class: 'card' }, h('h2', {}, text.add),
+    may('users') && card(text.add,
       form({ class: 'form inline' }, add, field(text.name, name, text.nameHint),
         field(text.role, role), field(text.password, fresh, S.login.passwordHint),
         h('button', { class: 'primary' }, text.submit))),

@@ -1,4 +1,4 @@
-// What a result says first: whose it is, how old, the verdict, and whether it can be acted on.
+// The head of a result: whose it is, how old, the verdict, and whether it can be acted on.
 import { live, since_s } from '../api.js';
 import { clear, h, localTime } from '../dom.js';
 import { S, translated } from '../strings.js';

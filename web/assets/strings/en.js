@@ -31,8 +31,8 @@ export const en = {
   offline: 'No connection to the appliance. Trying again…',
   lastKnown: (state) => `Last known: ${state}`,
   lastKnownAge: (seconds) => `, ${seconds} s ago`,
-  noAnswer: 'The appliance does not answer.',
-  answered: (status) => `The appliance answered ${status}.`,
+  noAnswer: 'The appliance is not responding.',
+  answered: (status) => `The appliance responded with status ${status}.`,
   leavingOffline: 'No connection to the appliance. You will be logged out as soon as it answers. '
     + 'Trying again…',
   loggedOff: 'You were logged out. Please log in again.',
@@ -46,7 +46,7 @@ export const en = {
   cancel: 'Cancel',
   language: 'Language',
   theme: 'Theme',
-  themes: { auto: 'As the system', dark: 'Dark', light: 'Light' },
+  themes: { auto: 'Same as the system', dark: 'Dark', light: 'Light' },
   states: {
     no_sensor: 'Sensor missing', ready: 'Ready', scanning: 'Scanning', working: 'Computing',
     result: 'Result', fault: 'Fault',
@@ -83,7 +83,8 @@ export const en = {
     certificate: 'Certificate of this appliance (SHA-256). Compare it with the one in its journal '
       + 'and the one that the browser shows:',
     firstTitle: 'Choose your password',
-    firstText: 'Somebody else chose the password of this account. Choose one that only you know.',
+    firstText: 'The password of this account was chosen by somebody else. Choose one that only you '
+      + 'know.',
     firstOld: 'Password that you were given', firstNew: 'Your own password',
     firstSubmit: 'Change password',
     last: (when, address) => `Last log-in: ${when}, from ${address}.`,
@@ -149,7 +150,7 @@ export const en = {
     noMatch: (code) => `No patient with this code: ${code}.`,
     search: 'Find a code, or scan the wristband', isOpen: 'session open',
     openFraction: 'Start treatment session', openReference: 'Scan a new reference',
-    reasonNeeded: 'Type why a new reference is taken in place of the approved one.',
+    reasonNeeded: 'State why a new reference is to replace the approved one.',
     reason: 'Reason for the new reference', reasonShort: 'Reason', references: 'References',
     version: 'Version', made: 'Created', state: 'State', draft: 'draft', plan: 'Plan',
     planView: 'View plan', approvedBy: (who, when) => `approved by ${who}, ${when}`,
@@ -188,8 +189,8 @@ export const en = {
     step: {
       tracking: 'Finishing tracking', markers: 'Measuring the markers',
       registration: 'Aligning the images', 'global ICP': 'Aligning the images',
-      surface: 'Merging surfaces', 'height map': 'Making the height map',
-      mesh: 'Making the surface', done: 'Reconstructed', comparing: 'Comparing', saving: 'Saving',
+      surface: 'Merging surfaces', 'height map': 'Building the height map',
+      mesh: 'Building the surface', done: 'Reconstructed', comparing: 'Comparing', saving: 'Saving',
       checking: 'Checking the markers',
     },
     seconds: (s) => `${s.toFixed(1)} s`,
@@ -214,7 +215,7 @@ export const en = {
     warm: 'Sensor warm', warming: (on, needed) => `Sensor warming up: ${on} of ${needed} min`,
     covered: (percent) => `${percent} % covered`,
     offline: 'NO CONNECTION', pairTitle: 'Pair this screen',
-    pairText: 'An engineer types this code on the page, under Accounts, Displays.',
+    pairText: 'An engineer enters this code on the page, under Accounts, Displays.',
     pairWaiting: 'Waiting…',
     unassigned: 'UNASSIGNED SCAN', reference: 'REFERENCE SCANNED',
     referenceHint: 'Saved as a draft. It waits for a plan and an approval.',
@@ -222,8 +223,8 @@ export const en = {
     checkDoneTitle: 'DAILY CHECK', nothing: 'No change',
   },
   displays: {
-    title: 'Displays', hint: 'A screen in the room opens /room and shows a code. Type it here. '
-      + '/room?language=es and /room?theme=light choose its language and theme.',
+    title: 'Displays', hint: 'Open /room on a screen in the room, and enter here the code that it '
+      + 'shows. /room?language=es and /room?theme=light choose its language and theme.',
     code: 'Code on the screen', name: 'Name of the screen', pair: 'Pair the screen',
     paired: 'The screen is paired.', remove: 'Remove', none: 'No screen is paired.',
     when: 'Paired', by: 'By',
@@ -240,7 +241,7 @@ export const en = {
     closed: 'SESSION NOT OPEN',
     closedText: 'The session of this patient is not open. Do not act on this result.',
     offline: 'NO CONNECTION',
-    offlineText: 'Whether this result still applies is not known. Do not act on it.',
+    offlineText: 'It is not known whether this result still applies. Do not act on it.',
     review: (when) => `Result of ${when}, for review.`,
     reviewText: 'Do not act on this result.', reviewTitle: 'REVIEW',
     unassigned: 'Unassigned scan: no session was open.',
@@ -255,7 +256,7 @@ export const en = {
       unsure: 'Every value is within tolerance, but not with its uncertainty. Scan again, slowly.',
       move: 'Apply the correction below, then scan again.', no_answer: '',
     },
-    // Of a result that can no longer be acted on.
+    // These are for a result that can no longer be acted on.
     verdictsThen: {
       in_tolerance: 'WAS IN TOLERANCE', unsure: 'WAS NOT SURELY WITHIN',
       move: 'WAS OUTSIDE TOLERANCE', no_answer: 'NO ANSWER',
@@ -279,7 +280,7 @@ export const en = {
     couch: 'Couch readings: what to set',
     couchHint: 'Type what the couch reads now. Shifts only, on scales as in IEC 61217: readings '
       + 'increase upward, toward the gantry, and to the right of a person who faces it. If your '
-      + 'couch counts differently, do not use this.',
+      + 'couch uses other scales, do not use this.',
     couchSet: (axis, cm) => `${axis}: set to ${cm} cm`,
     couchBad: 'a number in cm, with at most two digits after the point',
     refused: 'not known with couch markers', still: 'no change',
@@ -351,7 +352,7 @@ export const en = {
       minusX: '−X', plusY: '+Y', minusY: '−Y', roomPlusX: 'ROOM +X', roomMinusX: 'ROOM −X',
     },
     marksOfPlan: 'Head, feet, left and right are those of the planned posture: check that the '
-      + 'patient lies so.',
+      + 'patient is lying that way.',
     marksOfRoom: 'The marks are axes of the room (IEC 61217), not the patient’s sides.',
     marksOfAxes: 'The marks are axes of the reference marker, not the patient’s sides.',
     scaleBar: '10 cm',
@@ -362,13 +363,13 @@ export const en = {
       + 'same.',
     meshDamaged: 'The surface arrived damaged. The pictures above show the same.',
     ghost: 'Show the reference', ghostLoading: 'Loading the reference…',
-    correctionShare: 'Share of the correction that is shown',
-    ghostShare: 'Reference to current', views3d: {
+    correctionFraction: 'Share of the correction that is shown',
+    ghostFraction: 'Reference to current', views3d: {
       top: 'Top', anterior: 'Anterior', posterior: 'Posterior', left: 'Left', right: 'Right',
       head: 'Head', feet: 'Feet', reset: 'Reset',
     },
     cube: { anterior: 'ANT', posterior: 'POST', top: 'TOP', bottom: 'BOTTOM' },
-    cut: 'Cut', cutWhere: 'Place of the cut',
+    cut: 'Cut', cutWhere: 'Position of the cut',
     cutWays: { '': 'none', height: 'from above', along: 'across', across: 'lengthwise' },
     screenshot: 'Save picture',
     meshHint: 'Turn it with the mouse, a finger or the arrow keys.',
@@ -386,7 +387,7 @@ export const en = {
     acceptUnsure: 'Accept although not surely within tolerance',
     acceptOutsideHint: 'Your reason, the verdict and the numbers are stored in the log.',
     acceptReason: 'Reason', acceptPassword: 'Your password',
-    cannotAccept: 'Only the newest result of the open session can be accepted, for 2 minutes.',
+    cannotAccept: 'Only the newest result of the open session can be accepted, within 2 minutes.',
     newReference: 'New reference from this scan',
     newReferenceReason: 'Reason for the new reference', export: 'Export', print: 'Print view',
     report: 'Report (PDF)',
@@ -409,17 +410,17 @@ export const en = {
     failedText: 'Find out why the check failed, then repeat it before the next patient.',
     today: 'Today’s check has passed.', start: 'Start a check',
     sweep: 'sweep over all markers of the room, without a patient',
-    how: 'Take everything off the couch, then sweep over all markers as over a patient. The '
-      + 'markers must be where they were when the baseline was set, and the sensor’s depth must '
-      + 'agree with their size.',
+    how: 'Take everything off the couch, then sweep over all markers as you would over a patient. '
+      + 'The markers must be where they were when the baseline was set, and the sensor’s depth '
+      + 'must agree with their size.',
     baseline: 'Baseline',
     baselineOf: (who, when, markers) => `${markers} ${plural(markers, 'marker', 'markers')}, set `
       + `by ${who}, ${when}`,
     noBaseline: 'none yet', takeBaseline: 'Set as baseline',
-    takeHint: 'Only when you know that every marker is where it should be. All further checks are '
+    takeHint: 'Only if you know that every marker is where it should be. All later checks are '
       + 'compared with it.',
-    secondPerson: 'Another physicist than the one who took this check sets it as the baseline.',
-    baselineTaken: 'This check is the baseline now.', number: 'Number', value: 'Value',
+    secondPerson: 'A physicist other than the one who took this check must set it as the baseline.',
+    baselineTaken: 'This check is now the baseline.', number: 'Number', value: 'Value',
     limit: 'Limit', judged: 'Assessment', within: 'within the limit', outside: 'outside the limit',
     notKnown: 'not known', history: 'Earlier checks', by: 'By', sensor: 'Sensor',
     markers: 'Markers', last: (when, who) => `${when}, by ${who}`, trend: 'Trend of the checks',
@@ -479,7 +480,7 @@ export const en = {
     toleranceSigned: (axis) => `Tolerance: ${axis}`,
     isocentre: 'Isocentre',
     isocentreHint: 'Metres in the reference marker’s frame. Empty: the middle of the region.',
-    markerAtLasers: 'Marker at the lasers', takeMarker: 'Take its centre',
+    markerAtLasers: 'Marker at the lasers', takeMarker: 'Use its centre',
     marker: (id) => `Marker ${id}`,
     pick: 'Pick on the map', picking: 'Click the map where the isocentre is.',
     pickHint: 'A picked point lies on the skin: type z for an isocentre inside the body. By keys: '
@@ -494,20 +495,20 @@ export const en = {
     couch: 'Markers are fixed to the couch (no shifts are calculated)',
     isocentreBad: 'Three numbers in metres, or all three empty.',
     changedMeanwhile: 'Someone else has changed the plan in the meantime. This is what is stored '
-      + 'now: look at it, then try again.',
-    changedWhileEditing: 'Someone else has changed this plan while you are editing it: saving will '
-      + 'be refused. Reload the page to see it.',
+      + 'now: check it, then try again.',
+    changedWhileEditing: 'Someone else has changed this plan while you were editing it: saving '
+      + 'will be refused. Reload the page to see it.',
     reloaded: 'Someone else has changed the plan; this is what is stored now.',
     save: 'Save plan', approve: 'Approve', undo: 'Undo', deleteCorner: 'Delete corner',
     unplanned: 'Nobody has planned this reference yet. Save its plan, even if nothing needs to be '
       + 'changed; then a second physicist can approve it.',
     secondPerson: 'Waiting for a second physicist: you scanned or planned this reference, so '
-      + 'somebody else approves it.',
+      + 'somebody else must approve it.',
     approveHint: 'A second physicist approves. After that this version cannot be changed.',
     approvedHint: 'This version is approved and cannot be changed. Saving creates a new version.',
     unsaved: 'There are unsaved changes. Save them before the approval.',
     leave: 'There are unsaved changes. Leave without saving?',
-    draftKept: 'Your unsaved changes from before were kept.', discardDraft: 'Discard',
+    draftKept: 'Your earlier unsaved changes were kept.', discardDraft: 'Discard',
     draftDiscarded: 'The kept changes are discarded.',
     summary: 'You are signing exactly this', summarySubmit: 'Sign and approve',
     summaryReview: 'Review and approve', signature: 'Checksum', scanQuality: 'Scan quality',
@@ -647,20 +648,20 @@ export const en = {
     enterAll: 'No scan can start until an engineer enters every value here and saves them.',
     backup: 'Backup',
     backupHint: 'Copies the database and all scans into the folder that is set as backup_folder. '
-      + 'Scans go on meanwhile.',
+      + 'Scanning can continue meanwhile.',
     backupNow: 'Back up now', backupRunning: 'Backing up. This may take minutes…',
     backupDone: 'Backup made.', backupNone: 'No backup has been made yet.',
     backupLast: (when, who) => `Last backup: ${when}, by ${who}.`,
   },
   certificate: {
     title: 'Certificate of the page',
-    hint: 'Browsers know this appliance by its certificate. Another one is used for every new '
-      + 'connection at once; compare its fingerprint with the one that your browser then shows.',
+    hint: 'Browsers recognise this appliance by its certificate. A new one is used at once for '
+      + 'every new connection; compare its fingerprint with the one that your browser then shows.',
     fingerprint: 'SHA-256 fingerprint', subject: 'Issued to', validUntil: 'Valid until',
     fixed: 'It cannot be replaced here: the page is served without TLS, or the configuration '
       + 'names its certificate (web.tls_certificate).',
     which: 'What to do',
-    choices: { given: 'Use a certificate of your own', own: 'Make a new self-signed certificate' },
+    choices: { given: 'Use your own certificate', own: 'Make a new self-signed certificate' },
     chain: 'Certificate, followed by its intermediate certificates (PEM file)',
     key: 'Private key, without a password (PEM file)', tooLarge: (name) => `${name} is too large.`,
     submit: 'Replace the certificate',
@@ -672,7 +673,7 @@ export const en = {
       + 'version.',
     none: 'No profile yet: the next good scan creates one.',
     noneKept: 'No profile is stored here: ',
-    serial: 'Serial number', version: 'Version', made: 'Made', sweeps: 'Scans', cause: 'How',
+    serial: 'Serial number', version: 'Version', made: 'Made', sweeps: 'Scans', cause: 'Origin',
     causes: {
       learned: 'learned', rolled_back: 'restored', reset: 'reset', unreadable: 'was unreadable',
     },
@@ -697,20 +698,20 @@ export const en = {
     uploadFailed: 'The update file did not arrive: it is too large, or the connection was lost.',
     runs: (slot) => `${slot} (running)`, seen: 'I have seen it', restart: 'Restart',
     restartNeeded: 'An update is installed. It runs after a restart.',
-    restartHint: 'The appliance goes down for some minutes and cannot scan meanwhile. This is '
+    restartHint: 'The appliance is unavailable for a few minutes and cannot scan. This is '
       + 'refused while a scan runs or a session is open. The page comes back by itself. If the '
       + 'new system does not start properly, the previous one is used, and this page says so.',
     restartSubmit: 'Restart now',
     restarting: 'The appliance restarts. This page comes back by itself.',
     reset: 'Factory reset', resetKind: 'What to reset', resetChoose: 'Choose…',
-    resetHint: 'The appliance restarts and sets itself back. This is refused while a scan runs or '
-      + 'a session is open. Afterwards a new setup code makes the first account.',
+    resetHint: 'The appliance restarts and resets itself. This is refused while a scan runs or a '
+      + 'session is open. Afterwards the first account is created with a new setup code.',
     resetKeep: 'Accounts and settings; keep patients and scans',
     resetKeepHint: 'Removes all accounts, paired displays, settings, the configuration, update '
       + 'files and the page’s certificate. Patients, references, scans and the log stay.',
     resetWipe: 'Everything', resetWord: 'WIPE', resetType: 'Type WIPE to confirm',
-    resetWipeHint: 'Removes every patient, reference, scan, account and setting, and the log. Only '
-      + 'a backup elsewhere brings them back.',
+    resetWipeHint: 'Removes every patient, reference, scan, account and setting, and the log. They '
+      + 'can be recovered only from a backup that is stored elsewhere.',
     resetSubmit: 'Reset the appliance',
     resetting: 'The appliance restarts and resets itself. Its setup code is on its console.',
     install: 'Install', installing: 'Installing…', diagnostics: 'Diagnostics',

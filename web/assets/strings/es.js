@@ -286,7 +286,7 @@ export const es = {
         + 'nuevo, despacio.',
       move: 'Aplique la corrección de abajo y escanee de nuevo.', no_answer: '',
     },
-    // Of a result that can no longer be acted on.
+    // These are for a result that can no longer be acted on.
     verdictsThen: {
       in_tolerance: 'ESTABA EN TOLERANCIA', unsure: 'NO ERA CONCLUYENTE',
       move: 'ESTABA FUERA DE TOLERANCIA', no_answer: 'SIN RESPUESTA',
@@ -401,8 +401,8 @@ export const es = {
       + 'muestran lo mismo.',
     meshDamaged: 'La superficie llegó dañada. Las imágenes de arriba muestran lo mismo.',
     ghost: 'Mostrar la referencia', ghostLoading: 'Cargando la referencia…',
-    correctionShare: 'Parte de la corrección que se muestra',
-    ghostShare: 'De la referencia a la actual', views3d: {
+    correctionFraction: 'Parte de la corrección que se muestra',
+    ghostFraction: 'De la referencia a la actual', views3d: {
       top: 'Arriba', anterior: 'Anterior', posterior: 'Posterior', left: 'Izquierda',
       right: 'Derecha', head: 'Cabeza', feet: 'Pies', reset: 'Restablecer',
     },

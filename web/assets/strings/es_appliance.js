@@ -30,7 +30,7 @@ export const kWords = {
   'head and patient right side up': 'cabeza y lado derecho del paciente arriba',
   'feet and patient left side up': 'pies y lado izquierdo del paciente arriba',
   'feet and patient right side up': 'pies y lado derecho del paciente arriba',
-  'a reference is made of this scan: it goes only with its patient':
+  'this scan is the source of a reference: it is deleted only with its patient':
     'una referencia procede de este escaneo: solo se borra con su paciente',
   'the session of a patient is open: close it first':
     'hay una sesión de un paciente abierta: ciérrela primero',
@@ -95,7 +95,7 @@ export const kWords = {
   'there is no such patient': 'no existe ese paciente',
   'a scan is running already: end or cancel it first':
     'ya hay un escaneo en curso: termínelo o descártelo primero',
-  'your role may not do this': 'su función no permite hacer esto',
+  'your role is not allowed to do this': 'su función no permite hacer esto',
   'no sensor is attached': 'no hay ningún sensor conectado',
   'profiles are switched off in the configuration':
     'los perfiles están desactivados en la configuración',

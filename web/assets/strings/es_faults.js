@@ -1,5 +1,5 @@
-// What the appliance refuses, reports of its own faults, and writes into its log, in Spanish: as
-// es_appliance.js, which takes these in.
+// The appliance's refusals, reports of its own faults, and entries of its log, in Spanish.
+// es_appliance.js includes them.
 export const kFaultWords = {
   'the stored settings': 'los ajustes guardados', 'a stored plan': 'un plan guardado',
   // Refusals of scan and session.
@@ -118,7 +118,7 @@ export const kFaultWords = {
     'el código de puesta en marcha es incorrecto; está en la consola y en el diario',
   'this appliance is set up already; log in': 'este equipo ya está puesto en marcha; inicie sesión',
   'the session has ended: log in again': 'la sesión ha terminado: inicie sesión de nuevo',
-  'too many logins wait; try again in a few seconds':
+  'too many people are logging in; try again in a few seconds':
     'hay demasiados inicios de sesión en espera; pruebe en unos segundos',
   'no screen shows this code; a code is valid for 10 minutes':
     'ninguna pantalla muestra este código; un código vale 10 minutos',
@@ -127,16 +127,16 @@ export const kFaultWords = {
   'there is no such display': 'no existe esa pantalla',
   // Storage.
   'the store is busy: try again': 'el almacén está ocupado: pruebe de nuevo',
-  'too much is asked at once; try again in a few seconds':
+  'too many requests at once; try again in a few seconds':
     'se pide demasiado a la vez; pruebe en unos segundos',
-  'too much is being sent; try again in a few seconds':
+  'too much data is being sent; try again in a few seconds':
     'se está enviando demasiado; pruebe en unos segundos',
   'no folder for backups is configured: set backup_folder in [storage]':
     'no hay carpeta de copias configurada: indique backup_folder en [storage]',
   'a backup is being made already': 'ya se está haciendo una copia',
   'a backup is being made, and nothing is removed meanwhile: try again when it is done':
     'se está haciendo una copia y entretanto no se borra nada: pruebe cuando termine',
-  'internal error; the journal says more': 'error interno; el diario del equipo dice más',
+  'internal error; the journal has the details': 'error interno; el diario del equipo dice más',
   // Update.
   'the machine is being restarted': 'el equipo se está reiniciando',
   'the machine is being asked to restart already': 'ya se ha pedido el reinicio del equipo',
@@ -146,7 +146,7 @@ export const kFaultWords = {
     'se está instalando un archivo: espere a que termine',
   'another bundle is being installed: wait until it is done':
     'se está instalando otro archivo: espere a que termine',
-  'another file is being sent: wait until it is here':
+  'another file is being uploaded: wait until it has arrived':
     'se está enviando otro archivo: espere a que llegue',
   'the session of a patient is open: close it first, then restart':
     'hay una sesión de un paciente abierta: ciérrela y reinicie después',
@@ -154,7 +154,7 @@ export const kFaultWords = {
   'there are too many bundles: remove one first': 'hay demasiados archivos: quite antes uno',
   'there is no such bundle': 'no existe ese archivo de actualización',
   'there is no installer (RAUC) on this machine': 'no hay instalador (RAUC) en esta máquina',
-  'the installer cannot be asked': 'el instalador no responde',
+  'the installer cannot be reached': 'el instalador no responde',
   'the installer does not say why': 'el instalador no dice por qué',
   'the installer\'s answer cannot be read: is it RAUC 1.8?':
     'no se entiende la respuesta del instalador: ¿es RAUC 1.8?',
@@ -184,7 +184,7 @@ export const kFaultWords = {
   'of a scan that was discarded': 'de un escaneo que se descartó',
   'no scan of this number is known: is it of another database?':
     'no se conoce ningún escaneo con este número: ¿es de otra base de datos?',
-  'it is complete, but its scan was never noted as done':
+  'it is complete, but its scan was never recorded as finished':
     'está completa, pero su escaneo nunca se anotó como terminado',
   'name a folder on another disk, such as one that is mounted at /var/lib/plumb-backup':
     'indique una carpeta de otro disco, como uno montado en /var/lib/plumb-backup',
@@ -323,7 +323,7 @@ export const kFaultPatterns = [
     + 'of 2048 with RSA$',
   'el certificado $1 tiene una clave de solo $2 bits: haga una de 256 en una curva elíptica, o de '
     + '2048 con RSA'],
-  ['^the certificate (.+) ended on (.+): hand in a newer one$',
+  ['^the certificate (.+) ended on (.+): upload a newer one$',
     'el certificado $1 caducó el $2: entregue uno más nuevo'],
   ['^the certificate (.+) is valid only from (.+): check the clock$',
     'el certificado $1 no vale hasta el $2: compruebe el reloj'],
