@@ -65,8 +65,7 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const PlumbdOptions& options, co
                                                 const SensorRegistry& registry) {
   const SensorDriver& driver =
       registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
-  SensorSettings settings = SensorSettingsOf(config);
-  settings.markers_are_the_rooms = !driver.is_simulated;
+  const SensorSettings settings = SensorSettingsOf(config);
   const bool is_small = options.sim_size == "320x240";
   SimulatedSweeps sweeps{.suite = options.simulated.empty() ? "demo" : options.simulated,
                          .seed = options.sim_seed,

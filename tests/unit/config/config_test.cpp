@@ -9,12 +9,15 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/config/sensor_settings.hpp"
+#include "drivers/live/sensor_calibration.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace plumb {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 using namespace std::string_literals;
 
 std::string ErrorOf(const std::string& text) {
@@ -207,7 +210,7 @@ sensor_serial = "7"
   const Config in_use = ParseConfig("", "test.toml");
   Config next = ParseConfig(at_start + "result_s = 5\n[check]\nmin_views = 3\n", "test.toml");
   EXPECT_THAT(KeepUntilRestart(in_use, next),
-              testing::UnorderedElementsAre(
+              ::testing::UnorderedElementsAre(
                   "markers.dictionary", "markers.length_m", "markers.reference", "button.chip",
                   "button.line", "button.active_low", "light.chip", "light.red", "light.green",
                   "light.blue", "light.beeper", "light.active_low", "update.folder",
@@ -217,7 +220,24 @@ sensor_serial = "7"
   EXPECT_EQ(next.web.listen, in_use.web.listen);
   EXPECT_EQ(next.appliance.result_s, 5);
   EXPECT_EQ(next.check.min_views, 3);
-  EXPECT_THAT(KeepUntilRestart(in_use, next), testing::IsEmpty());
+  EXPECT_THAT(KeepUntilRestart(in_use, next), ::testing::IsEmpty());
+}
+
+// `plumb record`, `plumb doctor` and plumbd pass these settings to the driver as they are.
+TEST(ConfigTest, ASensorsCalibrationFileMayNotNameOtherMarkersThanTheRooms) {
+  const testing::TempFolder folder;
+  const auto length_m = [&](const char* of_file) {
+    std::ofstream(folder / "S1.yaml") << "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
+                                         "camera_matrix: [525, 0, 319.5, 0, 525, 239.5, 0, 0, 1]\n"
+                                         "distortion_coefficients: [0, 0, 0, 0, 0]\n"
+                                      << "marker_length: " << of_file << '\n';
+    SensorSettings settings =
+        SensorSettingsOf(ParseConfig("[markers]\nlength_m = 0.083\n", "test.toml"));
+    settings.calibration_folder = folder.path();
+    return LiveStreamInfo(settings, "S1", 640, 480, 0.0).marker_length_m;
+  };
+  EXPECT_EQ(length_m("0.083"), 0.083);
+  EXPECT_THROW((void)length_m("0.104"), DeviceError);
 }
 
 TEST(ConfigTest, WhatTheFileGivesIsKeptAsText) {
@@ -225,11 +245,11 @@ TEST(ConfigTest, WhatTheFileGivesIsKeptAsText) {
       "[web]\nlisten = \"[::1]:80\"\nhost_names = [\"a\", \"b\"]\n[appliance]\nquota_gb = 50.0\n"
       "keep_recordings = true\n",
       "test.toml");
-  EXPECT_THAT(config.given,
-              testing::UnorderedElementsAre(testing::Pair("web.listen", "'[::1]:80'"),
-                                            testing::Pair("web.host_names", "[ 'a', 'b' ]"),
-                                            testing::Pair("appliance.quota_gb", "50.0"),
-                                            testing::Pair("appliance.keep_recordings", "true")));
+  EXPECT_THAT(config.given, ::testing::UnorderedElementsAre(
+                                ::testing::Pair("web.listen", "'[::1]:80'"),
+                                ::testing::Pair("web.host_names", "[ 'a', 'b' ]"),
+                                ::testing::Pair("appliance.quota_gb", "50.0"),
+                                ::testing::Pair("appliance.keep_recordings", "true")));
 }
 
 TEST(ConfigTest, OffLoopbackThePageIsServedByTlsUnlessItIsSaidOtherwise) {
@@ -258,7 +278,7 @@ TEST(ConfigTest, TheAppliancesPresetIsBestAlone) {
   for (const std::string section : {"compare", "reconstruct"}) {
     const Config config = ParseConfig("[" + section + "]\npreset = \"paper\"\n", "t");
     EXPECT_THAT([&] { RefuseResearchPresets(config); },
-                testing::ThrowsMessage<DataError>(
+                ::testing::ThrowsMessage<DataError>(
                     HasSubstr("[" + section + "] preset: expected \"best\"")));
   }
 }
@@ -267,12 +287,12 @@ TEST(ConfigTest, AMissingFileIsBadInput) {
   EXPECT_THROW((void)ReadConfig("/nonexistent/plumb.toml"), DataError);
 }
 
-class RegionTest : public testing::Test {
+class RegionTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    file_ = std::filesystem::path(testing::TempDir()) /
+    file_ = std::filesystem::path(::testing::TempDir()) /
             (std::string("region_") +
-             testing::UnitTest::GetInstance()->current_test_info()->name() + ".json");
+             ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".json");
   }
   void TearDown() override { std::filesystem::remove(file_); }
   std::vector<Eigen::Vector2d> Read(const std::string& text) {
