@@ -301,7 +301,8 @@ PYBIND11_MODULE(plumb, module) {
              "Reconstructs a recording in the TUM RGB-D layout. Releases the interpreter lock.");
   module.def("compare", &CompareScenes, "reference"_a, "current"_a, "preset"_a = "best",
              "region_m"_a = std::vector<Eigen::Vector2d>(), "isocentre_m"_a = std::nullopt,
-             "shift_tolerance_mm"_a = 3.0, "rotation_tolerance_deg"_a = 1.0,
+             "shift_tolerance_mm"_a = kDefaultShiftTolerance_mm,
+             "rotation_tolerance_deg"_a = kDefaultRotationTolerance_deg,
              "Compares a current scene with its reference. Releases the interpreter lock.");
   module.def("evaluate", &Evaluate, "suite"_a, "preset"_a = "best", "progress"_a = ProgressCall(),
              "Reconstructs and compares a suite with truth; the figures as a dict.");

@@ -1,5 +1,5 @@
 // What may be entered, for the fields of forms. The server checks it again; a test compares this
-// with its limits (web/service/limits.hpp).
+// with its limits (web/model/limits.hpp).
 
 export const kBounds = {
   shift_tolerance_mm: { min: 0.1, max: 50, step: 0.1 },
@@ -9,6 +9,9 @@ export const kBounds = {
   retention_days: { min: 0, max: 36500, step: 1 },
   idle_logout_min: { min: 1, max: 240, step: 1 },
 };
+
+/// For how long a result is shown as one to act on (web/model/scan.hpp).
+export const kResult = { valid_s: 120 };
 
 export const kName = { maxlength: 32 };
 export const kSite = { maxlength: 64 };
