@@ -117,12 +117,13 @@ class Plumbd {
         sensors_(SetUpSensors(options, config, registry)),
         panel_(loop_, config.panel),
         appliance_(loop_, {.config = config,
-                           .configuration_fault = fault,
                            .make_provider = [this] { return sensors_->MakeProvider(); },
                            .before_scan = [this] { sensors_->BeforeScan(); },
                            .button = panel_.button(),
                            .indicator = panel_.light(),
-                           .demo_patient = options.simulated.empty() ? "" : "demo"}),
+                           .demo_patient = options.simulated.empty() ? "" : "demo",
+                           .result_s = options.sim_result_s,
+                           .storage = {.configuration_fault = fault}}),
         services_(appliance_, config.update, MakeLogindRestart(loop_, {})),
         http_(services_.services(), HttpOptions(config, page)),
         desk_(appliance_, services_.updates(),
@@ -369,7 +370,7 @@ int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
     Recover(*options.recover, ReadOrExplain(options, registry));
     return 0;
   }
-  if (options.simulated.empty() == false && !options.state)
+  if (!options.simulated.empty() && !options.state)
     throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
   Configured configured = ReadOrExplain(options, registry);
   // Stored data is for this account and at most its group.
