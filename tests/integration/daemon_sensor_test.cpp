@@ -2,6 +2,7 @@
 // out of order or of a wrong size.
 #include <csignal>
 #include <fstream>
+#include <optional>
 #include <random>
 #include <thread>
 
@@ -38,8 +39,8 @@ class DaemonSensorTest : public ::testing::Test {
   /// which record the calibration that a scan used, and the virtual sensor's files are in our
   /// reach.
   [[nodiscard]] testing::PlumbdOptions Options(std::optional<double> auto_stop_s = {},
-                                               int scenes = 1) const {
-    std::ofstream(folder_ / "plumb.toml") << "[sensor]\ndriver = \"virtual-openni\"\n";
+                                               int scenes = 1, const std::string& more = {}) const {
+    std::ofstream(folder_ / "plumb.toml") << "[sensor]\ndriver = \"virtual-openni\"\n" << more;
     fs::create_directories(folder_ / "tmp");
     return {.arguments = {"--config", folder_ / "plumb.toml"},
             .environment = {{"TMPDIR", folder_ / "tmp"}},
@@ -171,7 +172,8 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheOneInUseStaysAndTheOtherIsToldAndTakesOv
 }
 
 TEST_F(DaemonSensorTest, OfTwoSensorsTheConfiguredOneIsUsedAndNoOther) {
-  Plumbd plumbd(folder_.path(), Options(fmt::format("sensor_serial = \"{}\"\n", kSecond)));
+  Plumbd plumbd(folder_.path(),
+                Options({}, 1, fmt::format("[appliance]\nsensor_serial = \"{}\"\n", kSecond)));
   ASSERT_TRUE(plumbd.WaitUntilUp());
   EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(),
               AllOf(HasSubstr(kFirst), HasSubstr(kSecond)));
