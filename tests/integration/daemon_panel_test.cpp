@@ -244,7 +244,9 @@ TEST_F(DaemonPanelTest, TheLightShowsThatTheDiskIsNearlyFull) {
 }
 
 TEST_F(DaemonPanelTest, WhileTheServiceDoesNotRunTheLightSaysSo) {
-  Plumbd light(folder_.path(), Options({"--show-stopped"}));  // answers at no socket
+  testing::PlumbdOptions options = Options({"--show-stopped"});  // answers at no socket
+  options.settings = {};  // the store would be opened for them
+  Plumbd light(folder_.path(), options);
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (NumPhases({"red"}) < 3 && std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(milliseconds(50));
