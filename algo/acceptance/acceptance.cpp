@@ -1,6 +1,7 @@
 #include "algo/acceptance/acceptance.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -173,21 +174,24 @@ double ToleranceOf(const AcceptanceLimits& limits, std::size_t number) {
 }
 
 void CheckLimits(const AcceptanceLimits& limits) {
-  const auto positive = [](double value, const char* name) {
-    if (value > 0 && std::isfinite(value)) return;
+  const auto check = [](double value, double least, double most, const char* name) {
+    if (value >= least && value <= most) return;
     throw std::invalid_argument(
-        fmt::format("acceptance: {} must be positive, got {}", name, value));
+        fmt::format("acceptance: {} must lie in {:g}..{:g}, got {:g}", name, least, most, value));
   };
-  positive(limits.shift_tolerance_m, "the shift tolerance");
-  positive(limits.rotation_tolerance_rad, "the rotation tolerance");
-  positive(limits.max_hole_m, "the largest hole");
-  positive(limits.max_residual_p95_m, "the residual limit");
-  positive(limits.max_lost_s, "the limit of lost tracking");
-  positive(limits.max_breathing_m, "the limit of breathing");
-  if (!(limits.min_coverage >= 0 && limits.min_coverage <= 1)) {
-    throw std::invalid_argument(
-        fmt::format("acceptance: coverage must lie in 0..1, got {}", limits.min_coverage));
-  }
+  // The smallest positive number: a limit of 0 would let nothing pass.
+  constexpr double kAboveZero = std::numeric_limits<double>::denorm_min();
+  constexpr const AcceptanceLimits& kLoosest = kLoosestLimits;
+  check(limits.shift_tolerance_m, kAboveZero, kLoosest.shift_tolerance_m, "the shift tolerance");
+  check(limits.rotation_tolerance_rad, kAboveZero, kLoosest.rotation_tolerance_rad,
+        "the rotation tolerance");
+  check(limits.min_shared_markers, kLoosest.min_shared_markers, std::numeric_limits<int>::max(),
+        "the number of shared markers");
+  check(limits.min_coverage, kLoosest.min_coverage, 1.0, "the coverage");
+  check(limits.max_hole_m, kAboveZero, kLoosest.max_hole_m, "the largest hole");
+  check(limits.max_residual_p95_m, kAboveZero, kLoosest.max_residual_p95_m, "the residual limit");
+  check(limits.max_lost_s, kAboveZero, kLoosest.max_lost_s, "the limit of lost tracking");
+  check(limits.max_breathing_m, kAboveZero, kLoosest.max_breathing_m, "the limit of breathing");
 }
 
 Decision Decide(const Evidence& evidence, const AcceptanceLimits& limits) {

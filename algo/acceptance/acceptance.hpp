@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "algo/acceptance/verdict.hpp"
+#include "algo/base/default_tolerance.hpp"
 #include "algo/base/units.hpp"
 
 namespace plumb {
@@ -19,8 +20,9 @@ namespace plumb {
 /// Limits of the gates. They apply to every preset: a preset chooses how numbers are made, never
 /// whether they may be shown as an answer.
 struct AcceptanceLimits {
-  double shift_tolerance_m = 3 * kMillimetre;   ///< For each of the three shifts.
-  double rotation_tolerance_rad = 1 * kDegree;  ///< For each of the three rotations.
+  /// For each of the three shifts, and of the three rotations.
+  double shift_tolerance_m = kDefaultShiftTolerance_mm * kMillimetre;
+  double rotation_tolerance_rad = kDefaultRotationTolerance_deg * kDegree;
 
   int min_shared_markers = 3;  ///< With fewer markers that did not move there is no answer.
   double min_coverage = 0.9;   ///< Fraction of the region measured by the scan.
@@ -31,8 +33,20 @@ struct AcceptanceLimits {
   double max_breathing_m = 8 * kMillimetre;
 };
 
-/// @throws std::invalid_argument naming a limit that is not positive and finite, or a coverage
-///         outside 0..1.
+/// Beyond these a gate would refuse nothing any more. Experiments may go so far; an appliance takes
+/// no limit that is looser than the default. The tolerances are those of a plan: their bounds only
+/// exclude what is no tolerance.
+inline constexpr AcceptanceLimits kLoosestLimits{.shift_tolerance_m = 1.0,
+                                                 .rotation_tolerance_rad = 180 * kDegree,
+                                                 .min_shared_markers = 1,
+                                                 .min_coverage = 0.5,
+                                                 .max_hole_m = 0.3,
+                                                 .max_residual_p95_m = 100 * kMillimetre,
+                                                 .max_lost_s = 10.0,
+                                                 .max_breathing_m = 50 * kMillimetre};
+
+/// @throws std::invalid_argument naming a limit that is not positive, or looser than that of
+///         kLoosestLimits.
 void CheckLimits(const AcceptanceLimits& limits);
 
 /// The six numbers in the order used by results: vertical, longitudinal, lateral, pitch, roll, yaw.

@@ -78,6 +78,7 @@ class Comparer {
       : reference_(reference), current_(current), options_(options) {
     result_.preset = options.preset;
     result_.limits = options.limits;
+    result_.marker_consensus = options.markers;
     result_.reference_profile = reference.sensor_profile;
     result_.current_profile = current.sensor_profile;
     evidence_.reference_lost_s = reference.longest_lost_s;

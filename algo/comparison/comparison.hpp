@@ -76,8 +76,9 @@ struct Comparison {
   /// Names of the sensor units' profiles from which the two scenes were made, if they were.
   std::optional<std::string> reference_profile, current_profile;
   Verdict verdict = Verdict::kNoAnswer;
-  std::vector<std::string> reasons;  ///< Complete sentences; the first one decides.
-  AcceptanceLimits limits;           ///< By which the verdict was reached.
+  std::vector<std::string> reasons;         ///< Complete sentences; the first one decides.
+  AcceptanceLimits limits;                  ///< By which the verdict was reached.
+  MarkerConsensusOptions marker_consensus;  ///< By which moved markers were found.
   std::optional<Alignment> alignment;
   std::optional<BodyMotion> motion;
   std::optional<Correction> correction;

@@ -360,7 +360,8 @@ PYBIND11_MODULE(plumb, module) {
              "Reconstructs a recording in the TUM RGB-D layout. Releases the interpreter lock.");
   module.def("compare", &CompareScenes, "reference"_a, "current"_a, "preset"_a = "best",
              "region_m"_a = std::vector<Eigen::Vector2d>(), "isocentre_m"_a = std::nullopt,
-             "shift_tolerance_mm"_a = 3.0, "rotation_tolerance_deg"_a = 1.0, "posture"_a = "HFS",
+             "shift_tolerance_mm"_a = kDefaultShiftTolerance_mm,
+             "rotation_tolerance_deg"_a = kDefaultRotationTolerance_deg, "posture"_a = "HFS",
              "marker_kind"_a = "room", "T_iec_reference"_a = std::nullopt,
              "Compares a current scene with its reference, by the room's axes if they are given. "
              "Releases the interpreter lock.");

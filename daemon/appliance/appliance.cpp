@@ -1,7 +1,5 @@
 #include "daemon/appliance/appliance.hpp"
 
-#include <sys/epoll.h>
-
 #include <algorithm>
 #include <exception>
 #include <map>
@@ -12,6 +10,7 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "daemon/appliance/control_lines.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/records/stored_values.hpp"
 
@@ -42,31 +41,41 @@ Json ConfigChanges(const Config& before, const Config& after,
   return changes;
 }
 
+StorageOptions StorageOf(const ApplianceParts& parts) {
+  StorageOptions options = parts.storage;
+  options.state = parts.config.appliance.state;
+  return options;
+}
+
 }  // namespace
 
 Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
     : loop_(loop),
       parts_(std::move(parts)),
-      profiles_(std::make_shared<ProfileShelf>(parts_.config.appliance.state / "sensor-profiles")),
-      profiles_off_(ProfilesOff(parts_.config)),
-      warm_up_min_(parts_.config.appliance.warm_up_min) {
-  storage_timer_ = loop_.MakeTimer("storage retry", [this] { RetryStorage(); });
-  OpenStore();
-  RefreshRoom();
+      storage_(loop, StorageOf(parts_), *this, store_thread_, check_thread_),
+      store_(storage_.store()),
+      upkeep_(
+          loop, storage_, parts_.config, [this](web::EventKind kind) { NotifyWeb(kind); },
+          parts_.clock_trusted_after, store_thread_, check_thread_),
+      room_(store_, parts_.config, [this] { return sensors_->snapshot(); }),
+      profiles_(parts_.config, [this] { return sensors_->snapshot(); }),
+      references_(store_, parts_.config, !parts_.demo_patient.empty(),
+                  [this] { return sensors_->snapshot(); }),
+      session_(loop, parts_.config, [this] { OnSessionUnused(); }),
+      button_(loop, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }) {
+  storage_.Open();
+  room_.Refresh();
   result_timer_ =
       loop_.MakeTimer("result expired", [this] { (void)Handle(ScanEvent::kResultExpired); });
   limit_timer_ = loop_.MakeTimer("longest sweep", [this] {
     Log(LogLevel::kNotice, "the sweep has reached its longest duration", {{"SCAN", scan_.id}});
     (void)Handle(ScanEvent::kSweepComplete);
   });
-  session_timer_ = loop_.MakeTimer("session unused", [this] { OnSessionTimer(); });
   tick_timer_ = loop_.MakeTimer("tick", [this] { OnTick(); });
   tick_timer_.ArmAfter(parts_.tick);
-  if (!storage_fault_.empty()) (void)Handle(ScanEvent::kStorageFailed);
-  WatchButton();
+  if (!storage_.fault().empty()) (void)Handle(ScanEvent::kStorageFailed);
   Show();
-  RunMaintenance();
-  CheckRecords();
+  upkeep_.Run();
   sensors_ = std::make_unique<SensorThread>(
       parts_.make_provider,
       SensorThreadOptions{.serial = parts_.config.appliance.sensor_serial,
@@ -78,43 +87,14 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
 }
 
 Appliance::~Appliance() {
-  maintenance_stop_.request_stop();
-  session_.reset();
+  upkeep_.Stop();
+  running_.reset();
   sensors_.reset();
-}
-
-void Appliance::WatchButton() {
-  if (parts_.button == nullptr) return;
-  parts_.button->SetListener([this](ButtonPress press) { (void)Press(press, kButton); });
-  const auto dispatch = [this] {
-    try {
-      parts_.button->Dispatch(Button::Clock::now());
-      ArmButtonTimer();
-    } catch (const DeviceError& error) {
-      Log(LogLevel::kError, fmt::format("the button does not work any more: {}", error.what()));
-      button_source_ = {};
-    }
-  };
-  button_timer_ = loop_.MakeTimer("button", dispatch);
-  button_source_ = loop_.WatchDescriptor("button", parts_.button->fd(), EPOLLIN,
-                                         [dispatch](std::uint32_t) { dispatch(); });
-  ArmButtonTimer();
-}
-
-void Appliance::ArmButtonTimer() {
-  if (const auto deadline = parts_.button->deadline()) {
-    button_timer_.ArmAt(*deadline);
-  } else {
-    button_timer_.Disarm();
-  }
 }
 
 bool Appliance::IsRunning() const {
   return state_.phase == ApplianceState::kScanning || state_.phase == ApplianceState::kWorking;
 }
-
-/// The demo's patient, which is open from the start and stays open.
-bool Appliance::IsOwnSession() const { return opened_by_.user == kSelf.user; }
 
 Appliance::Answer Appliance::WhyNotIdle() const {
   return IsRunning() ? "a scan is running or being computed: wait for its result" : "";
@@ -122,32 +102,22 @@ Appliance::Answer Appliance::WhyNotIdle() const {
 
 Appliance::Answer Appliance::WhyNotRestart() const {
   if (std::string why = WhyNotIdle(); !why.empty()) return why;
-  if (HasPatientsSession()) return "the session of a patient is open: close it first, then restart";
+  if (session_.IsPatients())
+    return "the session of a patient is open: close it first, then restart";
   return {};
 }
 
 Appliance::Answer Appliance::WhyNotInstall() const {
   if (std::string why = WhyNotIdle(); !why.empty()) return why;
-  if (HasPatientsSession())
+  if (session_.IsPatients())
     return "the session of a patient is open: close it first, then install the update";
-  return {};
-}
-
-bool Appliance::HasPatientsSession() const {
-  return opening_ || (!session_id_.empty() && !IsOwnSession());
-}
-
-/// Otherwise the store and the page could end up with different sessions.
-Appliance::Answer Appliance::WhyNotChangeSession() const {
-  if (opening_) return "a patient is being opened: try again in a moment";
-  if (wiping_) return "this patient's data is being removed: try again in a moment";
   return {};
 }
 
 /// Without a running scan and a shown result, a long press ends the treatment session.
 Appliance::Answer Appliance::Press(ButtonPress press, const Actor& actor) {
-  if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady &&
-      !session_id_.empty() && !IsOwnSession())
+  if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady && session_.IsOpen() &&
+      session_.IsPatients())
     return CloseSession(actor);
   return Handle(press == ButtonPress::kShort ? ScanEvent::kShortPress : ScanEvent::kLongPress,
                 &actor);
@@ -167,10 +137,9 @@ Appliance::Answer Appliance::Cancel(const Actor& actor) {
 Appliance::Answer Appliance::WhyNotScan() const {
   if (stopped_) return "the appliance is being switched off";
   if (std::string why = WhyBlocked(); !why.empty()) return why;
-  if (store_ == nullptr || !storage_fault_.empty()) return "nothing can be stored";
+  if (!storage_.IsUsable()) return "nothing can be stored";
   if (std::string why = store_->WhyOtherScans(); !why.empty()) return why;
-  if (opening_) return "a patient is being opened: press again in a moment";
-  if (wiping_) return "this patient's data is being removed: press again in a moment";
+  if (std::string why = session_.WhyNotScan(); !why.empty()) return why;
   return WhyNoSpace();
 }
 
@@ -190,7 +159,7 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const Actor* actor) {
   if (!answer.empty()) {
     Log(LogLevel::kNotice,
         fmt::format("{} ignored in state {}: {}", Name(event), Name(before.phase), answer));
-    PublishEvent(IgnoredEvent{event, before.phase, answer});
+    PublishEvent(IgnoredEvent(event, before.phase, answer));
   }
   state_ = transition.state;
   if (state_.phase != ApplianceState::kResult) result_timer_.Disarm();
@@ -223,7 +192,7 @@ void Appliance::Audit(const Actor& actor, const std::string& action, const std::
   const auto report = [action](std::string_view why) {
     Log(LogLevel::kError, fmt::format("cannot write '{}' to the audit log: {}", action, why));
   };
-  if (store_ == nullptr) return report(storage_fault_);
+  if (store_ == nullptr) return report(storage_.fault());
   const bool posted = store_thread_.Post([=, this] {
     try {
       store_->audit.Log(actor, action, subject, detail);
@@ -246,28 +215,25 @@ void Appliance::Act(ScanAction action) {
     case ScanAction::kCancelScan:
       limit_timer_.Disarm();
       scan_.cancelled_at = Clock::now();
-      if (session_) session_->Cancel();
+      if (running_) running_->Cancel();
       return sensors_->EndScan();
     case ScanAction::kArmResultTimer:
-      return result_timer_.ArmAfter(std::chrono::microseconds(
-          static_cast<std::int64_t>(parts_.config.appliance.result_s * 1e6)));
+      return result_timer_.ArmAfterSeconds(parts_.result_s);
     case ScanAction::kRefuse:
       return;
   }
 }
 
-/// These run on the scan's thread: they use the store, which is thread-safe, and copies; everything
-/// else is posted. Of a check only its numbers are kept.
 Appliance::Answer Appliance::OpenCheck(const Actor& actor) {
   if (std::string why = WhyNotIdle(); !why.empty()) return why;
-  check_ = actor;
+  session_.SetCheck(actor);
   NotifyWeb(web::EventKind::kStatus);
   return {};
 }
 
 void Appliance::OnSensor(const SensorEvent& event) {
   LogSensor(event);
-  PublishEvent(event);
+  PublishEvent(SensorChanged(event));
   NotifyWeb(web::EventKind::kStatus);
   if (event.kind == SensorEvent::Kind::kOthers || event.kind == SensorEvent::Kind::kStalled) return;
   sensor_fault_ = event.reason;
@@ -285,9 +251,9 @@ void Appliance::LogSensor(const SensorEvent& event) {
   if (event.kind == SensorEvent::Kind::kStalled)
     Log(LogLevel::kWarning, event.reason, {{"SERIAL", serial}});
   if (event.kind == SensorEvent::Kind::kReady) {
-    sensor_since_ = Clock::now();
+    references_.SensorReady();
     Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", serial}});
-    if (const std::string why = WhyNoProfile(event.sensor); !why.empty())
+    if (const std::string why = profiles_.WhyNone(event.sensor); !why.empty())
       Log(LogLevel::kNotice, fmt::format("no profile is kept of this sensor: {}", why),
           {{"SERIAL", serial}});
     const StreamInfo info = sensors_->snapshot().info;
@@ -312,29 +278,19 @@ void Appliance::LogSensor(const SensorEvent& event) {
 
 void Appliance::OpenSession(const std::string& session_id, const std::string& patient_id,
                             ScanPurpose purpose, const std::string& reason, const Actor& actor) {
-  session_id_ = session_id;
-  open_patient_ = patient_id;
-  opened_by_ = actor;
-  check_.reset();
-  purpose_ = purpose;
-  reference_reason_ = reason;
-  ArmSessionTimer();
+  session_.Open(session_id, patient_id, purpose, reason, actor);
   NotifyWeb(web::EventKind::kStatus);
 }
 
 void Appliance::ForgetSession() {
-  session_id_.clear();
-  open_patient_.clear();
-  reference_reason_.clear();
-  purpose_ = ScanPurpose::kFraction;
-  session_timer_.Disarm();
+  session_.Forget();
   NotifyWeb(web::EventKind::kStatus);
 }
 
 Appliance::Answer Appliance::CloseSession(const Actor& actor) {
   if (std::string why = WhyNotIdle(); !why.empty()) return why;
-  if (std::string why = WhyNotChangeSession(); !why.empty()) return why;
-  if (session_id_.empty()) return "no session is open";
+  if (std::string why = session_.WhyNotChange(); !why.empty()) return why;
+  if (!session_.IsOpen()) return "no session is open";
   ForgetSession();
   (void)store_thread_.Post([this, actor] {
     try {
@@ -347,22 +303,15 @@ Appliance::Answer Appliance::CloseSession(const Actor& actor) {
   return {};
 }
 
-/// The demo's session does not expire, because no user could open it again.
-void Appliance::ArmSessionTimer() {
-  if (session_id_.empty() || opened_by_.user == kSelf.user) return session_timer_.Disarm();
-  session_timer_.ArmAfter(std::chrono::microseconds(
-      static_cast<std::int64_t>(parts_.config.appliance.session_idle_min * 60e6)));
-}
-
-void Appliance::OnSessionTimer() {
-  if (IsRunning() || !WhyNotChangeSession().empty()) return ArmSessionTimer();
+void Appliance::OnSessionUnused() {
+  if (IsRunning() || !session_.WhyNotChange().empty()) return session_.ArmTimer();
   Log(LogLevel::kNotice, fmt::format("the session was closed: nothing was scanned for {:g} minutes",
                                      parts_.config.appliance.session_idle_min));
   (void)CloseSession(kSelf);
 }
 
 void Appliance::ClosePatient(const std::string& patient_id) {
-  if (open_patient_ == patient_id) ForgetSession();
+  if (session_.patient_id() == patient_id) ForgetSession();
 }
 
 void Appliance::Reload(const Config& config) {
@@ -370,9 +319,9 @@ void Appliance::Reload(const Config& config) {
   const std::vector<std::string> kept = KeepUntilRestart(parts_.config, next);
   const Json changes = ConfigChanges(parts_.config, next, kept);
   parts_.config = std::move(next);
-  profiles_off_ = ProfilesOff(parts_.config);
-  warm_up_min_ = parts_.config.appliance.warm_up_min;
-  RefreshRoom();
+  profiles_.Configure(parts_.config);
+  references_.Configure(parts_.config);
+  room_.Refresh();
   Log(LogLevel::kInfo, "the configuration was read again");
   if (!changes.empty()) Audit(kSelf, "config.reload", "", changes.dump());
   if (!kept.empty())
@@ -381,7 +330,8 @@ void Appliance::Reload(const Config& config) {
 }
 
 void Appliance::Stop(std::function<void()> stopped) {
-  maintenance_stop_.request_stop();
+  upkeep_.Stop();
+  storage_.Stop();
   if (!IsRunning()) {
     stopped();
     stopped_ = [] {};
@@ -393,16 +343,9 @@ void Appliance::Stop(std::function<void()> stopped) {
 
 void Appliance::OnTick() {
   tick_timer_.ArmAfter(parts_.tick);
-  const bool is_running = IsRunning();
   WatchSpace();
-  if (is_unusable_due_) CountUnusable();
-  clock_.Look(std::chrono::system_clock::now(), Clock::now());
-  if (!is_running && --ticks_to_disk_check_ <= 0) CheckDisk();
-  if (!is_running && --ticks_to_maintenance_ <= 0) RunMaintenance();
-  if (!is_running && --ticks_to_file_check_ <= 0) CheckStoredFiles();
-  if (!is_running && --ticks_to_backup_ <= 0) BackUpIfDue();
-  if (!is_running && --ticks_to_record_check_ <= 0) CheckRecords();
-  if (parts_.button != nullptr && button_source_.is_armed()) ArmButtonTimer();
+  upkeep_.Tick(IsRunning());
+  button_.Tick();
 }
 
 bool Appliance::WorkersAreAlive() const {
@@ -410,8 +353,33 @@ bool Appliance::WorkersAreAlive() const {
   if (now_s - sensors_->heartbeat_s() > parts_.sensor_silence_s) return false;
   // During the sweep the scan's thread waits for frames; their arrival is monitored by the sensor
   // thread.
-  const bool is_working = state_.phase == ApplianceState::kWorking && session_ != nullptr;
-  return !is_working || now_s - session_->heartbeat_s() < parts_.worker_silence_s;
+  const bool is_working = state_.phase == ApplianceState::kWorking && running_ != nullptr;
+  return !is_working || now_s - running_->heartbeat_s() < parts_.worker_silence_s;
+}
+
+void Appliance::StoreOpened(Store& store) {
+  upkeep_.StoreOpened(store);
+  if (parts_.demo_patient.empty()) return;
+  const auto found = store.patients.FindByCode(parts_.demo_patient);
+  const std::string patient =
+      found ? found->id : store.patients.Add(kSelf, parts_.demo_patient, "");
+  session_.Open(store.treatments.Open(kSelf, patient, ScanPurpose::kFraction), patient,
+                ScanPurpose::kFraction, "", kSelf);
+}
+
+void Appliance::StorageFailed() {
+  space_fault_.clear();
+  (void)Handle(ScanEvent::kStorageFailed);
+  PublishState();
+}
+
+void Appliance::StorageWorks() {
+  (void)Handle(ScanEvent::kStorageWorks);
+  WatchSpace();
+  room_.Refresh();
+  upkeep_.Run();
+  NotifyWeb(web::EventKind::kStatus);
+  NotifyWeb(web::EventKind::kData);
 }
 
 }  // namespace plumb

@@ -1,5 +1,4 @@
 // A scan of the appliance from its beginning to its result.
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -7,6 +6,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/control_lines.hpp"
 #include "daemon/appliance/plan_options.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/records/stored_values.hpp"
@@ -36,32 +36,32 @@ void Appliance::StartScan() {
 }
 
 void Appliance::BeginSession() {
-  session_.reset();  // the previous one has ended
+  running_.reset();  // the previous one has ended
   scan_ = {};
-  scan_.patient_id = check_ ? std::string() : open_patient_;
-  scan_.session_id = check_ ? std::string() : session_id_;
-  scan_.purpose = check_ ? ScanPurpose::kDailyCheck : purpose_;
+  const bool is_check = session_.check().has_value();
+  scan_.patient_id = is_check ? std::string() : session_.patient_id();
+  scan_.session_id = is_check ? std::string() : session_.id();
+  scan_.purpose = session_.purpose();
   scan_.started = Clock::now();
   const Settings settings = store_->settings.Get();
   ScanJob job = MakeJob(settings);
   if (job.is_reference) {
-    if (const std::string why = WhyNoReference(); !why.empty()) throw DataError(why);
+    if (const std::string why = references_.WhyNot(); !why.empty()) throw DataError(why);
   }
   const NewScan record{.patient_id = scan_.patient_id,
                        .reference_id = scan_.reference_id,
                        .purpose = scan_.purpose,
                        .sensor_serial = sensors_->snapshot().sensor.serial,
-                       .reason = reference_reason_,
+                       .reason = session_.reason(),
                        .session_id = scan_.session_id,
-                       .sensor_on_s = SecondsSinceSensor(),
-                       .daily_check = DailyCheckToday()};
+                       .sensor_on_s = references_.SensorOn_s(),
+                       .daily_check = references_.CheckToday()};
   scan_.sensor_before = sensors_->snapshot().statistics;
-  ArmSessionTimer();
-  session_ = std::make_unique<ScanSession>(
-      std::move(job), check_ ? MakeCheckCallbacks(record) : MakeCallbacks(record));
-  sensors_->BeginScan(session_->feed());
-  limit_timer_.ArmAfter(std::chrono::microseconds(static_cast<std::int64_t>(
-      parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s) * 1e6)));
+  session_.ArmTimer();
+  running_ = std::make_unique<ScanSession>(
+      std::move(job), is_check ? MakeCheckCallbacks(record) : MakeCallbacks(record));
+  sensors_->BeginScan(running_->feed());
+  limit_timer_.ArmAfterSeconds(settings.scan_limit_s);
 }
 
 std::string Appliance::ScanKind() const {
@@ -76,10 +76,10 @@ ScanJob Appliance::MakeJob(const Settings& settings) {
   job.reconstructor = parts_.config.reconstruct;
   job.reconstructor.sensor_serial = OwnSerial(sensor.sensor);
   job.reconstructor.keep_color = false;  // only the shape of a patient is stored
-  job.keep_recording = parts_.config.appliance.keep_recordings || settings.keep_recordings;
-  job.unit_profile = MakeUnitProfile();
-  job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
-  if (check_) {
+  job.keep_recording = settings.keep_recordings;
+  job.unit_profile = profiles_.ForScan();
+  job.stop_after_s = settings.auto_stop_s;
+  if (session_.check()) {
     job.keep_recording = false;
     job.check = CheckJob{store_->checks.BaselineMarkers(), parts_.config.check};
     return job;
@@ -98,7 +98,7 @@ ScanJob Appliance::MakeJob(const Settings& settings) {
     };
     job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
     job.compare.now_s = SteadySeconds;
-    job.room = RoomOfJob();
+    job.room = room_.OfJob();
   }
   return job;
 }
@@ -112,6 +112,8 @@ ReferencePlan Appliance::DefaultPlan() {
           .couch_markers = settings.couch_markers};
 }
 
+/// These run on the scan's thread: they use the store, which is thread-safe, and copies; everything
+/// else is posted. Of a check only its numbers are kept.
 ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
   ScanCallbacks callbacks;
   auto id = std::make_shared<std::string>();
@@ -124,7 +126,8 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
   const ReferencePlan plan = DefaultPlan();
   const bool is_reference = record.purpose == ScanPurpose::kReference;
   callbacks.save = [this, id, plan, is_demo, is_reference, reason = record.reason,
-                    actor = opened_by_, patient = record.patient_id](const EndedScan& outcome) {
+                    actor = session_.opened_by(),
+                    patient = record.patient_id](const EndedScan& outcome) {
     if (id->empty()) return;  // it never began
     using Kind = EndedScan::Kind;
     // A scan that is discarded or fails while its result is being written has no result.
@@ -164,7 +167,7 @@ void Appliance::AddListeners(ScanCallbacks& callbacks) {
 ScanCallbacks Appliance::MakeCheckCallbacks(const NewScan& record) {
   ScanCallbacks callbacks;
   callbacks.begin = [] { return std::filesystem::path(); };
-  callbacks.save = [this, actor = *check_,
+  callbacks.save = [this, actor = session_.check().value(),
                     serial = record.sensor_serial](const EndedScan& outcome) {
     if (outcome.check) (void)store_->checks.Add(actor, serial, *outcome.check);
   };
@@ -179,7 +182,7 @@ void Appliance::OnUpdate(const ScanUpdate& update) {
   NoteDropped(update);
   scan_.update = update;
   Show();
-  PublishEvent(ProgressEvent{scan_.id, scan_.update, Coverage()});
+  PublishEvent(ProgressEvent(scan_.id, scan_.update, scan_.Coverage()));
   NotifyWeb(web::EventKind::kProgress);
 }
 
@@ -188,7 +191,7 @@ void Appliance::NoteDropped(const ScanUpdate& update) {
   const double seen = static_cast<double>(update.frames - scan_.update.frames);
   if (lost + seen <= 0) return;
   const double weight = 1.0 - std::exp(-(lost + seen) / (30.0 * kDroppedSmoothing_s));
-  scan_.dropped_share += weight * (lost / (lost + seen) - scan_.dropped_share);
+  scan_.dropped_fraction += weight * (lost / (lost + seen) - scan_.dropped_fraction);
 }
 
 void Appliance::OnEnded(const EndedScan& outcome) {
@@ -197,8 +200,8 @@ void Appliance::OnEnded(const EndedScan& outcome) {
   sensors_->EndScan();
   // Its thread has nothing left to do, but may still wait for a processor to end.
   (void)store_thread_.Post(
-      [ended = std::shared_ptr<ScanSession>(std::move(session_))]() mutable { ended.reset(); });
-  ArmSessionTimer();
+      [ended = std::shared_ptr<ScanSession>(std::move(running_))]() mutable { ended.reset(); });
+  session_.ArmTimer();
   scan_.has_ended = true;
   scan_.ended = Clock::now();
   scan_.outcome = outcome;
@@ -211,7 +214,7 @@ void Appliance::OnEnded(const EndedScan& outcome) {
     scan_fault_ = fmt::format("the scan failed: {}", outcome.reason);
     Log(LogLevel::kError, scan_fault_, {{"SCAN", scan_.id}});
     (void)Handle(ScanEvent::kScanFailed);
-    CheckDisk();
+    upkeep_.CheckDiskAtOnce();
   } else {
     if (state_.cancelling)
       Log(LogLevel::kNotice, "the scan was stored before it could be discarded: its result stands",
@@ -236,15 +239,14 @@ void Appliance::OnEnded(const EndedScan& outcome) {
           {{"SCAN", scan_.id}});
     }
     (void)Handle(ScanEvent::kScanDone);
-    PublishEvent(ResultEvent{scan_.id, answer});
+    PublishEvent(ResultEvent(scan_.id, answer));
   }
   if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
-  if (scan_.purpose == ScanPurpose::kDailyCheck) RefreshRoom();
-  check_.reset();
-  ticks_to_file_check_ = std::min(ticks_to_file_check_, kFirstFileCheckTicks);  // of a recording
+  if (scan_.purpose == ScanPurpose::kDailyCheck) room_.Refresh();
+  session_.SetCheck({});
   NotifyWeb(web::EventKind::kResult);
   NotifyWeb(web::EventKind::kData);
-  RunMaintenance();
+  upkeep_.ScanEnded();
   if (stopped_) std::exchange(stopped_, nullptr)();
 }
 

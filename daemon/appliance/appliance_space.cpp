@@ -1,6 +1,5 @@
-// Room on the disks of the stored data.
+// Room for the next scan on the disks of the stored data.
 #include <algorithm>
-#include <filesystem>
 
 #include <fmt/format.h>
 
@@ -8,23 +7,6 @@
 #include "daemon/loop/log.hpp"
 
 namespace plumb {
-
-std::optional<std::filesystem::space_info> Appliance::SpaceForScans() const {
-  std::optional<std::filesystem::space_info> least;
-  const std::filesystem::path& state = parts_.config.appliance.state;
-  for (const std::filesystem::path& folder : {state, state / "scans"}) {
-    std::error_code error;
-    const std::filesystem::space_info space = SpaceOf(folder, error);
-    if (!error && space.capacity > 0 && (!least || space.available < least->available))
-      least = space;
-  }
-  return least;
-}
-
-std::filesystem::space_info Appliance::SpaceOf(const std::filesystem::path& folder,
-                                               std::error_code& error) const {
-  return parts_.space ? parts_.space(folder, error) : std::filesystem::space(folder, error);
-}
 
 /// Upper limit for the space of the next scan.
 std::uint64_t Appliance::NeededBytes() const {
@@ -35,8 +17,8 @@ std::uint64_t Appliance::NeededBytes() const {
   const double pixels = std::max(320.0 * 240.0, static_cast<double>(camera.width) * camera.height);
   const Settings settings = store_ ? store_->settings.Get() : Settings{};
   double bytes = kScene + kSceneOfPixel * pixels;
-  if (!check_ && (parts_.config.appliance.keep_recordings || settings.keep_recordings)) {
-    const double sweep_s = parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s);
+  if (!session_.check() && settings.keep_recordings) {
+    const double sweep_s = settings.scan_limit_s;
     bytes += kFrameOfPixel * pixels * kFramesPerSecond * sweep_s;
   }
   return static_cast<std::uint64_t>(bytes);
@@ -45,7 +27,7 @@ std::uint64_t Appliance::NeededBytes() const {
 /// Why the disk has no room for a scan; empty if it has. @throws IoError if the settings cannot be
 /// read
 Appliance::Answer Appliance::WhyFull() const {
-  const auto space = SpaceForScans();
+  const auto space = storage_.SpaceForScans();
   if (!space) return {};  // a disk that cannot be examined is reported elsewhere
   const std::uint64_t needed = NeededBytes();
   if (space->available >= needed) return {};
@@ -68,7 +50,7 @@ Appliance::Answer Appliance::WhyNoSpace() const {
 /// scan, stays until it has been seen.
 void Appliance::WatchSpace() {
   if (IsRunning() || state_.phase == ApplianceState::kResult || state_.fault == FaultKind::kScan ||
-      !storage_fault_.empty())
+      !storage_.fault().empty())
     return;
   Answer why;
   try {
@@ -86,21 +68,6 @@ void Appliance::WatchSpace() {
   if (Pattern() == shown_) return;  // the disk may have become nearly full
   Show();
   NotifyWeb(web::EventKind::kStatus);
-}
-
-/// Used share of the disk with less room, counted as df does, without the blocks reserved for root.
-/// 0 if no disk can be examined.
-double Appliance::UsedShare() const {
-  const auto space = SpaceForScans();
-  if (!space || space->capacity < space->free) return 0.0;
-  const auto used = static_cast<double>(space->capacity - space->free);
-  const double total = used + static_cast<double>(space->available);
-  return total > 0 ? used / total : 1.0;
-}
-
-bool Appliance::IsNearlyFull() const {
-  constexpr double kNearlyFull = 0.8;
-  return UsedShare() >= kNearlyFull;
 }
 
 }  // namespace plumb

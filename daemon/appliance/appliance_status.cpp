@@ -1,15 +1,12 @@
 // The appliance's reports about itself: status, events, light.
-#include <sys/statvfs.h>
-
-#include <algorithm>
 #include <exception>
 #include <functional>
-#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/control_lines.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/loop/explain.hpp"
@@ -39,27 +36,12 @@ double SecondsSince(Clock::time_point time) {
 constexpr double kTooManyDropped = 0.2;
 
 /// Advice for the sweep. Lost images override all other advice except lost tracking.
-SweepAdvice AdviceOn(SweepAdvice seen, double dropped_share) {
-  const bool is_slow = seen != SweepAdvice::kTrackingLost && dropped_share > kTooManyDropped;
+SweepAdvice AdviceOn(SweepAdvice seen, double dropped_fraction) {
+  const bool is_slow = seen != SweepAdvice::kTrackingLost && dropped_fraction > kTooManyDropped;
   return is_slow ? SweepAdvice::kComputerTooSlow : seen;
 }
 
-/// True also where nothing can be said of it.
-bool IsReadOnly(const std::filesystem::path& folder) {
-  struct statvfs status {};
-  return ::statvfs(folder.c_str(), &status) != 0 || (status.f_flag & ST_RDONLY) != 0;
-}
-
 }  // namespace
-
-WallClock::time_point StartOfDay() {
-  const std::time_t now = std::time(nullptr);
-  std::tm local{};
-  ::localtime_r(&now, &local);
-  local.tm_hour = local.tm_min = local.tm_sec = 0;
-  local.tm_isdst = -1;  // summer time may have begun or ended since midnight
-  return WallClock::from_time_t(std::mktime(&local));
-}
 
 IndicatorPattern Appliance::Pattern() const {
   switch (state_.phase) {
@@ -67,7 +49,8 @@ IndicatorPattern Appliance::Pattern() const {
       return IndicatorPattern::kNoSensor;
     case ApplianceState::kReady:
       if (!rolled_back_.empty()) return IndicatorPattern::kReadyRolledBack;
-      return IsNearlyFull() ? IndicatorPattern::kReadyDiskNearlyFull : IndicatorPattern::kReady;
+      return storage_.IsNearlyFull() ? IndicatorPattern::kReadyDiskNearlyFull
+                                     : IndicatorPattern::kReady;
     case ApplianceState::kWorking:
       return IndicatorPattern::kWorking;
     case ApplianceState::kFault:
@@ -84,7 +67,7 @@ IndicatorPattern Appliance::Pattern() const {
       return scan_.outcome.verdict == Verdict::kMove ? IndicatorPattern::kResultMove
                                                      : IndicatorPattern::kResultInTolerance;
   }
-  switch (AdviceOn(scan_.update.guidance.advice, scan_.dropped_share)) {
+  switch (AdviceOn(scan_.update.guidance.advice, scan_.dropped_fraction)) {
     case SweepAdvice::kSlower:
     case SweepAdvice::kTrackingLost:
     case SweepAdvice::kComputerTooSlow:  // fewer frames: a slower sweep still overlaps enough
@@ -103,7 +86,7 @@ void Appliance::Show() {
   if (pattern == shown_) return;
   shown_ = pattern;
   if (parts_.indicator != nullptr) parts_.indicator->Show(pattern);
-  PublishEvent(LightEvent{pattern});
+  PublishEvent(LightEvent(pattern));
 }
 
 void Appliance::SetRolledBack(const std::string& text) {
@@ -112,19 +95,24 @@ void Appliance::SetRolledBack(const std::string& text) {
   NotifyWeb(web::EventKind::kStatus);
 }
 
-void Appliance::PublishEvent(const WatchedEvent& event) {
+void Appliance::ForgetDrift() {
+  profile_fault_.clear();
+  NotifyWeb(web::EventKind::kStatus);
+}
+
+void Appliance::PublishEvent(const Json& event) {
   if (notify_watchers_)
     Guarded("the control socket's watchers", [&] { notify_watchers_(EventLine(event)); });
 }
 
 void Appliance::PublishState() {
   Show();
-  PublishEvent(StateEvent{state_.phase, FaultReason(), state_.cancelling});
+  PublishEvent(StateEvent(state_.phase, FaultReason(), state_.cancelling));
   NotifyWeb(web::EventKind::kStatus);
 }
 
 void Appliance::NotifyWeb(web::EventKind kind) {
-  if (kind == web::EventKind::kData) is_unusable_due_ = true;
+  if (kind == web::EventKind::kData) upkeep_.CountAgain();
   if (notify_page_) Guarded("the page", [&] { notify_page_(kind); });
 }
 
@@ -132,7 +120,7 @@ std::string Appliance::FaultReason() const {
   if (state_.phase != ApplianceState::kFault) return {};
   switch (state_.fault) {
     case FaultKind::kStorage:
-      return storage_fault_.empty() ? space_fault_ : storage_fault_;
+      return storage_.fault().empty() ? space_fault_ : storage_.fault();
     case FaultKind::kScan:
       return scan_fault_;
     case FaultKind::kSensor:
@@ -141,14 +129,6 @@ std::string Appliance::FaultReason() const {
       break;
   }
   return {};
-}
-
-std::optional<double> Appliance::Coverage() const {
-  // Area of the region itself once it is known: the part that the picture of the sweep shows as
-  // missing.
-  if (scan_.update.surface && scan_.update.surface->coverage) return scan_.update.surface->coverage;
-  if (scan_.reference_area_m2 <= 0) return std::nullopt;
-  return std::min(1.0, scan_.update.guidance.area_m2 / scan_.reference_area_m2);
 }
 
 std::string Appliance::StatusLine() const {
@@ -163,7 +143,7 @@ std::string Appliance::StatusLine() const {
 Json Appliance::StatusJson() {
   const SensorSnapshot sensor = sensors_->snapshot();
   const ScanUpdate& update = scan_.update;
-  Json scan = ProgressFields(update, Coverage());
+  Json scan = ProgressFields(update, scan_.Coverage());
   scan["active"] = IsRunning();
   scan["id"] = scan_.id;
   scan["valid_depth"] = update.guidance.valid_depth;
@@ -233,25 +213,25 @@ Status Appliance::WebStatus() {
                    .serial = sensor.sensor.serial,
                    .name = sensor.sensor.name,
                    .frames_per_second = sensor.present ? sensor.statistics.frames_per_second : 0.0,
-                   .powered_s = sensor.present ? SecondsSince(sensor_since_) : 0.0,
-                   .warm_up_s = 60 * warm_up_min()};
-  if (const auto space = SpaceForScans()) {
+                   .powered_s = references_.SensorOn_s().value_or(0.0),
+                   .warm_up_s = 60 * references_.warm_up_min()};
+  if (const auto space = storage_.SpaceForScans()) {
     status.storage = {.free_bytes = static_cast<std::int64_t>(space->available),
                       .total_bytes = static_cast<std::int64_t>(space->capacity)};
   }
-  status.storage.writable = storage_fault_.empty() && !IsReadOnly(parts_.config.appliance.state);
+  status.storage.writable = storage_.fault().empty() && !storage_.IsReadOnly();
   status.storage.warnings = StorageWarnings();
   status.light = Name(shown_);
-  status.patient_id = check_ ? std::string() : open_patient_;
-  status.next_purpose = check_ ? ScanPurpose::kDailyCheck : purpose_;
+  status.patient_id = session_.check() ? std::string() : session_.patient_id();
+  status.next_purpose = session_.purpose();
   if (IsRunning()) {
     status.scan = LiveScan{.id = scan_.id,
                            .patient_id = scan_.patient_id,
                            .purpose = scan_.purpose,
                            .elapsed_s = SecondsSince(scan_.started),
-                           .coverage = Coverage(),
+                           .coverage = scan_.Coverage(),
                            .without_new_surface_s = scan_.update.guidance.without_new_area_s,
-                           .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_share),
+                           .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_fraction),
                            .keyframes = scan_.update.keyframes,
                            .frames = scan_.update.frames,
                            .frames_tracked = scan_.update.frames_tracked,
@@ -263,7 +243,7 @@ Status Appliance::WebStatus() {
   status.warnings = page_.warnings;
   if (!profile_fault_.empty()) status.warnings.push_back(profile_fault_);
   status.rolled_back = rolled_back_;
-  ReportRoom(status);
+  room_.Report(status);
   ReadStoredOrFail(status);
   return status;
 }
@@ -274,100 +254,39 @@ std::optional<double> Appliance::AgeOf(const std::string& scan_id) const {
              : std::nullopt;
 }
 
-std::optional<double> Appliance::SecondsSinceSensor() const {
-  return sensors_->snapshot().present ? std::optional(SecondsSince(sensor_since_)) : std::nullopt;
-}
-
-DailyCheck Appliance::DailyCheckToday() {
-  return store_->checks.StateSince(StartOfDay(), sensors_->snapshot().sensor.serial);
-}
-
-std::string Appliance::WhyNoReference(const std::optional<Scan>& scan) {
-  if (!parts_.demo_patient.empty() || store_ == nullptr) return {};
-  const DailyCheck today = DailyCheckToday();
-  if (today == DailyCheck::kFailed) {
-    return "the daily check has failed, and references need one that has passed since: open Daily "
-           "check, find out why it failed, sweep over all markers of the room, then go on here";
-  }
-  if (today == DailyCheck::kOverdue) {
-    return "the daily check is overdue, and references need one that has passed today: open Daily "
-           "check, sweep over all markers of the room, then go on here";
-  }
-  const bool is_unconfirmed =
-      scan && scan->daily_check != DailyCheck::kPassed && !store_->checks.ConfirmsScan(scan->id);
-  if (is_unconfirmed && scan->daily_check == DailyCheck::kFailed) {
-    return "this scan was taken after a failed daily check, and no check of the same day and "
-           "sensor has confirmed it: scan the reference again";
-  }
-  if (is_unconfirmed) {
-    return "this scan was taken while the daily check was overdue, and no check of the same day "
-           "and sensor has confirmed it: scan the reference again";
-  }
-  if (scan && store_->checks.RefutesScan(scan->id)) {
-    return "the first daily check after this scan failed, so the markers may already have been out "
-           "of place during it: scan the reference again";
-  }
-  return WhySensorIsCold(scan);
-}
-
-/// Depth drifts while a sensor warms up: a reference would keep that error for a whole course.
-std::string Appliance::WhySensorIsCold(const std::optional<Scan>& scan) const {
-  const std::optional<double> on_s = scan ? scan->sensor_on_s : SecondsSinceSensor();
-  if (!on_s || *on_s >= 60 * warm_up_min()) return {};
-  if (scan) {
-    return fmt::format(
-        "the sensor was still warming up at this scan, and references need one that has been on "
-        "for {:g} min: scan the reference again",
-        warm_up_min());
-  }
-  return fmt::format(
-      "the sensor is still warming up, and references need one that has been on for {:g} min: "
-      "wait, "
-      "then scan",
-      warm_up_min());
-}
-
 void Appliance::ReadStored(Status& status) {
-  status.daily_check = DailyCheckToday();
-  status.reference_block = WhyNoReference();
+  status.daily_check = references_.CheckToday();
+  status.reference_block = references_.WhyNot();
   status.session = store_->treatments.Opened();
-  if (status.session && status.session->id != session_id_) status.session.reset();
+  if (status.session && status.session->id != session_.id()) status.session.reset();
   status.waiting = store_->references.Waiting();
   status.last_check = store_->checks.Last();
-  if (!open_patient_.empty())
-    status.scans_today = store_->scans.CountSince(open_patient_, StartOfDay());
+  if (session_.IsOpen())
+    status.scans_today = store_->scans.CountSince(session_.patient_id(), StartOfDay());
   if (last_result_) status.last_result = store_->scans.Find(last_result_->id);
   if (status.last_result) status.last_result->age_s = AgeOf(status.last_result->id);
+}
+
+void Appliance::ReadAll() {
+  Status status;
+  ReadStored(status);
 }
 
 /// A request for the status must not end the appliance. A failure is posted, because this call may
 /// be part of reporting it.
 void Appliance::ReadStoredOrFail(Status& status) {
   if (store_ == nullptr) return;
-  const auto fail = [this](const std::exception& error, StorageFault kind) {
-    loop_.Post("store failed",
-               [this, what = std::string(error.what()), kind] { FailStorage(what, kind); });
-  };
   try {
     ReadStored(status);
-  } catch (const DatabaseCorrupt& error) {
-    fail(error, StorageFault::kDamage);
   } catch (const std::exception& error) {
-    fail(error, StorageFault::kMayEnd);
+    storage_.FailLater(error);
   }
 }
 
-CheckStatus Appliance::Checks() {
-  constexpr int kShown = 60;
-  return {.checks = store_->checks.List(kShown),
-          .baseline = store_->checks.Baseline(),
-          .today = DailyCheckToday()};
-}
-
 Health Appliance::health() {
-  if (!parts_.configuration_fault.empty()) return {.ok = false, .reason = storage_fault_};
-  if (!storage_fault_.empty()) return {.ok = false, .reason = "storage: " + storage_fault_};
-  if (IsReadOnly(parts_.config.appliance.state))
+  if (storage_.has_configuration_fault()) return {.ok = false, .reason = storage_.fault()};
+  if (!storage_.fault().empty()) return {.ok = false, .reason = "storage: " + storage_.fault()};
+  if (storage_.IsReadOnly())
     return {.ok = false, .reason = "storage: the state folder is on a read-only disk"};
   if (const std::string full = WhyNoSpace(); !full.empty())
     return {.ok = false, .reason = "storage: " + full};

@@ -8,11 +8,9 @@ bool BackgroundThreads::RunInBackground(web::BackgroundPool where, std::function
                                         std::function<void()> done) {
   WorkThread& thread = where == web::BackgroundPool::kReads ? reads_ : files_;
   return thread.Post(
-      [loop = &loop_, work = std::move(work), done = std::move(done), alive = alive_] {
+      [loop = &loop_, work = std::move(work), done = alive_.WhileAlive(std::move(done))] {
         work();
-        loop->Post("background work done", [done, alive] {
-          if (*alive) done();
-        });
+        loop->Post("background work done", done);
       });
 }
 

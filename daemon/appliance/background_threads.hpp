@@ -1,8 +1,9 @@
 // The threads beside the loop that the page's handlers use.
 #pragma once
 
-#include <memory>
+#include <functional>
 
+#include "daemon/loop/alive_flag.hpp"
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/work_thread.hpp"
 #include "web/service/background_work.hpp"
@@ -14,9 +15,6 @@ class BackgroundThreads : public web::BackgroundWork {
  public:
   /// The loop is borrowed and outlives this object.
   explicit BackgroundThreads(EventLoop& loop) : loop_(loop) {}
-  ~BackgroundThreads() override { *alive_ = false; }
-  BackgroundThreads(const BackgroundThreads&) = delete;
-  BackgroundThreads& operator=(const BackgroundThreads&) = delete;
 
   [[nodiscard]] bool RunInBackground(web::BackgroundPool where, std::function<void()> work,
                                      std::function<void()> done) override;
@@ -27,7 +25,7 @@ class BackgroundThreads : public web::BackgroundWork {
 
  private:
   EventLoop& loop_;
-  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+  AliveFlag alive_;
   WorkThread reads_{64}, files_{64};
 };
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "daemon/appliance/control_lines.hpp"
 
 namespace plumb {
 namespace {
@@ -57,7 +58,7 @@ void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Rep
       return reply(refusal.empty() ? ControlDone() : ControlRefusal(refusal));
     }
     case Kind::kBackup:
-      return appliance_.BackUp(
+      return appliance_.upkeep().BackUp(
           kSocket, request.folder,
           [reply](const std::string& error, const BackupReport& report) {
             reply(error.empty() ? BackupDone(report) : ControlRefusal(error));

@@ -7,29 +7,30 @@
 #include "daemon/control/control_protocol.hpp"
 
 namespace plumb {
-namespace {
 
 using Json = nlohmann::json;
 
-Json FieldsOf(const IgnoredEvent& event) {
-  return {{"event", "ignored"},
-          {"what", Name(event.what)},
-          {"state", Name(event.state)},
-          {"reason", event.reason}};
+Json IgnoredEvent(ScanEvent what, ApplianceState state, const std::string& reason) {
+  return {{"event", "ignored"}, {"what", Name(what)}, {"state", Name(state)}, {"reason", reason}};
 }
-Json FieldsOf(const LightEvent& event) {
-  return {{"event", "light"}, {"pattern", Name(event.pattern)}};
+
+Json LightEvent(IndicatorPattern pattern) {
+  return {{"event", "light"}, {"pattern", Name(pattern)}};
 }
-Json FieldsOf(const ProgressEvent& event) {
-  Json fields = ProgressFields(event.update, event.coverage);
-  fields["event"] = "progress";
-  fields["scan"] = event.scan;
-  return fields;
+
+Json ProgressEvent(const std::string& scan, const ScanUpdate& update,
+                   std::optional<double> coverage) {
+  Json event = ProgressFields(update, coverage);
+  event["event"] = "progress";
+  event["scan"] = scan;
+  return event;
 }
-Json FieldsOf(const ResultEvent& event) {
-  return {{"event", "result"}, {"scan", event.scan}, {"answer", event.answer}};
+
+Json ResultEvent(const std::string& scan, const std::string& answer) {
+  return {{"event", "result"}, {"scan", scan}, {"answer", answer}};
 }
-Json FieldsOf(const SensorEvent& event) {
+
+Json SensorChanged(const SensorEvent& event) {
   static constexpr auto kNames =
       NamesUpTo<SensorEvent::Kind::kStalled>({"ready", "lost", "failed", "others", "stalled"});
   return {{"event", "sensor"},
@@ -38,27 +39,20 @@ Json FieldsOf(const SensorEvent& event) {
           {"reason", event.reason},
           {"others", event.others}};
 }
-Json FieldsOf(const StateEvent& event) {
-  return {{"event", "state"},
-          {"state", Name(event.state)},
-          {"reason", event.reason},
-          {"cancelling", event.cancelling}};
+
+Json StateEvent(ApplianceState state, const std::string& reason, bool cancelling) {
+  return {
+      {"event", "state"}, {"state", Name(state)}, {"reason", reason}, {"cancelling", cancelling}};
 }
 
-std::string WithTime(Json fields) {
+std::string EventLine(Json event) {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  fields["time"] = std::chrono::duration<double>(now).count();
-  return ControlLine(fields);
+  event["time"] = std::chrono::duration<double>(now).count();
+  return ControlLine(event);
 }
 
-}  // namespace
-
-std::string EventLine(const WatchedEvent& event) {
-  return WithTime(std::visit([](const auto& one) { return FieldsOf(one); }, event));
-}
-
-std::string StatusEventLine(const nlohmann::json& status) {
-  return WithTime({{"event", "status"}, {"status", status}});
+std::string StatusEventLine(const Json& status) {
+  return EventLine({{"event", "status"}, {"status", status}});
 }
 
 Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {

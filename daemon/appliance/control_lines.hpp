@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <variant>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -15,33 +14,21 @@
 
 namespace plumb {
 
-struct IgnoredEvent {
-  ScanEvent what;
-  ApplianceState state;
-  std::string reason;
-};
-struct LightEvent {
-  IndicatorPattern pattern;
-};
-struct ProgressEvent {
-  std::string scan;
-  ScanUpdate update;
-  std::optional<double> coverage;
-};
-struct ResultEvent {
-  std::string scan;
-  std::string answer;  ///< The verdict, or why there is none.
-};
-struct StateEvent {
-  ApplianceState state;
-  std::string reason;  ///< In a fault.
-  bool cancelling;
-};
-using WatchedEvent =
-    std::variant<IgnoredEvent, LightEvent, ProgressEvent, ResultEvent, SensorEvent, StateEvent>;
+// Events, each {"event": NAME, ...}.
+[[nodiscard]] nlohmann::json IgnoredEvent(ScanEvent what, ApplianceState state,
+                                          const std::string& reason);
+[[nodiscard]] nlohmann::json LightEvent(IndicatorPattern pattern);
+[[nodiscard]] nlohmann::json ProgressEvent(const std::string& scan, const ScanUpdate& update,
+                                           std::optional<double> coverage);
+/// @param answer  The verdict, or why there is none.
+[[nodiscard]] nlohmann::json ResultEvent(const std::string& scan, const std::string& answer);
+[[nodiscard]] nlohmann::json SensorChanged(const SensorEvent& event);
+/// @param reason  In a fault.
+[[nodiscard]] nlohmann::json StateEvent(ApplianceState state, const std::string& reason,
+                                        bool cancelling);
 
-/// {"event": NAME, "time": seconds since 1970, ...}
-[[nodiscard]] std::string EventLine(const WatchedEvent& event);
+/// An event with "time", in seconds since 1970.
+[[nodiscard]] std::string EventLine(nlohmann::json event);
 /// The first line for each watcher: the whole status, in the same form.
 [[nodiscard]] std::string StatusEventLine(const nlohmann::json& status);
 

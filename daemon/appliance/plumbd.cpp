@@ -65,8 +65,7 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const PlumbdOptions& options, co
                                                 const SensorRegistry& registry) {
   const SensorDriver& driver =
       registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
-  SensorSettings settings = SensorSettingsOf(config);
-  settings.markers_are_the_rooms = !driver.is_simulated;
+  const SensorSettings settings = SensorSettingsOf(config);
   const bool is_small = options.sim_size == "320x240";
   SimulatedSweeps sweeps{.suite = options.simulated.empty() ? "demo" : options.simulated,
                          .seed = options.sim_seed,
@@ -118,12 +117,13 @@ class Plumbd {
         sensors_(SetUpSensors(options, config, registry)),
         panel_(loop_, config.panel),
         appliance_(loop_, {.config = config,
-                           .configuration_fault = fault,
                            .make_provider = [this] { return sensors_->MakeProvider(); },
                            .before_scan = [this] { sensors_->BeforeScan(); },
                            .button = panel_.button(),
                            .indicator = panel_.light(),
-                           .demo_patient = options.simulated.empty() ? "" : "demo"}),
+                           .demo_patient = options.simulated.empty() ? "" : "demo",
+                           .result_s = options.sim_result_s,
+                           .storage = {.configuration_fault = fault}}),
         services_(appliance_, config.update, MakeLogindRestart(loop_, {})),
         http_(services_.services(), HttpOptions(config, page)),
         desk_(appliance_, services_.updates(),
@@ -370,7 +370,7 @@ int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
     Recover(*options.recover, ReadOrExplain(options, registry));
     return 0;
   }
-  if (options.simulated.empty() == false && !options.state)
+  if (!options.simulated.empty() && !options.state)
     throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
   Configured configured = ReadOrExplain(options, registry);
   // Stored data is for this account and at most its group.

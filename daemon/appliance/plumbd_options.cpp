@@ -112,6 +112,9 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
   app.add_option("--sim-scenes", options.sim_scenes, "Number of the suite's scenes; 0: all")
       ->check(CLI::Range(0, 1000))
       ->group("Virtual sensor");
+  app.add_option("--sim-result-s", options.sim_result_s, "Seconds for which a result is shown")
+      ->check(CLI::Range(1, 3600))
+      ->group("Virtual sensor");
   app.add_flag("--sim-board", options.sim_board,
                "Start with three scenes of the room calibration board")
       ->group("Virtual sensor");

@@ -9,6 +9,7 @@
 
 #include "daemon/config/config.hpp"
 #include "drivers/live/sensor_driver.hpp"
+#include "web/model/scan.hpp"
 
 namespace plumb {
 
@@ -25,6 +26,7 @@ struct PlumbdOptions {
   unsigned sim_seed = 1;
   std::string sim_size = "640x480";
   bool sim_unplugged = false, sim_board = false;
+  double sim_result_s = kResultValid_s;
 };
 
 void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options);

@@ -176,13 +176,7 @@ void Put(const fs::path& file, const std::string& text) {
 Provisioning ReadProvisioning(const fs::path& file) {
   const std::string name = file.string();
   const toml::table root = ParseToml(ReadTextFile(file, kMaxBytes), name);
-  for (const auto& [key, node] : root) {
-    if (key.str() != "unit" && key.str() != "network" && key.str() != "page" &&
-        key.str() != "display")
-      throw DataError(fmt::format(
-          "{}:{}: unknown table or key '{}'; known are [unit], [network], [page], [display]", name,
-          node.source().begin.line, key.str()));
-  }
+  RejectUnknownTables(root, name, {"unit", "network", "page", "display"});
   Provisioning given;
   Section unit(root, "unit", name);
   unit.Take("serial", given.serial, "1 to 32 letters, digits, '.', '_' and '-'",

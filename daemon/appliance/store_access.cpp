@@ -12,6 +12,11 @@ Change AnswerOf(const std::string& why_not) {
   return Refused(why_not.empty() ? ChangeResult::kDone : ChangeResult::kConflict, why_not);
 }
 
+bool RefuseIf(const std::string& why_not, const Done& done) {
+  if (!why_not.empty()) done(AnswerOf(why_not));
+  return !why_not.empty();
+}
+
 std::string StoreAccess::Unreadable(const std::exception& error) {
   std::string text = fmt::format("what is stored cannot be read: {}", error.what());
   Log(LogLevel::kError, text);
@@ -32,8 +37,12 @@ void StoreAccess::RunOnStoreThread(Done done, std::function<std::string(Store&)>
   Store* store = appliance_.store();
   if (store == nullptr) return done(Refused(ChangeResult::kFailed, appliance_.storage_fault()));
   // The store's thread outlives this object, which must not be used there.
+  const auto changed = alive_.WhileAlive([appliance = &appliance_, done](const Change& answer) {
+    done(answer);
+    if (answer.result == ChangeResult::kDone) appliance->NotifyWeb(web::EventKind::kData);
+  });
   const bool posted = appliance_.store_thread().Post(
-      [store, done, appliance = &appliance_, change = std::move(change), alive = alive_] {
+      [store, changed, loop = &appliance_.loop(), change = std::move(change)] {
         Change answer;
         try {
           answer.id = change(*store);
@@ -44,11 +53,7 @@ void StoreAccess::RunOnStoreThread(Done done, std::function<std::string(Store&)>
         } catch (const std::exception& error) {
           answer = Refused(ChangeResult::kFailed, error.what());
         }
-        appliance->loop().Post("store changed", [appliance, done, answer, alive] {
-          if (!*alive) return;
-          done(answer);
-          if (answer.result == ChangeResult::kDone) appliance->NotifyWeb(web::EventKind::kData);
-        });
+        loop->Post("store changed", [changed, answer] { changed(answer); });
       });
   if (!posted) done(Refused(ChangeResult::kFailed, "the store is busy: try again"));
 }

@@ -3,31 +3,29 @@
 
 #include <exception>
 #include <functional>
-#include <memory>
 #include <string>
 #include <type_traits>
 #include <utility>
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/loop/alive_flag.hpp"
 #include "web/model/change.hpp"
 
 namespace plumb {
 
 /// Done if `why_not` is empty, otherwise a conflict with the state of the appliance.
 [[nodiscard]] Change AnswerOf(const std::string& why_not);
+/// Answers so and returns true if there is a reason against the change.
+[[nodiscard]] bool RefuseIf(const std::string& why_not, const Done& done);
 
 /// Changes run on the store's thread and call `done` on the loop; reads answer at once. Used on the
 /// loop's thread, Read() on any. In safe mode without a store reads return nothing, and changes
 /// fail with the reason.
 class StoreAccess {
  public:
-  /// The appliance is borrowed and outlives this object.
+  /// The appliance is borrowed and outlives this object. No `done` is called after its end.
   explicit StoreAccess(Appliance& appliance) : appliance_(appliance) {}
-  /// No `done` is called afterwards.
-  ~StoreAccess() { *alive_ = false; }
-  StoreAccess(const StoreAccess&) = delete;
-  StoreAccess& operator=(const StoreAccess&) = delete;
 
   /// Runs `change` with one service of the store on the store's thread. Its return value is the id
   /// of a new record, if any; its exceptions become the answer.
@@ -82,7 +80,7 @@ class StoreAccess {
   static std::string Unreadable(const std::exception& error);
 
   Appliance& appliance_;
-  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+  AliveFlag alive_;
 };
 
 }  // namespace plumb

@@ -85,11 +85,7 @@ std::string Restore(const UnitRecovery& given, const fs::path& state,
 UnitRecovery ReadUnitRecovery(const fs::path& file) {
   const std::string name = file.string();
   const toml::table root = ParseToml(ReadTextFile(file, kMaxBytes), name);
-  for (const auto& [key, node] : root) {
-    if (key.str() != "recovery")
-      throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known is [recovery]", name,
-                                  node.source().begin.line, key.str()));
-  }
+  RejectUnknownTables(root, name, {"recovery"});
   const auto is_path = [](const std::string& value) { return !value.empty(); };
   UnitRecovery given;
   std::string backup, key_file;

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "daemon/appliance/store_access.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/records/factory_reset.hpp"
@@ -17,7 +18,6 @@ namespace {
 
 const Actor kInstaller{.user = "installer", .address = {}};
 
-Change Conflict(std::string why) { return Refused(ChangeResult::kConflict, std::move(why)); }
 
 }  // namespace
 
@@ -51,10 +51,7 @@ Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,
   restart_limit_ = appliance_.loop().MakeTimer("restart", [this] { OnStillRunning(); });
 }
 
-Updates::~Updates() {
-  *alive_ = false;
-  appliance_.SetBlockingReason({});
-}
+Updates::~Updates() { appliance_.SetBlockingReason({}); }
 
 std::string Updates::WhyNotScan() const {
   if (restarting_) return "the machine is being restarted";
@@ -87,7 +84,7 @@ void Updates::RemoveBundle(const Actor& actor, const std::string& name, Done don
 }
 
 void Updates::InstallUpdate(const Actor& actor, const std::string& bundle, Done done) {
-  if (const std::string why = WhyNotInstall(); !why.empty()) return done(Conflict(why));
+  if (RefuseIf(WhyNotInstall(), done)) return;
   updater_.Install(bundle, LogInstall(actor, bundle, std::move(done)));
 }
 
@@ -101,34 +98,34 @@ Done Updates::LogInstall(const Actor& actor, const std::string& bundle, Done don
 
 void Updates::InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile> file,
                           const std::string& name, Done done) {
-  if (const std::string why = WhyNotInstall(); !why.empty()) return done(Conflict(why));
+  if (RefuseIf(WhyNotInstall(), done)) return;
   if (const UpdateStatus status = updater_.status(); !status.supported)
-    return done(Conflict(status.message));
+    return done(AnswerOf(status.message));
   if (copying_ || updater_.is_installing())
-    return done(Conflict("another bundle is being installed: wait until it is done"));
+    return done(AnswerOf("another bundle is being installed: wait until it is done"));
   copying_ = true;
-  const auto copied = [this, actor, name, done](const std::filesystem::path& copy,
-                                                const Change& failure) {
-    copying_ = false;
-    if (copy.empty()) {
-      options_.log(actor, "update.refuse", name, failure.message);
-      return done(failure);
-    }
-    const auto drop = [copy, done](const Change& why) {
-      std::error_code ignored;
-      std::filesystem::remove(copy, ignored);
-      done(why);
-    };
-    // A scan may have started during the copying.
-    if (const std::string why = WhyNotInstall(); !why.empty()) return drop(Conflict(why));
-    AddBundle(actor, copy, name, [this, actor, name, drop, done](const Change& added) {
-      if (added.result != ChangeResult::kDone) return drop(added);
-      updater_.InstallCopy(name, LogInstall(actor, name, done));
-    });
-  };
+  const auto copied = alive_.WhileAlive(
+      [this, actor, name, done](const std::filesystem::path& copy, const Change& failure) {
+        copying_ = false;
+        if (copy.empty()) {
+          options_.log(actor, "update.refuse", name, failure.message);
+          return done(failure);
+        }
+        const auto drop = [copy, done](const Change& why) {
+          std::error_code ignored;
+          std::filesystem::remove(copy, ignored);
+          done(why);
+        };
+        // A scan may have started during the copying.
+        if (RefuseIf(WhyNotInstall(), drop)) return;
+        AddBundle(actor, copy, name, [this, actor, name, drop, done](const Change& added) {
+          if (added.result != ChangeResult::kDone) return drop(added);
+          updater_.InstallCopy(name, LogInstall(actor, name, done));
+        });
+      });
   const auto work = [file = std::move(file), folder = options_.config.folder,
                      max_bytes = static_cast<std::uint64_t>(options_.config.max_bundle_mb) << 20,
-                     copied, &loop = appliance_.loop(), alive = alive_] {
+                     copied, &loop = appliance_.loop()] {
     Change failure;
     std::filesystem::path copy;
     try {
@@ -138,13 +135,11 @@ void Updates::InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile
     } catch (const std::exception& error) {
       failure = Refused(ChangeResult::kFailed, error.what());
     }
-    loop.Post("bundle copied", [copied, copy, failure, alive] {
-      if (*alive) copied(copy, failure);
-    });
+    loop.Post("bundle copied", [copied, copy, failure] { copied(copy, failure); });
   };
   if (options_.run_in_background(work)) return;
   copying_ = false;
-  done(Conflict("the disk is busy: try again"));
+  done(AnswerOf("the disk is busy: try again"));
 }
 
 void Updates::InstallFromStick(const Actor& actor, const std::string& bundle, Done done) {
@@ -157,15 +152,15 @@ void Updates::InstallFromStick(const Actor& actor, const std::string& bundle, Do
 }
 
 void Updates::RestartSystem(const Actor& actor, Done done) {
-  if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
+  if (RefuseIf(WhyNotRestart(), done)) return;
   restarting_ = true;  // no scan, session or update may begin before the machine goes down
   GoDown(actor, std::move(done));
 }
 
 void Updates::ResetToFactory(const Actor& actor, FactoryReset kind, Done done) {
-  if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
+  if (RefuseIf(WhyNotRestart(), done)) return;
   restarting_ = true;
-  const auto noted = [this, actor, kind, done](const std::string& failure) {
+  const auto noted = alive_.WhileAlive([this, actor, kind, done](const std::string& failure) {
     if (!failure.empty()) {
       restarting_ = false;
       return done(Refused(ChangeResult::kFailed, failure));
@@ -176,30 +171,26 @@ void Updates::ResetToFactory(const Actor& actor, FactoryReset kind, Done done) {
       if (change.result != ChangeResult::kDone) CancelFactoryReset(options_.state);
       done(change);
     });
-  };
-  const auto work = [state = options_.state, actor, kind, noted, &loop = appliance_.loop(),
-                     alive = alive_] {
+  });
+  const auto work = [state = options_.state, actor, kind, noted, &loop = appliance_.loop()] {
     std::string failure;
     try {
       RequestFactoryReset(state, kind, actor);
     } catch (const std::exception& error) {
       failure = error.what();
     }
-    loop.Post("factory reset noted", [noted, failure, alive] {
-      if (*alive) noted(failure);
-    });
+    loop.Post("factory reset noted", [noted, failure] { noted(failure); });
   };
   if (options_.run_in_background(work)) return;
   restarting_ = false;
-  done(Conflict("the disk is busy: try again"));
+  done(AnswerOf("the disk is busy: try again"));
 }
 
 void Updates::GoDown(const Actor& actor, Done done) {
   options_.log(actor, "system.restart", "", "");
   Log(LogLevel::kNotice, fmt::format("{} restarts the machine", actor.user));
   restart_->Restart(
-      [this, actor, done = std::move(done), alive = alive_](const std::string& failure) {
-        if (!*alive) return;
+      alive_.WhileAlive([this, actor, done = std::move(done)](const std::string& failure) {
         if (failure.empty()) {
           restarted_by_ = actor;
           restart_limit_.ArmAfter(restart_->limit());
@@ -209,7 +200,7 @@ void Updates::GoDown(const Actor& actor, Done done) {
         options_.log(actor, "system.restart_failed", "", failure);
         Log(LogLevel::kError, failure);
         done(Refused(ChangeResult::kFailed, failure));
-      });
+      }));
 }
 
 void Updates::OnStillRunning() {
@@ -227,7 +218,7 @@ void Updates::OnStillRunning() {
 
 void Updates::ForgetRollBack(const Actor& actor, Done done) {
   if (updater_.status().rolled_back.empty())
-    return done(Conflict("the machine has not been rolled back"));
+    return done(AnswerOf("the machine has not been rolled back"));
   updater_.ForgetRollBack();
   appliance_.SetRolledBack({});
   options_.log(actor, "update.seen", "", "");

@@ -8,6 +8,7 @@
 
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/control/attached_file.hpp"
+#include "daemon/loop/alive_flag.hpp"
 #include "daemon/update/system_restart.hpp"
 #include "daemon/update/updater.hpp"
 #include "daemon/update/usb_sticks.hpp"
@@ -75,7 +76,7 @@ class Updates : public web::UpdateService {
   bool restarting_ = false, copying_ = false;
   Actor restarted_by_;
   EventLoop::Source restart_limit_;
-  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+  AliveFlag alive_;
   Updater updater_;  // Declared last, so destroyed first: its callbacks use the members above.
 };
 

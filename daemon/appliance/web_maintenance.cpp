@@ -23,18 +23,16 @@ namespace {
 class WebMaintenance final : public web::MaintenanceService {
  public:
   WebMaintenance(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
-  ~WebMaintenance() override { *alive_ = false; }
 
   void MakeBackup(const Actor& actor, Done done) override {
-    const std::filesystem::path folder = appliance_.BackupTarget();
+    const std::filesystem::path folder = appliance_.upkeep().BackupTarget();
     if (folder.empty())
       return done(Refused(ChangeResult::kInvalid,
                           "no folder for backups is configured: set backup_folder in [storage]"));
-    appliance_.BackUp(
-        actor, folder, [done, alive = alive_](const std::string& error, const BackupReport&) {
-          if (!*alive) return;
+    appliance_.upkeep().BackUp(
+        actor, folder, alive_.WhileAlive([done](const std::string& error, const BackupReport&) {
           done(Refused(error.empty() ? ChangeResult::kDone : ChangeResult::kFailed, error));
-        });
+        }));
   }
 
   void WriteDiagnostics(const Actor& actor, Done done) override {
@@ -67,7 +65,7 @@ class WebMaintenance final : public web::MaintenanceService {
  private:
   Appliance& appliance_;
   StoreAccess& store_;
-  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+  AliveFlag alive_;
 };
 
 }  // namespace

@@ -56,15 +56,14 @@ class WebPatients final : public web::PatientService {
     if (status.scan && status.scan->patient_id == id) {
       return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
     }
-    const bool is_open = appliance_.open_patient() == id;
+    const bool is_open = appliance_.session().patient_id() == id;
     if (is_open) {
-      if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
-        return done(AnswerOf(why));
-      appliance_.SetWiping(true);
+      if (RefuseIf(appliance_.session().WhyNotChange(), done)) return;
+      appliance_.session().SetWiping(true);
     }
     // The session ends once the data is removed. A removal that is refused changes nothing.
     const Done wiped = [this, id, is_open, done = std::move(done)](const Change& change) {
-      if (is_open) appliance_.SetWiping(false);
+      if (is_open) appliance_.session().SetWiping(false);
       if (change.result == ChangeResult::kDone) appliance_.ClosePatient(id);
       done(change);
     };
@@ -80,15 +79,11 @@ class WebPatients final : public web::PatientService {
       return done(
           Refused(ChangeResult::kInvalid, "a daily check is of no patient: open it as a check"));
     }
-    if (const std::string why = WhyNotOpen(appliance_.IsRunning(), *patient, purpose); !why.empty())
-      return done(AnswerOf(why));
-    if (const std::string why = appliance_.WhyNotChangeSession(); !why.empty())
-      return done(AnswerOf(why));
-    if (const std::string why = appliance_.WhyBlocked(); !why.empty()) return done(AnswerOf(why));
-    if (purpose == ScanPurpose::kReference) {
-      if (const std::string why = appliance_.WhyNoReference(); !why.empty())
-        return done(AnswerOf(why));
-    }
+    if (RefuseIf(WhyNotOpen(appliance_.IsRunning(), *patient, purpose), done)) return;
+    if (RefuseIf(appliance_.session().WhyNotChange(), done)) return;
+    if (RefuseIf(appliance_.WhyBlocked(), done)) return;
+    if (purpose == ScanPurpose::kReference && RefuseIf(appliance_.references().WhyNot(), done))
+      return;
     const auto open = appliance_.WebStatus().session;
     if (open && open->patient_id == id && open->purpose == purpose &&
         purpose == ScanPurpose::kFraction) {
@@ -99,10 +94,10 @@ class WebPatients final : public web::PatientService {
       return done(AnswerOf(fmt::format("the session of {} is open (opened by {}): close it first",
                                        open->patient_code, open->opened_by)));
     }
-    appliance_.SetOpening(true);
+    appliance_.session().SetOpening(true);
     const Done opened = [this, actor, id, purpose, reason,
                          done = std::move(done)](const Change& change) {
-      appliance_.SetOpening(false);
+      appliance_.session().SetOpening(false);
       if (change.result == ChangeResult::kDone)
         appliance_.OpenSession(change.id, id, purpose, reason, actor);
       done(change);
@@ -112,7 +107,7 @@ class WebPatients final : public web::PatientService {
   }
 
   void CloseSession(const Actor& actor, const std::string& session_id, Done done) override {
-    if (!session_id.empty() && appliance_.session_id() != session_id)
+    if (!session_id.empty() && appliance_.session().id() != session_id)
       return done(AnswerOf("this session is closed already, or another one is open by now"));
     done(AnswerOf(appliance_.CloseSession(actor)));
   }
@@ -140,7 +135,7 @@ class WebReferences final : public web::ReferenceService {
     const std::optional<Scan> scan = ScanOf(reference.scan_id);
     if (!scan || scan->folder.empty()) return {};
     try {
-      const auto ways = appliance_.RoomIn(ReadSceneMarkers(scan->folder / "scene"));
+      const auto ways = appliance_.room().In(ReadSceneMarkers(scan->folder / "scene"));
       if (!ways) return {};
       return {.gantry_xy = {ways->gantry.x(), ways->gantry.y()},
               .right_xy = {ways->right.x(), ways->right.y()},
@@ -155,8 +150,7 @@ class WebReferences final : public web::ReferenceService {
   void AddReference(const Actor& actor, const std::string& scan_id, const std::string& reason,
                     Done done) override {
     const std::optional<Scan> scan = ScanOf(scan_id);
-    if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
-      return done(AnswerOf(why));
+    if (RefuseIf(appliance_.references().WhyNot(scan), done)) return;
     store_.Write(&Store::references, std::move(done),
                  [=, appliance = &appliance_](ReferenceStore& references) {
                    return references.Add(actor, scan_id, reason, appliance->DefaultPlan());
@@ -175,8 +169,7 @@ class WebReferences final : public web::ReferenceService {
                         const std::string& digest, Done done) override {
     const std::optional<Reference> reference = FindReference(id);
     const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
-    if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
-      return done(AnswerOf(why));
+    if (RefuseIf(appliance_.references().WhyNot(scan), done)) return;
     store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
       references.Approve(actor, id, revision, digest);
     });

@@ -17,7 +17,7 @@ class WebChecks final : public web::CheckService {
   WebChecks(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
 
   CheckStatus GetChecks() override {
-    return store_.Read([this](Store&) { return appliance_.Checks(); });
+    return store_.Read([this](Store&) { return appliance_.references().Checks(); });
   }
 
   void OpenCheck(const Actor& actor, Done done) override {
@@ -46,7 +46,7 @@ class WebRoomCalibration final : public web::RoomCalibrationService {
     web::RoomCalibrationStatus status;
     if (appliance_.store() == nullptr) return status;
     try {
-      status = appliance_.RoomCalibration();
+      status = appliance_.room().Calibration();
     } catch (const std::exception& error) {
       Log(LogLevel::kError,
           fmt::format("the room's calibration cannot be read from the store: {}", error.what()));
@@ -56,12 +56,12 @@ class WebRoomCalibration final : public web::RoomCalibrationService {
   }
 
   void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) override {
-    const auto [serial, since] = appliance_.RoomScansWanted();
+    const auto [serial, since] = appliance_.room().ScansWanted();
     // StoreAccess calls nothing once the services are destroyed, and the appliance outlives them.
     store_.Write(
         &Store::room,
         [&appliance = appliance_, done = std::move(done)](const Change& answer) {
-          if (answer.result == ChangeResult::kDone) appliance.RefreshRoom();
+          if (answer.result == ChangeResult::kDone) appliance.room().Refresh();
           done(answer);
         },
         [=, serial = serial, since = since](RoomStore& room) {
@@ -71,7 +71,7 @@ class WebRoomCalibration final : public web::RoomCalibrationService {
 
   std::optional<std::string> RoomBoardPdf(std::string& why_not) override {
     try {
-      return appliance_.RoomBoardPdf();
+      return appliance_.room().BoardPdf();
     } catch (const std::exception& error) {
       why_not = error.what();
       return std::nullopt;
@@ -88,14 +88,14 @@ class WebSensorProfiles final : public web::SensorProfileService {
   WebSensorProfiles(Appliance& appliance, StoreAccess& store)
       : appliance_(appliance), store_(store) {}
 
-  SensorProfiles GetSensorProfiles() override { return appliance_.UnitProfiles(); }
+  SensorProfiles GetSensorProfiles() override { return appliance_.profiles().OfConnected(); }
 
   std::optional<std::string> SensorProfileFile(int version) override {
-    return appliance_.SensorProfileFile(version);
+    return appliance_.profiles().FileOf(version);
   }
 
   void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) override {
-    ChangeProfile(serial, done, [=, shelf = appliance_.profiles()](AuditStore& audit) {
+    ChangeProfile(serial, done, [=, shelf = appliance_.profiles().shelf()](AuditStore& audit) {
       const int version = shelf->Reset(serial);
       audit.Log(actor, "profile.reset", serial, fmt::format("version {}", version));
     });
@@ -103,7 +103,7 @@ class WebSensorProfiles final : public web::SensorProfileService {
 
   void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
                              Done done) override {
-    ChangeProfile(serial, done, [=, shelf = appliance_.profiles()](AuditStore& audit) {
+    ChangeProfile(serial, done, [=, shelf = appliance_.profiles().shelf()](AuditStore& audit) {
       try {
         const int made = shelf->RollBack(serial, version);
         audit.Log(actor, "profile.roll_back", serial,
@@ -118,8 +118,8 @@ class WebSensorProfiles final : public web::SensorProfileService {
   /// As StoreAccess::Change(); afterwards the last scan's objection to the profile is discarded.
   void ChangeProfile(const std::string& serial, const Done& done,
                      std::function<void(AuditStore&)> change) {
-    if (const std::string why = appliance_.WhyNotChangeProfile(serial); !why.empty())
-      return done(AnswerOf(why));
+    if (RefuseIf(appliance_.WhyNotIdle(), done)) return;
+    if (RefuseIf(appliance_.profiles().WhyNotChange(serial), done)) return;
     store_.Write(
         &Store::audit,
         [this, done](const Change& answer) {

@@ -130,8 +130,8 @@ class WebScans final : public web::ScanService {
   };
 
   ReportSources SourcesIn(Store& store) const {
-    return {store.patients, store.references, store.scans, appliance_.warm_up_min(),
-            [this](const MarkerMap& scene) { return appliance_.RoomIn(scene); }};
+    return {store.patients, store.references, store.scans, appliance_.references().warm_up_min(),
+            [this](const MarkerMap& scene) { return appliance_.room().In(scene); }};
   }
 
   /// @throws DataError if there is none, or it cannot be read.

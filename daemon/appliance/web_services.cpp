@@ -40,7 +40,7 @@ WebServices::WebServices(Appliance& appliance, const UpdateConfig& update,
       updates_(
           appliance, std::move(restart),
           {.config = update,
-           .state = appliance.state_folder(),
+           .state = appliance.storage().state(),
            .boot = BootId(),
            .run_in_background =
                [this](std::function<void()> work) {

@@ -100,8 +100,7 @@ void CheckSensor(DoctorReport& report, const Config& config) try {
         report.Bad(finding.what, finding.found, finding.remedy);
     }
   }
-  SensorSettings settings = SensorSettingsOf(config);
-  settings.markers_are_the_rooms = true;
+  const SensorSettings settings = SensorSettingsOf(config);
   try {
     CheckAttached(report, driver, settings, config.appliance.sensor_serial);
   } catch (const DeviceError& error) {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <charconv>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -59,7 +59,6 @@ void RefuseControlCharacters(const std::string& text, const std::string& name) {
   }
 }
 
-const auto kAny = [](const auto&) { return true; };
 const std::vector<std::pair<std::string, Preset>> kPresets = {{"best", Preset::kBest},
                                                               {"paper", Preset::kPaper}};
 
@@ -76,19 +75,20 @@ void ReadMarkers(Section section, MarkerConfig& markers) {
 
 void ReadReconstruct(Section section, ReconstructorOptions& options) {
   section.TakeName("preset", options.preset, kPresets);
-  section.Take("keep_color", options.keep_color, "true or false", kAny);
-  section.Take("use_markers", options.use_markers, "true or false", kAny);
-  section.Take("use_keypoints", options.use_keypoints, "true or false", kAny);
-  section.Take("use_row_motion", options.use_row_motion, "true or false", kAny);
-  section.Take("use_tone_curve", options.use_tone_curve, "true or false", kAny);
-  section.Take("use_depth_field", options.use_depth_field, "true or false", kAny);
-  section.Take("use_dense_depth", options.use_dense_depth, "true or false", kAny);
+  section.TakeFlag("keep_color", options.keep_color);
+  section.TakeFlag("use_markers", options.use_markers);
+  section.TakeFlag("use_keypoints", options.use_keypoints);
+  section.TakeFlag("use_row_motion", options.use_row_motion);
+  section.TakeFlag("use_tone_curve", options.use_tone_curve);
+  section.TakeFlag("use_depth_field", options.use_depth_field);
+  section.TakeFlag("use_dense_depth", options.use_dense_depth);
   section.Take("keyframe_spacing", options.keyframe_spacing,
                "a number from 0.5 to 2, of the usual spacing",
                [](double v) { return v >= 0.5 && v <= 2; });
   section.Take("num_icp_iterations", options.num_icp_iterations, "a whole number from 1 to 1000",
                [](int n) { return n >= 1 && n <= 1000; });
-  section.Take("seed", options.seed, "a whole number, 0 or more", kAny);
+  section.Take("seed", options.seed, "a whole number, 0 or more",
+               [](std::uint64_t) { return true; });
   section.RejectUnknownKeys();
 }
 
@@ -107,10 +107,53 @@ void RefuseKeysOfThePlan(const Section& section) {
     section.Refuse(key, settings);
 }
 
+/// The loosest limits that a reader of the file takes. A room may be stricter than the method,
+/// never looser: what the method was measured with holds there.
+struct LoosestLimits {
+  AcceptanceLimits gates;
+  MarkerConsensusOptions markers;
+  std::string advice;  ///< In a refusal.
+};
+
+LoosestLimits LoosestFor(ConfigUse use) {
+  if (use == ConfigUse::kAppliance)
+    return {.gates = {},
+            .markers = {},
+            .advice =
+                "plumbd takes no limit that is looser than the method's own: remove the line, "
+                "or state a stricter one"};
+  return {.gates = kLoosestLimits,
+          .markers = {.moved_m = 100 * kMillimetre, .moved_sigmas = 100},
+          .advice = {}};
+}
+
+void ReadLimits(Section& section, ConfigUse use, CompareOptions& options) {
+  const auto [loosest, markers, advice] = LoosestFor(use);
+  AcceptanceLimits& limits = options.limits;
+  section.SetAdvice(advice);
+  section.Take("min_shared_markers", limits.min_shared_markers,
+               fmt::format("a whole number from {} to 1000", loosest.min_shared_markers),
+               [&](int n) { return n >= loosest.min_shared_markers && n <= 1000; });
+  section.TakeNumber("min_coverage", limits.min_coverage, loosest.min_coverage, 1, "a share");
+  const auto take = [&section](std::string_view key, double& value, double most, double unit,
+                               std::string_view unit_name) {
+    section.TakeLimit(key, value, most, unit, unit_name);
+  };
+  take("moved_marker_mm", options.markers.moved_m, markers.moved_m, kMillimetre, "millimetres");
+  take("moved_marker_sigmas", options.markers.moved_sigmas, markers.moved_sigmas, 1, "a number");
+  take("max_hole_mm", limits.max_hole_m, loosest.max_hole_m, kMillimetre, "millimetres");
+  take("max_residual_p95_mm", limits.max_residual_p95_m, loosest.max_residual_p95_m, kMillimetre,
+       "millimetres");
+  take("max_lost_s", limits.max_lost_s, loosest.max_lost_s, 1, "seconds");
+  take("max_breathing_mm", limits.max_breathing_m, loosest.max_breathing_m, kMillimetre,
+       "millimetres");
+}
+
 void ReadCompare(Section section, ConfigUse use, Config& config) {
   CompareOptions& options = config.compare;
   if (use == ConfigUse::kAppliance) RefuseKeysOfThePlan(section);
-  section.TakeName("preset", options.preset, kPresets);
+  section.Refuse("preset", "the preset of [reconstruct] holds for comparisons, too");
+  options.preset = config.reconstruct.preset;
   std::string region;
   section.Take("region", region, "the path of a region file",
                [](const std::string& s) { return !s.empty(); });
@@ -125,35 +168,32 @@ void ReadCompare(Section section, ConfigUse use, Config& config) {
                     {"HFP", PatientPosture::kHeadFirstProne},
                     {"FFS", PatientPosture::kFeetFirstSupine},
                     {"FFP", PatientPosture::kFeetFirstProne}});
-  section.TakeScaled("shift_tolerance_mm", options.limits.shift_tolerance_m, kMillimetre,
-                     "millimetres above 0");
-  section.TakeScaled("rotation_tolerance_deg", options.limits.rotation_tolerance_rad, kDegree,
-                     "degrees above 0");
-  section.Take("min_shared_markers", options.limits.min_shared_markers,
-               "a whole number from 1 to 1000", [](int n) { return n >= 1 && n <= 1000; });
-  section.TakeScaled("moved_marker_mm", options.markers.moved_m, kMillimetre,
-                     "millimetres above 0");
-  section.TakeScaled("moved_marker_sigmas", options.markers.moved_sigmas, 1.0, "a number above 0");
-  section.Take("min_coverage", options.limits.min_coverage, "a share from 0 to 1",
-               [](double v) { return v >= 0 && v <= 1; });
-  section.TakeScaled("max_hole_mm", options.limits.max_hole_m, kMillimetre, "millimetres above 0");
-  section.TakeScaled("max_residual_p95_mm", options.limits.max_residual_p95_m, kMillimetre,
-                     "millimetres above 0");
-  section.TakeScaled("max_lost_s", options.limits.max_lost_s, 1.0, "seconds above 0");
-  section.TakeScaled("max_breathing_mm", options.limits.max_breathing_m, kMillimetre,
-                     "millimetres above 0");
+  section.TakeLimit("shift_tolerance_mm", options.limits.shift_tolerance_m,
+                    kLoosestLimits.shift_tolerance_m, kMillimetre, "millimetres");
+  section.TakeLimit("rotation_tolerance_deg", options.limits.rotation_tolerance_rad,
+                    kLoosestLimits.rotation_tolerance_rad, kDegree, "degrees");
+  ReadLimits(section, use, options);
   section.RejectUnknownKeys();
 }
 
+/// Only plumbd uses them, and takes none that is looser than the method's.
 void ReadCheck(Section section, MarkerCheckLimits& limits) {
   constexpr double kPercent = 0.01;
-  section.TakeScaled("misfit_mm", limits.max_misfit_m, kMillimetre, "millimetres above 0");
-  section.TakeScaled("moved_mm", limits.max_moved_m, kMillimetre, "millimetres above 0");
-  section.TakeScaled("side_percent", limits.max_side_error, kPercent, "percent above 0");
-  section.TakeScaled("scale_percent", limits.max_scale_error, kPercent, "percent above 0");
-  section.TakeScaled("depth_percent", limits.max_depth_error, kPercent, "percent above 0");
-  section.Take("min_views", limits.min_views, "a whole number from 1 to 1000",
-               [](int n) { return n >= 1 && n <= 1000; });
+  const MarkerCheckLimits loosest;
+  section.SetAdvice(LoosestFor(ConfigUse::kAppliance).advice);
+  section.TakeLimit("misfit_mm", limits.max_misfit_m, loosest.max_misfit_m, kMillimetre,
+                    "millimetres");
+  section.TakeLimit("moved_mm", limits.max_moved_m, loosest.max_moved_m, kMillimetre,
+                    "millimetres");
+  section.TakeLimit("side_percent", limits.max_side_error, loosest.max_side_error, kPercent,
+                    "percent");
+  section.TakeLimit("scale_percent", limits.max_scale_error, loosest.max_scale_error, kPercent,
+                    "percent");
+  section.TakeLimit("depth_percent", limits.max_depth_error, loosest.max_depth_error, kPercent,
+                    "percent");
+  section.Take("min_views", limits.min_views,
+               fmt::format("a whole number from {} to 1000", loosest.min_views),
+               [&](int n) { return n >= loosest.min_views && n <= 1000; });
   section.RejectUnknownKeys();
 }
 
@@ -179,39 +219,18 @@ void ReadIec(Section section, const toml::table& root, std::optional<Pose>& T_ie
 }
 
 void ReadAppliance(Section section, ApplianceConfig& appliance) {
-  const auto take_path = [&](std::string_view key, std::filesystem::path& path) {
-    std::string text;
-    section.Take(key, text, "an absolute path",
-                 [](const std::string& s) { return s.starts_with('/') && s.size() < 4096; });
-    if (!text.empty()) path = text;
-  };
-  const auto take_seconds = [&](std::string_view key, std::optional<double>& value, double least,
-                                double most) {
-    section.Take(key, value, fmt::format("seconds from {} to {}", least, most),
-                 [&](double v) { return v >= least && v <= most; });
-  };
-  take_path("state", appliance.state);
-  take_path("control", appliance.control);
-  take_path("calibration", appliance.calibration);
+  for (const char* key : {"auto_stop_s", "scan_limit_s", "keep_recordings"})
+    section.Refuse(key, "set it on the page under Settings");
+  section.TakePath("state", appliance.state);
+  section.TakePath("control", appliance.control);
+  section.TakePath("calibration", appliance.calibration);
   section.Take("sensor_serial", appliance.sensor_serial, "the serial of a sensor",
                [](const std::string& s) { return s.size() <= 64; });
-  section.Take("sensor_profiles", appliance.sensor_profiles, "true or false", kAny);
-  section.Take("keep_recordings", appliance.keep_recordings, "true or false", kAny);
+  section.TakeFlag("sensor_profiles", appliance.sensor_profiles);
   section.Take("quota_gb", appliance.quota_gb, "gigabytes from 1 to 100000",
                [](double v) { return v >= 1 && v <= 100000; });
-  take_seconds("auto_stop_s", appliance.auto_stop_s, 1, 120);
-  take_seconds("scan_limit_s", appliance.scan_limit_s, 1, 600);
-  std::optional<double> result_s;
-  take_seconds("result_s", result_s, 1, 3600);
-  appliance.result_s = result_s.value_or(appliance.result_s);
-  const auto take_minutes = [&](std::string_view key, double& value, double least, double most) {
-    std::optional<double> minutes;
-    section.Take(key, minutes, fmt::format("minutes from {} to {}", least, most),
-                 [&](double v) { return v >= least && v <= most; });
-    value = minutes.value_or(value);
-  };
-  take_minutes("warm_up_min", appliance.warm_up_min, 0, 120);
-  take_minutes("session_idle_min", appliance.session_idle_min, 1, 600);
+  section.TakeNumber("warm_up_min", appliance.warm_up_min, 0, 120, "minutes");
+  section.TakeNumber("session_idle_min", appliance.session_idle_min, 1, 600, "minutes");
   section.RejectUnknownKeys();
 }
 
@@ -223,16 +242,9 @@ void ReadSensor(Section section, ApplianceConfig& appliance) {
 }
 
 void ReadStorage(Section section, ApplianceConfig& appliance) {
-  std::string folder;
-  section.Take("backup_folder", folder, "an absolute path",
-               [](const std::string& s) { return s.starts_with('/') && s.size() < 1024; });
-  if (!folder.empty()) appliance.backup_folder = folder;
-  section.Take("backup_hours", appliance.backup_hours, "hours from 1 to 8760",
-               [](double v) { return v >= 1 && v <= 8760; });
-  std::string key_file;
-  section.Take("backup_key_file", key_file, "an absolute path",
-               [](const std::string& s) { return s.starts_with('/') && s.size() < 1024; });
-  appliance.backup_key_file = key_file;
+  section.TakePath("backup_folder", appliance.backup_folder);
+  section.TakeNumber("backup_hours", appliance.backup_hours, 1, 8760, "hours");
+  section.TakePath("backup_key_file", appliance.backup_key_file);
   section.RejectUnknownKeys();
 }
 
@@ -243,22 +255,19 @@ void ReadPanel(Section button, Section light, PanelConfig& panel) {
   };
   take(button, "chip", panel.button_chip);
   take(button, "line", panel.button_line);
-  button.Take("active_low", panel.button_active_low, "true or false", kAny);
+  button.TakeFlag("active_low", panel.button_active_low);
   button.RejectUnknownKeys();
   take(light, "chip", panel.light_chip);
   take(light, "red", panel.red_line);
   take(light, "green", panel.green_line);
   take(light, "blue", panel.blue_line);
   take(light, "beeper", panel.beeper_line);
-  light.Take("active_low", panel.light_active_low, "true or false", kAny);
+  light.TakeFlag("active_low", panel.light_active_low);
   light.RejectUnknownKeys();
 }
 
 void ReadUpdate(Section section, UpdateConfig& update) {
-  std::string folder;
-  section.Take("folder", folder, "an absolute path",
-               [](const std::string& text) { return text.starts_with('/') && text.size() < 4096; });
-  if (!folder.empty()) update.folder = folder;
+  section.TakePath("folder", update.folder);
   section.Take("max_bundle_mb", update.max_bundle_mb, "a whole number from 1 to 65536",
                [](int n) { return n >= 1 && n <= 65536; });
   section.RejectUnknownKeys();
@@ -268,15 +277,9 @@ void ReadWeb(Section section, WebConfig& web) {
   section.Take("listen", web.listen,
                "an address and a port, such as \"0.0.0.0:8080\" or \"[::]:8080\"",
                [](const std::string& s) { return ParseListenAddress(s).has_value(); });
-  const auto take_path = [&](std::string_view key, std::filesystem::path& path) {
-    std::string text;
-    section.Take(key, text, "an absolute path",
-                 [](const std::string& s) { return s.starts_with('/') && s.size() < 4096; });
-    if (!text.empty()) path = text;
-  };
-  take_path("tls_certificate", web.tls_certificate);
-  take_path("tls_key", web.tls_key);
-  section.Take("plain_http", web.plain_http, "true or false", kAny);
+  section.TakePath("tls_certificate", web.tls_certificate);
+  section.TakePath("tls_key", web.tls_key);
+  section.TakeFlag("plain_http", web.plain_http);
   section.TakeNames("host_names", web.host_names, "a list of at most 16 host names", 16);
   section.RejectUnknownKeys();
 }
@@ -336,14 +339,9 @@ toml::table ParseToml(const std::string& text, const std::string& name) try {
 
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
   const toml::table root = ParseToml(text, name);
-  static constexpr std::array<std::string_view, 12> kSections = {
-      "markers", "reconstruct", "compare", "check", "iec", "appliance",
-      "storage", "sensor",      "button",  "light", "web", "update"};
-  for (const auto& [key, node] : root) {
-    if (std::find(kSections.begin(), kSections.end(), key.str()) != kSections.end()) continue;
-    throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known are [{}]", name,
-                                node.source().begin.line, key.str(), fmt::join(kSections, "], [")));
-  }
+  RejectUnknownTables(root, name,
+                      {"markers", "reconstruct", "compare", "check", "iec", "appliance", "storage",
+                       "sensor", "button", "light", "web", "update"});
   Config config;
   config.given = GivenIn(root);
   ReadMarkers(Section(root, "markers", name), config.markers);
@@ -388,16 +386,14 @@ Config SalvageConfig(const std::filesystem::path& file) {
 }
 
 void RefuseResearchPresets(const Config& config) {
-  const auto refuse = [](Preset preset, const char* section) {
-    if (preset == Preset::kBest) return;
-    throw DataError(fmt::format(
-        "[{}] preset: expected \"best\", found \"{}\"; plumbd takes preset \"{}\" only with "
-        "--simulated, because it is the published method kept for comparison. Remove the "
-        "key, or compare scans with `plumb compare --preset {}`",
-        section, Name(preset), Name(preset), Name(preset)));
-  };
-  refuse(config.reconstruct.preset, "reconstruct");
-  refuse(config.compare.preset, "compare");
+  const Preset preset = config.reconstruct.preset;
+  if (preset == Preset::kBest) return;
+  throw DataError(fmt::format(
+      "[reconstruct] preset: expected \"best\", found \"{0}\"; plumbd takes preset \"{0}\" only "
+      "with --simulated, because it is the published method kept for comparison. Remove the key, "
+      "or "
+      "compare scans with `plumb compare --preset {0}`",
+      Name(preset)));
 }
 
 std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {

@@ -33,13 +33,8 @@ struct ApplianceConfig {
   std::string sensor_driver;         ///< Driver of the sensors; empty: the first of the build.
   /// Scans start from what earlier scans learned about this sensor unit.
   bool sensor_profiles = true;
-  bool keep_recordings = false;  ///< Record every scan, whatever the page's settings are.
   /// Limit for all scans; the oldest are removed first. Not set: a fraction of the disk.
   std::optional<double> quota_gb;
-  /// Time without new coverage after which the sweep ends; not set: the page's setting.
-  std::optional<double> auto_stop_s;
-  std::optional<double> scan_limit_s;  ///< Longest sweep; not set: the page's setting.
-  double result_s = 120.0;             ///< Time for which a result is shown.
   double warm_up_min = 15.0;  ///< Time that the sensor must have been on before a reference scan.
   double session_idle_min = 30.0;       ///< Time without a scan after which a session is closed.
   std::filesystem::path backup_folder;  ///< Folder of scheduled backups; empty: none are made.
@@ -111,27 +106,26 @@ struct Config {
 
 /// The reader of a file. The keys are the same for both, but plumbd refuses those of [compare] that
 /// belong to a patient (region, isocentre_m, marker_kind, posture and the two tolerances) and takes
-/// them from the approved plan of the reference.
+/// them from the approved plan of the reference, and it refuses limits that are looser than the
+/// method's own.
 enum class ConfigUse { kCommandLine, kAppliance };
 
 /// Reads and checks a file.
 ///
 ///     [markers]      dictionary, length_m, reference
-///     [reconstruct]  preset, keep_color, use_markers, use_keypoints, use_row_motion,
-///                    use_tone_curve, use_depth_field, use_dense_depth, keyframe_spacing,
-///                    num_icp_iterations, seed
-///     [compare]      preset, region, isocentre_m = [x, y, z], marker_kind = "room"|"couch",
+///     [reconstruct]  preset (also of [compare]), keep_color, use_markers, use_keypoints,
+///                    use_row_motion, use_tone_curve, use_depth_field, use_dense_depth,
+///                    keyframe_spacing, num_icp_iterations, seed
+///     [compare]      region, isocentre_m = [x, y, z], marker_kind = "room"|"couch",
 ///                    posture = "HFS"|"HFP"|"FFS"|"FFP",
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers,
 ///                    moved_marker_mm, moved_marker_sigmas, min_coverage, max_hole_mm,
 ///                    max_residual_p95_mm, max_lost_s, max_breathing_mm
 ///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views
-///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to the IEC fixed
-///     frame
+///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to IEC fixed frame
 ///     [storage]      backup_folder, backup_hours, backup_key_file
-///     [appliance]    state, control, calibration,
-///     sensor_serial, sensor_profiles, keep_recordings, quota_gb,
-///                    auto_stop_s, scan_limit_s, result_s, warm_up_min, session_idle_min
+///     [appliance]    state, control, calibration, sensor_serial, sensor_profiles, quota_gb,
+///                    warm_up_min, session_idle_min
 ///     [sensor]       driver
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -23,6 +25,17 @@ namespace plumb {
 
 /// @param name  Name of the file for messages. @throws DataError naming file and line.
 [[nodiscard]] toml::table ParseToml(const std::string& text, const std::string& name);
+
+/// @param known  Names of the tables that the file may have. @throws DataError naming file and
+/// line.
+inline void RejectUnknownTables(const toml::table& root, const std::string& file,
+                                std::initializer_list<std::string_view> known) {
+  for (const auto& [key, node] : root) {
+    if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
+    throw DataError(fmt::format("{}:{}: unknown table or key '{}'; expected [{}]", file,
+                                node.source().begin.line, key.str(), fmt::join(known, "], [")));
+  }
+}
 
 /// Keys that were not consumed are unknown, and refused. All functions throw DataError.
 class Section {
@@ -63,13 +76,36 @@ class Section {
     value = found;
   }
 
-  /// A positive number with another unit than inside the program.
-  void TakeScaled(std::string_view key, double& value, double unit, std::string_view expected) {
-    double number = value / unit;
-    bool taken = false;
-    Take(key, number, expected, [&](double v) { return taken = std::isfinite(v) && v > 0; });
-    if (taken) value = number * unit;
+  void TakeFlag(std::string_view key, bool& value) {
+    Take(key, value, "true or false", [](bool) { return true; });
   }
+
+  void TakePath(std::string_view key, std::filesystem::path& path) {
+    std::string text;
+    Take(key, text, "an absolute path",
+         [](const std::string& s) { return s.starts_with('/') && s.size() < 1024; });
+    if (!text.empty()) path = text;
+  }
+
+  /// A number in a range, with the name of its unit.
+  void TakeNumber(std::string_view key, double& value, double least, double most,
+                  std::string_view unit) {
+    Take(key, value, fmt::format("{} from {} to {}", unit, least, most),
+         [&](double v) { return v >= least && v <= most; });
+  }
+
+  /// A limit above 0 that may not exceed `most`.
+  /// @param value  Like `most` in the unit inside the program, of which the file's is `unit`.
+  void TakeLimit(std::string_view key, double& value, double most, double unit,
+                 std::string_view unit_name) {
+    double number = 0.0;
+    Take(key, number, fmt::format("{} above 0 and at most {:g}", unit_name, most / unit),
+         [&](double v) { return v > 0 && v * unit <= most; });
+    if (number > 0) value = number * unit;
+  }
+
+  /// What the user can do about a value that is refused from now on.
+  void SetAdvice(std::string advice) { advice_ = std::move(advice); }
 
   template <typename T>
   void TakeName(std::string_view key, T& value,
@@ -155,8 +191,9 @@ class Section {
                          std::string_view expected) const {
     std::ostringstream found;
     node.visit([&found](const auto& n) { found << n; });
-    throw DataError(fmt::format("{}:{}: {}.{}: expected {}, found {}", file_,
-                                node.source().begin.line, name_, key, expected, found.str()));
+    throw DataError(fmt::format("{}:{}: {}.{}: expected {}, found {}{}{}", file_,
+                                node.source().begin.line, name_, key, expected, found.str(),
+                                advice_.empty() ? "" : "; ", advice_));
   }
 
  private:
@@ -169,6 +206,7 @@ class Section {
   const std::string& file_;
   const toml::table* table_ = nullptr;
   std::vector<std::string> taken_;
+  std::string advice_;
 };
 
 }  // namespace plumb

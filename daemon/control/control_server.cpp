@@ -70,7 +70,6 @@ ControlServer::ControlServer(EventLoop& loop, int listening, Handler handler,
 }
 
 ControlServer::~ControlServer() {
-  *alive_ = false;
   source_ = {};
   clients_.clear();
   ::close(listening_);
@@ -160,12 +159,11 @@ void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
     }
     if (request.kind == ControlRequest::Kind::kWatch) client.watches = true;
     ++client.unanswered;
-    handler_(request, [this, id, alive = alive_](const std::string& reply) {
-      if (!*alive) return;
+    handler_(request, alive_.WhileAlive([this, id](const std::string& reply) {
       if (const auto found = clients_.find(id); found != clients_.end())
         --found->second->unanswered;
       Send(id, reply);
-    });
+    }));
   } catch (const DataError& error) {
     Send(id, ControlRefusal(error.what(), /*is_input=*/true));
   } catch (const std::exception& error) {  // it costs this connection, and not plumbd

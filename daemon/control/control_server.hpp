@@ -9,6 +9,7 @@
 #include <string>
 
 #include "daemon/control/control_protocol.hpp"
+#include "daemon/loop/alive_flag.hpp"
 #include "daemon/loop/event_loop.hpp"
 
 namespace plumb {
@@ -60,8 +61,7 @@ class ControlServer {
   ControlServerOptions options_;
   std::map<std::uint64_t, std::unique_ptr<Client>> clients_;
   std::uint64_t next_id_ = 1;
-  std::shared_ptr<bool> alive_ =
-      std::make_shared<bool>(true);  ///< For replies that arrive after this object is destroyed.
+  AliveFlag alive_;  ///< For replies that arrive after this object is destroyed.
   EventLoop::Source source_;
 };
 

@@ -104,6 +104,21 @@ Json RegionJson(const RegionCoverage& region, const AcceptanceLimits& limits) {
           {"max_hole_m", limits.max_hole_m}};
 }
 
+/// Every limit that decided about the verdict, so that a result states by what it was judged.
+Json LimitsJson(const Comparison& comparison) {
+  const AcceptanceLimits& limits = comparison.limits;
+  return {{"shift_tolerance_mm", limits.shift_tolerance_m / kMillimetre},
+          {"rotation_tolerance_deg", limits.rotation_tolerance_rad / kDegree},
+          {"min_shared_markers", limits.min_shared_markers},
+          {"moved_marker_mm", comparison.marker_consensus.moved_m / kMillimetre},
+          {"moved_marker_sigmas", comparison.marker_consensus.moved_sigmas},
+          {"min_coverage", limits.min_coverage},
+          {"max_hole_mm", limits.max_hole_m / kMillimetre},
+          {"max_residual_p95_mm", limits.max_residual_p95_m / kMillimetre},
+          {"max_lost_s", limits.max_lost_s},
+          {"max_breathing_mm", limits.max_breathing_m / kMillimetre}};
+}
+
 Json BodyPartsJson(const BodyParts& body) {
   Json parts = Json::array();
   const auto words = [](const BodyPart& part, const std::optional<double>& height_m) {
@@ -190,6 +205,7 @@ std::string ResultJson(const Comparison& comparison, const std::optional<ResultR
                              {"current", named(comparison.current_profile)}};
   json["verdict"] = Name(comparison.verdict);
   json["reasons"] = comparison.reasons;
+  json["limits"] = LimitsJson(comparison);
   json["alignment"] = comparison.alignment ? AlignmentJson(*comparison.alignment) : Json(nullptr);
   json["motion"] = comparison.motion ? MotionJson(*comparison.motion) : Json(nullptr);
   json["correction"] =

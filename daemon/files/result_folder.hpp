@@ -36,8 +36,9 @@ struct ResultRoom {
                                      const std::optional<ResultRoom>& room = {});
 
 struct PictureOptions {
-  double tolerance_m = 3 * kMillimetre;  ///< Tolerance of the colour scale.
-  bool paper_colors = false;             ///< Use the paper's scale, blue at 0 to red at 10 cm.
+  /// Tolerance of the colour scale.
+  double tolerance_m = kDefaultShiftTolerance_mm * kMillimetre;
+  bool paper_colors = false;  ///< Use the paper's scale, blue at 0 to red at 10 cm.
   std::string subtitle;
 };
 

@@ -209,6 +209,10 @@ void EventLoop::Source::ArmAt(Clock::time_point time) {
 
 void EventLoop::Source::ArmAfter(std::chrono::microseconds delay) { ArmAt(Clock::now() + delay); }
 
+void EventLoop::Source::ArmAfterSeconds(double seconds) {
+  ArmAfter(std::chrono::microseconds(static_cast<std::int64_t>(seconds * 1e6)));
+}
+
 void EventLoop::Source::Disarm() {
   Checked(sd_event_source_set_enabled(impl_->source, SD_EVENT_OFF), "disarm a timer");
 }

@@ -69,6 +69,7 @@ class EventLoop::Source {
   /// For a timer: expires once, at this time or after this duration; replaces an earlier arming.
   void ArmAt(Clock::time_point time);
   void ArmAfter(std::chrono::microseconds delay);
+  void ArmAfterSeconds(double seconds);
   void Disarm();
   [[nodiscard]] bool is_armed() const;
 

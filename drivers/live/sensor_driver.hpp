@@ -31,9 +31,9 @@ struct SensorSettings {
   double marker_length_m = kDefaultMarkerLength_m;
   std::optional<int> reference_marker = {};
   /// The three values above describe the room: a calibration file that states other markers is
-  /// refused. Off for recordings and the virtual sensor, whose file is the only source for their
-  /// markers.
-  bool markers_are_the_rooms = false;
+  /// refused. Only drivers of simulated sensors switch this off: the file of such a unit is the
+  /// only source for its markers.
+  bool markers_are_the_rooms = true;
 };
 
 /// Sweeps shown by a simulated sensor; drivers of real sensors ignore them.

@@ -77,6 +77,7 @@ class VirtualSetup : public SensorSetup {
                const std::stop_token& stop, const SetUpProgress& progress) {
     const RenderedScenes scenes = RenderScenes(options, stop, progress);
     settings.calibration_folder.clear();  // it belongs to real sensors
+    settings.markers_are_the_rooms = false;
     std::vector<std::string> caches;
     for (const std::filesystem::path& cache : scenes.caches) caches.push_back(cache.string());
     units_ = {.bus = std::make_shared<VirtualBus>(std::make_shared<Stage>(caches), options.serial),

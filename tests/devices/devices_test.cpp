@@ -116,9 +116,12 @@ TEST_F(DevicesTest, ADamagedOniFileIsBadInput) {
 }
 
 TEST_F(DevicesTest, RecordsAVirtualSensorToAFolderAndToAnOniFile) {
+  // Other markers than the virtual sensor's: its own file is the source for them.
+  WriteText(folder_ / "room.toml", "[markers]\nlength_m = 0.083\nreference = 11\n");
   for (const char* name : {"r", "r.oni"}) {
-    const RunResult record = Plumb(
-        {"record", "--simulated", "demo", "--seconds", "0.5", "--out", (folder_ / name).string()});
+    const RunResult record =
+        Plumb({"record", "--simulated", "demo", "--seconds", "0.5", "--config",
+               (folder_ / "room.toml").string(), "--out", (folder_ / name).string()});
     ASSERT_EQ(record.exit_code, 0) << record.err;
     EXPECT_THAT(record.out, HasSubstr("VIRTUAL-0001"));
     const json facts = json::parse(Plumb({"info", (folder_ / name).string(), "--json"}).out);
@@ -126,7 +129,8 @@ TEST_F(DevicesTest, RecordsAVirtualSensorToAFolderAndToAnOniFile) {
     EXPECT_LE(facts.at("frames"), 25);
     EXPECT_NE(facts.at("calibration"), "assumed");
   }
-  EXPECT_THAT(LeftBehind({"r", "r.oni", "r.oni.yaml"}), IsEmpty());
+  EXPECT_THAT(ReadText(folder_ / "r" / "camera.yaml"), HasSubstr("marker_length: 0.104"));
+  EXPECT_THAT(LeftBehind({"r", "r.oni", "r.oni.yaml", "room.toml"}), IsEmpty());
 }
 
 #endif

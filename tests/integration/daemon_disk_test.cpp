@@ -397,11 +397,11 @@ TEST_F(DaemonDiskTest, ACopyOfTheDiskAtAnyMomentStartsWithEveryScanThatWasAnnoun
 TEST(DaemonPowerCutTest, AScanIsCalledDoneOnlyAfterAllOfItIsOnTheDisk) {
   testing::RenderOnce();
   const testing::TempFolder folder;
-  std::ofstream(folder / "plumb.toml") << "[appliance]\nkeep_recordings = true\n";
-  Plumbd plumbd(folder.path(), {.arguments = {"--config", folder / "plumb.toml"},
-                                .environment = {{"LD_PRELOAD", PLUMB_SYNC_LOG},
-                                                {"PLUMB_SYNC_LOG", folder / "synced"}},
-                                .scenes = 2});
+  Plumbd plumbd(
+      folder.path(),
+      {.environment = {{"LD_PRELOAD", PLUMB_SYNC_LOG}, {"PLUMB_SYNC_LOG", folder / "synced"}},
+       .scenes = 2,
+       .settings = [](Settings& settings) { settings.keep_recordings = true; }});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   plumbd.ScanOnce();

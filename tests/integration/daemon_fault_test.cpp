@@ -408,9 +408,9 @@ TEST_F(DaemonFaultTest, WhatItStoresIsForItsAccountAndItsGroupWhateverTheUmask) 
 }
 
 TEST_F(DaemonFaultTest, ASecondPlumbdOnTheSameFolderIsSafeModeAndTheFirstGoesOn) {
-  std::ofstream(folder_ / "plumb.toml")
-      << "[appliance]\nauto_stop_s = 100\n";  // the second one may take long to start
-  Plumbd first(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  // The second one may take long to start.
+  Plumbd first(folder_.path(),
+               {.settings = [](Settings& settings) { settings.auto_stop_s = 100; }});
   ASSERT_TRUE(first.WaitUntilUp());
   first.WaitForState("ready");
   ASSERT_EQ(first.Press()["ok"], true);
@@ -462,20 +462,21 @@ TEST_F(DaemonFaultTest, ManyShortScansLeaveNoThreadsDescriptorsOrMemoryBehind) {
 
 TEST_F(DaemonFaultTest, SighupTakesAGoodConfigurationAndKeepsTheOldOneForABadOne) {
   const fs::path config = folder_ / "plumb.toml";
-  std::ofstream(config) << "[appliance]\nscan_limit_s = 600\n";
+  std::ofstream(config) << "[appliance]\nwarm_up_min = 20\n";
   Plumbd plumbd(folder_.path(), {.arguments = {"--config", config}});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
-  std::ofstream(config) << "[appliance]\nscan_limit_s = -1\n";
+  std::ofstream(config) << "[appliance]\nwarm_up_min = -1\n";
   plumbd.Signal(SIGHUP);
   plumbd.WaitForLog("plumb.toml:2");
-  std::ofstream(config) << "[appliance]\nscan_limit_s = 1\n[markers]\nlength_m = "
+  std::ofstream(config) << "[reconstruct]\npreset = \"paper\"\n[markers]\nlength_m = "
                            "0.05\n[web]\nhost_names = [\"scan.example\"]\n";
   plumbd.Signal(SIGHUP);
   plumbd.WaitForLog("only after a restart: markers.length_m, web.host_names");
-  plumbd.Press();
-  plumbd.WaitForState("result");
-  EXPECT_THAT(plumbd.log(), HasSubstr("longest duration")) << "the new limit holds";
+  const std::string scan = plumbd.ScanOnce()["last_result"]["scan"];
+  EXPECT_THAT(ReadTextFile(plumbd.state() / "scans" / scan / "scene" / "scene.json", 1 << 20),
+              HasSubstr("\"preset\": \"paper\""))
+      << "the new preset holds";
   EXPECT_THAT(plumbd.notifications(), HasSubstr("RELOADING=1"));
 }
 
@@ -501,10 +502,10 @@ TEST_F(DaemonFaultTest, TheWatchdogIsFedWhileItScansAndAfter) {
 TEST_F(DaemonFaultTest, AClockThatStepsDisturbsNoTimer) {
   // Wall-clock time comes from a library loaded before the others, which adds what a file says.
   std::ofstream(folder_ / "offset") << 0;
-  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nauto_stop_s = 1.5\n";
-  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"},
-                                 .environment = {{"LD_PRELOAD", PLUMB_CLOCK_STEP},
-                                                 {"PLUMB_CLOCK_OFFSET", folder_ / "offset"}}});
+  Plumbd plumbd(folder_.path(),
+                {.environment = {{"LD_PRELOAD", PLUMB_CLOCK_STEP},
+                                 {"PLUMB_CLOCK_OFFSET", folder_ / "offset"}},
+                 .settings = [](Settings& settings) { settings.auto_stop_s = 1.5; }});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   plumbd.Press();

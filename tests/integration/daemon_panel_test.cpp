@@ -43,7 +43,7 @@ class DaemonPanelTest : public ::testing::Test {
     std::ofstream(folder_ / "plumb.toml")
         << "[button]\nline = \"start\"\n[light]\nred = \"red\"\ngreen = \"green\"\nblue = "
            "\"blue\"\n"
-        << "beeper = \"beeper\"\n[appliance]\nauto_stop_s = 100\n";
+        << "beeper = \"beeper\"\n";
   }
   ~DaemonPanelTest() override { ::close(button_); }
 
@@ -53,7 +53,8 @@ class DaemonPanelTest : public ::testing::Test {
     return {.arguments = arguments,
             .environment = {{"LD_PRELOAD", PLUMB_FAKE_GPIOD ":" PLUMB_DISK_USE},
                             {"PLUMB_FAKE_GPIO", folder_.path()},
-                            {"PLUMB_DISK_USED_PERCENT", "50"}}};
+                            {"PLUMB_DISK_USED_PERCENT", "50"}},
+            .settings = [](Settings& settings) { settings.auto_stop_s = 100; }};
   }
 
   void Edge(char edge) const { ASSERT_EQ(::write(button_, &edge, 1), 1); }
@@ -243,7 +244,9 @@ TEST_F(DaemonPanelTest, TheLightShowsThatTheDiskIsNearlyFull) {
 }
 
 TEST_F(DaemonPanelTest, WhileTheServiceDoesNotRunTheLightSaysSo) {
-  Plumbd light(folder_.path(), Options({"--show-stopped"}));  // answers at no socket
+  testing::PlumbdOptions options = Options({"--show-stopped"});  // answers at no socket
+  options.settings = {};  // the store would be opened for them
+  Plumbd light(folder_.path(), options);
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (NumPhases({"red"}) < 3 && std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(milliseconds(50));

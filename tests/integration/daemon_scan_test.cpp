@@ -73,9 +73,11 @@ TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion
 
 TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
   std::ofstream(folder_ / "plumb.toml")
-      << "[appliance]\nkeep_recordings = true\nsensor_profiles = false\n"
-         "[reconstruct]\nkeep_color = false\n";
-  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}, .scenes = 2});
+      << "[appliance]\nsensor_profiles = false\n[reconstruct]\nkeep_color = false\n";
+  Plumbd plumbd(folder_.path(),
+                {.arguments = {"--config", folder_ / "plumb.toml"},
+                 .scenes = 2,
+                 .settings = [](Settings& settings) { settings.keep_recordings = true; }});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   plumbd.ScanOnce();
@@ -129,8 +131,8 @@ TEST_F(DaemonScanTest, WhatAGoodScanTaughtOfTheSensorIsWhereTheNextOneBegins) {
 }
 
 TEST_F(DaemonScanTest, ASweepEndsByItselfWhenNothingNewIsSeen) {
-  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nauto_stop_s = 1.5\n";
-  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  Plumbd plumbd(folder_.path(),
+                {.settings = [](Settings& settings) { settings.auto_stop_s = 1.5; }});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   EXPECT_EQ(plumbd.Press()["ok"], true);
@@ -142,8 +144,8 @@ TEST_F(DaemonScanTest, ASweepEndsByItselfWhenNothingNewIsSeen) {
 }
 
 TEST_F(DaemonScanTest, ASweepEndsAtItsLimit) {
-  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\n";
-  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  Plumbd plumbd(folder_.path(),
+                {.settings = [](Settings& settings) { settings.scan_limit_s = 1; }});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   EXPECT_EQ(plumbd.Press()["ok"], true);
@@ -152,16 +154,14 @@ TEST_F(DaemonScanTest, ASweepEndsAtItsLimit) {
 }
 
 TEST_F(DaemonScanTest, AResultIsPutAwayAfterItsTimeAndThePressStartsTheNextScanBefore) {
-  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\nresult_s = 600\n";
-  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  Plumbd plumbd(folder_.path(),
+                {.arguments = {"--sim-result-s", "10"},
+                 .settings = [](Settings& settings) { settings.scan_limit_s = 1; }});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   plumbd.Press();
   const json first = plumbd.WaitForState("result");
-  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\nresult_s = 1\n";
-  plumbd.Signal(SIGHUP);
-  plumbd.WaitForLog("read again");
-  EXPECT_EQ(plumbd.Press()["ok"], true) << "its 600 s are not over";
+  EXPECT_EQ(plumbd.Press()["ok"], true) << "its 10 s are not over";
   const json later = plumbd.WaitForState("ready");
   EXPECT_TRUE(later["last_result"].is_object()) << "the status still has the last result";
   EXPECT_NE(later["last_result"]["scan"], first["last_result"]["scan"])

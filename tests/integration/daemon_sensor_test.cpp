@@ -2,6 +2,7 @@
 // out of order or of a wrong size.
 #include <csignal>
 #include <fstream>
+#include <optional>
 #include <random>
 #include <thread>
 
@@ -37,14 +38,17 @@ class DaemonSensorTest : public ::testing::Test {
   /// The virtual sensor is seen through OpenNI2, as real ones are. plumbd keeps its recordings,
   /// which record the calibration that a scan used, and the virtual sensor's files are in our
   /// reach.
-  [[nodiscard]] testing::PlumbdOptions Options(const std::string& more = {}, int scenes = 1) const {
-    std::ofstream(folder_ / "plumb.toml") << "[sensor]\ndriver = \"virtual-openni\"\n"
-                                             "[appliance]\nkeep_recordings = true\n"
-                                          << more;
+  [[nodiscard]] testing::PlumbdOptions Options(std::optional<double> auto_stop_s = {},
+                                               int scenes = 1, const std::string& more = {}) const {
+    std::ofstream(folder_ / "plumb.toml") << "[sensor]\ndriver = \"virtual-openni\"\n" << more;
     fs::create_directories(folder_ / "tmp");
     return {.arguments = {"--config", folder_ / "plumb.toml"},
             .environment = {{"TMPDIR", folder_ / "tmp"}},
-            .scenes = scenes};
+            .scenes = scenes,
+            .settings = [auto_stop_s](Settings& settings) {
+              settings.keep_recordings = true;
+              settings.auto_stop_s = auto_stop_s.value_or(settings.auto_stop_s);
+            }};
   }
 
   /// Gives a unit the first one's calibration with another focal length, and returns that.
@@ -168,7 +172,8 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheOneInUseStaysAndTheOtherIsToldAndTakesOv
 }
 
 TEST_F(DaemonSensorTest, OfTwoSensorsTheConfiguredOneIsUsedAndNoOther) {
-  Plumbd plumbd(folder_.path(), Options(fmt::format("sensor_serial = \"{}\"\n", kSecond)));
+  Plumbd plumbd(folder_.path(),
+                Options({}, 1, fmt::format("[appliance]\nsensor_serial = \"{}\"\n", kSecond)));
   ASSERT_TRUE(plumbd.WaitUntilUp());
   EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(),
               AllOf(HasSubstr(kFirst), HasSubstr(kSecond)));
@@ -181,7 +186,7 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheConfiguredOneIsUsedAndNoOther) {
 TEST_F(DaemonSensorTest,
        FramesThatComeFasterThanTrackingAreDroppedCountedAndShownAndTheResultIsRightOrNone) {
   Plumbd plumbd(folder_.path(),
-                Options("auto_stop_s = 100\n",
+                Options(100.0,
                         2));  // the press is to end the second sweep, however slow tracking is
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
@@ -289,7 +294,7 @@ class DaemonGlitchTest : public DaemonSensorTest,
 
 TEST_P(DaemonGlitchTest, AreCountedAndTheResultIsRightOrSaidToBeNone) {
   const std::string glitch = GetParam();
-  Plumbd plumbd(folder_.path(), Options("auto_stop_s = 1.5\n", 2));
+  Plumbd plumbd(folder_.path(), Options(1.5, 2));
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
   const json first = ScanWith(plumbd, glitch);

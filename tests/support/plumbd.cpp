@@ -24,6 +24,7 @@
 #include <thread>
 
 #include "daemon/control/unix_socket.hpp"
+#include "daemon/records/store.hpp"
 #include "tests/support/sanitized.hpp"
 
 namespace plumb::testing {
@@ -76,6 +77,12 @@ int MakeNotifySocket(const fs::path& path) {
 
 Plumbd::Plumbd(const fs::path& folder, PlumbdOptions options)
     : folder_(folder), state_(options.state.empty() ? folder / "state" : options.state) {
+  if (options.settings) {
+    Store store(state_);
+    Settings settings = store.settings.Get();
+    options.settings(settings);
+    store.settings.Change({.user = "test", .address = ""}, settings);
+  }
   notify_fd_ = MakeNotifySocket(folder_ / "notify.sock");
   std::vector<std::string> arguments = {PLUMBD_BINARY,
                                         "--simulated",

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/temp_folder.hpp"
+#include "web/model/settings.hpp"
 
 namespace plumb::testing {
 
@@ -27,6 +28,7 @@ struct PlumbdOptions {
   long max_file_bytes = 0;           ///< > 0: larger files fail as on a full disk.
   std::filesystem::path state = {};  ///< Empty: a folder in the test's own.
   std::string listen = "127.0.0.1:0";
+  std::function<void(Settings&)> settings = {};  ///< Changes those of the page before the start.
 };
 
 /// Starts plumbd and speaks to it. Every wait is for a condition, with a generous end. Killed by

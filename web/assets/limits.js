@@ -10,6 +10,9 @@ export const kBounds = {
   idle_logout_min: { min: 1, max: 240, step: 1 },
 };
 
+/// For how long a result is shown as one to act on (web/model/scan.hpp).
+export const kResult = { valid_s: 120 };
+
 export const kName = { maxlength: 32 };
 export const kSite = { maxlength: 64 };
 export const kNote = { maxlength: 500 };

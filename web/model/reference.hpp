@@ -6,13 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/default_tolerance.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
 
 struct Tolerance {
-  double shift_mm = 3.0;
-  double rotation_deg = 1.0;
+  double shift_mm = kDefaultShiftTolerance_mm;
+  double rotation_deg = kDefaultRotationTolerance_deg;
 };
 
 /// Settings by the physicist before a reference is approved.

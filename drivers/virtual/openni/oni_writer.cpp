@@ -103,6 +103,7 @@ void WriteOni(const fs::path& file, FrameSource& source, const std::stop_token& 
   OpenNiOptions options;
   options.library = FindVirtualSensorRuntime();
   options.calibration_folder = session.calibration_folder();
+  options.markers_are_the_rooms = false;
   OpenNiProvider provider(options);
   OniFileSummary written;
   {

@@ -26,6 +26,7 @@ class VirtualOpenNiSetup : public SensorSetup {
       : sensor_(VirtualSensorOptions{sweeps}, stop, progress), options_{settings} {
     options_.library = sensor_.runtime_library();
     options_.calibration_folder = sensor_.calibration_folder();
+    options_.markers_are_the_rooms = false;
     options_.before_stop = [this] { sensor_.Quit(); };
   }
 

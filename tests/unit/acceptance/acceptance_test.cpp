@@ -253,8 +253,26 @@ TEST(AcceptanceTest, ImpossibleLimitsAreTheCallersMistake) {
     EXPECT_THROW(CheckLimits({.max_lost_s = bad}), std::invalid_argument);
     EXPECT_THROW(CheckLimits({.max_breathing_m = bad}), std::invalid_argument);
   }
+  EXPECT_THROW(CheckLimits({.min_shared_markers = 0}), std::invalid_argument);
   EXPECT_THROW(CheckLimits({.min_coverage = 1.1}), std::invalid_argument);
   EXPECT_THROW(CheckLimits({.min_coverage = kNan}), std::invalid_argument);
+}
+
+TEST(AcceptanceTest, ALimitThatWouldRefuseNothingIsTheCallersMistake) {
+  EXPECT_NO_THROW(CheckLimits(kLoosestLimits));
+  const auto looser = [](auto limit, double factor) {
+    AcceptanceLimits limits = kLoosestLimits;
+    limits.*limit *= factor;
+    return limits;
+  };
+  for (const auto limit :
+       {&AcceptanceLimits::shift_tolerance_m, &AcceptanceLimits::rotation_tolerance_rad,
+        &AcceptanceLimits::max_hole_m, &AcceptanceLimits::max_residual_p95_m,
+        &AcceptanceLimits::max_lost_s, &AcceptanceLimits::max_breathing_m}) {
+    EXPECT_NO_THROW(CheckLimits(looser(limit, 0.999)));
+    EXPECT_THROW(CheckLimits(looser(limit, 1.001)), std::invalid_argument);
+  }
+  EXPECT_THROW(CheckLimits(looser(&AcceptanceLimits::min_coverage, 0.999)), std::invalid_argument);
 }
 
 TEST(AcceptanceTest, EveryVerdictHasItsName) {

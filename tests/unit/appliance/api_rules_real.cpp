@@ -119,7 +119,7 @@ class RealRuledAppliance : public RuledAppliance {
   void LearnProfile() override {
     SensorProfile profile = ProfileOfAnyUnit(testing::FakeBus::Info().intrinsics);
     profile.num_sweeps = 4;
-    On([&] { (void)served_->appliance.profiles()->Add("A", profile); });
+    On([&] { (void)served_->appliance.profiles().shelf()->Add("A", profile); });
   }
 
  private:

@@ -37,7 +37,7 @@ class ApplianceProfileTest : public ApplianceTest {
   }
   /// The profile that a scan of now begins from: read as each scan reads it, from the same shelf.
   [[nodiscard]] std::string NextScanBeginsFrom() const {
-    UnitProfile unit(appliance_->profiles(), "A", FakeBus::Info().intrinsics);
+    UnitProfile unit(appliance_->profiles().shelf(), "A", FakeBus::Info().intrinsics);
     ReconstructorOptions options;
     unit.Begin(options);
     if (!options.profile) return "none";
@@ -169,7 +169,7 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
     for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
     On([&] {
       (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
-      appliance_->RefreshRoom();
+      appliance_->room().Refresh();
     });
     EXPECT_FALSE(Gantry()) << "neither the calibration nor the configuration";
     EXPECT_THAT(warnings_, ::testing::HasSubstr("marker 4 moved 8 mm"));
@@ -208,19 +208,19 @@ TEST_F(ApplianceRoomTest, OnTheMapsOfAReferenceTheRoomLiesAsItsOwnMarkersSay) {
         (Eigen::Vector2d(shown().right_xy.data()) - Eigen::Vector2d(expected.y(), -expected.x()))
             .norm(),
         1e-6);
-    const auto ways = appliance_->RoomIn(turned);
+    const auto ways = appliance_->room().In(turned);
     ASSERT_TRUE(ways);
     EXPECT_LT((ways->gantry - expected).norm(), 1e-6) << "the same in the report";
-    EXPECT_FALSE(appliance_->RoomIn(two)) << "too few markers: a comparison would not know it";
+    EXPECT_FALSE(appliance_->room().In(two)) << "too few markers: a comparison would not know it";
 
     MarkerMap moved = testing::MarkersOfRoom();
     for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
     On([&] {
       (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
-      appliance_->RefreshRoom();
+      appliance_->room().Refresh();
     });
     EXPECT_FALSE(shown().is_known) << "it has to be calibrated again";
-    EXPECT_FALSE(appliance_->RoomIn(turned));
+    EXPECT_FALSE(appliance_->room().In(turned));
   });
 }
 
@@ -228,7 +228,7 @@ TEST_F(ApplianceRoomTest, WithoutAnyNobodyKnowsTheRoom) {
   Play([&] {
     MakeReady();
     EXPECT_FALSE(Gantry());
-    EXPECT_FALSE(appliance_->RoomIn(testing::MarkersOfRoom()));
+    EXPECT_FALSE(appliance_->room().In(testing::MarkersOfRoom()));
     EXPECT_EQ(warnings_, "");
     std::string why_not;
     EXPECT_EQ(services_->services().room.RoomBoardPdf(why_not).value_or("").substr(0, 5), "%PDF-")

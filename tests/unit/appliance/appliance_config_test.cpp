@@ -1,11 +1,9 @@
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
 #include "daemon/config/config.hpp"
 #include "tests/support/message_of.hpp"
-#include "web/model/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -23,11 +21,7 @@ control = "/run/p.sock"
 calibration = "/data/cal"
 sensor_serial = "1804060024"
 sensor_profiles = false
-keep_recordings = true
 quota_gb = 12.5
-auto_stop_s = 4
-scan_limit_s = 30
-result_s = 300
 warm_up_min = 20
 session_idle_min = 45
 [storage]
@@ -54,14 +48,10 @@ host_names = ["plumb.local", "couch"]
   EXPECT_EQ(config.appliance.sensor_serial, "1804060024");
   EXPECT_FALSE(config.appliance.sensor_profiles);
   EXPECT_TRUE(Config().appliance.sensor_profiles);
-  EXPECT_TRUE(config.appliance.keep_recordings);
   EXPECT_EQ(config.appliance.quota_gb, 12.5);
   EXPECT_EQ(config.appliance.backup_folder, "/mnt/backup");
   EXPECT_EQ(config.appliance.backup_hours, 12);
   EXPECT_EQ(config.appliance.backup_key_file, "/etc/plumb/backup.key");
-  EXPECT_EQ(config.appliance.auto_stop_s, 4.0);
-  EXPECT_EQ(config.appliance.scan_limit_s, 30.0);
-  EXPECT_EQ(config.appliance.result_s, 300.0);
   EXPECT_EQ(config.appliance.warm_up_min, 20.0);
   EXPECT_EQ(config.appliance.session_idle_min, 45.0);
   EXPECT_EQ(config.panel.button_chip, "gpiochip1");
@@ -81,8 +71,8 @@ TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
   };
   EXPECT_THAT(complaint("[appliance]\n\nstate = \"relative\"\n"),
               AllOf(HasSubstr("plumb.toml:3"), HasSubstr("absolute"), HasSubstr("relative")));
-  EXPECT_THAT(complaint("[appliance]\nauto_stop_s = 1000\n"),
-              AllOf(HasSubstr(":2"), HasSubstr("120")));
+  EXPECT_THAT(complaint("[appliance]\nwarm_up_min = 1000\n"),
+              AllOf(HasSubstr(":2"), HasSubstr("minutes from 0 to 120")));
   EXPECT_THAT(complaint("[storage]\nbackup_hours = 0.5\n"), HasSubstr("1 to 8760"));
   EXPECT_THAT(complaint("[storage]\nbackup_folder = \"usb\"\n"), HasSubstr("absolute"));
   EXPECT_THAT(complaint("[storage]\nbackup_key_file = \"key\"\n"), HasSubstr("absolute"));
@@ -92,21 +82,6 @@ TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
               AllOf(HasSubstr(":2"), HasSubstr("0.0.0.0:8080")));
   EXPECT_THAT(complaint("[web]\nhost_names = [1]\n"), HasSubstr(":2"));
   EXPECT_THAT(complaint("[gpio]\n"), HasSubstr("[appliance]"));
-}
-
-TEST(ApplianceConfigTest, ATimeThatReplacesASettingHasTheLimitsOfThatSetting) {
-  const auto parse = [](const char* key, double seconds) {
-    return ParseConfig(fmt::format("[appliance]\n{} = {:.1f}\n", key, seconds), "plumb.toml");
-  };
-  const double least_s = kAutoStop_s.entered.least, most_s = kAutoStop_s.entered.most;
-  EXPECT_EQ(parse("auto_stop_s", least_s).appliance.auto_stop_s, least_s);
-  EXPECT_EQ(parse("auto_stop_s", most_s).appliance.auto_stop_s, most_s);
-  EXPECT_THROW((void)parse("auto_stop_s", least_s - 0.1), DataError);
-  EXPECT_THROW((void)parse("auto_stop_s", most_s + 0.1), DataError);
-  // Trials need shorter sweeps than a person can make.
-  const double longest_s = kScanLimit_s.entered.most;
-  EXPECT_EQ(parse("scan_limit_s", longest_s).appliance.scan_limit_s, longest_s);
-  EXPECT_THROW((void)parse("scan_limit_s", longest_s + 0.1), DataError);
 }
 
 TEST(ApplianceConfigTest, ListenAddresses) {

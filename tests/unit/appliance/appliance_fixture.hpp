@@ -54,7 +54,7 @@ class ApplianceTest : public ::testing::Test {
     parts_.config.update.folder = folder_ / "updates";
     parts_.demo_patient = "demo";
     // Independent of the machine's disk: the light shows whether it is nearly full.
-    parts_.space = [](const std::filesystem::path&, std::error_code&) {
+    parts_.storage.space = [](const std::filesystem::path&, std::error_code&) {
       return std::filesystem::space_info{
           .capacity = 100'000'000'000, .free = 50'000'000'000, .available = 50'000'000'000};
     };

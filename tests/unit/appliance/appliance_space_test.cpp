@@ -23,7 +23,7 @@ class ApplianceSpaceTest : public testing::ApplianceTest {
  protected:
   ApplianceSpaceTest() {
     parts_.demo_patient.clear();
-    parts_.space = [this](const fs::path&, std::error_code&) {
+    parts_.storage.space = [this](const fs::path&, std::error_code&) {
       const std::lock_guard lock(mutex_);
       return space_;
     };
@@ -104,10 +104,12 @@ TEST_F(ApplianceSpaceTest, OneByteTooLittleIsAFaultAndNoReadiness) {
 }
 
 TEST_F(ApplianceSpaceTest, ARecordingNeedsItsOwnRoomAndADailyCheckHasNone) {
-  parts_.config.appliance.keep_recordings = true;
-  parts_.config.appliance.scan_limit_s = 60;
+  Settings settings;
+  settings.keep_recordings = true;
+  settings.scan_limit_s = 60;
   Play([&] {
     MakeReady();
+    On([&] { appliance_->store()->settings.Change(kTester, settings); });
     const auto reason = [&] { return appliance_->health().reason; };
     SetAvailable(kScanBytes + kRecordingBytes);
     On([&] { EXPECT_EQ(reason(), ""); });

@@ -50,13 +50,12 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
   Appliance appliance(
       around.loop,
       {.config = around.config,
-       .configuration_fault = {},
        .make_provider = [&] { return std::make_unique<testing::FakeProvider>(around.bus); },
        .before_scan = {},
        .button = nullptr,
        .indicator = nullptr,
        .demo_patient = {},
-       .storage_retries = {std::chrono::milliseconds(1)}});
+       .storage = {.retries = {std::chrono::milliseconds(1)}}});
   for (const fs::directory_entry& entry : fs::directory_iterator(around.config.appliance.state)) {
     if (!entry.is_regular_file()) continue;
     std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
@@ -88,7 +87,6 @@ bool RunUntil(EventLoop& loop, const Done& done) {
 
 ApplianceParts PartsOf(const Config& config, testing::FakeBus& bus) {
   return {.config = config,
-          .configuration_fault = {},
           .make_provider = [&bus] { return std::make_unique<testing::FakeProvider>(bus); },
           .before_scan = {},
           .button = nullptr,
@@ -99,7 +97,7 @@ ApplianceParts PartsOf(const Config& config, testing::FakeBus& bus) {
 TEST(ApplianceStorage, AFaultThatQuotesAPathInAnyEncodingIsUtf8) {
   Surroundings around;
   ApplianceParts parts = PartsOf(around.config, around.bus);
-  parts.configuration_fault = "cannot read /media/\xff.toml";
+  parts.storage.configuration_fault = "cannot read /media/\xff.toml";
   Appliance appliance(around.loop, parts);
   EXPECT_EQ(appliance.storage_fault(), "cannot read /media/\xEF\xBF\xBD.toml");
 }
@@ -182,7 +180,7 @@ TEST(ApplianceStorage, ADatabaseTooLargeForTheCheckAtTheStartIsCheckedWhileItWor
     Surroundings around;
     MakeLargeDatabase(around.config.appliance.state, is_damaged);
     ApplianceParts parts = PartsOf(around.config, around.bus);
-    parts.check_limit = std::chrono::milliseconds(-1);
+    parts.storage.check_limit = std::chrono::milliseconds(-1);
     Appliance appliance(around.loop, std::move(parts));
     EXPECT_EQ(appliance.storage_fault(), "") << "the start did not wait for the check";
     const auto is_found = [&] { return !appliance.storage_fault().empty(); };
@@ -245,15 +243,16 @@ TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
   Surroundings around;
   {
     Appliance appliance(around.loop, PartsOf(around.config, around.bus));
-    EXPECT_TRUE(appliance.BackupTarget().empty());
+    EXPECT_TRUE(appliance.upkeep().BackupTarget().empty());
     std::optional<std::string> made, refused;
-    appliance.BackUp({.user = "anna", .address = {}}, around.folder / "backup",
-                     [&](const std::string& error, const BackupReport& report) {
-                       made = error;
-                       EXPECT_EQ(report.files, 1U);
-                     });
-    appliance.BackUp({.user = "anna", .address = {}}, "/proc/backup",
-                     [&](const std::string& error, const BackupReport&) { refused = error; });
+    appliance.upkeep().BackUp({.user = "anna", .address = {}}, around.folder / "backup",
+                              [&](const std::string& error, const BackupReport& report) {
+                                made = error;
+                                EXPECT_EQ(report.files, 1U);
+                              });
+    appliance.upkeep().BackUp(
+        {.user = "anna", .address = {}}, "/proc/backup",
+        [&](const std::string& error, const BackupReport&) { refused = error; });
     EXPECT_FALSE(made || refused) << "the loop does not wait";
     EXPECT_TRUE(RunUntil(around.loop, [&] { return made && refused; }));
     EXPECT_EQ(made, "");
@@ -269,9 +268,9 @@ TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
     EventLoop another;
     Appliance appliance(another, PartsOf(around.config, around.bus));
     std::optional<std::string> made, refused;
-    appliance.BackUp({.user = "anna", .address = {}}, around.folder / "sealed",
-                     [&](const std::string& error, const BackupReport&) { made = error; });
-    appliance.BackUp(
+    appliance.upkeep().BackUp({.user = "anna", .address = {}}, around.folder / "sealed",
+                              [&](const std::string& error, const BackupReport&) { made = error; });
+    appliance.upkeep().BackUp(
         {.user = "anna", .address = {}}, around.folder / "none",
         [&](const std::string& error, const BackupReport&) { refused = error; },
         around.folder / "no-such-key");
@@ -289,8 +288,9 @@ TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
     EventLoop another;
     Appliance appliance(another, PartsOf(around.config, around.bus));
     std::string answer;
-    appliance.BackUp({.user = "anna", .address = {}}, around.folder / "other",
-                     [&](const std::string& error, const BackupReport&) { answer = error; });
+    appliance.upkeep().BackUp(
+        {.user = "anna", .address = {}}, around.folder / "other",
+        [&](const std::string& error, const BackupReport&) { answer = error; });
     EXPECT_THAT(answer, HasSubstr("safe mode"));
   }
 }
@@ -311,8 +311,9 @@ TEST(ApplianceStorage, ABackupBesideTheScansIsWarnedOf) {
     {
       Appliance appliance(around.loop, PartsOf(around.config, around.bus));
       std::optional<std::string> made;
-      appliance.BackUp({.user = "anna", .address = {}}, appliance.BackupTarget(),
-                       [&](const std::string& error, const BackupReport&) { made = error; });
+      appliance.upkeep().BackUp(
+          {.user = "anna", .address = {}}, appliance.upkeep().BackupTarget(),
+          [&](const std::string& error, const BackupReport&) { made = error; });
       EXPECT_TRUE(RunUntil(around.loop, [&] { return made.has_value(); }));
       EXPECT_EQ(made, "");
       const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
@@ -332,8 +333,9 @@ TEST(ApplianceStorage, ABackupInMemoryIsRefused) {
   const fs::path memory = InMemory(around);
   Appliance appliance(around.loop, PartsOf(around.config, around.bus));
   std::optional<std::string> refused;
-  appliance.BackUp({.user = "anna", .address = {}}, memory,
-                   [&](const std::string& error, const BackupReport&) { refused = error; });
+  appliance.upkeep().BackUp(
+      {.user = "anna", .address = {}}, memory,
+      [&](const std::string& error, const BackupReport&) { refused = error; });
   EXPECT_TRUE(RunUntil(around.loop, [&] { return refused.has_value(); }));
   EXPECT_THAT(refused.value_or(""), HasSubstr("is empty after a restart of the machine"));
   EXPECT_FALSE(fs::exists(memory));
@@ -344,7 +346,7 @@ class StorageRetryTest : public testing::ApplianceTest {
  protected:
   StorageRetryTest() {
     parts_.demo_patient.clear();
-    parts_.storage_retries = {std::chrono::milliseconds(20)};
+    parts_.storage.retries = {std::chrono::milliseconds(20)};
   }
   [[nodiscard]] fs::path state() const { return folder_ / "state"; }
   [[nodiscard]] std::string Fault() {
@@ -358,8 +360,8 @@ class StorageRetryTest : public testing::ApplianceTest {
   /// Waits until several attempts to leave safe mode have failed.
   void LetItTryInVain() {
     std::size_t before = 0;
-    On([&] { before = appliance_->num_storage_retries(); });
-    ASSERT_TRUE(Becomes([&] { return appliance_->num_storage_retries() >= before + 5; }));
+    On([&] { before = appliance_->storage().num_retries(); });
+    ASSERT_TRUE(Becomes([&] { return appliance_->storage().num_retries() >= before + 5; }));
   }
 };
 

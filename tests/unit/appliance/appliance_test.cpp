@@ -135,7 +135,7 @@ TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClose
     On([&] {
       ASSERT_TRUE(appliance_->WebStatus().session);
       EXPECT_EQ(appliance_->WebStatus().session->patient_id, patient);
-      EXPECT_EQ(appliance_->open_patient(), patient);
+      EXPECT_EQ(appliance_->session().patient_id(), patient);
       EXPECT_EQ(appliance_->CloseSession(tess), "");
     });
   });
@@ -172,7 +172,7 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
                 ::testing::HasSubstr("a scan of this patient is running"));
     On([&] {
       ASSERT_TRUE(appliance_->WebStatus().session) << "nothing was removed";
-      EXPECT_EQ(appliance_->open_patient(), patient);
+      EXPECT_EQ(appliance_->session().patient_id(), patient);
       appliance_->store()->scans.Finish(
           running,
           {.outcome = ScanOutcome::kCancelled, .failure = "discarded", .swept_area_m2 = 0.0});
@@ -182,7 +182,7 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
     EXPECT_EQ(wiped.get_future().get().result, ChangeResult::kDone);
     On([&] {
       EXPECT_FALSE(appliance_->WebStatus().session);
-      EXPECT_EQ(appliance_->open_patient(), "");
+      EXPECT_EQ(appliance_->session().patient_id(), "");
     });
   });
 }
@@ -219,6 +219,46 @@ TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVe
       const Scan failed = appliance_->store()->scans.List(patient, 1)[0];
       EXPECT_EQ(failed.outcome, ScanOutcome::kFailed);
       EXPECT_FALSE(failed.result);
+    });
+  });
+}
+
+TEST_F(ApplianceTest, APlanThatCannotBeReadRefusesTheScanInWords) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
+  Play([&] {
+    MakeReady();
+    std::string patient;
+    std::size_t num_scans = 0;
+    const auto num_folders = [&] {
+      const std::filesystem::directory_iterator folders(appliance_->store()->folders.scans());
+      return std::distance(begin(folders), end(folders));
+    };
+    On([&] {
+      Store& store = *appliance_->store();
+      patient = store.patients.Add(kTester, "P-1", "");
+      const std::string scan = testing::StoreScan(store, patient);
+      (void)testing::PlanAndApprove(store, store.references.Add(testing::kAnna, scan, "", {}));
+      store.database().ForChanges()->Prepare("DROP TRIGGER refs_immutable").Run();
+      store.database().ForChanges()->Prepare("UPDATE refs SET plan = '{'").Run();
+      num_scans = store.scans.List(patient, 10).size();
+      const std::string session = store.treatments.Open(kTester, patient, ScanPurpose::kFraction);
+      appliance_->OpenSession(session, patient, ScanPurpose::kFraction, "", kTester);
+    });
+    const auto folders_before = num_folders();
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
+    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ApplianceState::kFault; }));
+    On([&] {
+      EXPECT_THAT(appliance_->WebStatus().fault,
+                  ::testing::HasSubstr("the scan could not begin: version 1 of the reference"));
+      EXPECT_EQ(appliance_->WebStatus().light, "fault");
+      EXPECT_FALSE(appliance_->WebStatus().scan);
+      EXPECT_EQ(appliance_->storage_fault(), "") << "other patients can be scanned";
+      EXPECT_TRUE(appliance_->StatusJson()["last_result"].is_null());
+      EXPECT_EQ(appliance_->store()->scans.List(patient, 10).size(), num_scans);
+      EXPECT_EQ(num_folders(), folders_before);
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "") << "acknowledges the fault";
+      EXPECT_EQ(appliance_->state().phase, ApplianceState::kReady);
     });
   });
 }
@@ -296,8 +336,8 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
       EXPECT_TRUE(appliance_->store()->scans.List("", 10).empty()) << "nothing was scanned";
       AddPassedCheck(tess);
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(DailyCheck::kPassed)), "");
-      EXPECT_THAT(appliance_->WhyNoReference(ScanOf(DailyCheck::kOverdue)),
+      EXPECT_EQ(appliance_->references().WhyNot(ScanOf(DailyCheck::kPassed)), "");
+      EXPECT_THAT(appliance_->references().WhyNot(ScanOf(DailyCheck::kOverdue)),
                   ::testing::HasSubstr("scan the reference again"))
           << "of a scan from before the check";
       const auto check = [&](MarkerCheckStatus status) {
@@ -309,13 +349,13 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
       const web::Json status = web::ToJson(appliance_->WebStatus(), WallClock::now());
       EXPECT_TRUE(status["check_overdue"]);
       EXPECT_TRUE(status["check_failed"]);
-      EXPECT_EQ(appliance_->Checks().today, DailyCheck::kFailed);
-      EXPECT_THAT(appliance_->WhyNoReference(ScanOf(DailyCheck::kPassed)),
+      EXPECT_EQ(appliance_->references().Checks().today, DailyCheck::kFailed);
+      EXPECT_THAT(appliance_->references().WhyNot(ScanOf(DailyCheck::kPassed)),
                   ::testing::HasSubstr("the daily check has failed"))
           << "after one that had passed";
       check(MarkerCheckStatus::kPassed);
-      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(DailyCheck::kPassed)), "");
-      EXPECT_THAT(appliance_->WhyNoReference(ScanOf(DailyCheck::kFailed)),
+      EXPECT_EQ(appliance_->references().WhyNot(ScanOf(DailyCheck::kPassed)), "");
+      EXPECT_THAT(appliance_->references().WhyNot(ScanOf(DailyCheck::kFailed)),
                   ::testing::HasSubstr("after a failed daily check"));
       (void)appliance_->CloseSession(tess);
       (void)appliance_->Press(ButtonPress::kShort, kTester);  // acknowledges the fault
@@ -486,12 +526,12 @@ TEST_F(ApplianceTest, AColdSensorTakesNoReference) {
       // What was scanned long ago is judged by how warm the sensor was then.
       Scan scan = ScanOf(DailyCheck::kPassed);
       scan.sensor_on_s = 899;
-      EXPECT_THAT(appliance_->WhyNoReference(scan),
+      EXPECT_THAT(appliance_->references().WhyNot(scan),
                   ::testing::HasSubstr("scan the reference again"));
       scan.sensor_on_s = 900;
-      EXPECT_EQ(appliance_->WhyNoReference(scan), "");
+      EXPECT_EQ(appliance_->references().WhyNot(scan), "");
       scan.sensor_on_s.reset();
-      EXPECT_EQ(appliance_->WhyNoReference(scan), "") << "not known: from an older version";
+      EXPECT_EQ(appliance_->references().WhyNot(scan), "") << "not known: from an older version";
     });
   });
 }
@@ -522,7 +562,7 @@ TEST_F(ApplianceTest, TheDemoNeedsNoCheckForItsReference) {
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().daily_check, DailyCheck::kOverdue);
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(DailyCheck::kOverdue)), "");
+      EXPECT_EQ(appliance_->references().WhyNot(ScanOf(DailyCheck::kOverdue)), "");
     });
   });
 }

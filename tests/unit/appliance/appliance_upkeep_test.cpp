@@ -24,7 +24,8 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   ApplianceUpkeepTest() {
     parts_.demo_patient.clear();
     parts_.tick = milliseconds(1);
-    parts_.space = [this, space = parts_.space](const fs::path& folder, std::error_code& error) {
+    parts_.storage.space = [this, space = parts_.storage.space](const fs::path& folder,
+                                                                std::error_code& error) {
       if (folder == state()) ++num_ticks_;
       return space(folder, error);
     };

@@ -179,7 +179,6 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReferenceAndItsNoiseWithTh
                               sweep_->info.reference_marker.value()),
                   "plumb.toml");
   config.appliance.state = folder / "state";
-  config.appliance.keep_recordings = true;
   const std::unique_ptr<SensorSetup> setup = registry_.Choose(config.appliance.sensor_driver, false)
                                                  .set_up(SensorSettingsOf(config), {}, {}, {});
   ApplianceParts parts;
@@ -188,6 +187,9 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReferenceAndItsNoiseWithTh
   parts.before_scan = [&] { setup->BeforeScan(); };
   parts.demo_patient = "demo";
   Appliance appliance(loop, parts);
+  Settings settings;
+  settings.keep_recordings = true;
+  appliance.store()->settings.Change({.user = "tester", .address = {}}, settings);
 
   const auto on_loop = [&](const std::function<void()>& work) {
     const auto done = std::make_shared<std::promise<void>>();

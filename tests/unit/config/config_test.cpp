@@ -9,12 +9,15 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/config/sensor_settings.hpp"
+#include "drivers/live/sensor_calibration.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace plumb {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 using namespace std::string_literals;
 
 std::string ErrorOf(const std::string& text) {
@@ -50,7 +53,6 @@ keyframe_spacing = 1.3
 num_icp_iterations = 50
 seed = 9
 [compare]
-preset = "paper"
 region = "torso.json"
 isocentre_m = [0.4, 0.2, 0]
 marker_kind = "couch"
@@ -172,6 +174,90 @@ TEST(ConfigTest, PlumbdRefusesTheKeysOfThePlanAndSaysWhereTheyBelong) {
       << "the limits of the room stay";
 }
 
+struct GateCase {
+  const char* key;
+  double method;   ///< The method's own limit, the loosest that plumbd takes.
+  double loosest;  ///< The loosest that an experiment may set.
+  double looser;   ///< A step in the loose direction.
+};
+
+class GateTest : public ::testing::TestWithParam<GateCase> {
+ protected:
+  static std::string Refusal(const std::string& section, const std::string& key, double value,
+                             ConfigUse use) {
+    const std::string text = fmt::format("[{}]\n{} = {}\n", section, key, value);
+    try {
+      (void)ParseConfig(text, "plumb.toml", use);
+    } catch (const DataError& error) {
+      return error.what();
+    }
+    return {};
+  }
+};
+
+// A looser limit than the method's would let a result pass that nothing has shown to be right.
+TEST_P(GateTest, PlumbdTakesNoLimitThatIsLooserThanTheMethods) {
+  const auto [key, method, loosest, looser] = GetParam();
+  EXPECT_EQ(Refusal("compare", key, method, ConfigUse::kAppliance), "");
+  EXPECT_EQ(Refusal("compare", key, method - looser, ConfigUse::kAppliance), "") << "stricter";
+  EXPECT_THAT(Refusal("compare", key, method + looser, ConfigUse::kAppliance),
+              AllOf(HasSubstr(std::string("plumb.toml:2: compare.") + key + ": expected"),
+                    HasSubstr("found"), HasSubstr("looser than the method's own"),
+                    HasSubstr("remove the line")));
+}
+
+TEST_P(GateTest, AnExperimentMaySetALooserOneThatStillRefusesSomething) {
+  const auto [key, method, loosest, looser] = GetParam();
+  EXPECT_EQ(Refusal("compare", key, method + looser, ConfigUse::kCommandLine), "");
+  EXPECT_EQ(Refusal("compare", key, loosest, ConfigUse::kCommandLine), "");
+  EXPECT_THAT(Refusal("compare", key, loosest + looser, ConfigUse::kCommandLine),
+              HasSubstr(std::string("compare.") + key + ": expected"));
+}
+
+INSTANTIATE_TEST_SUITE_P(AllGates, GateTest,
+                         ::testing::Values(GateCase{"min_shared_markers", 3, 1, -1},
+                                           GateCase{"moved_marker_mm", 5, 100, 0.5},
+                                           GateCase{"moved_marker_sigmas", 3, 100, 0.5},
+                                           GateCase{"min_coverage", 0.9, 0.5, -0.01},
+                                           GateCase{"max_hole_mm", 50, 300, 1},
+                                           GateCase{"max_residual_p95_mm", 25, 100, 1},
+                                           GateCase{"max_lost_s", 1, 10, 0.5},
+                                           GateCase{"max_breathing_mm", 8, 50, 1}),
+                         [](const auto& gate) { return std::string(gate.param.key); });
+
+TEST_F(GateTest, TheDailyCheckMayBeStricterOnly) {
+  for (const auto& [key, method, looser] : {std::tuple("misfit_mm", 3.0, 0.1),
+                                            {"moved_mm", 5.0, 0.1},
+                                            {"side_percent", 3.0, 0.1},
+                                            {"scale_percent", 0.5, 0.1},
+                                            {"depth_percent", 3.0, 0.1},
+                                            {"min_views", 3.0, -1.0}}) {
+    for (const ConfigUse use : {ConfigUse::kAppliance, ConfigUse::kCommandLine}) {
+      EXPECT_EQ(Refusal("check", key, method, use), "");
+      EXPECT_EQ(Refusal("check", key, method - looser, use), "");
+      EXPECT_THAT(Refusal("check", key, method + looser, use),
+                  AllOf(HasSubstr(std::string("check.") + key), HasSubstr("looser")));
+    }
+  }
+}
+
+TEST(ConfigTest, WhatThePageSetsIsRefusedWithItsPlace) {
+  for (const std::string line :
+       {"auto_stop_s = 10", "scan_limit_s = 60", "keep_recordings = true"}) {
+    EXPECT_THAT(ErrorOf("[appliance]\n" + line + "\n"),
+                AllOf(HasSubstr("test.toml:2: appliance." + line.substr(0, line.find(' '))),
+                      HasSubstr("set it on the page under Settings")));
+  }
+  EXPECT_THAT(ErrorOf("[appliance]\nresult_s = 60\n"), HasSubstr("unknown key 'result_s'"));
+}
+
+TEST(ConfigTest, OnePresetHoldsForReconstructionAndComparison) {
+  EXPECT_EQ(ParseConfig("[reconstruct]\npreset = \"paper\"\n", "t").compare.preset, Preset::kPaper);
+  EXPECT_EQ(ParseConfig("[compare]\n", "t").compare.preset, Preset::kBest);
+  EXPECT_THAT(ErrorOf("[compare]\npreset = \"paper\"\n"),
+              AllOf(HasSubstr("test.toml:2: compare.preset"), HasSubstr("[reconstruct]")));
+}
+
 TEST(ConfigTest, WhatTakesEffectAtTheStartIsKeptAndNamed) {
   const std::string at_start = R"(
 [markers]
@@ -205,9 +291,9 @@ calibration = "/d"
 sensor_serial = "7"
 )";
   const Config in_use = ParseConfig("", "test.toml");
-  Config next = ParseConfig(at_start + "result_s = 5\n[check]\nmin_views = 3\n", "test.toml");
+  Config next = ParseConfig(at_start + "quota_gb = 5\n[check]\nmin_views = 4\n", "test.toml");
   EXPECT_THAT(KeepUntilRestart(in_use, next),
-              testing::UnorderedElementsAre(
+              ::testing::UnorderedElementsAre(
                   "markers.dictionary", "markers.length_m", "markers.reference", "button.chip",
                   "button.line", "button.active_low", "light.chip", "light.red", "light.green",
                   "light.blue", "light.beeper", "light.active_low", "update.folder",
@@ -215,21 +301,38 @@ sensor_serial = "7"
                   "web.plain_http", "web.host_names", "appliance.state", "appliance.control",
                   "appliance.calibration", "appliance.sensor_serial"));
   EXPECT_EQ(next.web.listen, in_use.web.listen);
-  EXPECT_EQ(next.appliance.result_s, 5);
-  EXPECT_EQ(next.check.min_views, 3);
-  EXPECT_THAT(KeepUntilRestart(in_use, next), testing::IsEmpty());
+  EXPECT_EQ(next.appliance.quota_gb, 5);
+  EXPECT_EQ(next.check.min_views, 4);
+  EXPECT_THAT(KeepUntilRestart(in_use, next), ::testing::IsEmpty());
+}
+
+// `plumb record`, `plumb doctor` and plumbd pass these settings to the driver as they are.
+TEST(ConfigTest, ASensorsCalibrationFileMayNotNameOtherMarkersThanTheRooms) {
+  const testing::TempFolder folder;
+  const auto length_m = [&](const char* of_file) {
+    std::ofstream(folder / "S1.yaml") << "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
+                                         "camera_matrix: [525, 0, 319.5, 0, 525, 239.5, 0, 0, 1]\n"
+                                         "distortion_coefficients: [0, 0, 0, 0, 0]\n"
+                                      << "marker_length: " << of_file << '\n';
+    SensorSettings settings =
+        SensorSettingsOf(ParseConfig("[markers]\nlength_m = 0.083\n", "test.toml"));
+    settings.calibration_folder = folder.path();
+    return LiveStreamInfo(settings, "S1", 640, 480, 0.0).marker_length_m;
+  };
+  EXPECT_EQ(length_m("0.083"), 0.083);
+  EXPECT_THROW((void)length_m("0.104"), DeviceError);
 }
 
 TEST(ConfigTest, WhatTheFileGivesIsKeptAsText) {
   const Config config = ParseConfig(
       "[web]\nlisten = \"[::1]:80\"\nhost_names = [\"a\", \"b\"]\n[appliance]\nquota_gb = 50.0\n"
-      "keep_recordings = true\n",
+      "sensor_profiles = true\n",
       "test.toml");
-  EXPECT_THAT(config.given,
-              testing::UnorderedElementsAre(testing::Pair("web.listen", "'[::1]:80'"),
-                                            testing::Pair("web.host_names", "[ 'a', 'b' ]"),
-                                            testing::Pair("appliance.quota_gb", "50.0"),
-                                            testing::Pair("appliance.keep_recordings", "true")));
+  EXPECT_THAT(config.given, ::testing::UnorderedElementsAre(
+                                ::testing::Pair("web.listen", "'[::1]:80'"),
+                                ::testing::Pair("web.host_names", "[ 'a', 'b' ]"),
+                                ::testing::Pair("appliance.quota_gb", "50.0"),
+                                ::testing::Pair("appliance.sensor_profiles", "true")));
 }
 
 TEST(ConfigTest, OffLoopbackThePageIsServedByTlsUnlessItIsSaidOtherwise) {
@@ -254,25 +357,23 @@ TEST(ConfigTest, OffLoopbackThePageIsServedByTlsUnlessItIsSaidOtherwise) {
 
 TEST(ConfigTest, TheAppliancesPresetIsBestAlone) {
   EXPECT_NO_THROW(RefuseResearchPresets(Config{}));
-  EXPECT_NO_THROW(RefuseResearchPresets(ParseConfig("[compare]\npreset = \"best\"\n", "t")));
-  for (const std::string section : {"compare", "reconstruct"}) {
-    const Config config = ParseConfig("[" + section + "]\npreset = \"paper\"\n", "t");
-    EXPECT_THAT([&] { RefuseResearchPresets(config); },
-                testing::ThrowsMessage<DataError>(
-                    HasSubstr("[" + section + "] preset: expected \"best\"")));
-  }
+  EXPECT_NO_THROW(RefuseResearchPresets(ParseConfig("[reconstruct]\npreset = \"best\"\n", "t")));
+  const Config config = ParseConfig("[reconstruct]\npreset = \"paper\"\n", "t");
+  EXPECT_THAT(
+      [&] { RefuseResearchPresets(config); },
+      ::testing::ThrowsMessage<DataError>(HasSubstr("[reconstruct] preset: expected \"best\"")));
 }
 
 TEST(ConfigTest, AMissingFileIsBadInput) {
   EXPECT_THROW((void)ReadConfig("/nonexistent/plumb.toml"), DataError);
 }
 
-class RegionTest : public testing::Test {
+class RegionTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    file_ = std::filesystem::path(testing::TempDir()) /
+    file_ = std::filesystem::path(::testing::TempDir()) /
             (std::string("region_") +
-             testing::UnitTest::GetInstance()->current_test_info()->name() + ".json");
+             ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".json");
   }
   void TearDown() override { std::filesystem::remove(file_); }
   std::vector<Eigen::Vector2d> Read(const std::string& text) {

@@ -121,6 +121,16 @@ TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
   EXPECT_EQ(json.at("region").at("largest_hole_m"), 0.012);
   EXPECT_EQ(json.at("region").at("min_coverage"), 0.85);
   EXPECT_EQ(json.at("region").at("max_hole_m"), 0.04);
+  EXPECT_EQ(json.at("limits"), (nlohmann::json{{"shift_tolerance_mm", 3.0},
+                                               {"rotation_tolerance_deg", 1.0},
+                                               {"min_shared_markers", 4},
+                                               {"moved_marker_mm", 4.0},
+                                               {"moved_marker_sigmas", 2.5},
+                                               {"min_coverage", 0.85},
+                                               {"max_hole_mm", 40.0},
+                                               {"max_residual_p95_mm", 25.0},
+                                               {"max_lost_s", 0.5},
+                                               {"max_breathing_mm", 8.0}}));
   EXPECT_EQ(json.at("deformation").at("samples"), 2);
   EXPECT_EQ(json.at("deformation").at("observed"), 1);
   EXPECT_NEAR(json.at("deformation").at("shift_mm").at("p95").get<double>(), 37.0, 1e-9);

@@ -92,6 +92,9 @@ inline Comparison Answer() {
   comparison.region = RegionCoverage{0.97, 0.012, Eigen::Vector2d(0.4, 0.5)};
   comparison.limits.min_coverage = 0.85;
   comparison.limits.max_hole_m = 0.04;
+  comparison.limits.min_shared_markers = 4;
+  comparison.limits.max_lost_s = 0.5;
+  comparison.marker_consensus = {.moved_m = 0.004, .moved_sigmas = 2.5};
   comparison.deviation = Slope(0.009);
   comparison.distance = Slope(0.008);
   comparison.current_height = Slope(0.109);

@@ -24,7 +24,6 @@ class SensorCalibrationTest : public ::testing::Test {
     room_.marker_dictionary = "DICT_4X4_50";
     room_.marker_length_m = 0.083;
     room_.reference_marker = 7;
-    room_.markers_are_the_rooms = true;
   }
   void Write(const std::string& keys) const {
     std::ofstream(folder_ / "S1.yaml") << "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
@@ -68,6 +67,16 @@ TEST_F(SensorCalibrationTest, AFileWithOtherMarkersThanTheRoomIsRefused) {
               AllOf(HasSubstr("reference_marker is 8"), HasSubstr("this room has 7")));
   room_.reference_marker.reset();
   EXPECT_THAT(Complaint("reference_marker: 7\n"), HasSubstr("none configured"));
+}
+
+TEST_F(SensorCalibrationTest, TheMarkersAreTheRoomsUnlessADriverSaysOtherwise) {
+  Write("marker_length: 0.104\n");
+  SensorSettings settings{.calibration_folder = folder_.path()};
+  settings.marker_length_m = 0.083;
+  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)LiveStreamInfo(settings, "S1", 640, 480, 0.0); }),
+              HasSubstr("this room has 0.083 m"));
+  settings.markers_are_the_rooms = false;
+  EXPECT_EQ(LiveStreamInfo(settings, "S1", 640, 480, 0.0).marker_length_m, 0.104);
 }
 
 TEST_F(SensorCalibrationTest, WithoutARoomTheFileSaysWhichMarkersThereAre) {

@@ -45,6 +45,7 @@ struct VirtualRig {
     OpenNiOptions options;
     options.library = sensor.runtime_library();
     options.calibration_folder = sensor.calibration_folder();
+    options.markers_are_the_rooms = false;
     options.stall_time = stall_time;
     return options;
   }

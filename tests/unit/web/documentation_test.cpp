@@ -8,6 +8,7 @@
 
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/model/limits.hpp"
+#include "web/model/scan.hpp"
 #include "web/security/password_rules.hpp"
 
 namespace plumb::test {
@@ -87,6 +88,7 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
     EXPECT_THAT(Stated(page, of_page, "maxlength"), ElementsAre(most)) << of_page;
     EXPECT_THAT(Stated(api, of_api, "maxLength"), ElementsAre(most)) << of_api;
   }
+  EXPECT_THAT(Stated(page, "kResult", "valid_s"), ElementsAre(kResultValid_s));
   EXPECT_THAT(Stated(page, "kReason", "minlength"), ElementsAre(kMinReason));
   EXPECT_THAT(Stated(api, "reason", "minLength"), ElementsAre(kMinReason));
   EXPECT_THAT(Stated(page, "kNewPassword", "minlength"), ElementsAre(web::kMinPassword));

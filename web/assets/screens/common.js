@@ -8,7 +8,6 @@ import { S, translated } from '../strings.js';
 /// the appliance.
 export const isCold = (on_s) => on_s < live.status?.sensor.warm_up_s;
 export const minutesOf = (seconds) => Math.round(seconds / 6) / 10;
-export const kOldAfter_s = 120;
 
 const capital = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}`;
 /// A reason as a sentence.

@@ -1,8 +1,9 @@
 // The head of a result: whose it is, how old, the verdict, and whether it can be acted on.
 import { live, since_s } from '../api.js';
 import { clear, h, localTime } from '../dom.js';
+import { kResult } from '../limits.js';
 import { S, translated } from '../strings.js';
-import { ageText, flagList, kOldAfter_s, sentence, verdictIcon } from './common.js';
+import { ageText, flagList, sentence, verdictIcon } from './common.js';
 
 /// Seconds since the scan ended; Infinity where that is not known: such a result is old.
 export function ageOf(scan, received) {
@@ -23,7 +24,7 @@ export function whyNotValid(scan, received) {
   if (status?.state === 'scanning' || status?.state === 'working') return 'running';
   if (status?.last_result && status.last_result.id !== scan.id
       && status.last_result.patient_id === scan.patient_id) return 'superseded';
-  if (ageOf(scan, received) > kOldAfter_s) return 'old';
+  if (ageOf(scan, received) > kResult.valid_s) return 'old';
   if (status && scan.patient_id && status.session?.patient_id !== scan.patient_id) return 'closed';
   if (status?.last_result?.id !== scan.id) return 'old';
   return live.connected ? null : 'offline';

@@ -1,9 +1,12 @@
-// The axes of the room: the signed calibration.
+#include "daemon/appliance/room_in_use.hpp"
+
+#include <ctime>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "algo/base/units.hpp"
 #include "algo/comparison/room_board.hpp"
-#include "daemon/appliance/appliance.hpp"
 #include "daemon/files/marker_sheet.hpp"
 #include "daemon/loop/log.hpp"
 
@@ -37,25 +40,38 @@ web::RoomCalibrationVersion ForPage(const SignedRoom& room) {
 
 }  // namespace
 
-void Appliance::RefreshRoom() {
+WallClock::time_point StartOfDay() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  ::localtime_r(&now, &local);
+  local.tm_hour = local.tm_min = local.tm_sec = 0;
+  local.tm_isdst = -1;  // summer time may have begun or ended since midnight
+  return WallClock::from_time_t(std::mktime(&local));
+}
+
+RoomInUse::RoomInUse(const CurrentStore& store, const Config& config,
+                     std::function<SensorSnapshot()> sensor)
+    : store_(store), config_(config), sensor_(std::move(sensor)) {}
+
+void RoomInUse::Refresh() {
   Room room;
-  room.configured = parts_.config.compare.T_iec_reference;
+  room.configured = config_.compare.T_iec_reference;
   if (store_ != nullptr) {
     try {
       room.calibration = store_->room.Newest();
-      if (room.calibration) room.due = store_->room.WhyDue(*room.calibration, parts_.config.check);
+      if (room.calibration) room.due = store_->room.WhyDue(*room.calibration, config_.check);
     } catch (const std::exception& error) {  // the orientation of the room is then unknown
       room.calibration.reset();
       room.due = error.what();
     }
   }
-  const std::lock_guard lock(room_mutex_);
+  const std::lock_guard lock(mutex_);
   if (!room.due.empty() && room.due != room_.due)
     Log(LogLevel::kWarning, fmt::format("the room has to be calibrated again: {}", room.due));
   room_ = std::move(room);
 }
 
-std::optional<RoomAxes> Appliance::RoomOfJob() const {
+std::optional<RoomAxes> RoomInUse::OfJob() const {
   if (room_.calibration)
     return RoomAxes{room_.calibration->version, room_.calibration->fit.markers_iec, room_.due};
   if (!room_.due.empty()) return RoomAxes{0, {}, room_.due};
@@ -64,20 +80,20 @@ std::optional<RoomAxes> Appliance::RoomOfJob() const {
 
 /// A signed calibration takes precedence even while it is due, and the axes are then unknown. The
 /// configuration counts only where no calibration was ever signed.
-std::optional<Pose> Appliance::RoomPose() const {
+std::optional<Pose> RoomInUse::T_iec_reference() const {
   if (!room_.due.empty()) return std::nullopt;
   return room_.calibration ? room_.calibration->fit.T_iec_reference : room_.configured;
 }
 
-std::optional<RoomWays> Appliance::RoomIn(const MarkerMap& scene) const {
-  const std::lock_guard lock(room_mutex_);
+std::optional<RoomWays> RoomInUse::In(const MarkerMap& scene) const {
+  const std::lock_guard lock(mutex_);
   if (!room_.due.empty()) return std::nullopt;
   const std::optional<Pose> T_iec_scene =
       room_.calibration ? RoomOf(room_.calibration->fit.markers_iec, scene) : room_.configured;
   return T_iec_scene ? std::optional(WaysOfRoom(*T_iec_scene)) : std::nullopt;
 }
 
-void Appliance::ReportRoom(Status& status) const {
+void RoomInUse::Report(Status& status) const {
   if (!room_.due.empty())
     status.warnings.push_back(fmt::format(
         "The room must be calibrated again; until then, directions refer to the patient: {}",
@@ -86,31 +102,31 @@ void Appliance::ReportRoom(Status& status) const {
     status.warnings.push_back(
         "The signed room calibration is in effect; T_iec_reference of the configuration is "
         "ignored");
-  const std::optional<Pose> T_iec_reference = RoomPose();
-  const Eigen::Matrix3d R_iec_reference = T_iec_reference.value_or(Pose::Identity()).linear();
+  const std::optional<Pose> room = T_iec_reference();
+  const Eigen::Matrix3d R_iec_reference = room.value_or(Pose::Identity()).linear();
   status.room = {.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)},
                  .right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)},
-                 .is_known = T_iec_reference.has_value()};
+                 .is_known = room.has_value()};
 }
 
-std::pair<std::string, WallClock::time_point> Appliance::RoomScansWanted() const {
-  return {sensors_->snapshot().sensor.serial, StartOfDay()};
+std::pair<std::string, WallClock::time_point> RoomInUse::ScansWanted() const {
+  return {sensor_().sensor.serial, StartOfDay()};
 }
 
-web::RoomCalibrationStatus Appliance::RoomCalibration() {
+web::RoomCalibrationStatus RoomInUse::Calibration() const {
   const RoomCalibrationLimits limits;
   web::RoomCalibrationStatus status;
   status.num_wanted = limits.num_scans;
   status.max_shift_mm = limits.max_shift_m / kMillimetre;
   status.max_turn_deg = limits.max_turn_rad / kDegree;
   {
-    const std::lock_guard lock(room_mutex_);
+    const std::lock_guard lock(mutex_);
     status.due = room_.due;
     status.is_configured = room_.configured.has_value();
   }
   for (const SignedRoom& room : store_->room.List(kVersionsShown))
     status.versions.push_back(ForPage(room));
-  const auto [serial, since] = RoomScansWanted();
+  const auto [serial, since] = ScansWanted();
   const RoomCandidate candidate = store_->room.Candidate(serial, since);
   for (const BoardScan& scan : candidate.scans) status.scans.push_back(ForPage(scan));
   if (candidate.fit) {
@@ -122,8 +138,8 @@ web::RoomCalibrationStatus Appliance::RoomCalibration() {
   return status;
 }
 
-std::string Appliance::RoomBoardPdf() const {
-  const StreamInfo info = sensors_->snapshot().info;
+std::string RoomInUse::BoardPdf() const {
+  const StreamInfo info = sensor_().info;
   const MarkerSheet sheet({.dictionary = info.marker_dictionary,
                            .ids = {},
                            .length_m = info.marker_length_m,

@@ -1,0 +1,9 @@
+// The tolerance where nobody has chosen one.
+#pragma once
+
+namespace plumb {
+
+inline constexpr double kDefaultShiftTolerance_mm = 3.0;
+inline constexpr double kDefaultRotationTolerance_deg = 1.0;
+
+}  // namespace plumb

@@ -1,0 +1,66 @@
+// To whom the next scan belongs and what it is for: the treatment session that is open, and the
+// daily check.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "daemon/config/config.hpp"
+#include "daemon/loop/event_loop.hpp"
+#include "web/model/account.hpp"
+#include "web/model/scan.hpp"
+
+namespace plumb {
+
+/// Used on the loop's thread.
+class CurrentSession {
+ public:
+  /// The loop and the configuration are borrowed.
+  /// @param unused  Called when nothing was scanned for the configured time.
+  CurrentSession(EventLoop& loop, const Config& config, std::function<void()> unused);
+
+  /// A session that the store has opened: scans belong to it until it is forgotten.
+  void Open(const std::string& id, const std::string& patient_id, ScanPurpose purpose,
+            const std::string& reason, const Actor& actor);
+  void Forget();
+  /// Begins the time without a scan anew. The demo's session does not expire, because no user could
+  /// open it again.
+  void ArmTimer();
+  [[nodiscard]] bool IsOpen() const { return !id_.empty(); }
+  [[nodiscard]] const std::string& id() const { return id_; }
+  [[nodiscard]] const std::string& patient_id() const { return patient_id_; }
+  [[nodiscard]] const std::string& reason() const { return reason_; }
+  [[nodiscard]] const Actor& opened_by() const { return opened_by_; }
+  /// The demo's is open from the start and stays open; another is closed or about to be opened.
+  [[nodiscard]] bool IsPatients() const;
+
+  /// Until the store has opened a session, no scan begins, and no session is opened or closed.
+  void SetOpening(bool opening) { opening_ = opening; }
+  /// The same while the store removes the data of the patient whose session is open.
+  void SetWiping(bool wiping) { wiping_ = wiping; }
+  /// Why no session can be opened or closed at the moment; empty: one can. Otherwise the store and
+  /// the page could end up with different sessions.
+  [[nodiscard]] std::string WhyNotChange() const;
+  [[nodiscard]] std::string WhyNotScan() const;
+
+  /// The next scan is the daily check of the room's markers; scans after it belong to the open
+  /// patient again.
+  void SetCheck(std::optional<Actor> actor) { check_ = std::move(actor); }
+  /// The user who has asked for it; not set if the next or running scan is no check.
+  [[nodiscard]] const std::optional<Actor>& check() const { return check_; }
+  /// Of the next scan.
+  [[nodiscard]] ScanPurpose purpose() const { return check_ ? ScanPurpose::kDailyCheck : purpose_; }
+
+ private:
+  const Config& config_;
+  std::string id_, patient_id_, reason_;
+  Actor opened_by_;
+  ScanPurpose purpose_ = ScanPurpose::kFraction;
+  bool opening_ = false, wiping_ = false;
+  std::optional<Actor> check_;
+  EventLoop::Source timer_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,65 @@
+// The axes of the room that are in use: those of the signed calibration.
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "algo/base/pose.hpp"
+#include "algo/comparison/body_parts.hpp"
+#include "daemon/appliance/current_store.hpp"
+#include "daemon/appliance/scan_session.hpp"
+#include "daemon/appliance/sensor_thread.hpp"
+#include "daemon/config/config.hpp"
+#include "web/model/status.hpp"
+#include "web/service/room_services.hpp"
+
+namespace plumb {
+
+/// Used on the loop's thread, except for functions marked "from any thread".
+class RoomInUse {
+ public:
+  /// Store and configuration are borrowed and outlive this object, and so does what `sensor` uses.
+  RoomInUse(const CurrentStore& store, const Config& config,
+            std::function<SensorSnapshot()> sensor);
+
+  /// Reloads the calibration, and whether a marker has moved since.
+  void Refresh();
+  /// For the comparison of the next scan.
+  [[nodiscard]] std::optional<RoomAxes> OfJob() const;
+  /// Where the gantry is on the maps of a scene, as a comparison with it would find it; not set if
+  /// the room is not known. From any thread.
+  /// @param scene  Its markers: the reference marker may have lain otherwise than when the room
+  ///         was calibrated.
+  [[nodiscard]] std::optional<RoomWays> In(const MarkerMap& scene) const;
+  void Report(Status& status) const;
+  /// From any thread.
+  [[nodiscard]] web::RoomCalibrationStatus Calibration() const;
+  /// The board for the room's markers; from any thread.
+  [[nodiscard]] std::string BoardPdf() const;
+  /// Whose scans of the board count for the next calibration, and since when; from any thread.
+  [[nodiscard]] std::pair<std::string, WallClock::time_point> ScansWanted() const;
+
+ private:
+  [[nodiscard]] std::optional<Pose> T_iec_reference() const;
+
+  /// The calibration in use, as found by Refresh().
+  struct Room {
+    std::optional<SignedRoom> calibration;
+    std::string due;  ///< Set without a calibration: one is stored but cannot be read.
+    std::optional<Pose> configured;  ///< T_iec_reference of the configuration.
+  };
+
+  const CurrentStore& store_;
+  const Config& config_;
+  const std::function<SensorSnapshot()> sensor_;
+  mutable std::mutex mutex_;  ///< For the room: changed on the loop, read from any thread.
+  Room room_;
+};
+
+/// Midnight, local time.
+[[nodiscard]] WallClock::time_point StartOfDay();
+
+}  // namespace plumb

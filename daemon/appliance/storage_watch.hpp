@@ -1,0 +1,128 @@
+// What is stored, and whether it can be used: opening it, safe mode while it cannot be used, and
+// the room on its disks.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "daemon/appliance/current_store.hpp"
+#include "daemon/loop/event_loop.hpp"
+#include "daemon/loop/work_thread.hpp"
+
+namespace plumb {
+
+struct StorageOptions {
+  std::filesystem::path state = {};
+  /// Why the configuration cannot be used; empty if it can. If it cannot, nothing stored is
+  /// touched, because the configured folder may be another.
+  std::string configuration_fault = {};
+  /// Longest check of the whole database at the start. A larger one is checked while the appliance
+  /// already works.
+  std::chrono::milliseconds check_limit = StoreOptions().check_limit;
+  /// Pauses between the attempts to leave safe mode; the last one is repeated.
+  std::vector<std::chrono::milliseconds> retries = {
+      std::chrono::seconds(10), std::chrono::seconds(60), std::chrono::seconds(300)};
+  /// Measures the room on the disk of a folder. Empty: asks the system.
+  std::function<std::filesystem::space_info(const std::filesystem::path&, std::error_code&)> space =
+      {};
+};
+
+/// Whose storage it is. Called on the loop's thread.
+class StorageUser {
+ public:
+  virtual ~StorageUser() = default;
+  /// The store can be changed from now on. @throws IoError and its kinds, if it cannot
+  virtual void StoreOpened(Store& store) = 0;
+  virtual void StorageFailed() = 0;
+  virtual void StorageFaultChanged() = 0;
+  virtual void StorageWorks() = 0;
+  /// Reads everything that the status shows. @throws IoError and its kinds
+  virtual void ReadAll() = 0;
+  [[nodiscard]] virtual bool IsRunning() const = 0;
+  [[nodiscard]] virtual bool HasSession() const = 0;
+};
+
+/// Used on the loop's thread, except for functions marked "from any thread".
+class StorageWatch {
+ public:
+  /// Why nothing can be stored.
+  enum class Fault {
+    kMayEnd,  ///< For example, a disk is read-only or not mounted.
+    kDamage,  ///< The database is damaged: somebody has to restore a backup and restart plumbd.
+  };
+
+  /// Everything is borrowed. The threads are destroyed before this object.
+  /// @param changes  For changes of the store. @param reads  For what may take long.
+  StorageWatch(EventLoop& loop, StorageOptions options, StorageUser& user, WorkThread& changes,
+               WorkThread& reads);
+
+  /// At the start; waits for a program that copies the database.
+  void Open();
+  /// In safe mode a read-only one, or none. From any thread.
+  [[nodiscard]] const CurrentStore& store() const { return store_; }
+  [[nodiscard]] const std::filesystem::path& state() const { return options_.state; }
+  /// That the configuration cannot be used, which is no fault of the storage.
+  [[nodiscard]] bool has_configuration_fault() const {
+    return !options_.configuration_fault.empty();
+  }
+  /// Why nothing can be stored; empty outside safe mode.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+  [[nodiscard]] bool IsUsable() const { return store_ != nullptr && fault_.empty(); }
+  /// Attempts to leave safe mode that were armed since it began.
+  [[nodiscard]] std::size_t num_retries() const { return num_retries_; }
+  void Stop() { stopped_ = true; }
+
+  /// Begins safe mode, except for a fault that is not worse than the present one.
+  void Fail(const std::string& what, Fault kind);
+  /// The same after the present callback of the loop; from any thread.
+  void FailLater(const std::exception& error);
+  /// Detects a disk that has become read-only before a patient is scanned in vain. Off the loop.
+  void CheckDisk();
+
+  /// True also where nothing can be said of it.
+  [[nodiscard]] bool IsReadOnly() const;
+  /// Of the state folder's disk, or of the one that scans/ is: the one with less room.
+  [[nodiscard]] std::optional<std::filesystem::space_info> SpaceForScans() const;
+  /// From any thread.
+  [[nodiscard]] std::filesystem::space_info SpaceOf(const std::filesystem::path& folder,
+                                                    std::error_code& error) const;
+  /// Used share of the disk with less room, counted as df does, without the blocks reserved for
+  /// root. 0 if no disk can be examined.
+  [[nodiscard]] double UsedShare() const;
+  [[nodiscard]] bool IsNearlyFull() const;
+
+ private:
+  [[nodiscard]] std::unique_ptr<Store> OpenForWork(StoreOptions options) const;
+  void Use(std::unique_ptr<Store> store);
+  void EnterSafeMode(const std::string& what, Fault kind);
+  void ArmRetry();
+  void Retry();
+  void Probe();
+  void Reopen();
+  void EndRetry(const std::string& what, Fault kind = Fault::kMayEnd);
+  void LeaveSafeMode();
+  void LogRecovery(const RecoveryReport& found) const;
+
+  EventLoop& loop_;
+  const StorageOptions options_;
+  StorageUser& user_;
+  WorkThread& changes_;
+  WorkThread& reads_;
+  CurrentStore store_;
+  bool is_open_ = false;  ///< For changes; otherwise it is read-only, or there is none.
+  std::string fault_;
+  Fault kind_ = Fault::kMayEnd;
+  std::size_t num_retries_ = 0;
+  std::chrono::steady_clock::time_point works_since_;
+  bool stopped_ = false;
+  EventLoop::Source timer_;
+};
+
+}  // namespace plumb
