@@ -182,7 +182,7 @@ void FakeAppliance::CloseCheck() {
 void FakeAppliance::EndCheck() {
   CheckRecord check;
   check.id = fmt::format("{}", next_id_++);
-  check.status = checks.baseline ? "passed" : "no_baseline";
+  check.status = checks.baseline ? MarkerCheckStatus::kPassed : MarkerCheckStatus::kNoBaseline;
   check.num_markers = 12;
   check.items = {
       {"markers_seen", 12, 12, "", true, ""},    {"misfit", 0.84, 3, "mm", true, ""},
@@ -202,10 +202,10 @@ void FakeAppliance::EndCheck() {
   check.user = checker_;
   check.sensor_serial = status.sensor.serial;
   checks.checks.insert(checks.checks.begin(), check);
-  if (check.status == "passed") {
+  if (check.status == MarkerCheckStatus::kPassed) {
     checks.today = DailyCheck::kPassed;
     status.reference_block.clear();
-  } else if (check.status == "failed") {
+  } else if (check.status == MarkerCheckStatus::kFailed) {
     checks.today = DailyCheck::kFailed;
     status.reference_block =
         "the daily check has failed, and references need one that has passed since: open Daily "
@@ -215,7 +215,7 @@ void FakeAppliance::EndCheck() {
   status.daily_check = checks.today;
   status.scan.reset();
   status.state = ApplianceState::kResult;
-  status.light = check.status == "passed" ? "result_in_tolerance" : "no_answer";
+  status.light = check.status == MarkerCheckStatus::kPassed ? "result_in_tolerance" : "no_answer";
   if (is_board_there) SeeBoard(check);
   CloseCheck();
   Notify(EventKind::kResult);
@@ -315,7 +315,7 @@ void FakeAppliance::ResetSensorProfile(const Actor& actor, const std::string& se
   SensorProfileVersion reset;
   reset.version = profiles.versions.empty() ? 1 : profiles.versions.front().version + 1;
   reset.made_at = WallClock::now();
-  reset.cause = "reset";
+  reset.cause = ProfileCause::kReset;
   profiles.versions.insert(profiles.versions.begin(), reset);
   Did(actor, "profile.reset", serial, done);
 }
@@ -327,7 +327,7 @@ void FakeAppliance::RollBackSensorProfile(const Actor& actor, const std::string&
   for (SensorProfileVersion one : profiles.versions) {
     if (one.version != version || one.num_sweeps == 0) continue;
     one.version = profiles.versions.front().version + 1;
-    one.cause = "rolled_back";
+    one.cause = ProfileCause::kRolledBack;
     profiles.versions.insert(profiles.versions.begin(), one);
     return Did(actor, "profile.roll_back", serial, done);
   }
@@ -349,11 +349,11 @@ void FakeAppliance::EndScan() {
   }
   status.scan.reset();
   status.state = ApplianceState::kResult;
-  status.light = !scan.result                             ? "done"
-                 : scan.result->verdict == "move"         ? "result_move"
-                 : scan.result->verdict == "in_tolerance" ? "result_in_tolerance"
-                 : scan.result->verdict == "unsure"       ? "result_unsure"
-                                                          : "no_answer";
+  status.light = !scan.result                                    ? "done"
+                 : scan.result->verdict == Verdict::kMove        ? "result_move"
+                 : scan.result->verdict == Verdict::kInTolerance ? "result_in_tolerance"
+                 : scan.result->verdict == Verdict::kUnsure      ? "result_unsure"
+                                                                 : "no_answer";
   status.last_result = scan;
   if (status.session) ++status.session->num_scans;
   ++status.scans_today;

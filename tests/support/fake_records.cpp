@@ -330,14 +330,14 @@ void FakeAppliance::AcceptScan(const Actor& actor, const std::string& id, const 
   if (found == scans.end()) return Finish(done, Refused(ChangeResult::kNotFound, "no such scan"));
   const auto refuse = [&](const char* why) { Finish(done, Refused(ChangeResult::kConflict, why)); };
   if (status.scan) return refuse("a scan is running: accept its result, not an older one");
-  if (!found->result || found->result->verdict == "no_answer")
+  if (!found->result || found->result->verdict == Verdict::kNoAnswer)
     return refuse("there is nothing to accept");
   if (IsOld(*found)) return refuse("this result is older than 2 minutes: scan again");
   if (std::any_of(found + 1, scans.end(), [&](const Scan& scan) {
         return scan.patient_id == found->patient_id && scan.outcome == ScanOutcome::kDone;
       }))
     return refuse("there is a newer scan of this patient: accept that one");
-  if (found->result->verdict != "in_tolerance" && reason.empty())
+  if (found->result->verdict != Verdict::kInTolerance && reason.empty())
     return refuse("this result is not in tolerance: accepting it requires a reason");
   found->accepted_by = actor.user;
   found->accepted_reason = reason;

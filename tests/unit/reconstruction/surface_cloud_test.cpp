@@ -125,7 +125,7 @@ TEST(MergeSurfaceTest, EmptyInputsAndCallersMistakes) {
   EXPECT_THROW((void)MergeSurface(PrepareViews(std::vector{blind}), {.voxel_size_m = 0.0F}),
                std::invalid_argument);
   blind.T_world_camera.translation().x() = std::nan("");
-  EXPECT_THROW((void)PrepareViews(std::vector{blind}), std::invalid_argument);
+  EXPECT_THROW((void)MergeSurface(PrepareViews(std::vector{blind})), std::invalid_argument);
 }
 
 TEST(PrepareViewsTest, WeightsAndEdgesFollowTheNoiseThatIsStatedForTheSensor) {

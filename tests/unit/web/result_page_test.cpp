@@ -32,7 +32,7 @@ class ResultPageTest : public WebTest {
       scan.started_at = WallClock::now() - age - seconds(20);
       scan.finished_at = WallClock::now() - age;
       scan.result = ResultSummary{};
-      scan.result->verdict = "in_tolerance";
+      scan.result->verdict = Verdict::kInTolerance;
       service_.scans.push_back(scan);
       if (outcome != ScanOutcome::kDone) return;
       scan.age_s = static_cast<double>(age.count());
@@ -73,7 +73,7 @@ TEST_F(ResultPageTest, TheNumbersHaveTheNamesThatTheResultGivesThem) {
 
 TEST_F(ResultPageTest, AnAcceptanceWithAReasonIsInTheWordsOfItsVerdict) {
   Add("s1", seconds(10));
-  const auto accepted = [&](const char* verdict) {
+  const auto accepted = [&](Verdict verdict) {
     loop_->Do([&] {
       service_.scans.back().result->verdict = verdict;
       service_.scans.back().accepted_by = "anna";
@@ -81,8 +81,9 @@ TEST_F(ResultPageTest, AnAcceptanceWithAReasonIsInTheWordsOfItsVerdict) {
     });
     return Page();
   };
-  EXPECT_THAT(accepted("move"), HasSubstr("Accepted outside tolerance by anna: as &lt;before&gt;"));
-  EXPECT_THAT(accepted("unsure"),
+  EXPECT_THAT(accepted(Verdict::kMove),
+              HasSubstr("Accepted outside tolerance by anna: as &lt;before&gt;"));
+  EXPECT_THAT(accepted(Verdict::kUnsure),
               AllOf(HasSubstr("Accepted although not surely within tolerance by anna"),
                     Not(HasSubstr("Accepted outside"))));
 }
@@ -155,7 +156,7 @@ TEST_F(ResultPageTest, ItSpeaksTheBrowsersLanguageOrTheOneThatIsAskedFor) {
   Add("s1", seconds(90));
   loop_->Do([&] {
     ResultSummary& result = *service_.scans.back().result;
-    result.verdict = "move";
+    result.verdict = Verdict::kMove;
     result.correction.emplace().vertical_mm = -8.04;
     result.u95.emplace().vertical_mm = 0.9;
     result.u95->pitch_deg = 0.14;
@@ -196,7 +197,7 @@ TEST_F(ResultPageTest, WhatIsNotSurelyWithinAsksForAnotherScan) {
   Add("s1", seconds(30));
   loop_->Do([&] {
     ResultSummary& result = *service_.scans.back().result;
-    result.verdict = "unsure";
+    result.verdict = Verdict::kUnsure;
     result.correction.emplace().vertical_mm = 2.8;
     result.correction->longitudinal_mm = 0.5;
     result.u95.emplace().vertical_mm = 1.2;

@@ -79,7 +79,7 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   scan.outcome = ScanOutcome::kDone;
   scan.folder = folder.path();
   scan.result = ResultSummary{};
-  scan.result->verdict = "move";
+  scan.result->verdict = Verdict::kMove;
   scan.result->correction.emplace().vertical_mm = -8.25;
   scan.daily_check = DailyCheck::kFailed;
   scan.accepted_by = "anna";
