@@ -30,13 +30,12 @@ Preset ParsePreset(const std::string& name) {
 }
 
 PatientPosture ParsePosture(const std::string& name) {
-  if (const std::optional<PatientPosture> posture = PostureNamed(name)) return *posture;
+  if (const auto posture = Named<PatientPosture>(name)) return *posture;
   throw py::value_error("posture: expected 'HFS', 'HFP', 'FFS' or 'FFP', found '" + name + "'");
 }
 
 MarkerKind ParseMarkerKind(const std::string& name) {
-  if (name == "room") return MarkerKind::kRoom;
-  if (name == "couch") return MarkerKind::kCouch;
+  if (const auto kind = Named<MarkerKind>(name)) return *kind;
   throw py::value_error("marker_kind: expected 'room' or 'couch', found '" + name + "'");
 }
 

@@ -225,19 +225,20 @@ Status Appliance::WebStatus() {
   status.patient_id = session_.check() ? std::string() : session_.patient_id();
   status.next_purpose = session_.purpose();
   if (IsRunning()) {
-    status.scan = LiveScan{.id = scan_.id,
-                           .patient_id = scan_.patient_id,
-                           .purpose = scan_.purpose,
-                           .elapsed_s = SecondsSince(scan_.started),
-                           .coverage = scan_.Coverage(),
-                           .without_new_surface_s = scan_.update.guidance.without_new_area_s,
-                           .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_fraction),
-                           .keyframes = scan_.update.keyframes,
-                           .frames = scan_.update.frames,
-                           .frames_tracked = scan_.update.frames_tracked,
-                           .frames_dropped = scan_.update.frames_dropped,
-                           .step = scan_.update.step,
-                           .step_fraction = scan_.update.fraction};
+    status.scan =
+        LiveScan{.id = scan_.id,
+                 .patient_id = scan_.patient_id,
+                 .purpose = scan_.purpose,
+                 .elapsed_s = SecondsSince(scan_.started),
+                 .coverage = scan_.Coverage(),
+                 .without_new_surface_s = scan_.update.guidance.without_new_area_s,
+                 .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_fraction),
+                 .keyframes = scan_.update.keyframes,
+                 .frames = scan_.update.frames,
+                 .frames_tracked = scan_.update.frames_tracked,
+                 .frames_dropped = scan_.update.frames_dropped,
+                 .step = scan_.update.step,
+                 .step_fraction = scan_.update.fraction};
   }
   status.version = Version();
   status.warnings = page_.warnings;

@@ -6,7 +6,6 @@
 
 namespace plumb {
 
-
 CurrentSession::CurrentSession(EventLoop& loop, const Config& config, std::function<void()> unused)
     : config_(config), timer_(loop.MakeTimer("session unused", std::move(unused))) {}
 

@@ -10,6 +10,7 @@
 #include "daemon/config/config.hpp"
 #include "drivers/live/sensor_driver.hpp"
 #include "web/model/scan.hpp"
+#include "web/model/settings.hpp"
 
 namespace plumb {
 
@@ -35,6 +36,10 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options);
 /// @throws DataError for a file that cannot be used, std::invalid_argument for an option.
 [[nodiscard]] Config ReadConfiguration(const PlumbdOptions& options,
                                        const SensorRegistry& registry);
+
+/// The settings of a new store: the defaults, but for what the file gives.
+/// @throws DataError for a value that no settings may have
+[[nodiscard]] Settings FirstSettings(const ApplianceConfig& given);
 
 /// The configuration in use, and why the requested one cannot be used.
 struct Configured {

@@ -19,7 +19,6 @@
 
 namespace plumb {
 
-
 namespace {
 
 /// Ticks between the checks of two stored scans, and until the next search for one that is due.

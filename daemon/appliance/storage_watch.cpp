@@ -20,7 +20,6 @@
 
 namespace plumb {
 
-
 namespace {
 
 /// If the display cannot be paired, that is logged, and scanning remains possible.
@@ -54,6 +53,7 @@ StorageWatch::StorageWatch(EventLoop& loop, StorageOptions options, StorageUser&
 /// On any thread. @throws IoError and its kinds
 std::unique_ptr<Store> StorageWatch::OpenForWork(StoreOptions options) const {
   options.check_limit = options_.check_limit;
+  options.first_settings = options_.first_settings;
   auto store = std::make_unique<Store>(options_.state, options);
   // Sessions end with the process: the patient on the couch has to be confirmed again.
   store->treatments.CloseAll(kSelf);

@@ -23,6 +23,7 @@ struct StorageOptions {
   /// Why the configuration cannot be used; empty if it can. If it cannot, nothing stored is
   /// touched, because the configured folder may be another.
   std::string configuration_fault = {};
+  Settings first_settings = {};  ///< In force until somebody saves settings.
   /// Longest check of the whole database at the start. A larger one is checked while the appliance
   /// already works.
   std::chrono::milliseconds check_limit = StoreOptions().check_limit;

@@ -18,7 +18,6 @@ namespace {
 
 const Actor kInstaller{.user = "installer", .address = {}};
 
-
 }  // namespace
 
 Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,

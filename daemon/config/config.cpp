@@ -112,6 +112,7 @@ void RefuseKeysOfThePlan(const Section& section) {
 struct LoosestLimits {
   AcceptanceLimits gates;
   MarkerConsensusOptions markers;
+  MarkerCheckLimits check;
   std::string advice;  ///< In a refusal.
 };
 
@@ -119,16 +120,23 @@ LoosestLimits LoosestFor(ConfigUse use) {
   if (use == ConfigUse::kAppliance)
     return {.gates = {},
             .markers = {},
+            .check = {},
             .advice =
                 "plumbd takes no limit that is looser than the method's own: remove the line, "
                 "or state a stricter one"};
   return {.gates = kLoosestLimits,
           .markers = {.moved_m = 100 * kMillimetre, .moved_sigmas = 100},
+          .check = {.max_misfit_m = 100 * kMillimetre,
+                    .max_moved_m = 100 * kMillimetre,
+                    .max_side_error = 1,
+                    .max_scale_error = 1,
+                    .max_depth_error = 1,
+                    .min_views = 1},
           .advice = {}};
 }
 
 void ReadLimits(Section& section, ConfigUse use, CompareOptions& options) {
-  const auto [loosest, markers, advice] = LoosestFor(use);
+  const auto [loosest, markers, check, advice] = LoosestFor(use);
   AcceptanceLimits& limits = options.limits;
   section.SetAdvice(advice);
   section.Take("min_shared_markers", limits.min_shared_markers,
@@ -151,9 +159,9 @@ void ReadLimits(Section& section, ConfigUse use, CompareOptions& options) {
 
 void ReadCompare(Section section, ConfigUse use, Config& config) {
   CompareOptions& options = config.compare;
-  if (use == ConfigUse::kAppliance) RefuseKeysOfThePlan(section);
-  section.Refuse("preset", "the preset of [reconstruct] holds for comparisons, too");
+  if (use != ConfigUse::kCommandLine) RefuseKeysOfThePlan(section);
   options.preset = config.reconstruct.preset;
+  section.TakeName("preset", options.preset, kPresets);
   std::string region;
   section.Take("region", region, "the path of a region file",
                [](const std::string& s) { return !s.empty(); });
@@ -176,11 +184,10 @@ void ReadCompare(Section section, ConfigUse use, Config& config) {
   section.RejectUnknownKeys();
 }
 
-/// Only plumbd uses them, and takes none that is looser than the method's.
-void ReadCheck(Section section, MarkerCheckLimits& limits) {
+void ReadCheck(Section section, ConfigUse use, MarkerCheckLimits& limits) {
   constexpr double kPercent = 0.01;
-  const MarkerCheckLimits loosest;
-  section.SetAdvice(LoosestFor(ConfigUse::kAppliance).advice);
+  const auto [gates, markers, loosest, advice] = LoosestFor(use);
+  section.SetAdvice(advice);
   section.TakeLimit("misfit_mm", limits.max_misfit_m, loosest.max_misfit_m, kMillimetre,
                     "millimetres");
   section.TakeLimit("moved_mm", limits.max_moved_m, loosest.max_moved_m, kMillimetre,
@@ -219,8 +226,13 @@ void ReadIec(Section section, const toml::table& root, std::optional<Pose>& T_ie
 }
 
 void ReadAppliance(Section section, ApplianceConfig& appliance) {
-  for (const char* key : {"auto_stop_s", "scan_limit_s", "keep_recordings"})
-    section.Refuse(key, "set it on the page under Settings");
+  // The ranges are those of the settings, which plumbd knows.
+  section.Take("auto_stop_s", appliance.auto_stop_s, "seconds above 0",
+               [](double v) { return v > 0; });
+  section.Take("scan_limit_s", appliance.scan_limit_s, "seconds above 0",
+               [](double v) { return v > 0; });
+  section.Take("keep_recordings", appliance.keep_recordings, "true or false",
+               [](bool) { return true; });
   section.TakePath("state", appliance.state);
   section.TakePath("control", appliance.control);
   section.TakePath("calibration", appliance.calibration);
@@ -347,7 +359,7 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
   ReadMarkers(Section(root, "markers", name), config.markers);
   ReadReconstruct(Section(root, "reconstruct", name), config.reconstruct);
   ReadCompare(Section(root, "compare", name), use, config);
-  ReadCheck(Section(root, "check", name), config.check);
+  ReadCheck(Section(root, "check", name), use, config.check);
   ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
   ReadAppliance(Section(root, "appliance", name), config.appliance);
   ReadStorage(Section(root, "storage", name), config.appliance);
@@ -386,14 +398,16 @@ Config SalvageConfig(const std::filesystem::path& file) {
 }
 
 void RefuseResearchPresets(const Config& config) {
-  const Preset preset = config.reconstruct.preset;
-  if (preset == Preset::kBest) return;
-  throw DataError(fmt::format(
-      "[reconstruct] preset: expected \"best\", found \"{0}\"; plumbd takes preset \"{0}\" only "
-      "with --simulated, because it is the published method kept for comparison. Remove the key, "
-      "or "
-      "compare scans with `plumb compare --preset {0}`",
-      Name(preset)));
+  const auto refuse = [](const char* section, Preset preset) {
+    if (preset == Preset::kBest) return;
+    throw DataError(fmt::format(
+        "[{0}] preset: expected \"best\", found \"{1}\"; plumbd takes preset \"{1}\" only with "
+        "--simulated, because it is the published method kept for comparison. Remove the key, or "
+        "compare scans with `plumb compare --preset {1}`",
+        section, Name(preset)));
+  };
+  refuse("reconstruct", config.reconstruct.preset);
+  refuse("compare", config.compare.preset);
 }
 
 std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
@@ -409,6 +423,10 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("appliance.state", in_use.appliance.state, next.appliance.state);
   keep("appliance.control", in_use.appliance.control, next.appliance.control);
   keep("appliance.calibration", in_use.appliance.calibration, next.appliance.calibration);
+  keep("appliance.auto_stop_s", in_use.appliance.auto_stop_s, next.appliance.auto_stop_s);
+  keep("appliance.scan_limit_s", in_use.appliance.scan_limit_s, next.appliance.scan_limit_s);
+  keep("appliance.keep_recordings", in_use.appliance.keep_recordings,
+       next.appliance.keep_recordings);
   keep("appliance.sensor_serial", in_use.appliance.sensor_serial, next.appliance.sensor_serial);
   keep("sensor.driver", in_use.appliance.sensor_driver, next.appliance.sensor_driver);
   keep("button.chip", in_use.panel.button_chip, next.panel.button_chip);

@@ -35,6 +35,9 @@ struct ApplianceConfig {
   bool sensor_profiles = true;
   /// Limit for all scans; the oldest are removed first. Not set: a fraction of the disk.
   std::optional<double> quota_gb;
+  /// First values of the page's settings, in force until somebody saves settings there.
+  std::optional<double> auto_stop_s, scan_limit_s;
+  std::optional<bool> keep_recordings;
   double warm_up_min = 15.0;  ///< Time that the sensor must have been on before a reference scan.
   double session_idle_min = 30.0;       ///< Time without a scan after which a session is closed.
   std::filesystem::path backup_folder;  ///< Folder of scheduled backups; empty: none are made.
@@ -104,19 +107,20 @@ struct Config {
   std::map<std::string, std::string> given;
 };
 
-/// The reader of a file. The keys are the same for both, but plumbd refuses those of [compare] that
+/// The reader of a file. The keys are the same for all, but plumbd refuses those of [compare] that
 /// belong to a patient (region, isocentre_m, marker_kind, posture and the two tolerances) and takes
-/// them from the approved plan of the reference, and it refuses limits that are looser than the
-/// method's own.
-enum class ConfigUse { kCommandLine, kAppliance };
+/// them from the approved plan of the reference. Unless its sensor is simulated, it also refuses
+/// limits that are looser than the method's own.
+enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 
 /// Reads and checks a file.
 ///
 ///     [markers]      dictionary, length_m, reference
-///     [reconstruct]  preset (also of [compare]), keep_color, use_markers, use_keypoints,
+///     [reconstruct]  preset, keep_color, use_markers, use_keypoints,
 ///                    use_row_motion, use_tone_curve, use_depth_field, use_dense_depth,
 ///                    keyframe_spacing, num_icp_iterations, seed
-///     [compare]      region, isocentre_m = [x, y, z], marker_kind = "room"|"couch",
+///     [compare]      preset (by default that of [reconstruct]), region,
+///                    isocentre_m = [x, y, z], marker_kind = "room"|"couch",
 ///                    posture = "HFS"|"HFP"|"FFS"|"FFP",
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers,
 ///                    moved_marker_mm, moved_marker_sigmas, min_coverage, max_hole_mm,
@@ -125,7 +129,7 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to IEC fixed frame
 ///     [storage]      backup_folder, backup_hours, backup_key_file
 ///     [appliance]    state, control, calibration, sensor_serial, sensor_profiles, quota_gb,
-///                    warm_up_min, session_idle_min
+///                    auto_stop_s, scan_limit_s, keep_recordings, warm_up_min, session_idle_min
 ///     [sensor]       driver
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low

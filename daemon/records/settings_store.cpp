@@ -14,7 +14,7 @@ constexpr const char* kStoredSettings = "SELECT value FROM settings WHERE name =
 
 Settings SettingsStore::Get() {
   const std::optional<std::string> stored = database_.ForRows()->FirstText(kStoredSettings);
-  return stored ? ParseSettings(*stored) : Settings{};
+  return stored ? ParseSettings(*stored) : first_;
 }
 
 void SettingsStore::Change(const Actor& actor, const Settings& settings) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/records/store_database.hpp"
@@ -15,13 +16,16 @@ namespace plumb {
 /// Thread-safe. @throws IoError and its kinds; DataError for settings that cannot be read.
 class SettingsStore {
  public:
-  explicit SettingsStore(StoreDatabase& database) : database_(database) {}
+  /// @param first  In force until somebody saves settings.
+  explicit SettingsStore(StoreDatabase& database, Settings first = {})
+      : database_(database), first_(std::move(first)) {}
 
   [[nodiscard]] Settings Get();
   void Change(const Actor& actor, const Settings& settings);
 
  private:
   StoreDatabase& database_;
+  const Settings first_;
 };
 
 /// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds.

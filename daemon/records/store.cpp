@@ -122,6 +122,7 @@ Store::Store(const fs::path& folder, const StoreOptions& options)
     : folders(fs::absolute(folder)),
       database_(OpenForChanges(folders, options, lock_, recovery_), folders.state() / kDatabase,
                 Database::Access::kReadOnly),
+      settings(database_, options.first_settings),
       integrity(database_, folders, options.look) {
   RecoverStore(*database_.ForChanges(), folders, options.look, recovery_);
   NoteRestore(folders.state(), *database_.ForChanges());
@@ -135,6 +136,7 @@ Store::Store(const fs::path& folder, ReadOnly)
     : folders(fs::absolute(folder)),
       database_(std::make_unique<Database>(folders.state() / kDatabase, Database::Access::kFrozen),
                 folders.state() / kDatabase, Database::Access::kFrozen),
+      settings(database_),
       integrity(database_, folders, LookAt) {
   (void)patients.List();  // fails if the tables do not exist
 }

@@ -62,6 +62,7 @@ struct StoreOptions {
   std::function<void(std::chrono::milliseconds)> sleep = {};      ///< Empty: the thread's sleep.
   /// Time for the database check at the start.
   std::chrono::milliseconds check_limit = std::chrono::seconds(20);
+  Settings first_settings = {};  ///< In force until somebody saves settings.
 };
 
 /// Opens DIR/plumb.db and DIR/scans/ID/ and owns the services over them. Users of a record call its
@@ -103,7 +104,7 @@ class Store {
  public:
   // Declared after the members that they use.
   AuditStore audit{database_};
-  SettingsStore settings{database_};
+  SettingsStore settings;
   UserStore users{database_};
   DisplayStore displays{database_};
   PatientStore patients{database_};

@@ -143,9 +143,9 @@ TEST_F(DaemonScanTest, ASweepEndsByItselfWhenNothingNewIsSeen) {
       << "the whole sweep was used, and then some time in which nothing new came";
 }
 
-TEST_F(DaemonScanTest, ASweepEndsAtItsLimit) {
-  Plumbd plumbd(folder_.path(),
-                {.settings = [](Settings& settings) { settings.scan_limit_s = 1; }});
+TEST_F(DaemonScanTest, ASweepEndsAtTheLimitThatTheFileGivesAsAFirstSetting) {
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\n";
+  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   EXPECT_EQ(plumbd.Press()["ok"], true);

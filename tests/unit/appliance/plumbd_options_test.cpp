@@ -80,5 +80,18 @@ TEST_F(UnusableConfigurationTest, AFileThatIsNoTomlGivesTheDefaults) {
   EXPECT_EQ(read.config.web.listen, WebConfig{}.listen);
 }
 
+TEST_F(UnusableConfigurationTest, TheFirstSettingsAreThoseOfTheFileWithinTheLimitsOfSettings) {
+  const Configured given =
+      Read("[appliance]\nauto_stop_s = 2.5\nscan_limit_s = 3600\nkeep_recordings = true\n");
+  EXPECT_EQ(given.fault, "");
+  const Settings first = FirstSettings(given.config.appliance);
+  EXPECT_EQ(first.auto_stop_s, 2.5);
+  EXPECT_EQ(first.scan_limit_s, 3600);
+  EXPECT_TRUE(first.keep_recordings);
+  EXPECT_THAT(Read("[appliance]\nscan_limit_s = 3601\n").fault,
+              HasSubstr("[appliance] scan_limit_s: expected 0.1 to 3600 seconds, found 3601"));
+  EXPECT_EQ(FirstSettings({}).auto_stop_s, Settings{}.auto_stop_s);
+}
+
 }  // namespace
 }  // namespace plumb

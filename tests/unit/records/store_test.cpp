@@ -51,6 +51,20 @@ TEST_F(StoreTest, KeepsEverythingOverARestart) {
   EXPECT_EQ(store->scans.SweptArea(scan), 2.5);
 }
 
+TEST_F(StoreTest, TheFirstSettingsHoldUntilOthersAreSaved) {
+  const StoreOptions options{
+      .first_settings = {.tolerance = {}, .auto_stop_s = 2.5, .keep_recordings = true}};
+  {
+    Store store(folder_ / "state", options);
+    EXPECT_EQ(store.settings.Get().auto_stop_s, 2.5);
+    EXPECT_TRUE(store.settings.Get().keep_recordings);
+    store.settings.Change(kAnna, {.tolerance = {}, .auto_stop_s = 7});
+  }
+  Store store(folder_ / "state", options);
+  EXPECT_EQ(store.settings.Get().auto_stop_s, 7);
+  EXPECT_FALSE(store.settings.Get().keep_recordings);
+}
+
 TEST_F(StoreTest, AScanThatWasRunningAtACrashHasFailedAndLeavesNothing) {
   std::string patient, id;
   {
