@@ -174,24 +174,29 @@ double ToleranceOf(const AcceptanceLimits& limits, std::size_t number) {
 }
 
 void CheckLimits(const AcceptanceLimits& limits) {
-  const auto check = [](double value, double least, double most, const char* name) {
-    if (value >= least && value <= most) return;
+  const auto refuse = [](const char* name, const std::string& expected, double value) {
     throw std::invalid_argument(
-        fmt::format("acceptance: {} must lie in {:g}..{:g}, got {:g}", name, least, most, value));
+        fmt::format("acceptance: {} must be {}, got {:g}", name, expected, value));
   };
-  // The smallest positive number: a limit of 0 would let nothing pass.
-  constexpr double kAboveZero = std::numeric_limits<double>::denorm_min();
+  // A limit of 0 would let nothing pass.
+  const auto check = [&](double value, double most, const char* name) {
+    if (!(value > 0 && value <= most))
+      refuse(name, fmt::format("above 0 and at most {:g}", most), value);
+  };
   constexpr const AcceptanceLimits& kLoosest = kLoosestLimits;
-  check(limits.shift_tolerance_m, kAboveZero, kLoosest.shift_tolerance_m, "the shift tolerance");
-  check(limits.rotation_tolerance_rad, kAboveZero, kLoosest.rotation_tolerance_rad,
-        "the rotation tolerance");
-  check(limits.min_shared_markers, kLoosest.min_shared_markers, std::numeric_limits<int>::max(),
-        "the number of shared markers");
-  check(limits.min_coverage, kLoosest.min_coverage, 1.0, "the coverage");
-  check(limits.max_hole_m, kAboveZero, kLoosest.max_hole_m, "the largest hole");
-  check(limits.max_residual_p95_m, kAboveZero, kLoosest.max_residual_p95_m, "the residual limit");
-  check(limits.max_lost_s, kAboveZero, kLoosest.max_lost_s, "the limit of lost tracking");
-  check(limits.max_breathing_m, kAboveZero, kLoosest.max_breathing_m, "the limit of breathing");
+  check(limits.shift_tolerance_m, kLoosest.shift_tolerance_m, "the shift tolerance in metres");
+  check(limits.rotation_tolerance_rad, kLoosest.rotation_tolerance_rad,
+        "the rotation tolerance in radians");
+  if (limits.min_shared_markers < kLoosest.min_shared_markers)
+    refuse("the number of shared markers", fmt::format("at least {}", kLoosest.min_shared_markers),
+           limits.min_shared_markers);
+  if (!(limits.min_coverage >= kLoosest.min_coverage && limits.min_coverage <= 1.0))
+    refuse("the coverage", fmt::format("from {:g} to 1", kLoosest.min_coverage),
+           limits.min_coverage);
+  check(limits.max_hole_m, kLoosest.max_hole_m, "the largest hole in metres");
+  check(limits.max_residual_p95_m, kLoosest.max_residual_p95_m, "the residual limit in metres");
+  check(limits.max_lost_s, kLoosest.max_lost_s, "the limit of lost tracking in seconds");
+  check(limits.max_breathing_m, kLoosest.max_breathing_m, "the limit of breathing in metres");
 }
 
 Decision Decide(const Evidence& evidence, const AcceptanceLimits& limits) {

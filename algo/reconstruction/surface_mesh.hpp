@@ -18,9 +18,9 @@ struct SurfaceMeshOptions {
 /// from +z. Vertices without a triangle are left out; normals are the area-weighted mean of the
 /// surrounding triangles.
 /// @param colors  Empty, or one per cell.
-/// @throws std::invalid_argument if the decimation is out of range or the number of colours differs
-/// from
-///         the number of cells.
+/// @throws std::invalid_argument if the decimation is out of range, or if there are colours, but
+/// not
+///         one for each cell.
 [[nodiscard]] TriangleMesh MeshOfHeightMap(const HeightMap& map, std::span<const Color> colors = {},
                                            const SurfaceMeshOptions& options = {});
 

@@ -157,7 +157,7 @@ Json Appliance::StatusJson() {
     const bool has_no_scene = ended.kind == EndedScan::Kind::kNoScene;
     last = {{"scan", last_result_->id},
             {"is_reference", is_done && !ended.verdict},
-            {"verdict", has_no_scene ? Json("no_answer") : Json(nullptr)},
+            {"verdict", has_no_scene ? Json(Name(Verdict::kNoAnswer)) : Json(nullptr)},
             {"reasons", has_no_scene ? Json{ended.reason} : Json::array()},
             {"correction", nullptr},
             {"frames", ended.frames},

@@ -1,4 +1,4 @@
-// What an appliance knows of the scan that runs.
+// The running scan, or the last one.
 #pragma once
 
 #include <algorithm>

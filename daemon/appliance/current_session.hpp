@@ -33,15 +33,15 @@ class CurrentSession {
   [[nodiscard]] const std::string& patient_id() const { return patient_id_; }
   [[nodiscard]] const std::string& reason() const { return reason_; }
   [[nodiscard]] const Actor& opened_by() const { return opened_by_; }
-  /// The demo's is open from the start and stays open; another is closed or about to be opened.
+  /// Whether a patient's session is open or being opened; the demo's own does not count.
   [[nodiscard]] bool IsPatients() const;
 
   /// Until the store has opened a session, no scan begins, and no session is opened or closed.
   void SetOpening(bool opening) { opening_ = opening; }
   /// The same while the store removes the data of the patient whose session is open.
   void SetWiping(bool wiping) { wiping_ = wiping; }
-  /// Why no session can be opened or closed at the moment; empty: one can. Otherwise the store and
-  /// the page could end up with different sessions.
+  /// Why no session can be opened or closed at the moment, because the store and the page could end
+  /// up with different ones; empty: one can.
   [[nodiscard]] std::string WhyNotChange() const;
   [[nodiscard]] std::string WhyNotScan() const;
 

@@ -13,7 +13,6 @@
 #include "daemon/appliance/page_identity.hpp"
 #include "daemon/config/version.hpp"
 #include "drivers/files/file_io.hpp"
-#include "web/model/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -126,16 +125,8 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
 
 Settings FirstSettings(const ApplianceConfig& given) {
   Settings first;
-  const auto take = [](const char* key, const std::optional<double>& value, const Limits& limits,
-                       double& setting) {
-    if (!value) return;
-    if (!limits.stored.Holds(*value))
-      throw DataError(fmt::format("[appliance] {}: expected {} to {} seconds, found {}", key,
-                                  limits.stored.least, limits.stored.most, *value));
-    setting = *value;
-  };
-  take("auto_stop_s", given.auto_stop_s, kAutoStop_s, first.auto_stop_s);
-  take("scan_limit_s", given.scan_limit_s, kScanLimit_s, first.scan_limit_s);
+  first.auto_stop_s = given.auto_stop_s.value_or(first.auto_stop_s);
+  first.scan_limit_s = given.scan_limit_s.value_or(first.scan_limit_s);
   first.keep_recordings = given.keep_recordings.value_or(first.keep_recordings);
   return first;
 }
@@ -151,7 +142,6 @@ Config ReadConfiguration(const PlumbdOptions& options, const SensorRegistry& reg
     config.compare.T_iec_reference = SimulatedRoom();
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
   CheckPageIdentity(config.web);
-  (void)FirstSettings(config.appliance);
   (void)registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
   if (options.state) {
     config.appliance.state = fs::absolute(*options.state);

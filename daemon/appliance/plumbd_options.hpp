@@ -38,7 +38,6 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options);
                                        const SensorRegistry& registry);
 
 /// The settings of a new store: the defaults, but for what the file gives.
-/// @throws DataError for a value that no settings may have
 [[nodiscard]] Settings FirstSettings(const ApplianceConfig& given);
 
 /// The configuration in use, and why the requested one cannot be used.

@@ -1,5 +1,5 @@
-// Upkeep of stored data, off the loop and never during a scan: retention and quota, checks of its
-// files and log, backups.
+// Upkeep of stored data, off the loop: retention and quota, checks of files and log, backups. Only
+// backups begin during a scan.
 #pragma once
 
 #include <chrono>
@@ -20,8 +20,8 @@ namespace plumb {
 /// Used on the loop's thread.
 class StorageUpkeep {
  public:
-  /// The arguments are borrowed. The threads are destroyed before this object.
-  /// @param notify  Tells the page what has changed.
+  /// All arguments but `notify` are borrowed. The threads are destroyed before this object.
+  /// @param notify  Notifies the page of changes.
   /// @param clock_trusted_after  Nothing is removed for its age until the wall clock has run for so
   ///         long without a step: a time server may still correct it.
   StorageUpkeep(EventLoop& loop, StorageWatch& storage, const Config& config,
@@ -39,7 +39,7 @@ class StorageUpkeep {
   void CheckDiskAtOnce();
   /// Stored data has changed.
   void CountAgain() { is_unusable_due_ = true; }
-  /// Nothing is begun any more, and what runs is cut short.
+  /// Begins nothing more, and cuts short what is running.
   void Stop() { stop_.request_stop(); }
 
   /// Makes a backup while scans continue. Calls `done` on the loop with an error (empty if it was

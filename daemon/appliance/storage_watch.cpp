@@ -86,7 +86,7 @@ void StorageWatch::Open() {
     return EnterSafeMode(error.what(), KindOf(error));
   }
   try {
-    store_.Replace(Store::OpenReadable(options_.state));
+    store_.Replace(Store::OpenReadable(options_.state, options_.first_settings));
     Log(LogLevel::kNotice, "stored data can be read, but not changed");
   } catch (const std::exception& error) {
     Log(LogLevel::kError, fmt::format("read-only access failed too: {}", error.what()));

@@ -35,7 +35,7 @@ struct StorageOptions {
       {};
 };
 
-/// Whose storage it is. Called on the loop's thread.
+/// The owner of the storage. Called on the loop's thread.
 class StorageUser {
  public:
   virtual ~StorageUser() = default;
@@ -84,7 +84,8 @@ class StorageWatch {
   void Fail(const std::string& what, Fault kind);
   /// The same after the present callback of the loop; from any thread.
   void FailLater(const std::exception& error);
-  /// Detects a disk that has become read-only before a patient is scanned in vain. Off the loop.
+  /// Detects a disk that has become read-only before a patient is scanned in vain. Called on the
+  /// loop; the check itself runs on the store's thread.
   void CheckDisk();
 
   /// True also where nothing can be said of it.

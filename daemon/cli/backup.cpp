@@ -31,9 +31,8 @@ struct Options {
 fs::path StateFolder(const Options& options) {
   if (options.state) return fs::absolute(*options.state);
   std::error_code ignored;
-  return fs::exists(kDefaultConfig, ignored)
-             ? ReadConfig(kDefaultConfig, ConfigUse::kAppliance).appliance.state
-             : ApplianceConfig{}.state;
+  return fs::exists(kDefaultConfig, ignored) ? ReadConfig(kDefaultConfig).appliance.state
+                                             : ApplianceConfig{}.state;
 }
 
 bool IsPlumbdThere(const fs::path& control) {

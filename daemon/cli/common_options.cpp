@@ -1,5 +1,8 @@
 #include "daemon/cli/common_options.hpp"
 
+#include <set>
+#include <string>
+
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -15,7 +18,8 @@ namespace plumb {
 void MethodOptions::AddTo(CLI::App& app) {
   app.add_option("--preset", preset,
                  "best: the most accurate method (default); paper: the method as published")
-      ->check(CLI::IsMember({"best", "paper"}))
+      ->check(
+          CLI::IsMember(std::set<std::string>(kNamesOf<Preset>.begin(), kNamesOf<Preset>.end())))
       ->type_name("best|paper");
   app.add_option("--config", config_file, "Options of the method, as TOML")->type_name("FILE");
 }

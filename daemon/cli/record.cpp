@@ -63,6 +63,8 @@ struct Attached {
            const std::stop_token& stop, Progress& progress) {
     SensorSettings settings = SensorSettingsOf(config);
     settings.calibration_folder = options.calibration;
+    // Without a configuration no room is stated, and the file of the sensor may name its markers.
+    settings.markers_are_the_rooms = options.method.config_file.has_value();
     SimulatedSweeps sweeps;
     sweeps.suite = options.simulated.value_or(sweeps.suite);
     sweeps.max_scenes = 1;

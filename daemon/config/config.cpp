@@ -59,9 +59,6 @@ void RefuseControlCharacters(const std::string& text, const std::string& name) {
   }
 }
 
-const std::vector<std::pair<std::string, Preset>> kPresets = {{"best", Preset::kBest},
-                                                              {"paper", Preset::kPaper}};
-
 void ReadMarkers(Section section, MarkerConfig& markers) {
   section.Take("dictionary", markers.dictionary,
                fmt::format("one of {}", fmt::join(MarkerDictionary::KnownNames(), ", ")),
@@ -74,7 +71,7 @@ void ReadMarkers(Section section, MarkerConfig& markers) {
 }
 
 void ReadReconstruct(Section section, ReconstructorOptions& options) {
-  section.TakeName("preset", options.preset, kPresets);
+  section.TakeName("preset", options.preset);
   section.TakeFlag("keep_color", options.keep_color);
   section.TakeFlag("use_markers", options.use_markers);
   section.TakeFlag("use_keypoints", options.use_keypoints);
@@ -161,7 +158,7 @@ void ReadCompare(Section section, ConfigUse use, Config& config) {
   CompareOptions& options = config.compare;
   if (use != ConfigUse::kCommandLine) RefuseKeysOfThePlan(section);
   options.preset = config.reconstruct.preset;
-  section.TakeName("preset", options.preset, kPresets);
+  section.TakeName("preset", options.preset);
   std::string region;
   section.Take("region", region, "the path of a region file",
                [](const std::string& s) { return !s.empty(); });
@@ -169,13 +166,8 @@ void ReadCompare(Section section, ConfigUse use, Config& config) {
   if (const auto rows = section.TakeRows("isocentre_m", 1, 3, "[x, y, z] in metres")) {
     options.isocentre_m = Eigen::Vector3d(rows->front().data());
   }
-  section.TakeName("marker_kind", options.marker_kind,
-                   {{"room", MarkerKind::kRoom}, {"couch", MarkerKind::kCouch}});
-  section.TakeName("posture", options.posture,
-                   {{"HFS", PatientPosture::kHeadFirstSupine},
-                    {"HFP", PatientPosture::kHeadFirstProne},
-                    {"FFS", PatientPosture::kFeetFirstSupine},
-                    {"FFP", PatientPosture::kFeetFirstProne}});
+  section.TakeName("marker_kind", options.marker_kind);
+  section.TakeName("posture", options.posture);
   section.TakeLimit("shift_tolerance_mm", options.limits.shift_tolerance_m,
                     kLoosestLimits.shift_tolerance_m, kMillimetre, "millimetres");
   section.TakeLimit("rotation_tolerance_deg", options.limits.rotation_tolerance_rad,
@@ -226,11 +218,10 @@ void ReadIec(Section section, const toml::table& root, std::optional<Pose>& T_ie
 }
 
 void ReadAppliance(Section section, ApplianceConfig& appliance) {
-  // The ranges are those of the settings, which plumbd knows.
-  section.Take("auto_stop_s", appliance.auto_stop_s, "seconds above 0",
-               [](double v) { return v > 0; });
-  section.Take("scan_limit_s", appliance.scan_limit_s, "seconds above 0",
-               [](double v) { return v > 0; });
+  // As stored settings may be (web/model/limits.hpp, which not every build has; a test compares).
+  const auto is_time = [](double v) { return v >= 0.1 && v <= 3600; };
+  section.Take("auto_stop_s", appliance.auto_stop_s, "seconds from 0.1 to 3600", is_time);
+  section.Take("scan_limit_s", appliance.scan_limit_s, "seconds from 0.1 to 3600", is_time);
   section.Take("keep_recordings", appliance.keep_recordings, "true or false",
                [](bool) { return true; });
   section.TakePath("state", appliance.state);

@@ -19,6 +19,7 @@
 #include <fmt/ranges.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/names.hpp"
 #include "daemon/config/toml.hpp"
 
 namespace plumb {
@@ -82,8 +83,8 @@ class Section {
 
   void TakePath(std::string_view key, std::filesystem::path& path) {
     std::string text;
-    Take(key, text, "an absolute path",
-         [](const std::string& s) { return s.starts_with('/') && s.size() < 1024; });
+    Take(key, text, "an absolute path of at most 4095 bytes",
+         [](const std::string& s) { return s.starts_with('/') && s.size() < 4096; });
     if (!text.empty()) path = text;
   }
 
@@ -107,19 +108,15 @@ class Section {
   /// What the user can do about a value that is refused from now on.
   void SetAdvice(std::string advice) { advice_ = std::move(advice); }
 
-  template <typename T>
-  void TakeName(std::string_view key, T& value,
-                const std::vector<std::pair<std::string, T>>& names) {
+  /// One of the names of an enumeration.
+  template <typename Enum>
+  void TakeName(std::string_view key, Enum& value) {
     std::vector<std::string> known;
-    for (const auto& [name, unused] : names) known.push_back('"' + name + '"');
+    for (const std::string_view name : kNamesOf<Enum>) known.push_back(fmt::format("\"{}\"", name));
     std::string found;
-    const auto match = [&](const std::string& text) {
-      return std::find_if(names.begin(), names.end(),
-                          [&](const auto& name) { return name.first == text; });
-    };
     Take(key, found, fmt::format("one of {}", fmt::join(known, ", ")),
-         [&](const std::string& text) { return match(text) != names.end(); });
-    if (!found.empty()) value = match(found)->second;
+         [](const std::string& text) { return Named<Enum>(text).has_value(); });
+    if (!found.empty()) value = Named<Enum>(found).value();
   }
 
   /// A list of texts that are not empty.

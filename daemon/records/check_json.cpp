@@ -95,7 +95,7 @@ CheckRecord CheckIn(const std::string& check_json) {
   if (!json.is_object()) return unreadable("it is not a JSON object");
   try {
     const auto status = Named<MarkerCheckStatus>(json.at("status").get<std::string>());
-    if (!status) return unreadable("its status is none that this version knows");
+    if (!status) return unreadable("this version does not know its status");
     record.status = *status;
     record.reasons = json.value("reasons", record.reasons);
     record.num_markers = json.value("markers", Json::object()).size();

@@ -119,8 +119,9 @@ void CheckStore::SetBaseline(const Actor& actor, const std::string& check_id) {
           "this check saw fewer than 3 markers well: check again and sweep over all of them");
     }
     if (query.Text(1) == actor.user) {
-      throw StoreRefusal(ChangeResult::kRefused,
-                         "another person than the one who took this check sets it as the baseline");
+      throw StoreRefusal(
+          ChangeResult::kRefused,
+          "somebody other than the person who took this check must set it as the baseline");
     }
     described = fmt::format("{} markers", baseline->markers.size());
   }

@@ -326,7 +326,6 @@ class PatientImport {
   }
 
   SummedReader reader_;
-
   Store store_;
   StoreDatabase::Held database_;  ///< Held for the whole import.
   std::stop_token stop_;

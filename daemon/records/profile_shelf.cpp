@@ -57,7 +57,7 @@ ProfileVersion Parse(const std::string& text, const std::string& serial, int ver
   found.version = version;
   found.made = Clock::time_point(std::chrono::seconds(json.at("made_s").get<std::int64_t>()));
   const auto cause = Named<ProfileCause>(json.at("cause").get<std::string>());
-  if (!cause) throw DataError("its cause is none that this version knows");
+  if (!cause) throw DataError("this version does not know its cause");
   found.cause = *cause;
   if (json.at("profile").is_null()) return found;
   found.profile = ParseSensorProfile(json["profile"].dump());

@@ -221,9 +221,14 @@ void Migrate(Database& database) {
     version = step.to;
   }
   if (version == kSchemaVersion) return;
-  throw DatabaseCorrupt(fmt::format(
-      "the database has version {}, this Plumb knows up to {}: install the newer Plumb again",
-      version, kSchemaVersion));
+  if (version > kSchemaVersion)
+    throw DatabaseCorrupt(fmt::format(
+        "the database has version {}, this Plumb knows up to {}: install the newer Plumb again",
+        version, kSchemaVersion));
+  throw DatabaseCorrupt(
+      fmt::format("the database has version {}, which no release of Plumb has written: restore a "
+                  "backup, or install the Plumb that wrote it",
+                  version));
 }
 
 }  // namespace plumb

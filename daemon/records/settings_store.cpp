@@ -17,6 +17,8 @@ Settings SettingsStore::Get() {
   return stored ? ParseSettings(*stored) : first_;
 }
 
+bool SettingsStore::AreSaved() { return database_.ForRows()->Has(kStoredSettings); }
+
 void SettingsStore::Change(const Actor& actor, const Settings& settings) {
   StoreChange change(database_);
   const std::string text = SettingsJson(settings);

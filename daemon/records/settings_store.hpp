@@ -21,6 +21,8 @@ class SettingsStore {
       : database_(database), first_(std::move(first)) {}
 
   [[nodiscard]] Settings Get();
+  /// Whether somebody has saved settings, so that the first ones no longer hold.
+  [[nodiscard]] bool AreSaved();
   void Change(const Actor& actor, const Settings& settings);
 
  private:

@@ -132,17 +132,17 @@ Store::Store(const fs::path& folder, const StoreOptions& options)
   scans_place_ = PlaceOf(folders.scans());
 }
 
-Store::Store(const fs::path& folder, ReadOnly)
+Store::Store(const fs::path& folder, const Settings& first_settings, ReadOnly)
     : folders(fs::absolute(folder)),
       database_(std::make_unique<Database>(folders.state() / kDatabase, Database::Access::kFrozen),
                 folders.state() / kDatabase, Database::Access::kFrozen),
-      settings(database_),
+      settings(database_, first_settings),
       integrity(database_, folders, LookAt) {
   (void)patients.List();  // fails if the tables do not exist
 }
 
-std::unique_ptr<Store> Store::OpenReadable(const fs::path& folder) {
-  return std::unique_ptr<Store>(new Store(folder, ReadOnly{}));
+std::unique_ptr<Store> Store::OpenReadable(const fs::path& folder, const Settings& first_settings) {
+  return std::unique_ptr<Store>(new Store(folder, first_settings, ReadOnly{}));
 }
 
 void Store::CheckWritable() {

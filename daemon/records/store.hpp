@@ -75,7 +75,8 @@ class Store {
   /// Opens what can be read of a store on a disk that cannot be written: nothing is checked,
   /// repaired or changed, and every change throws DiskRefused.
   /// @throws IoError and its kinds.
-  [[nodiscard]] static std::unique_ptr<Store> OpenReadable(const std::filesystem::path& folder);
+  [[nodiscard]] static std::unique_ptr<Store> OpenReadable(const std::filesystem::path& folder,
+                                                           const Settings& first_settings = {});
 
   /// Tries to write beside the database and in the folder of the scans.
   /// @throws DiskRefused with the reason if that fails, unless the disk is only full.
@@ -92,7 +93,7 @@ class Store {
 
  private:
   struct ReadOnly {};
-  Store(const std::filesystem::path& folder, ReadOnly);
+  Store(const std::filesystem::path& folder, const Settings& first_settings, ReadOnly);
 
   FolderLock lock_;
   RecoveryReport recovery_;

@@ -23,8 +23,8 @@ inline const Actor kCommand{.user = "command line", .address = ""};
 /// The time now, as it is stored.
 [[nodiscard]] std::int64_t StoredNow();
 
-/// An id from outside; nothing if no record can have it. Bound to a statement, nothing equals no
-/// id.
+/// An id from outside; nothing if no record can have it. An absent id, bound to
+/// a statement, matches no row.
 [[nodiscard]] std::optional<std::int64_t> ParseId(std::string_view text);
 /// The same. @throws StoreRefusal (kNotFound) naming what does not exist.
 [[nodiscard]] std::int64_t RequireId(const std::string& text, const char* what);

@@ -70,7 +70,7 @@ class Accounts : public SessionLookup {
   /// The login before this one, and failed attempts since.
   void ShowLastLogin(const Request& request, const Respond& respond);
   void ChangeOwnPassword(const Request& request, const Respond& respond);
-  /// An act that its person has signed with the own password.
+  /// An act that the user has signed with their own password.
   using SignedAct = std::function<void(const Actor&, Done)>;
   /// Adds a route for such an act.
   /// @param parse  Reads the fields of the body besides the password, before the password is read.

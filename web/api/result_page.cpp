@@ -192,7 +192,7 @@ struct Records {
 /// A request for the page.
 struct Wanted {
   std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
-  Status status;                    ///< The appliance's at the request.
+  Status status;                    ///< At the time of the request.
   bool is_display = false;          ///< Requested by a display in the room.
   Language language = Language::kEnglish;
   const ResultWords& words = ResultWordsOf(language);

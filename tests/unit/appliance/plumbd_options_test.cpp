@@ -1,11 +1,15 @@
 #include "daemon/appliance/plumbd_options.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <utility>
 
 #include "drivers/files/file_io.hpp"
 #include "drivers/live/sensor_driver.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "web/model/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -88,8 +92,16 @@ TEST_F(UnusableConfigurationTest, TheFirstSettingsAreThoseOfTheFileWithinTheLimi
   EXPECT_EQ(first.auto_stop_s, 2.5);
   EXPECT_EQ(first.scan_limit_s, 3600);
   EXPECT_TRUE(first.keep_recordings);
-  EXPECT_THAT(Read("[appliance]\nscan_limit_s = 3601\n").fault,
-              HasSubstr("[appliance] scan_limit_s: expected 0.1 to 3600 seconds, found 3601"));
+  for (const auto& [key, limits] :
+       {std::pair("auto_stop_s", kAutoStop_s), {"scan_limit_s", kScanLimit_s}}) {
+    const auto fault = [&, key = key](double value) {
+      return Read(fmt::format("[appliance]\n{} = {}\n", key, value)).fault;
+    };
+    EXPECT_EQ(fault(limits.stored.least), "");
+    EXPECT_EQ(fault(limits.stored.most), "");
+    for (const double outside : {0.9 * limits.stored.least, 1.01 * limits.stored.most})
+      EXPECT_THAT(fault(outside), HasSubstr(fmt::format("plumb.toml:2: appliance.{}", key)));
+  }
   EXPECT_EQ(FirstSettings({}).auto_stop_s, Settings{}.auto_stop_s);
 }
 

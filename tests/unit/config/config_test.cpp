@@ -254,7 +254,7 @@ TEST(ConfigTest, TheFirstSettingsMayBeGiven) {
   EXPECT_EQ(given.auto_stop_s, 2.5);
   EXPECT_EQ(given.scan_limit_s, 30.0);
   EXPECT_EQ(given.keep_recordings, true);
-  EXPECT_THAT(ErrorOf("[appliance]\nauto_stop_s = 0\n"), HasSubstr("seconds above 0"));
+  EXPECT_THAT(ErrorOf("[appliance]\nauto_stop_s = 0\n"), HasSubstr("seconds from 0.1 to 3600"));
   EXPECT_THAT(ErrorOf("[appliance]\nresult_s = 60\n"), HasSubstr("unknown key 'result_s'"));
 }
 

@@ -128,7 +128,7 @@ TEST_F(StoreTest, ADatabaseOfASchemaThatWasNeverReleasedIsRefused) {
     Database(database(), Database::Access::kReadWrite)
         .Execute(fmt::format("PRAGMA user_version = {}", version));
     EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }),
-                HasSubstr(fmt::format("the database has version {}", version)));
+                HasSubstr(fmt::format("the database has version {}, which no release", version)));
   }
 }
 

@@ -387,7 +387,7 @@ export const en = {
     acceptUnsure: 'Accept although not surely within tolerance',
     acceptOutsideHint: 'Your reason, the verdict and the numbers are stored in the log.',
     acceptReason: 'Reason', acceptPassword: 'Your password',
-    cannotAccept: 'Only the newest result of the open session can be accepted, within 2 minutes.',
+    cannotAccept: 'Only the newest result of the open session can be accepted, and only for 2 minutes.',
     newReference: 'New reference from this scan',
     newReferenceReason: 'Reason for the new reference', export: 'Export', print: 'Print view',
     report: 'Report (PDF)',
@@ -496,7 +496,7 @@ export const en = {
     isocentreBad: 'Three numbers in metres, or all three empty.',
     changedMeanwhile: 'Someone else has changed the plan in the meantime. This is what is stored '
       + 'now: check it, then try again.',
-    changedWhileEditing: 'Someone else has changed this plan while you were editing it: saving '
+    changedWhileEditing: 'Someone else changed this plan while you were editing it: saving '
       + 'will be refused. Reload the page to see it.',
     reloaded: 'Someone else has changed the plan; this is what is stored now.',
     save: 'Save plan', approve: 'Approve', undo: 'Undo', deleteCorner: 'Delete corner',

@@ -91,7 +91,7 @@ export const kFaultWords = {
   'there is no such check': 'no existe ese control',
   'this check saw fewer than 3 markers well: check again and sweep over all of them':
     'este control vio bien menos de 3 marcadores: repítalo y bárralos todos',
-  'another person than the one who took this check sets it as the baseline':
+  'somebody other than the person who took this check must set it as the baseline':
     'lo fija como base otra persona que la que hizo este control',
   'the stored baseline of the daily check cannot be read: set another one':
     'no se puede leer la base guardada del control diario: fije otra',
