@@ -133,9 +133,10 @@ LoosestLimits LoosestFor(ConfigUse use) {
 }
 
 void ReadLimits(Section& section, ConfigUse use, CompareOptions& options) {
-  const auto [loosest, markers, check, advice] = LoosestFor(use);
+  const LoosestLimits loose = LoosestFor(use);
+  const AcceptanceLimits& loosest = loose.gates;
   AcceptanceLimits& limits = options.limits;
-  section.SetAdvice(advice);
+  section.SetAdvice(loose.advice);
   section.Take("min_shared_markers", limits.min_shared_markers,
                fmt::format("a whole number from {} to 1000", loosest.min_shared_markers),
                [&](int n) { return n >= loosest.min_shared_markers && n <= 1000; });
@@ -144,8 +145,10 @@ void ReadLimits(Section& section, ConfigUse use, CompareOptions& options) {
                                std::string_view unit_name) {
     section.TakeLimit(key, value, most, unit, unit_name);
   };
-  take("moved_marker_mm", options.markers.moved_m, markers.moved_m, kMillimetre, "millimetres");
-  take("moved_marker_sigmas", options.markers.moved_sigmas, markers.moved_sigmas, 1, "a number");
+  take("moved_marker_mm", options.markers.moved_m, loose.markers.moved_m, kMillimetre,
+       "millimetres");
+  take("moved_marker_sigmas", options.markers.moved_sigmas, loose.markers.moved_sigmas, 1,
+       "a number");
   take("max_hole_mm", limits.max_hole_m, loosest.max_hole_m, kMillimetre, "millimetres");
   take("max_residual_p95_mm", limits.max_residual_p95_m, loosest.max_residual_p95_m, kMillimetre,
        "millimetres");
@@ -178,8 +181,9 @@ void ReadCompare(Section section, ConfigUse use, Config& config) {
 
 void ReadCheck(Section section, ConfigUse use, MarkerCheckLimits& limits) {
   constexpr double kPercent = 0.01;
-  const auto [gates, markers, loosest, advice] = LoosestFor(use);
-  section.SetAdvice(advice);
+  const LoosestLimits loose = LoosestFor(use);
+  const MarkerCheckLimits& loosest = loose.check;
+  section.SetAdvice(loose.advice);
   section.TakeLimit("misfit_mm", limits.max_misfit_m, loosest.max_misfit_m, kMillimetre,
                     "millimetres");
   section.TakeLimit("moved_mm", limits.max_moved_m, loosest.max_moved_m, kMillimetre,
