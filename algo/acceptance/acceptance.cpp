@@ -184,19 +184,18 @@ void CheckLimits(const AcceptanceLimits& limits) {
       refuse(name, fmt::format("above 0 and at most {:g}", most), value);
   };
   constexpr const AcceptanceLimits& kLoosest = kLoosestLimits;
-  check(limits.shift_tolerance_m, kLoosest.shift_tolerance_m, "the shift tolerance in metres");
-  check(limits.rotation_tolerance_rad, kLoosest.rotation_tolerance_rad,
-        "the rotation tolerance in radians");
+  check(limits.shift_tolerance_m, kLoosest.shift_tolerance_m, "the shift tolerance");
+  check(limits.rotation_tolerance_rad, kLoosest.rotation_tolerance_rad, "the rotation tolerance");
   if (limits.min_shared_markers < kLoosest.min_shared_markers)
     refuse("the number of shared markers", fmt::format("at least {}", kLoosest.min_shared_markers),
            limits.min_shared_markers);
   if (!(limits.min_coverage >= kLoosest.min_coverage && limits.min_coverage <= 1.0))
     refuse("the coverage", fmt::format("from {:g} to 1", kLoosest.min_coverage),
            limits.min_coverage);
-  check(limits.max_hole_m, kLoosest.max_hole_m, "the largest hole in metres");
-  check(limits.max_residual_p95_m, kLoosest.max_residual_p95_m, "the residual limit in metres");
-  check(limits.max_lost_s, kLoosest.max_lost_s, "the limit of lost tracking in seconds");
-  check(limits.max_breathing_m, kLoosest.max_breathing_m, "the limit of breathing in metres");
+  check(limits.max_hole_m, kLoosest.max_hole_m, "the largest hole");
+  check(limits.max_residual_p95_m, kLoosest.max_residual_p95_m, "the residual limit");
+  check(limits.max_lost_s, kLoosest.max_lost_s, "the limit of lost tracking");
+  check(limits.max_breathing_m, kLoosest.max_breathing_m, "the limit of breathing");
 }
 
 Decision Decide(const Evidence& evidence, const AcceptanceLimits& limits) {

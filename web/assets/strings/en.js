@@ -387,7 +387,8 @@ export const en = {
     acceptUnsure: 'Accept although not surely within tolerance',
     acceptOutsideHint: 'Your reason, the verdict and the numbers are stored in the log.',
     acceptReason: 'Reason', acceptPassword: 'Your password',
-    cannotAccept: 'Only the newest result of the open session can be accepted, and only for 2 minutes.',
+    cannotAccept: 'Only the newest result of the open session can be accepted, and only for '
+      + '2 minutes.',
     newReference: 'New reference from this scan',
     newReferenceReason: 'Reason for the new reference', export: 'Export', print: 'Print view',
     report: 'Report (PDF)',
