@@ -31,6 +31,7 @@ using Json = nlohmann::ordered_json;
 
 }  // namespace plumb::web
 
+/// @cond  Doxygen does not find the scope of these.
 // An absent value is null, a time is text.
 template <typename T>
 struct nlohmann::adl_serializer<std::optional<T>> {
@@ -47,6 +48,7 @@ struct nlohmann::adl_serializer<plumb::WallClock::time_point> {
     json = plumb::web::TimeText(time);
   }
 };
+/// @endcond
 
 namespace plumb {
 
