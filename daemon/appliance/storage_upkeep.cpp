@@ -305,7 +305,7 @@ std::vector<std::string> StorageUpkeep::Warnings(bool is_demo) const {
   std::vector<std::string> warnings;
   if (storage_.IsNearlyFull())
     warnings.push_back(fmt::format("The disk is {:.0f} % full: back up and remove scans.",
-                                   100 * storage_.UsedShare()));
+                                   100 * storage_.UsedFraction()));
   if (unusable_.references > 0)
     warnings.push_back(fmt::format(
         "The approved references of some patients ({}) cannot be used, because their files are "

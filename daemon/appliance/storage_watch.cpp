@@ -274,7 +274,7 @@ std::filesystem::space_info StorageWatch::SpaceOf(const std::filesystem::path& f
   return options_.space ? options_.space(folder, error) : std::filesystem::space(folder, error);
 }
 
-double StorageWatch::UsedShare() const {
+double StorageWatch::UsedFraction() const {
   const auto space = SpaceForScans();
   if (!space || space->capacity < space->free) return 0.0;
   const auto used = static_cast<double>(space->capacity - space->free);
@@ -284,7 +284,7 @@ double StorageWatch::UsedShare() const {
 
 bool StorageWatch::IsNearlyFull() const {
   constexpr double kNearlyFull = 0.8;
-  return UsedShare() >= kNearlyFull;
+  return UsedFraction() >= kNearlyFull;
 }
 
 }  // namespace plumb

@@ -95,9 +95,9 @@ class StorageWatch {
   /// From any thread.
   [[nodiscard]] std::filesystem::space_info SpaceOf(const std::filesystem::path& folder,
                                                     std::error_code& error) const;
-  /// Used share of the disk with less room, counted as df does, without the blocks reserved for
+  /// Used fraction of the disk with less room, counted as df does, without the blocks reserved for
   /// root. 0 if no disk can be examined.
-  [[nodiscard]] double UsedShare() const;
+  [[nodiscard]] double UsedFraction() const;
   [[nodiscard]] bool IsNearlyFull() const;
 
  private:

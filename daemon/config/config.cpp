@@ -140,7 +140,7 @@ void ReadLimits(Section& section, ConfigUse use, CompareOptions& options) {
   section.Take("min_shared_markers", limits.min_shared_markers,
                fmt::format("a whole number from {} to 1000", loosest.min_shared_markers),
                [&](int n) { return n >= loosest.min_shared_markers && n <= 1000; });
-  section.TakeNumber("min_coverage", limits.min_coverage, loosest.min_coverage, 1, "a share");
+  section.TakeNumber("min_coverage", limits.min_coverage, loosest.min_coverage, 1, "a fraction");
   const auto take = [&section](std::string_view key, double& value, double most, double unit,
                                std::string_view unit_name) {
     section.TakeLimit(key, value, most, unit, unit_name);
