@@ -1,4 +1,4 @@
-// The tolerance where nobody has chosen one.
+// Tolerances that apply until somebody sets others.
 #pragma once
 
 namespace plumb {

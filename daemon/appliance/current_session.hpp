@@ -25,8 +25,8 @@ class CurrentSession {
   void Open(const std::string& id, const std::string& patient_id, ScanPurpose purpose,
             const std::string& reason, const Actor& actor);
   void Forget();
-  /// Begins the time without a scan anew. The demo's session does not expire, because no user could
-  /// open it again.
+  /// Restarts the timer that closes a session without scans. The demo's session does not expire,
+  /// because no user could open it again.
   void ArmTimer();
   [[nodiscard]] bool IsOpen() const { return !id_.empty(); }
   [[nodiscard]] const std::string& id() const { return id_; }

@@ -318,8 +318,8 @@ std::vector<std::string> StorageUpkeep::Warnings(bool is_demo) const {
         unusable_.scans));
   if (unusable_.set_aside > 0)
     warnings.push_back(fmt::format(
-        "Scan folders set aside because they have no entry in the database: {}. Restore a more "
-        "recent backup, or move the contents of the set-aside folder to another disk.",
+        "Some scan folders ({}) have no entry in the database and were set aside: restore a more "
+        "recent backup, or move the contents of the folder set-aside to another disk.",
         unusable_.set_aside));
   if (!record_fault_.empty()) warnings.push_back(record_fault_);
   if (config_.appliance.backup_folder.empty() && !is_demo)

@@ -84,8 +84,8 @@ class StorageWatch {
   void Fail(const std::string& what, Fault kind);
   /// The same after the present callback of the loop; from any thread.
   void FailLater(const std::exception& error);
-  /// Detects a disk that has become read-only before a patient is scanned in vain. Called on the
-  /// loop; the check itself runs on the store's thread.
+  /// Checks whether the disk has become read-only, so that no patient is scanned for nothing.
+  /// Called on the loop; the check itself runs on the store's thread.
   void CheckDisk();
 
   /// True also where nothing can be said of it.

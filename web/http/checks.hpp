@@ -33,7 +33,8 @@ namespace plumb::web {
 /// coding.
 [[nodiscard]] bool AcceptsGzip(std::optional<std::string_view> accept_encoding);
 
-/// Values of placeholders: [A-Za-z0-9._-]{1,64} without a leading dot, which cannot leave a folder.
+/// A value of a path parameter: [A-Za-z0-9._-]{1,64} without a leading dot, so that it cannot lead
+/// out of a folder.
 [[nodiscard]] bool IsName(std::string_view text);
 
 /// The address that counters use: one machine can have all addresses of an IPv6 network of 64 bits

@@ -45,7 +45,7 @@ struct Request {
   std::string body;
   std::shared_ptr<UploadFile> upload;  ///< Replaces body in routes that take a file.
   std::string address;                 ///< Address of the browser.
-  /// Values of the route's placeholders: [A-Za-z0-9._-]{1,64}, not beginning with a dot.
+  /// Values of the route's path parameters: [A-Za-z0-9._-]{1,64}, not beginning with a dot.
   std::vector<std::string> arguments;
   std::shared_ptr<Session> session;  ///< Set if the route requires a login.
 

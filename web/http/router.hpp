@@ -19,13 +19,13 @@ enum class BodyKind {
   kFile,  ///< Written directly to the disk: Request::upload.
 };
 
-/// The record that a route names by its first placeholder: displays in the room may read it while
-/// the status names it.
+/// The record that a route names by its first path parameter: displays in the room may read it
+/// while the status names it.
 enum class ShownRecord : std::uint8_t { kNone, kPatient, kReference, kScan, kScanFile };
 
 struct Route {
   std::string method;
-  std::string pattern;  ///< "/api/v1/scans/{id}"; a placeholder is a whole segment.
+  std::string pattern;  ///< "/api/v1/scans/{id}"; a path parameter is a whole segment.
   Permission permission = Permission::kView;
   BodyKind body = BodyKind::kNone;
   Handler handler;
@@ -33,7 +33,7 @@ struct Route {
   /// view is logged once per hour, a download each time. Both empty: it contains none. The status
   /// and its events do not count: they only name the open session.
   std::string_view view = {}, download = {};
-  /// Without a record, a route with placeholders is refused to displays in the room.
+  /// Without a record, a route with path parameters is refused to displays in the room.
   ShownRecord shown = ShownRecord::kNone;
   std::string_view absent = {};  ///< The refusal to a display: as if there were no such record.
 

@@ -25,8 +25,8 @@ struct Session {
 /// Random text from that many bytes of the system's generator, in letters, digits, '-' and '_'.
 [[nodiscard]] std::string RandomToken(std::size_t bytes);
 
-/// That many letters and digits that are not easily confused, of 5 bits each, with a hyphen in the
-/// middle: "XXXX-XXXX". For people to type.
+/// A code that people type: that many letters and digits that are not easily confused, of 5 bits
+/// each, with a hyphen in the middle, as in "AB3D-7KQM".
 [[nodiscard]] std::string RandomCode(int letters);
 
 /// The hash by which a display's token is stored, in hexadecimal digits.
