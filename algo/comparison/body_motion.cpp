@@ -22,7 +22,6 @@
 namespace plumb {
 namespace {
 
-constexpr std::size_t kMinSamples = 50;
 constexpr int kMinPairs = 30;
 // pairs summed together; a fixed number, so that sums do not depend on the number of threads
 constexpr std::size_t kChunk = 1024;
@@ -46,7 +45,7 @@ struct Side {
       : surface(std::move(s)), nearest(surface.points, radius_m) {}
 };
 
-struct Stage {
+struct MotionStage {
   double radius_m;        // search radius for correspondences
   double max_sideways_m;  // largest distance of a correspondence along the surface
   double min_normal_cos;
@@ -54,8 +53,8 @@ struct Stage {
   int max_iterations;
 };
 
-constexpr Stage kCoarse = {0.08, 0.03, 0.6, 0.03, 15};
-constexpr Stage kMiddle = {0.03, 0.015, 0.7, 0.008, 15};
+constexpr MotionStage kCoarse = {0.08, 0.03, 0.6, 0.03, 15};
+constexpr MotionStage kMiddle = {0.03, 0.015, 0.7, 0.008, 15};
 constexpr double kCoarseSpacing_m = 0.02;
 constexpr double kMiddleSpacing_m = 0.01;
 constexpr double kFineSpacing_m = 0.005;
@@ -64,7 +63,9 @@ constexpr double kMaxFineSamples =
 
 // A correspondence is at most two sample spacings away: surfaces that are farther apart do not
 // belong to the rigid part, and the search stays short.
-Stage FineStage(double spacing_m) { return {2 * spacing_m, 1.2 * spacing_m, 0.8, spacing_m, 25}; }
+MotionStage FineStage(double spacing_m) {
+  return {2 * spacing_m, 1.2 * spacing_m, 0.8, spacing_m, 25};
+}
 
 struct Pair {
   Eigen::Vector3d arm = Eigen::Vector3d::Zero();  // moved point from the pivot
@@ -81,7 +82,7 @@ Vector6d Gradient(const Eigen::Vector3d& arm, const Eigen::Vector3d& normal) {
 }
 
 Pair MakePair(const Surface& reference, std::size_t i, const Surface& current, std::size_t j,
-              const Pose& T, const Eigen::Vector3d& pivot, const Stage& stage) {
+              const Pose& T, const Eigen::Vector3d& pivot, const MotionStage& stage) {
   Pair pair;
   const Eigen::Vector3d p = T * reference.points[i].cast<double>();
   const Eigen::Vector3d q = current.points[j].cast<double>();
@@ -99,7 +100,7 @@ Pair MakePair(const Surface& reference, std::size_t i, const Surface& current, s
 // Correspondences from both sides, one slot each: the reference's samples first, then the current
 // ones.
 std::vector<Pair> FindPairs(const Side& reference, const Side& current, const Pose& T,
-                            const Eigen::Vector3d& pivot, const Stage& stage) {
+                            const Eigen::Vector3d& pivot, const MotionStage& stage) {
   const std::size_t n = reference.surface.size();
   const std::size_t m = current.surface.size();
   std::vector<Pair> pairs(n + m);
@@ -139,18 +140,18 @@ double WeightOf(double residual_m, double scale_m) {
   return TukeyWeight(residual_m / (kTukeyCut * scale_m));
 }
 
-struct NormalEquations {
+struct MotionEquations {
   Matrix6d A = Matrix6d::Zero();
   // A computed with one normal from each side, so that the noise of the normals does not bias it
   Matrix6d crossed = Matrix6d::Zero();
   Vector6d b = Vector6d::Zero();
 };
 
-NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
+MotionEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
   const std::size_t num_chunks = (pairs.size() + kChunk - 1) / kChunk;
-  std::vector<NormalEquations> sums(num_chunks);
+  std::vector<MotionEquations> sums(num_chunks);
   tbb::parallel_for(std::size_t{0}, num_chunks, [&](std::size_t c) {
-    NormalEquations& sum = sums[c];
+    MotionEquations& sum = sums[c];
     for (std::size_t k = c * kChunk; k < std::min(pairs.size(), (c + 1) * kChunk); ++k) {
       const Pair& pair = pairs[k];
       const double w = pair.valid ? WeightOf(pair.residual_m, scale_m) : 0.0;
@@ -163,8 +164,8 @@ NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
       sum.b += w * pair.residual_m * gradient;
     }
   });
-  NormalEquations total;
-  for (const NormalEquations& sum : sums) {
+  MotionEquations total;
+  for (const MotionEquations& sum : sums) {
     total.A += sum.A;
     total.crossed += 0.5 * (sum.crossed + sum.crossed.transpose());
     total.b += sum.b;
@@ -175,7 +176,7 @@ NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
 // Gauss-Newton step within the directions that the surfaces determine. Along a direction that they
 // do not determine (the roll of a cylinder), the noise of the normals would drive the pose away.
 // `unit` scales the unknowns to comparable size.
-Vector6d StepInObservableSubspace(const NormalEquations& equations, const Vector6d& unit) {
+Vector6d StepInObservableSubspace(const MotionEquations& equations, const Vector6d& unit) {
   const Matrix6d A = unit.asDiagonal() * equations.A * unit.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(unit.asDiagonal() * equations.crossed *
                                                       unit.asDiagonal());
@@ -212,7 +213,7 @@ double LeverArm(const Surface& surface, const Eigen::Vector3d& centroid) {
 }
 
 StageResult RunStage(const Side& reference, const Side& current, const Pose& T_start,
-                     const Stage& stage, const std::stop_token& stop) {
+                     const MotionStage& stage, const std::stop_token& stop) {
   StageResult result;
   result.T = T_start;
   const Eigen::Vector3d centroid = MeanPoint(reference.surface);
@@ -240,8 +241,8 @@ StageResult RunStage(const Side& reference, const Side& current, const Pose& T_s
 }
 
 // Two-sided mean of truncated distances, metres; samples without a correspondence count as `limit`.
-double Disagreement(const Side& reference, const Side& current, const Pose& T, const Stage& stage,
-                    double limit_m) {
+double Disagreement(const Side& reference, const Side& current, const Pose& T,
+                    const MotionStage& stage, double limit_m) {
   const std::vector<Pair> pairs = FindPairs(reference, current, T, Eigen::Vector3d::Zero(), stage);
   const auto mean = [&](const Surface& surface, std::size_t first) {
     double sum = 0.0;
@@ -354,7 +355,8 @@ Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double sp
 std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
   const PointCloud reference = BodyCloud(input.reference_cloud, input.reference_body);
   const PointCloud current = BodyCloud(input.current_cloud, input.current_body);
-  if (reference.size() < kMinSamples || current.size() < kMinSamples) return std::nullopt;
+  if (reference.size() < kMinSurfaceSamples || current.size() < kMinSurfaceSamples)
+    return std::nullopt;
   const std::optional<Pose> T_start = GlobalMotion(input, reference, current);
   if (!T_start) return std::nullopt;
 
@@ -369,8 +371,8 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
       return input.in_region(fine_reference.points[i].cast<double>());
     });
   }
-  if (fine_reference.size() < kMinSamples) return std::nullopt;
-  const Stage stage = FineStage(spacing_m);
+  if (fine_reference.size() < kMinSurfaceSamples) return std::nullopt;
+  const MotionStage stage = FineStage(spacing_m);
   const Side side_reference(std::move(fine_reference), stage.radius_m);
   const Side side_current(MakeSurface(current, spacing_m, 3 * spacing_m), stage.radius_m);
   const StageResult fitted = RunStage(side_reference, side_current, *T_start, stage, input.stop);

@@ -20,7 +20,6 @@
 namespace plumb {
 namespace {
 
-constexpr std::size_t kMinSamples = 50;
 constexpr double kSampleSpacing_m = 0.01;
 constexpr double kSmoothing_m = 0.02;
 constexpr double kNodeSpacing_m =
@@ -35,14 +34,14 @@ constexpr double kSigmaOfTurn_rad = 0.3;  // weak prior for nodes that are not c
 constexpr double kSigmaOfShift_m = 2e-3;
 
 // Search radius and weights of one stage of the optimisation.
-struct Stage {
+struct DeformationStage {
   double radius_m;        // search radius for correspondences
   double min_normal_cos;  // cosine between the normals of the two surfaces
   double scale_m;         // scale of the Tukey weights
   double edge_sigma_m;    // allowed disagreement of neighbouring nodes (stiffness)
   int iterations;
 };
-constexpr std::array<Stage, 3> kStages = {
+constexpr std::array<DeformationStage, 3> kStages = {
     {{0.06, 0.6, 0.015, 1e-3, 6}, {0.04, 0.7, 0.008, 2e-3, 6}, {0.02, 0.8, 0.004, 3e-3, 6}}};
 
 struct Node {
@@ -128,9 +127,9 @@ std::vector<Follower> FollowersOf(const Surface& surface, const std::vector<Node
 }
 
 // The normal equations by blocks: one 6 x 6 block for each pair of nodes that share a sample.
-class NormalEquations {
+class NodeEquations {
  public:
-  NormalEquations(std::size_t num_nodes, const std::vector<Follower>& followers)
+  NodeEquations(std::size_t num_nodes, const std::vector<Follower>& followers)
       : num_nodes_(num_nodes) {
     for (std::size_t k = 0; k < num_nodes; ++k) (void)BlockOf(k, k);
     for (const Follower& follower : followers) {
@@ -208,7 +207,7 @@ class Registration {
         equations_(nodes_.size(), followers_),
         edges_(equations_.Edges()) {}
 
-  void Descend(const Stage& stage, const std::stop_token& stop) {
+  void Descend(const DeformationStage& stage, const std::stop_token& stop) {
     const NearestSample nearest(current_.points, stage.radius_m);
     for (int i = 0; i < stage.iterations; ++i) {
       CheckStop(stop);
@@ -258,7 +257,7 @@ class Registration {
     return (R * reference_.normals[i].cast<double>()).normalized();
   }
 
-  void FindMatches(const NearestSample& nearest, const Stage& stage) {
+  void FindMatches(const NearestSample& nearest, const DeformationStage& stage) {
     matches_.assign(reference_.size(), Match());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, reference_.size(), 256),
                       [&](const tbb::blocked_range<std::size_t>& range) {
@@ -268,7 +267,7 @@ class Registration {
   }
 
   [[nodiscard]] Match MatchOf(std::size_t i, const NearestSample& nearest,
-                              const Stage& stage) const {
+                              const DeformationStage& stage) const {
     if (reference_.inner[i] == 0) return {};
     const Eigen::Vector3d p = Moved(i);
     const std::uint32_t j = nearest.Find(p.cast<float>());
@@ -282,7 +281,7 @@ class Registration {
     return match;
   }
 
-  bool Step(const Stage& stage) {
+  bool Step(const DeformationStage& stage) {
     equations_.Clear();
     for (std::size_t i = 0; i < matches_.size(); ++i) {
       if (matches_[i].weight > 0) AddSample(i);
@@ -359,7 +358,7 @@ class Registration {
   std::vector<Node> nodes_;
   std::vector<Follower> followers_;
   std::vector<Match> matches_;
-  NormalEquations equations_;
+  NodeEquations equations_;
   std::vector<std::pair<std::size_t, std::size_t>> edges_;
 };
 
@@ -368,9 +367,10 @@ class Registration {
 std::optional<Deformation> EstimateDeformation(const DeformationInput& input) {
   Surface reference = BodySurface(input.reference_cloud, input.reference_body);
   Surface current = MovedBack(BodySurface(input.current_cloud, input.current_body), input.T_motion);
-  if (reference.size() < kMinSamples || current.size() < kMinSamples) return std::nullopt;
+  if (reference.size() < kMinSurfaceSamples || current.size() < kMinSurfaceSamples)
+    return std::nullopt;
   Registration registration(std::move(reference), std::move(current));
-  for (const Stage& stage : kStages) registration.Descend(stage, input.stop);
+  for (const DeformationStage& stage : kStages) registration.Descend(stage, input.stop);
   return registration.Result();
 }
 

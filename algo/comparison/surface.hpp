@@ -25,6 +25,9 @@ struct Surface {
   [[nodiscard]] std::size_t size() const { return points.size(); }
 };
 
+/// Surfaces with fewer samples are not registered.
+inline constexpr std::size_t kMinSurfaceSamples = 50;
+
 /// Transforms the cloud: p_a = T_a_b * p_b. Normals are rotated, colours dropped. T_a_b is rigid
 /// apart from a small stretch.
 [[nodiscard]] PointCloud TransformedCloud(const Eigen::Affine3d& T_a_b,

@@ -21,7 +21,7 @@ constexpr int kOuterRounds = 4;  // geometry (homography, pixel set) is recomput
 constexpr int kFirstSteps = 2;   // Gauss-Newton steps in the first round; later rounds have one
 // largest corner movement of a round that ends the iteration
 constexpr double kConverged_px = 0.03;
-constexpr double kMinContrast = 0.02;  // fraction of full scale
+constexpr double kMinStep = 0.02;      // fraction of full scale
 constexpr int kFirstSideSamples = 90;  // approximate number of pixels per side in the first round
 constexpr int kSideSamples = 180;      // and in later rounds
 constexpr double kModelError_px =
@@ -93,7 +93,7 @@ bool StartLevels(const Side& side, const std::vector<Sample>& samples, SideFit& 
   fit.white = white / num_white;
   fit.step = fit.white - black / num_black;
   fit.white_slope = fit.step_slope = 0;
-  return fit.step > kMinContrast;
+  return fit.step > kMinStep;
 }
 
 using Vector8 = Eigen::Matrix<double, 8, 1>;
@@ -169,7 +169,7 @@ bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_s
   fit.residual_levels = std::sqrt(levels_square / std::max(weights, 1.0));
   const double variance = weighted_square / std::max(1.0, weights - 7);
   fit.ends_covariance = variance * solver.solve(Matrix8::Identity()).topLeftCorner<2, 2>();
-  return fit.step > kMinContrast;
+  return fit.step > kMinStep;
 }
 
 /// Fits a side from scratch (`fit` is invalid and only its blur is used) or from the previous
@@ -187,12 +187,12 @@ void FitSide(const cv::Mat& gray, const Tone& tone, const Side& side, bool find_
 }
 
 /// The fitted line of a side as n . p = c.
-struct Line {
+struct SideLine {
   Eigen::Vector2d normal;
   double offset;
 };
 
-Line LineOf(const Side& side, const SideFit& fit) {
+SideLine LineOf(const Side& side, const SideFit& fit) {
   const Eigen::Vector2d a = side.origin + fit.ends[0] * side.normal;
   const Eigen::Vector2d b =
       side.origin + side.length_px * side.direction + fit.ends[1] * side.normal;
@@ -201,7 +201,7 @@ Line LineOf(const Side& side, const SideFit& fit) {
   return {normal, normal.dot(a)};
 }
 
-std::optional<Eigen::Vector2d> Intersection(const Line& a, const Line& b) {
+std::optional<Eigen::Vector2d> Intersection(const SideLine& a, const SideLine& b) {
   Eigen::Matrix2d m;
   m << a.normal.transpose(), b.normal.transpose();
   if (std::abs(m.determinant()) < 0.1)

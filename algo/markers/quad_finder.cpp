@@ -34,12 +34,12 @@ std::optional<std::array<std::size_t, 4>> FourVertices(const Outline& outline,
 }
 
 /// Total least squares line n . p = c through the middle part of the outline between two vertices.
-struct Line {
+struct OutlineLine {
   Eigen::Vector2d normal;
   double offset = 0;
 };
 
-std::optional<Line> FitSide(const Outline& outline, std::size_t from, std::size_t to) {
+std::optional<OutlineLine> FitSide(const Outline& outline, std::size_t from, std::size_t to) {
   const std::size_t count = (to + outline.size() - from) % outline.size();
   const std::size_t skip = std::max<std::size_t>(1, count / 8);  // excludes the rounded corners
   if (count < 2 * skip + 4) return std::nullopt;
@@ -56,7 +56,7 @@ std::optional<Line> FitSide(const Outline& outline, std::size_t from, std::size_
   const Eigen::Matrix2d scatter = squares / n - mean * mean.transpose();
   const double angle = 0.5 * std::atan2(2 * scatter(0, 1), scatter(0, 0) - scatter(1, 1));
   const Eigen::Vector2d normal(-std::sin(angle), std::cos(angle));
-  return Line{normal, normal.dot(base + mean)};
+  return OutlineLine{normal, normal.dot(base + mean)};
 }
 
 /// True for the outer outline of a dark region, false for the rim of a hole in one; OpenCV traces
@@ -77,9 +77,9 @@ std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size
   const Eigen::Vector2d centre =
       0.25 * (ToVector(outline[vertices[0]]) + ToVector(outline[vertices[1]]) +
               ToVector(outline[vertices[2]]) + ToVector(outline[vertices[3]]));
-  std::array<Line, 4> lines;
+  std::array<OutlineLine, 4> lines;
   for (std::size_t k = 0; k < 4; ++k) {
-    const std::optional<Line> line = FitSide(outline, vertices[k], vertices[(k + 1) % 4]);
+    const std::optional<OutlineLine> line = FitSide(outline, vertices[k], vertices[(k + 1) % 4]);
     if (!line) return std::nullopt;
     // Outline pixels are the last dark ones; the edge is half a pixel outside them.
     const double outside =
@@ -88,8 +88,8 @@ std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size
   }
   ImageCorners corners;
   for (std::size_t k = 0; k < 4; ++k) {
-    const Line& before = lines[(k + 3) % 4];
-    const Line& after = lines[k];
+    const OutlineLine& before = lines[(k + 3) % 4];
+    const OutlineLine& after = lines[k];
     const double determinant =
         before.normal.x() * after.normal.y() - before.normal.y() * after.normal.x();
     const Eigen::Vector2d vertex = ToVector(outline[vertices[k]]);

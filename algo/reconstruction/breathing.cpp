@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -14,6 +13,7 @@
 #include "algo/base/pose.hpp"
 #include "algo/base/robust_weights.hpp"
 #include "algo/base/statistics.hpp"
+#include "algo/base/units.hpp"
 #include "algo/reconstruction/view_fusion.hpp"
 
 namespace plumb {
@@ -30,7 +30,7 @@ constexpr float kMinNormalAgreement = 0.8F;  // length of the mean of a patch's 
 constexpr float kMaxDistance_m = 0.02F;      // farther away is another surface
 constexpr float kMaxDepth_m = 1.8F;          // noise grows with the square of the depth
 constexpr float kMinDepth_m = 0.5F;
-constexpr float kMinCosIncidence = 0.1F;
+constexpr float kMinPatchIncidence = 0.1F;
 
 // Estimate.
 constexpr std::size_t kMinSamples = 6;  // of a patch
@@ -43,10 +43,10 @@ constexpr int kNumPhases = 16;
 constexpr double kMinSpread = 1.5;  // of the cosine over a patch's views; less shows no rhythm
 constexpr float kReach_m = 0.08F;   // patches averaged about each patch
 constexpr float kSameSide = 0.7F;   // cosine between their normals
-constexpr int kMinNeighbours = 4;
+constexpr int kMinPatchNeighbours = 4;
 constexpr int kFirstSweeps = 6;  // of the alternating fit, before the period is known
 constexpr int kSweeps = 4;       // and each time after it
-constexpr int kRounds = 2;
+constexpr int kMovementRounds = 2;
 constexpr double kCauchySigmas = 3.0;
 constexpr double kRidge = 0.02;  // keeps a patch solvable if its views show little of a period
 constexpr double kLeastSigma_m = 1e-6;
@@ -69,14 +69,14 @@ constexpr double kPoseSigma_rad = 3e-3;
 // The errors of neighbouring patches are correlated: so many samples carry the information of one.
 constexpr double kCorrelatedSamples = 20.0;
 
-using Key = std::uint64_t;
+using PatchKey = std::uint64_t;
 
-Key CellOf(const Eigen::Vector3f& p) {
-  Key key = 0;
+PatchKey CellOf(const Eigen::Vector3f& p) {
+  PatchKey key = 0;
   for (int axis = 0; axis < 3; ++axis) {
     constexpr std::int64_t kOffset = 1 << 20;
-    key = (key << 21) |
-          static_cast<Key>(static_cast<std::int64_t>(std::floor(p[axis] / kPatch_m)) + kOffset);
+    key = (key << 21) | static_cast<PatchKey>(
+                            static_cast<std::int64_t>(std::floor(p[axis] / kPatch_m)) + kOffset);
   }
   return key;
 }
@@ -161,8 +161,7 @@ class SurfaceFit {
     tbb::parallel_for(0, kNumFrequencies, [&](int i) {
       const double fraction = static_cast<double>(i) / (kNumFrequencies - 1);
       best[static_cast<std::size_t>(i)] =
-          BestPhase(2.0 * std::numbers::pi *
-                    ((1.0 - fraction) / longest_period_s + fraction / kShortestPeriod_s));
+          BestPhase(kTwoPi * ((1.0 - fraction) / longest_period_s + fraction / kShortestPeriod_s));
     });
     return *std::max_element(best.begin(), best.end(),
                              [](const Rhythm& a, const Rhythm& b) { return a.excess < b.excess; });
@@ -189,7 +188,7 @@ class SurfaceFit {
         sum.xy += regressions[q].xy;
         ++count;
       }
-      if (count >= kMinNeighbours) slopes[p] = sum.xy / sum.xx;
+      if (count >= kMinPatchNeighbours) slopes[p] = sum.xy / sum.xx;
     });
     return slopes;
   }
@@ -305,7 +304,7 @@ class SurfaceFit {
     const std::vector<Moments> moments = MomentsAt(angular_per_s);
     Rhythm best;
     for (int k = 0; k < kNumPhases; ++k) {
-      const double phase = 2.0 * std::numbers::pi * k / kNumPhases;
+      const double phase = kTwoPi * k / kNumPhases;
       const double a = std::cos(phase);
       const double b = -std::sin(phase);
       double with = 0.0;
@@ -333,12 +332,12 @@ class SurfaceFit {
 
 std::vector<SurfacePatch> MeasurePatches(std::span<const ViewSurface> views,
                                          const PointCloud& cloud, const std::stop_token& stop) {
-  std::vector<std::pair<Key, std::uint32_t>> points;
+  std::vector<std::pair<PatchKey, std::uint32_t>> points;
   const std::size_t stride = std::max(kPointStride, cloud.points.size() / kMaxPoints);
   for (std::size_t i = 0; i < cloud.points.size(); i += stride)
     points.emplace_back(CellOf(cloud.points[i]), static_cast<std::uint32_t>(i));
   std::sort(points.begin(), points.end());
-  std::vector<std::span<const std::pair<Key, std::uint32_t>>> cells;
+  std::vector<std::span<const std::pair<PatchKey, std::uint32_t>>> cells;
   for (std::size_t first = 0, k = 0; k < points.size(); ++k) {
     if (k + 1 < points.size() && points[k + 1].first == points[first].first) continue;
     if (k + 1 - first >= kMinPoints)
@@ -374,7 +373,7 @@ std::vector<SurfacePatch> MeasurePatches(std::span<const ViewSurface> views,
       }
       if (2 * seen <= cells[p].size()) continue;
       const float cos_incidence = -patch.normal.dot(way) / way.norm();
-      if (!(cos_incidence >= kMinCosIncidence)) continue;
+      if (!(cos_incidence >= kMinPatchIncidence)) continue;
       const float depth2 = std::max(depth_m, kMinDepth_m) * std::max(depth_m, kMinDepth_m);
       patch.samples.push_back({static_cast<std::uint32_t>(v), sum_m / static_cast<float>(seen),
                                cos_incidence / (depth2 * depth2)});
@@ -409,7 +408,7 @@ std::optional<Breathing> FindBreathing(std::span<const SurfacePatch> patches,
     const double above_m = std::max(kSignificant * noise_m, -TakeQuantile(known, kLowestFraction));
     const std::size_t num_moving = fit.LetMove(rhythm.angular_per_s, slopes, above_m);
     std::erase_if(known, [&](double slope) { return slope <= above_m; });
-    if (round < kRounds && num_moving > 0) {
+    if (round < kMovementRounds && num_moving > 0) {
       fit.Solve(kSweeps);
       continue;
     }
@@ -418,7 +417,7 @@ std::optional<Breathing> FindBreathing(std::span<const SurfacePatch> patches,
     if (num_moving < kMinMoving || rhythm.contrast < kMinContrast) return result;
     result.amplitude_m = 2.0 * TakeQuantile(known, kMostAffected);
     result.sigma_m = std::hypot(2.0 * noise_m, kAmplitudeError * result.amplitude_m);
-    result.period_s = 2.0 * std::numbers::pi / rhythm.angular_per_s;
+    result.period_s = kTwoPi / rhythm.angular_per_s;
     return result;
   }
 }

@@ -14,6 +14,8 @@
 
 namespace plumb {
 
+inline constexpr double kMaxHeightMapCells = 64e6;
+
 /// Parameters of PaperHeightMap(); the defaults are the paper's. Lengths in metres, reference
 /// marker's frame.
 struct HeightMapOptions {

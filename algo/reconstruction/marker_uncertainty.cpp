@@ -23,7 +23,7 @@ constexpr double kUndetermined_m = 0.1;
 // Rounds of the weighted fit. In the first one all weights are equal, so that a poorly determined
 // marker spoils the others; in the third it no longer does. Further rounds would concentrate the
 // weight on a few markers.
-constexpr int kRounds = 3;
+constexpr int kWeightRounds = 3;
 
 // The markers that the posterior determines, and how their corners in the world move.
 struct Markers {
@@ -102,7 +102,7 @@ std::map<int, double> MarkerSigmas(const BundlePosterior& posterior, const Track
     variances.setConstant(1, corners.trace() / kCoordinates);
   } else if (markers.size() > 1) {
     Eigen::VectorXd weights = Eigen::VectorXd::Ones(markers.size());
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kWeightRounds; ++round) {
       variances = OwnVariances(markers, weights);
       weights = variances.cwiseInverse();
     }

@@ -9,7 +9,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kMaxCells = 64e6;
 constexpr int kMaxRowsPerBand = 64;  // rows of cells in one task
 
 /// Highest point of one cloud in one cell, and the band below it.
@@ -30,7 +29,7 @@ struct CellPoint {
 GridShape HeightMapOptions::Grid() const {
   const double columns = std::round((x_max - x_min) / cell_size);
   const double rows = std::round((y_max - y_min) / cell_size);
-  if (!(cell_size > 0.0 && columns >= 1.0 && rows >= 1.0 && columns * rows <= kMaxCells))
+  if (!(cell_size > 0.0 && columns >= 1.0 && rows >= 1.0 && columns * rows <= kMaxHeightMapCells))
     throw std::invalid_argument("height map: crop or cell size out of range");
   GridShape grid;
   grid.x_min = x_min;

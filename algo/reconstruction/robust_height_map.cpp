@@ -20,21 +20,20 @@ constexpr int kTile = 8;
 constexpr double kExtentCell = 0.05;  // metres; raster cell for finding the extent of the data
 constexpr int kMinExtentCount =
     30;  // samples for a raster cell to count (a surface at 1 m gives 200 per view)
-constexpr std::size_t kMaxSamples =
+constexpr std::size_t kMaxTopSamples =
     1'500'000;  // limit for the coarse tops; views are thinned evenly to it
 constexpr float kMinTopFraction =
     0.2F;  // fraction of a coarse cell's samples that must support the top
 constexpr std::size_t kMinTopCount = 2;
 constexpr float kMinNormalZ = 0.17F;  // flanks steeper than 80 deg are given no height
-constexpr double kMaxCells = 64e6;
-constexpr int kMaxViews = 12;  // views used for one cell
+constexpr int kMaxViews = 12;         // views used for one cell
 constexpr float kMaxMeanSlope =
     2.0F;  // tan of 63 deg; means of the corners are not used over steeper squares
-constexpr int kMinNeighbours =
+constexpr int kMinTopNeighbours =
     5;  // of the 8 neighbours of an empty coarse cell; enough to try to measure it
 
 /// A measured working pixel in a coarse cell.
-struct Sample {
+struct TopSample {
   std::uint32_t cell;  ///< Index within its row of tiles.
   float z;
   std::uint32_t view;
@@ -152,7 +151,7 @@ GridShape CoarseGrid(const GridShape& fine) {
 /// Samples of one view, by rows of tiles.
 void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stride,
                   const GridShape& coarse, const RobustHeightMapOptions& options,
-                  std::vector<std::vector<Sample>>& rows) {
+                  std::vector<std::vector<TopSample>>& rows) {
   const Eigen::Matrix3f R = RotationOf(view);
   const Eigen::Vector3f t = TranslationOf(view);
   const std::size_t cells_per_row = static_cast<std::size_t>(coarse.width) * kTile;
@@ -171,19 +170,19 @@ void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stri
 
 /// Number of different views among the samples. Views whose indices differ by 64 count as one,
 /// which only makes the test stricter.
-int NumViews(std::span<const Sample> samples) {
+int NumViews(std::span<const TopSample> samples) {
   std::uint64_t seen = 0;
-  for (const Sample& sample : samples) seen |= std::uint64_t{1} << (sample.view % 64);
+  for (const TopSample& sample : samples) seen |= std::uint64_t{1} << (sample.view % 64);
   return std::popcount(seen);
 }
 
 /// The highest band of samples that has support, as a plane. `samples` are those of one cell and
 /// are reordered.
-TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, float band,
+TopPlane FindTop(std::span<TopSample> samples, std::span<const ViewSurface> views, float band,
                  int min_views) {
   TopPlane top;
   // Highest first, equal heights in input order, independent of the sorting algorithm.
-  std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
+  std::sort(samples.begin(), samples.end(), [](const TopSample& a, const TopSample& b) {
     return a.z != b.z ? a.z > b.z : (a.view != b.view ? a.view < b.view : a.pixel < b.pixel);
   });
   const std::size_t needed = std::max(
@@ -223,11 +222,11 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine,
   map.cells.resize(map.grid.num_cells());
   std::size_t total = 0;
   for (const ViewSurface& view : views) total += view.size();
-  std::size_t stride = (total + kMaxSamples - 1) / kMaxSamples;
+  std::size_t stride = (total + kMaxTopSamples - 1) / kMaxTopSamples;
   if (stride > 1) stride |= 1U;  // odd, so that it has no factor in common with the usual widths
   const std::size_t num_rows = static_cast<std::size_t>((map.grid.height + kTile - 1) / kTile);
-  std::vector<std::vector<std::vector<Sample>>> samples(views.size(),
-                                                        std::vector<std::vector<Sample>>(num_rows));
+  std::vector<std::vector<std::vector<TopSample>>> samples(
+      views.size(), std::vector<std::vector<TopSample>>(num_rows));
   tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t v) {
     CheckStop(options.stop);
     SortIntoRows(views[v], static_cast<std::uint32_t>(v), std::max<std::size_t>(1, stride),
@@ -242,12 +241,12 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine,
     const std::size_t num_cells = std::min(cells_per_row, map.cells.size() - first);
     std::vector<std::uint32_t> starts(num_cells + 1, 0);
     for (const auto& of_view : samples)
-      for (const Sample& sample : of_view[row]) ++starts[sample.cell + 1];
+      for (const TopSample& sample : of_view[row]) ++starts[sample.cell + 1];
     for (std::size_t c = 0; c < num_cells; ++c) starts[c + 1] += starts[c];
-    std::vector<Sample> sorted(starts[num_cells]);
+    std::vector<TopSample> sorted(starts[num_cells]);
     std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
     for (const auto& of_view : samples)
-      for (const Sample& sample : of_view[row]) sorted[next[sample.cell]++] = sample;
+      for (const TopSample& sample : of_view[row]) sorted[next[sample.cell]++] = sample;
     for (std::size_t c = 0; c < num_cells; ++c)
       map.cells[first + c] = FindTop(
           std::span(sorted).subspan(starts[c], starts[c + 1] - starts[c]), views, band, min_views);
@@ -275,7 +274,7 @@ void SeedGaps(CoarseMap& map) {
           ++sum.count;
         }
       }
-      if (sum.count < kMinNeighbours) continue;
+      if (sum.count < kMinTopNeighbours) continue;
       sum.point /= static_cast<float>(sum.count);
       sum.normal.normalize();
       map.cells[i] = sum;
@@ -450,7 +449,7 @@ HeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
   if (!grid) grid = GridAroundData(views_in_marker, options);
   if (!grid) return HeightMap();
   if (!(grid->width > 0 && grid->height > 0 && grid->step > 0.0 &&
-        static_cast<double>(grid->width) * grid->height <= kMaxCells))
+        static_cast<double>(grid->width) * grid->height <= kMaxHeightMapCells))
     throw std::invalid_argument("robust height map: grid out of range");
   HeightMap map(*grid);
   if (views_in_marker.empty()) return map;

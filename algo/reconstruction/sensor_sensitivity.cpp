@@ -12,7 +12,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kPatch_m = 0.2;
+constexpr double kCube_m = 0.2;
 constexpr int kCellStride = 4;      // Neighbouring cells move alike.
 constexpr float kMinCells = 50.0F;  // Patches with fewer cells are rims.
 constexpr std::size_t kMaxPatches = 200;
@@ -47,12 +47,12 @@ Columns Moved(const Eigen::Matrix3d& R, const Eigen::Vector3d& sum, double count
   return R * (count * twist.bottomRows<3>() - Skew(sum) * twist.topRows<3>());
 }
 
-using Key = std::tuple<int, int, int>;
+using CubeKey = std::tuple<int, int, int>;
 
-Key CubeOf(const Eigen::Vector3d& p) {
-  return {static_cast<int>(std::floor(p.x() / kPatch_m)),
-          static_cast<int>(std::floor(p.y() / kPatch_m)),
-          static_cast<int>(std::floor(p.z() / kPatch_m))};
+CubeKey CubeOf(const Eigen::Vector3d& p) {
+  return {static_cast<int>(std::floor(p.x() / kCube_m)),
+          static_cast<int>(std::floor(p.y() / kCube_m)),
+          static_cast<int>(std::floor(p.z() / kCube_m))};
 }
 
 // What one view shows of a cube. Covariances are linear in the points and in their Jacobians, so
@@ -64,9 +64,9 @@ struct ViewSum {
   double count = 0;
 };
 
-std::map<Key, ViewSum> SumCells(const dense::Sensor& sensor, const dense::View& view,
-                                const Pose& T_marker_world) {
-  std::map<Key, ViewSum> sums;
+std::map<CubeKey, ViewSum> SumCells(const dense::Sensor& sensor, const dense::View& view,
+                                    const Pose& T_marker_world) {
+  std::map<CubeKey, ViewSum> sums;
   const Pose T_marker_depth = T_marker_world * view.T_world_depth;
   for (int r = kCellStride / 2; r < view.height; r += kCellStride) {
     for (int c = kCellStride / 2; c < view.width; c += kCellStride) {
@@ -90,17 +90,17 @@ struct Sum {
   double count = 0;
 };
 
-std::map<Key, Sum> SumPatches(const Intrinsics& stated, const CalibrationModel& calibration,
-                              const BundlePosterior& posterior, const TrackingMap& map,
-                              const MarkerFrame& frame) {
+std::map<CubeKey, Sum> SumPatches(const Intrinsics& stated, const CalibrationModel& calibration,
+                                  const BundlePosterior& posterior, const TrackingMap& map,
+                                  const MarkerFrame& frame) {
   const dense::Cells cells = dense::MakeCells(stated, map);
   const dense::Sensor sensor = dense::MakeSensor(stated, calibration);
   const std::vector<dense::View> views = dense::MakeViews(sensor, calibration, cells, map);
-  std::vector<std::map<Key, ViewSum>> seen(views.size());
+  std::vector<std::map<CubeKey, ViewSum>> seen(views.size());
   tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
     seen[k] = SumCells(sensor, views[k], frame.T_marker_world);
   });
-  std::map<Key, Sum> sums;
+  std::map<CubeKey, Sum> sums;
   for (std::size_t k = 0; k < views.size(); ++k) {
     const TwistColumns twist = RowsOf(posterior, posterior.CameraAt(static_cast<int>(k)));
     const Eigen::Matrix3d R_world_color = map.keyframes[k].T_world_color.linear();

@@ -114,7 +114,7 @@ class VoxelIndex {
 };
 
 /// A measured working pixel to be entered into a voxel.
-struct Sample {
+struct VoxelSample {
   Key key;
   float weight;
   std::uint32_t pixel;
@@ -146,7 +146,7 @@ Eigen::Vector3f PointInWorld(const ViewSurface& view, std::size_t pixel) {
          view.T_world_camera.translation().cast<float>();
 }
 
-void SortIntoShards(const ViewSurface& view, float inverse_size, Shards<Sample>& shards) {
+void SortIntoShards(const ViewSurface& view, float inverse_size, Shards<VoxelSample>& shards) {
   for (auto& shard : shards) shard.clear();
   const Eigen::Matrix3f R = view.T_world_camera.linear().cast<float>();
   const Eigen::Vector3f t = view.T_world_camera.translation().cast<float>();
@@ -185,7 +185,7 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size,
                        const std::stop_token& stop) {
   Shards<Seed> seeds;
   VoxelShards voxels;
-  std::vector<Shards<Sample>> samples(std::min(kViewsAtOnce, views.size()));
+  std::vector<Shards<VoxelSample>> samples(std::min(kViewsAtOnce, views.size()));
   for (std::size_t first = 0; first < views.size(); first += kViewsAtOnce) {
     CheckStop(stop);
     const std::size_t count = std::min(kViewsAtOnce, views.size() - first);
@@ -195,7 +195,7 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size,
     });
     tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
       for (std::size_t i = 0; i < count; ++i) {
-        for (const Sample& sample : samples[i][s]) {
+        for (const VoxelSample& sample : samples[i][s]) {
           const std::uint32_t index = voxels[s].FindOrAdd(sample.key);
           if (index == seeds[s].size()) {
             seeds[s].push_back({sample.key, sample.weight, sample.pixel,

@@ -9,20 +9,20 @@ namespace {
 
 constexpr float kBandSigmas = 4.0F;
 constexpr float kMinCosIncidence =
-    0.15F;                       // a view steeper than 81 deg to the seed's normal is not used
-constexpr int kMaxSamples = 64;  // views averaged in one mean; more would not improve it
+    0.15F;                           // a view steeper than 81 deg to the seed's normal is not used
+constexpr int kMaxViewSamples = 64;  // views averaged in one mean; more would not improve it
 
 /// One view's measurement of the seed.
-struct Sample {
+struct ViewSample {
   float distance_m;
   float weight;
 };
 
 /// Weighted mean with Tukey's weights about `centre`: smooth, with zero weight beyond the cut-off.
-float TukeyMean(std::span<const Sample> samples, float centre, float cut, float& weight_sum) {
+float TukeyMean(std::span<const ViewSample> samples, float centre, float cut, float& weight_sum) {
   float sum = 0.0F;
   weight_sum = 0.0F;
-  for (const Sample& sample : samples) {
+  for (const ViewSample& sample : samples) {
     const float ratio = (sample.distance_m - centre) / cut;
     const float inside = 1.0F - ratio * ratio;
     if (inside <= 0.0F) continue;
@@ -176,7 +176,7 @@ std::optional<float> ViewFusion::Distance(std::size_t view, const Eigen::Vector3
 FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3f& n_world,
                             std::span<const std::uint16_t> candidates) const {
   FusedPoint fused;
-  std::array<Sample, kMaxSamples> samples;
+  std::array<ViewSample, kMaxViewSamples> samples;
   std::size_t num_samples = 0;
   float best_weight = 0.0F;
   float widest_band = options_.min_band_m;
@@ -206,7 +206,7 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
         if (beyond * p.z() > options_.see_through_m) ++fused.num_through;
         continue;
       }
-      if (num_samples == kMaxSamples) continue;
+      if (num_samples == kMaxViewSamples) continue;
       const std::size_t nearest =
           group[k].top_left + (group[k].fu > 0.5F ? 1U : 0U) +
           (group[k].fv > 0.5F ? static_cast<std::size_t>(view.width()) : 0U);
@@ -224,7 +224,7 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
   }
   fused.num_agreeing = static_cast<int>(num_samples);
   if (num_samples == 0) return fused;
-  const std::span<const Sample> used(samples.data(), num_samples);
+  const std::span<const ViewSample> used(samples.data(), num_samples);
   // First with the whole band about the seed, then about the result, so that an outlier near the
   // end of the band loses its influence.
   fused.offset_m = TukeyMean(used, 0.0F, 1.5F * widest_band, fused.weight);

@@ -15,7 +15,7 @@ namespace {
 constexpr Color kRegionHoleDark = {88, 43, 98};
 
 /// Weak shading keeps the legend readable: at most 14 % darker.
-constexpr double kReliefStrength = 0.30;
+constexpr double kErrorReliefStrength = 0.30;
 
 /// True for an unmeasured cell of the region that has an unmeasured neighbour there: single cells
 /// are sampling noise of the grid.
@@ -70,7 +70,7 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
       double shade =
           relief.empty()
               ? 1.0
-              : 1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
+              : 1.0 - kErrorReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
       const std::size_t cell = difference.grid.index(cells.y + row, cells.x + column);
       out[column] =
           CellColor(color, shade, !options.region_mask.empty() && options.region_mask[cell] == 0);

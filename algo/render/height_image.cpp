@@ -16,7 +16,7 @@ namespace {
 
 // Lightness increases with height, readable in grey and with any colour vision.
 constexpr Color kLow = {34, 74, 120}, kHigh = {240, 226, 168};
-constexpr double kReliefStrength = 0.6;  // strength of the shading
+constexpr double kHeightReliefStrength = 0.6;  // strength of the shading
 
 struct Range {
   double low_m = 0.0, high_m = 1e-3;
@@ -50,7 +50,7 @@ cv::Mat ColoredCells(const HeightMap& heights, std::span<const std::uint8_t> reg
       const Color color =
           Mix(kLow, kHigh, std::clamp((z - range.low_m) / (range.high_m - range.low_m), 0.0, 1.0));
       const double shade =
-          1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
+          1.0 - kHeightReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
       const std::size_t cell = heights.grid.index(cells.y + row, cells.x + column);
       out[column] = CellColor(color, shade, !region.empty() && region[cell] == 0);
     }

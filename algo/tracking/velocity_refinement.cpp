@@ -18,7 +18,7 @@ using Vector12d = Eigen::Matrix<double, 12, 1>;
 using Matrix12d = Eigen::Matrix<double, 12, 12>;
 using Rows = Eigen::Matrix<double, 2, 12>;
 
-constexpr int kIterations = 4;
+constexpr int kVelocityIterations = 4;
 // With fewer points, pose and velocity would depend on the prior only.
 constexpr int kMinPoints = 12;
 
@@ -40,7 +40,7 @@ class ImageMotion {
   Vector6d Solve() {
     prior_.tail<6>() << Eigen::Vector3d::Constant(std::pow(options_.turning_sigma_rad_per_s, -2)),
         Eigen::Vector3d::Constant(std::pow(options_.shifting_sigma_m_per_s, -2));
-    for (int i = 0; i < kIterations; ++i) {
+    for (int i = 0; i < kVelocityIterations; ++i) {
       camera_.Prepare();
       H_ = prior_.asDiagonal();
       g_ = prior_.cwiseProduct(change_);

@@ -17,7 +17,7 @@ namespace {
 using namespace bundle;  // NOLINT: the residuals' own vocabulary
 
 constexpr int kOneIn = 16;  // The same fraction of each kind as of the dense cells.
-constexpr int kIterations = 6;
+constexpr int kPointIterations = 6;
 constexpr double kLossScale_px = 1.0;
 
 struct View {
@@ -62,7 +62,7 @@ class Images {
 // from these observations; empty if it cannot be.
 std::vector<double> DistancesOf(const Images& images, const std::vector<View>& views,
                                 Eigen::Vector3d p_world, double px) {
-  for (int i = 0; i < kIterations; ++i) {
+  for (int i = 0; i < kPointIterations; ++i) {
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
     Eigen::Vector3d g = Eigen::Vector3d::Zero();
     for (const View& view : views) {

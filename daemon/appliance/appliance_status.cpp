@@ -147,7 +147,7 @@ Json Appliance::StatusJson() {
   scan["active"] = IsRunning();
   scan["id"] = scan_.id;
   scan["valid_depth"] = update.guidance.valid_depth;
-  scan["without_new_area_s"] = update.guidance.without_new_area_s;
+  scan["without_new_surface_s"] = update.guidance.without_new_surface_s;
   scan["first_frame_ms"] = scan_.first_frame_ms;
   scan["cancel_ms"] = scan_.cancel_ms;
   Json last = nullptr;
@@ -231,7 +231,7 @@ Status Appliance::WebStatus() {
                  .purpose = scan_.purpose,
                  .elapsed_s = SecondsSince(scan_.started),
                  .coverage = scan_.Coverage(),
-                 .without_new_surface_s = scan_.update.guidance.without_new_area_s,
+                 .without_new_surface_s = scan_.update.guidance.without_new_surface_s,
                  .guidance = AdviceOn(scan_.update.guidance.advice, scan_.dropped_fraction),
                  .keyframes = scan_.update.keyframes,
                  .frames = scan_.update.frames,

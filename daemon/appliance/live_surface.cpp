@@ -9,8 +9,6 @@
 namespace plumb {
 namespace {
 
-// surfaces farther away are the room, measured with low accuracy
-constexpr double kFarthest_m = 2.5;
 constexpr std::uint32_t kMostPoints = 1'000;  // more points hardly change the mean of a cell
 
 GridShape SquareGrid(const LiveSurfaceOptions& options) {
@@ -62,7 +60,7 @@ void LiveSurface::Add(const Frame& frame, const TrackingReport& report) {
     const float* row = frame.depth_m.ptr<float>(v);
     for (int u = pixel_step_ / 2; u < frame.depth_m.cols; u += pixel_step_) {
       const float z = row[u];
-      if (!(z > 0) || z > kFarthest_m) continue;
+      if (!(z > 0) || z > kFarthestSurface_m) continue;
       const Eigen::Vector3f p_camera((static_cast<float>(u) - cx) / fx * z,
                                      (static_cast<float>(v) - cy) / fy * z, z);
       const Eigen::Vector3f p = T_target_camera * p_camera;

@@ -26,6 +26,9 @@ struct LiveSurfaceOptions {
   std::size_t max_waiting = 300'000;  ///< Points kept until the reference marker has been seen.
 };
 
+/// Surfaces farther away are the room, measured with low accuracy.
+inline constexpr double kFarthestSurface_m = 2.5;
+
 /// Snapshot of a sweep, in the reference marker's frame.
 struct LiveSurfaceView {
   HeightMap heights;  ///< NaN where nothing was seen.

@@ -21,7 +21,7 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::size_t kMaxBytes = 64 << 10;
+constexpr std::size_t kMaxPemBytes = 64 << 10;
 // certificate and key together, so that they always match
 constexpr const char* kKeyFile = "page-key.pem";
 constexpr const char* kDeviceFile = "device.key";
@@ -50,8 +50,8 @@ void WriteSecret(const fs::path& file, const std::string& contents) {
 web::TlsIdentity GivenTls(const WebConfig& web) {
   const std::string name = fmt::format("web.tls_certificate {} with web.tls_key {}",
                                        web.tls_certificate.string(), web.tls_key.string());
-  return web::CheckedTlsIdentity(ReadTextFile(web.tls_certificate, kMaxBytes),
-                                 ReadTextFile(web.tls_key, kMaxBytes), name);
+  return web::CheckedTlsIdentity(ReadTextFile(web.tls_certificate, kMaxPemBytes),
+                                 ReadTextFile(web.tls_key, kMaxPemBytes), name);
 }
 
 web::TlsIdentity OwnTls(const Config& config, std::vector<std::string>& warnings) {
@@ -102,7 +102,7 @@ std::string ReadOrMakeSecret(const fs::path& file, const std::function<std::stri
         fmt::format("{} is not a regular file: {}", file.string(),
                     error ? error.message() : "expected a file of the appliance's own"));
   ::chmod(file.c_str(), 0600);  // a copy of the folder may have lost the mode
-  return ReadTextFile(file, kMaxBytes);
+  return ReadTextFile(file, kMaxPemBytes);
 }
 
 void KeepSecret(const fs::path& file, const std::string& contents) {

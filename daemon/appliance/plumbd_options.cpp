@@ -42,8 +42,8 @@ std::optional<fs::path> ConfigFile(const PlumbdOptions& options) {
 /// Looks for the key's name line by line, because the file may not be valid TOML. A file that
 /// cannot be read may contain it.
 bool MayNameBackupKey(const fs::path& file) try {
-  constexpr std::size_t kMaxBytes = 1 << 20;
-  std::istringstream lines(ReadTextFile(file, kMaxBytes));
+  constexpr std::size_t kMaxEnvironmentBytes = 1 << 20;
+  std::istringstream lines(ReadTextFile(file, kMaxEnvironmentBytes));
   for (std::string line; std::getline(lines, line);) {
     const bool is_comment = line.find_first_not_of(" \t") == line.find('#');
     if (!is_comment && line.find("backup_key_file") != std::string::npos) return true;

@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxBytes = 64 << 10;
+constexpr std::size_t kMaxProvisionedBytes = 64 << 10;
 constexpr std::size_t kMaxServers = 8;
 constexpr std::size_t kKeyDigits = 64;  // 32 random bytes; no longer, because it becomes a cookie
 constexpr const char* kDisplayFile = "provisioned-display";  // the hash of its key, and its name
@@ -120,14 +120,14 @@ void ReadPage(Section section, const fs::path& file, Provisioning& given) {
     throw DataError(fmt::format("{}: page: certificate and key are given together", file.string()));
   if (certificate.empty()) return;
   const fs::path folder = file.parent_path();
-  given.page = web::CheckedTlsIdentity(ReadTextFile(folder / certificate, kMaxBytes),
-                                       ReadTextFile(folder / key, kMaxBytes),
+  given.page = web::CheckedTlsIdentity(ReadTextFile(folder / certificate, kMaxProvisionedBytes),
+                                       ReadTextFile(folder / key, kMaxProvisionedBytes),
                                        (folder / certificate).string());
 }
 
 /// The messages say how long a wrong key is, but show nothing of it.
 std::string CheckedDisplayKey(const fs::path& file) {
-  std::string key = ReadTextFile(file, kMaxBytes);
+  std::string key = ReadTextFile(file, kMaxProvisionedBytes);
   while (!key.empty() && (key.back() == '\n' || key.back() == '\r')) key.pop_back();
   if (IsHex(key, kKeyDigits)) return key;
   throw DataError(fmt::format(
@@ -175,7 +175,7 @@ void Put(const fs::path& file, const std::string& text) {
 
 Provisioning ReadProvisioning(const fs::path& file) {
   const std::string name = file.string();
-  const toml::table root = ParseToml(ReadTextFile(file, kMaxBytes), name);
+  const toml::table root = ParseToml(ReadTextFile(file, kMaxProvisionedBytes), name);
   RejectUnknownTables(root, name, {"unit", "network", "page", "display"});
   Provisioning given;
   Section unit(root, "unit", name);
@@ -220,7 +220,7 @@ std::optional<Display> ProvisionedDisplay(const fs::path& state) {
   const fs::path file = state / kDisplayFile;
   std::error_code ignored;
   if (fs::symlink_status(file, ignored).type() == fs::file_type::not_found) return std::nullopt;
-  std::string text = ReadTextFile(file, kMaxBytes);
+  std::string text = ReadTextFile(file, kMaxProvisionedBytes);
   if (text.ends_with('\n')) text.pop_back();
   const std::size_t space = std::min(text.find(' '), text.size());
   Display display{.id = {},

@@ -201,7 +201,7 @@ void ScanSession::OnProgress(const ScanProgress& progress) {
     update_.guidance = guide_.Add(*progress.frame, *progress.tracking);
     Show(*progress.frame, *progress.tracking);
     outcome_.swept_area_m2 = update_.guidance.area_m2;
-    if (update_.guidance.without_new_area_s >= job_.stop_after_s &&
+    if (update_.guidance.without_new_surface_s >= job_.stop_after_s &&
         !std::exchange(complete_reported_, true))
       callbacks_.sweep_complete();
   }

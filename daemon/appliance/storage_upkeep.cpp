@@ -14,6 +14,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/records/database.hpp"
 #include "daemon/records/file_cipher.hpp"
 #include "daemon/records/stored_values.hpp"
 
@@ -134,7 +135,7 @@ void StorageUpkeep::CheckRecords() {
     try {
       if (!std::exchange(is_database_checked_, true)) {
         constexpr std::chrono::minutes kLongest{30};
-        Database(storage_.state() / "plumb.db", Database::Access::kReadOnly)
+        Database(storage_.state() / kDatabaseFile, Database::Access::kReadOnly)
             .CheckIntegrity(kLongest);
       }
       if (const std::optional<std::int64_t> broken = store_->audit.FirstBroken())

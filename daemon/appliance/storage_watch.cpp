@@ -16,6 +16,7 @@
 #include "algo/base/utf8.hpp"
 #include "daemon/appliance/provisioning.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/records/database.hpp"
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
@@ -144,7 +145,7 @@ void StorageWatch::Probe() {
 /// disk may be missing, or a backup about to be restored.
 void StorageWatch::Reopen() {
   std::error_code ignored;
-  if (!std::filesystem::exists(options_.state / "plumb.db", ignored)) return EndRetry(fault_);
+  if (!std::filesystem::exists(options_.state / kDatabaseFile, ignored)) return EndRetry(fault_);
   const bool posted = reads_.Post([this, fault = fault_] {
     const auto opened = std::make_shared<std::unique_ptr<Store>>();
     std::string what;

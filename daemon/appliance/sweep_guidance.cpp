@@ -4,12 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "daemon/appliance/live_surface.hpp"
+
 namespace plumb {
 
 namespace {
-
-// surfaces farther away are the room, measured with low accuracy
-constexpr double kFarthest_m = 2.5;
 
 /// Key of a cell of the coarse grid; unique within 50 km of the first camera.
 std::uint64_t CellKey(const Eigen::Vector3d& p_world, double cell_m) {
@@ -39,7 +38,7 @@ const SweepGuidance& SweepGuide::Add(const Frame& frame, const TrackingReport& r
     UpdateArea(frame, report);
     if (report.num_markers > 0) marker_s_ = time_s;
   }
-  guidance_.without_new_area_s = std::max(0.0, time_s - grown_s_.value_or(*first_s_));
+  guidance_.without_new_surface_s = std::max(0.0, time_s - grown_s_.value_or(*first_s_));
   guidance_.advice = Advice(time_s);
   return guidance_;
 }
@@ -63,7 +62,7 @@ void SweepGuide::UpdateArea(const Frame& frame, const TrackingReport& report) {
     const float* row = frame.depth_m.ptr<float>(v);
     for (int u = options_.pixel_step / 2; u < frame.depth_m.cols; u += options_.pixel_step) {
       const double z = row[u];
-      if (!(z > 0) || z > kFarthest_m) continue;
+      if (!(z > 0) || z > kFarthestSurface_m) continue;
       const Eigen::Vector3d p_camera((u - intrinsics_.cx) / intrinsics_.fx * z,
                                      (v - intrinsics_.cy) / intrinsics_.fy * z, z);
       cells_.insert(CellKey(report.T_world_camera * p_camera, options_.cell_m));

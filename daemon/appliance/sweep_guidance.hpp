@@ -41,7 +41,7 @@ struct SweepGuidance {
   /// comparison.
   double area_m2 = 0.0;
   /// Time since new surface was last seen; 0 until there was some.
-  double without_new_area_s = 0.0;
+  double without_new_surface_s = 0.0;
 };
 
 /// Follows one sweep on the tracking thread; takes under a millisecond per frame. Not thread-safe.

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxBytes = 64 << 10;
+constexpr std::size_t kMaxRecoveryBytes = 64 << 10;
 
 /// Root reads what a stranger's stick holds, and writes where the account of plumbd may put links,
 /// with no more rights than that account has.
@@ -84,7 +84,7 @@ std::string Restore(const UnitRecovery& given, const fs::path& state,
 
 UnitRecovery ReadUnitRecovery(const fs::path& file) {
   const std::string name = file.string();
-  const toml::table root = ParseToml(ReadTextFile(file, kMaxBytes), name);
+  const toml::table root = ParseToml(ReadTextFile(file, kMaxRecoveryBytes), name);
   RejectUnknownTables(root, name, {"recovery"});
   const auto is_path = [](const std::string& value) { return !value.empty(); };
   UnitRecovery given;

@@ -22,13 +22,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct BackupArguments {
   fs::path folder;
   std::optional<fs::path> key_file;
   std::optional<fs::path> state;
 };
 
-fs::path StateFolder(const Options& options) {
+fs::path StateFolder(const BackupArguments& options) {
   if (options.state) return fs::absolute(*options.state);
   std::error_code ignored;
   return fs::exists(kDefaultConfig, ignored) ? ReadConfig(kDefaultConfig).appliance.state
@@ -52,16 +52,16 @@ void PrintReport(const char* done, const fs::path& folder, const BackupReport& r
   PrintOut(text);
 }
 
-std::unique_ptr<BackupSecret> SecretOf(const Options& options) {
+std::unique_ptr<BackupSecret> SecretOf(const BackupArguments& options) {
   return options.key_file ? std::make_unique<BackupSecret>(*options.key_file) : nullptr;
 }
 
-void AddKeyFile(CLI::App& app, Options& options, const char* what) {
+void AddKeyFile(CLI::App& app, BackupArguments& options, const char* what) {
   app.add_option("--key-file", options.key_file, what)->type_name("FILE");
 }
 
 /// plumbd reads the key file itself, so that no key is sent through the socket.
-BackupReport AskForBackup(const fs::path& folder, const Options& options,
+BackupReport AskForBackup(const fs::path& folder, const BackupArguments& options,
                           const CommandContext& context) {
   const nlohmann::json answer = AskPlumbd(
       context.control,
@@ -80,7 +80,7 @@ BackupReport AskForBackup(const fs::path& folder, const Options& options,
 
 /// A running plumbd makes the backup. For a named state folder, or without plumbd, this program
 /// does.
-int Backup(const Options& options, const CommandContext& context) {
+int Backup(const BackupArguments& options, const CommandContext& context) {
   const fs::path folder = fs::absolute(options.folder);
   BackupReport report;
   if (!options.state && IsPlumbdThere(context.control)) {
@@ -99,7 +99,7 @@ int Backup(const Options& options, const CommandContext& context) {
   return report.problems.empty() ? kDone : kBadInput;
 }
 
-int Restore(const Options& options, const CommandContext& context) {
+int Restore(const BackupArguments& options, const CommandContext& context) {
   const fs::path state = StateFolder(options);
   PrintReport(
       "restored into", state,
@@ -110,7 +110,7 @@ int Restore(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddBackup(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BackupArguments>();
   app.add_option("folder", options->folder,
                  "Folder of the backup, or one file if its name ends in .tar; an older backup "
                  "there is replaced")
@@ -127,7 +127,7 @@ Command AddBackup(CLI::App& app) {
 }
 
 Command AddRestore(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BackupArguments>();
   app.add_option("folder", options->folder, "The backup")->required()->type_name("FOLDER|FILE.tar");
   app.add_option("--state", options->state,
                  "State folder, missing or empty; default: the one of the configuration")

@@ -16,7 +16,7 @@
 namespace plumb {
 namespace {
 
-struct Options {
+struct CalibrateArguments {
   std::vector<std::filesystem::path> recordings;
   std::filesystem::path out;
   MethodOptions method;
@@ -38,7 +38,7 @@ std::string WhyLeftOut(const Scene& scene, const std::optional<SensorProfile>& b
       agreement.chi_square, agreement.limit, agreement.num_terms);
 }
 
-int Run(const Options& options, const CommandContext& context) {
+int Run(const CalibrateArguments& options, const CommandContext& context) {
   Config config = options.method.Read();
   if (config.reconstruct.preset == Preset::kPaper)
     throw std::invalid_argument(
@@ -77,7 +77,7 @@ int Run(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddCalibrate(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateArguments>();
   app.add_option(
          "recordings", options->recordings,
          "Ordinary sweeps by one sensor unit over any scenes with markers; several are better")

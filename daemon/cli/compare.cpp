@@ -18,7 +18,7 @@
 namespace plumb {
 namespace {
 
-struct Options {
+struct CompareArguments {
   std::filesystem::path reference, current, out;
   std::optional<std::filesystem::path> region;
   std::vector<double> isocentre_m;
@@ -27,7 +27,7 @@ struct Options {
   bool json = false;
 };
 
-CompareOptions MethodOf(const Options& options) {
+CompareOptions MethodOf(const CompareArguments& options) {
   CompareOptions compare = options.method.Read().compare;
   if (options.region) compare.region_polygon_m = ReadRegion(*options.region);
   if (!options.isocentre_m.empty())
@@ -36,7 +36,7 @@ CompareOptions MethodOf(const Options& options) {
   return compare;
 }
 
-int Run(const Options& options, const CommandContext& context) {
+int Run(const CompareArguments& options, const CommandContext& context) {
   const CompareOptions method = MethodOf(options);
   { const AtomicFolder check(options.out, ResultOutput()); }  // rejects a bad place before the work
   Progress progress;
@@ -72,7 +72,7 @@ int Run(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddCompare(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompareArguments>();
   app.add_option("reference", options->reference, "Scene folder of the reference")
       ->required()
       ->type_name("REFERENCE_SCENE");

@@ -17,7 +17,7 @@
 namespace plumb {
 namespace {
 
-struct Options {
+struct EvaluateArguments {
   std::filesystem::path suite;
   std::optional<std::filesystem::path> out;
   MethodOptions method;
@@ -37,7 +37,7 @@ Scene Reconstruct(const Suite& suite, const std::string& name, const Config& con
   return scene;
 }
 
-int Run(const Options& options, const CommandContext& context) {
+int Run(const EvaluateArguments& options, const CommandContext& context) {
   const Config config = options.method.Read();
   const Suite suite = OpenSuite(options.suite);
   const Preset preset = config.reconstruct.preset;
@@ -81,7 +81,7 @@ int Run(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddEvaluate(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EvaluateArguments>();
   app.add_option("suite", options->suite,
                  "Suite folder: recordings/, truth/ and usually suite.json")
       ->required()

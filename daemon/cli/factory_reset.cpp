@@ -17,12 +17,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct FactoryResetArguments {
   fs::path state = "/var/lib/plumb";
   bool keep_records = false, wipe = false, yes = false;
 };
 
-int Reset(const Options& options) {
+int Reset(const FactoryResetArguments& options) {
   if (options.keep_records == options.wipe)
     throw std::invalid_argument("give one of --keep-records and --wipe");
   if (!fs::is_directory(options.state))
@@ -44,7 +44,7 @@ int Reset(const Options& options) {
 }  // namespace
 
 Command AddFactoryReset(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FactoryResetArguments>();
   app.add_flag("--keep-records", options->keep_records,
                "Remove accounts, paired displays, settings, configuration and keys of the page; "
                "keep patients, scans and the log");

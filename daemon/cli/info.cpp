@@ -23,7 +23,7 @@ using nlohmann::ordered_json;
 
 constexpr std::size_t kMaxJsonBytes = std::size_t{64} << 20;
 
-struct Options {
+struct InfoArguments {
   fs::path path;
   bool json = false;
 };
@@ -96,7 +96,7 @@ std::string Lines(const ordered_json& facts) {
   return text;
 }
 
-int Run(const Options& options) {
+int Run(const InfoArguments& options) {
   ordered_json facts;
   if (IsSceneFolder(options.path)) {
     facts = {{"kind", "scene"}};
@@ -121,7 +121,7 @@ int Run(const Options& options) {
 }  // namespace
 
 Command AddInfo(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InfoArguments>();
   app.add_option("path", options->path,
                  "A recording (folder or .oni file), or the folder of a scene or a result")
       ->required()

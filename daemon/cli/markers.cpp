@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct MarkersArguments {
   SheetOptions sheet;
   std::string ids = "0-15";
   fs::path out;
@@ -26,7 +26,7 @@ fs::path PageFile(const fs::path& out, int page, int num_pages) {
          fmt::format("{}-{:02}{}", out.stem().string(), page + 1, out.extension().string());
 }
 
-int Run(const Options& options) {
+int Run(const MarkersArguments& options) {
   SheetOptions sheet_options = options.sheet;
   if (!sheet_options.is_board) sheet_options.ids = ParseIds(options.ids);
   const MarkerSheet sheet(sheet_options);
@@ -51,7 +51,7 @@ int Run(const Options& options) {
 }  // namespace
 
 Command AddMarkers(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MarkersArguments>();
   CLI::Option* ids = app.add_option("--ids", options->ids, "Ids and ranges")
                          ->capture_default_str()
                          ->type_name("0-15,20");

@@ -11,11 +11,11 @@
 namespace plumb {
 namespace {
 
-struct Options {
+struct MeshArguments {
   std::filesystem::path scene, out;
 };
 
-int Run(const Options& options) {
+int Run(const MeshArguments& options) {
   const Scene scene = ReadScene(options.scene, {.cloud = false, .height_map = false, .mesh = true});
   if (scene.mesh.triangles.empty()) {
     throw DataError(
@@ -32,7 +32,7 @@ int Run(const Options& options) {
 }  // namespace
 
 Command AddMesh(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MeshArguments>();
   app.add_option("scene", options->scene, "Scene folder")->required()->type_name("SCENE");
   app.add_option("--out", options->out, "File to write; its extension selects the format")
       ->required()

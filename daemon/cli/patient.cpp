@@ -14,13 +14,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct PatientArguments {
   std::string code;
   fs::path folder, state;
   std::optional<fs::path> key_file;
 };
 
-std::unique_ptr<BackupSecret> SecretOf(const Options& options) {
+std::unique_ptr<BackupSecret> SecretOf(const PatientArguments& options) {
   return options.key_file ? std::make_unique<BackupSecret>(*options.key_file) : nullptr;
 }
 
@@ -32,7 +32,7 @@ void PrintReport(const char* done, const PatientReport& report) {
   PrintOut(text);
 }
 
-int Export(const Options& options, const CommandContext& context) {
+int Export(const PatientArguments& options, const CommandContext& context) {
   const PatientReport report =
       ExportPatient(fs::absolute(options.state), options.code, fs::absolute(options.folder),
                     context.stop, SecretOf(options).get());
@@ -40,7 +40,7 @@ int Export(const Options& options, const CommandContext& context) {
   return report.problems.empty() ? kDone : kBadInput;
 }
 
-int Import(const Options& options, const CommandContext& context) {
+int Import(const PatientArguments& options, const CommandContext& context) {
   const PatientReport report =
       ImportPatient(fs::absolute(options.folder), fs::absolute(options.state), context.stop,
                     SecretOf(options).get());
@@ -51,7 +51,7 @@ int Import(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddExportPatient(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PatientArguments>();
   app.add_option("code", options->code, "The patient's code")->required()->type_name("CODE");
   app.add_option(
          "folder", options->folder,
@@ -70,7 +70,7 @@ Command AddExportPatient(CLI::App& app) {
 }
 
 Command AddImportPatient(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PatientArguments>();
   app.add_option("folder", options->folder, "The export")->required()->type_name("FOLDER|FILE.tar");
   app.add_option("--state", options->state, "State folder that no plumbd is using")
       ->required()

@@ -15,7 +15,7 @@
 namespace plumb {
 namespace {
 
-struct Options {
+struct ReconstructArguments {
   std::filesystem::path recording, out;
   MethodOptions method;
   bool realtime = false;
@@ -60,7 +60,7 @@ std::string Summary(const Scene& scene, const std::filesystem::path& out) {
   return text;
 }
 
-int Run(const Options& options, const CommandContext& context) {
+int Run(const ReconstructArguments& options, const CommandContext& context) {
   const Config config = options.method.Read();
   {
     const AtomicFolder check(options.out, SceneOutput());
@@ -80,7 +80,7 @@ int Run(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddReconstruct(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReconstructArguments>();
   app.add_option("recording", options->recording,
                  "Recording: a folder in the TUM RGB-D layout, or an .oni file")
       ->required()

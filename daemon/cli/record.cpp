@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct RecordArguments {
   fs::path out;
   double seconds = 10.0;
   std::string serial;
@@ -59,7 +59,7 @@ struct Attached {
   std::unique_ptr<SensorProvider> provider;
   std::unique_ptr<LiveSensor> sensor;
 
-  Attached(const Options& options, const RecordingKind* kind, const Config& config,
+  Attached(const RecordArguments& options, const RecordingKind* kind, const Config& config,
            const std::stop_token& stop, Progress& progress) {
     SensorSettings settings = SensorSettingsOf(config);
     settings.calibration_folder = options.calibration;
@@ -103,8 +103,8 @@ std::int64_t ReadFor(LiveSensor& sensor, double seconds, const std::stop_token& 
   }
 }
 
-std::string RecordFile(const Options& options, const RecordingKind& kind, const Attached& attached,
-                       const std::stop_token& stop, Progress& progress) {
+std::string RecordFile(const RecordArguments& options, const RecordingKind& kind,
+                       const Attached& attached, const std::stop_token& stop, Progress& progress) {
   FileRecorder::Summary summary;
   WriteFileAtomically(options.out, [&](const fs::path& hidden) {
     const std::unique_ptr<FileRecorder> recorder =
@@ -120,7 +120,7 @@ std::string RecordFile(const Options& options, const RecordingKind& kind, const 
   return fmt::format("{} colour and {} depth images", summary.num_color, summary.num_depth);
 }
 
-std::string RecordFolder(const Options& options, const Attached& attached,
+std::string RecordFolder(const RecordArguments& options, const Attached& attached,
                          const std::stop_token& stop, Progress& progress) {
   static const OutputKind kKind{
       "recording", "depth.txt", {"rgb", "depth", "rgb.txt", "depth.txt", "camera.yaml"}};
@@ -163,7 +163,7 @@ std::string RecordFolder(const Options& options, const Attached& attached,
   return fmt::format("{} frames{}", num_frames, dropped);
 }
 
-int Run(const Options& options, const CommandContext& context) {
+int Run(const RecordArguments& options, const CommandContext& context) {
   const Config config = options.method.Read();
   Progress progress;
   const RecordingKind* kind = BuiltInSensors().KindWithExtension(options.out.extension().string());
@@ -183,7 +183,7 @@ int Run(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddRecord(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecordArguments>();
   app.add_option(
          "--out", options->out,
          "Recording to write: a folder in the TUM RGB-D layout, or a file that ends in .oni")

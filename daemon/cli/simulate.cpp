@@ -19,7 +19,7 @@ struct Switch {
   bool on;
 };
 
-struct Options {
+struct SimulateArguments {
   SimulateOptions simulate;
   std::string format = "tum", noise = "nominal", size = "640x480";
   std::vector<Switch> switches;
@@ -60,7 +60,7 @@ std::string FaultList() {
   return list;
 }
 
-int Run(const Options& options, const CommandContext& context) {
+int Run(const SimulateArguments& options, const CommandContext& context) {
   SimulateOptions simulate = options.simulate;
   simulate.noise = Named<simulated::NoiseLevel>(options.noise).value_or(simulate.noise);
   simulate.format = options.format == "oni" ? RecordingFormat::kOni : RecordingFormat::kTum;
@@ -87,7 +87,7 @@ int Run(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddSimulate(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimulateArguments>();
   SimulateOptions& simulate = options->simulate;
   app.add_option("--suite", simulate.suite,
                  "demo: a reference and a moved body; nine: nine placements, 72 pairs; small: ten "

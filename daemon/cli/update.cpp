@@ -26,7 +26,7 @@ using Kind = ControlRequest::Kind;
 
 constexpr std::chrono::milliseconds kPollInterval{300};
 
-struct Options {
+struct UpdateArguments {
   std::optional<fs::path> file;
   bool restart = false;
 };
@@ -72,7 +72,7 @@ void Follow(Progress& progress, const CommandContext& context) {
   }
 }
 
-int Update(const Options& options, const CommandContext& context) {
+int Update(const UpdateArguments& options, const CommandContext& context) {
   if (!options.file && !options.restart)
     throw std::invalid_argument("name a bundle, or give --restart");
   if (options.file) {
@@ -95,7 +95,7 @@ int Update(const Options& options, const CommandContext& context) {
 }  // namespace
 
 Command AddUpdate(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<UpdateArguments>();
   app.add_option("file", options->file, "A bundle, NAME.raucb, signed for this machine")
       ->type_name("FILE");
   app.add_flag("--restart", options->restart,

@@ -16,12 +16,12 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t kMaxScenes = 1000;
 
 /// Names become folder names, so they must not lead elsewhere.
-std::string CheckedName(const json& value, const fs::path& file) {
+std::string CheckedName(const Json& value, const fs::path& file) {
   const std::string name = value.is_string() ? value.get<std::string>() : "";
   if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos) {
     throw DataError(fmt::format("suite file '{}': expected the name of a scene, found {}",
@@ -33,12 +33,12 @@ std::string CheckedName(const json& value, const fs::path& file) {
 void ReadSuiteFile(const fs::path& file, Suite& suite) {
   constexpr std::size_t kMaxBytes = 1 << 20;
   try {
-    const json content = ParseBoundedJson(ReadTextFile(file, kMaxBytes));
+    const Json content = ParseBoundedJson(ReadTextFile(file, kMaxBytes));
     suite.name = content.value("name", suite.name);
     for (const auto& scene : content.at("scenes")) suite.scenes.push_back(CheckedName(scene, file));
     for (const auto& pair : content.at("pairs"))
       suite.pairs.emplace_back(CheckedName(pair.at(0), file), CheckedName(pair.at(1), file));
-  } catch (const json::exception& error) {
+  } catch (const Json::exception& error) {
     throw DataError(fmt::format(
         "suite file '{}': expected {{\"name\", \"scenes\": [..], \"pairs\": [[a, b], ..]}}; {}",
         file.string(), error.what()));

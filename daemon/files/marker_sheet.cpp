@@ -28,12 +28,12 @@ constexpr double kLabel_mm =
 constexpr double kLabelBegin = 0.45;  // fraction of the white margin of one cell, from the marker
 constexpr double kRuler_mm = 100.0;
 constexpr std::size_t kMaxIds = 1000;
-constexpr double kGrey = 0.45;
+constexpr double kRulerGrey = 0.45;
 
 struct SurfaceCloser {
   void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
 };
-using Surface = std::unique_ptr<cairo_surface_t, SurfaceCloser>;
+using CairoSurface = std::unique_ptr<cairo_surface_t, SurfaceCloser>;
 
 MarkerDictionary Dictionary(const std::string& name) try {
   return MarkerDictionary::ByName(name);
@@ -47,7 +47,7 @@ cairo_status_t Append(void* bytes, const unsigned char* data, unsigned length) {
 }
 
 /// @throws IoError if the surface was not written whole.
-void Finish(const Surface& surface, const std::filesystem::path& file) {
+void Finish(const CairoSurface& surface, const std::filesystem::path& file) {
   cairo_surface_finish(surface.get());
   if (const cairo_status_t status = cairo_surface_status(surface.get());
       status != CAIRO_STATUS_SUCCESS)
@@ -183,7 +183,7 @@ void MarkerSheet::DrawMarker(const Canvas& canvas, const PlacedMarker& marker) c
   cairo_fill(canvas.cr);  // all cells at once, so that neighbours have no seams
 
   const double y = marker.top_mm + side_mm + kLabelBegin * cell_mm + 4.5, x = marker.left_mm;
-  canvas.Grey(kGrey);
+  canvas.Grey(kRulerGrey);
   cairo_move_to(canvas.cr, x + 1.5, y - 3.6);
   cairo_line_to(canvas.cr, x + 3.0, y - 1.0);
   cairo_line_to(canvas.cr, x, y - 1.0);
@@ -202,7 +202,7 @@ void MarkerSheet::DrawRuler(const Canvas& canvas, int page) const {
   }
   canvas.Line(x, y, x + kRuler_mm, y, 0.12);
   canvas.Text(x + kRuler_mm + 3.0, y, 3.2, "must measure 100 mm: print at 100 %, without fitting");
-  canvas.Grey(kGrey);
+  canvas.Grey(kRulerGrey);
   canvas.Text(
       x, y + 5.0, 3.0,
       options_.is_board
@@ -221,7 +221,7 @@ void MarkerSheet::Draw(const Canvas& canvas, int page) const {
 }
 
 void MarkerSheet::WritePdf(const std::filesystem::path& file) const {
-  const Surface surface(
+  const CairoSurface surface(
       cairo_pdf_surface_create(file.c_str(), width_mm_ * kPointsPerMm, height_mm_ * kPointsPerMm));
   DrawPages(surface.get());
   Finish(surface, file);
@@ -229,7 +229,7 @@ void MarkerSheet::WritePdf(const std::filesystem::path& file) const {
 
 std::string MarkerSheet::Pdf() const {
   std::string bytes;
-  const Surface surface(cairo_pdf_surface_create_for_stream(
+  const CairoSurface surface(cairo_pdf_surface_create_for_stream(
       &Append, &bytes, width_mm_ * kPointsPerMm, height_mm_ * kPointsPerMm));
   DrawPages(surface.get());
   Finish(surface, "the sheet");
@@ -245,7 +245,7 @@ void MarkerSheet::DrawPages(cairo_surface_t* surface) const {
 }
 
 void MarkerSheet::WriteSvg(const std::filesystem::path& file, int page) const {
-  const Surface surface(cairo_svg_surface_create(file.c_str(), width_mm_, height_mm_));
+  const CairoSurface surface(cairo_svg_surface_create(file.c_str(), width_mm_, height_mm_));
   cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_MM);
   {
     const Canvas canvas(surface.get(), 1.0);
@@ -258,7 +258,7 @@ cv::Mat MarkerSheet::Rasterise(int page, double dots_per_inch) const {
   const double dots_per_mm = dots_per_inch / 25.4;
   const int width = static_cast<int>(std::lround(width_mm_ * dots_per_mm)),
             height = static_cast<int>(std::lround(height_mm_ * dots_per_mm));
-  const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height));
+  const CairoSurface surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height));
   {
     const Canvas canvas(surface.get(), dots_per_mm);
     canvas.Grey(1);

@@ -25,13 +25,13 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormat = 1;
+constexpr int kResultFormat = 1;
 constexpr double kSpokenHeight_m =
     3 * kMillimetre;  // smaller differences of a part are not reported in words
 // Along the surface the field is interpolated from its surroundings, so small displacements are not
 // reported.
 constexpr double kSpokenShift_m = 8 * kMillimetre;
-constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
+constexpr std::size_t kMaxResultBytes = std::size_t{16} << 20;
 
 template <typename Derived>
 Json MatrixJson(const Eigen::MatrixBase<Derived>& matrix) {
@@ -195,7 +195,7 @@ OutputKind ResultOutput() {
 
 std::string ResultJson(const Comparison& comparison, const std::optional<ResultRoom>& room) {
   Json json;
-  json["format"] = kFormat;
+  json["format"] = kResultFormat;
   json["version"] = PLUMB_VERSION;
   json["preset"] = Name(comparison.preset);
   const auto named = [](const std::optional<std::string>& profile) {
@@ -303,7 +303,7 @@ void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
 
 std::string ReadResultJson(const fs::path& folder) {
   const fs::path file = folder / "result.json";
-  std::string text = ReadTextFile(file, kMaxJsonBytes);
+  std::string text = ReadTextFile(file, kMaxResultBytes);
   const Json json = ParseBoundedJsonOrNothing<Json>(text);
   if (!json.is_object() || !json.contains("format") || !json["format"].is_number_integer()) {
     throw DataError(fmt::format(
@@ -311,11 +311,11 @@ std::string ReadResultJson(const fs::path& folder) {
         file.string()));
   }
   const auto format = json["format"].get<std::int64_t>();
-  if (format != kFormat) {
+  if (format != kResultFormat) {
     throw DataError(
         fmt::format("{} has format {}, this version reads format {}; update Plumb or compare again "
                     "with this version",
-                    file.string(), format, kFormat));
+                    file.string(), format, kResultFormat));
   }
   return text;
 }

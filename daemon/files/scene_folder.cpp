@@ -21,12 +21,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
+constexpr std::size_t kMaxSceneBytes = std::size_t{16} << 20;
 constexpr std::size_t kMaxTrajectoryBytes = std::size_t{64} << 20;
 
 SceneHeader ReadHeader(const fs::path& scene_folder) {
   const fs::path json = scene_folder / "scene.json";
-  return ParseSceneJson(ReadTextFile(json, kMaxJsonBytes), json.string());
+  return ParseSceneJson(ReadTextFile(json, kMaxSceneBytes), json.string());
 }
 
 std::vector<StampedPose> ReadTrajectory(const fs::path& file) {
@@ -128,7 +128,7 @@ Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
   std::error_code no_error;
   if (fs::exists(sensitivity, no_error))
     scene.sensitivity =
-        ParseSensitivityJson(ReadTextFile(sensitivity, kMaxJsonBytes), sensitivity.string());
+        ParseSensitivityJson(ReadTextFile(sensitivity, kMaxSceneBytes), sensitivity.string());
   if (parts.cloud) scene.cloud = ReadCloudPly(folder / "cloud.ply");
   if (parts.height_map && header.grid)
     scene.height_map = ReadHeightMap(folder / "heightmap.tiff", *header.grid);

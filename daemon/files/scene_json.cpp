@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormat = 1;
+constexpr int kSceneFormat = 1;
 constexpr int kMaxMarkerId = 65535;
 constexpr double kMaxCoordinate_m = 1e4;
 constexpr double kMaxCount = 1e9;
@@ -24,22 +24,22 @@ constexpr double kMinStep_m = 1e-5;
 constexpr double kMaxStep_m = 1.0;
 
 /// One value of the document with its path, for messages.
-class Value {
+class SceneValue {
  public:
-  Value(const Json& json, std::string where) : json_(json), where_(std::move(where)) {}
+  SceneValue(const Json& json, std::string where) : json_(json), where_(std::move(where)) {}
 
   [[nodiscard]] bool has(const char* key) const { return json_.is_object() && json_.contains(key); }
   [[nodiscard]] bool is_null() const { return json_.is_null(); }
   [[nodiscard]] const Json& json() const { return json_; }
 
-  [[nodiscard]] Value operator[](const char* key) const {
+  [[nodiscard]] SceneValue operator[](const char* key) const {
     if (!json_.is_object()) Fail("is not an object");
     if (!json_.contains(key))
       throw DataError(fmt::format("{}.{} is missing; make the scene again", where_, key));
     return {json_[key], fmt::format("{}.{}", where_, key)};
   }
 
-  [[nodiscard]] Value At(std::size_t index) const {
+  [[nodiscard]] SceneValue At(std::size_t index) const {
     return {json_[index], fmt::format("{}[{}]", where_, index)};
   }
 
@@ -70,7 +70,7 @@ class Value {
   void ForEach(const Visit& visit) const {
     if (!json_.is_object()) Fail("is not an object");
     for (const auto& [key, value] : json_.items())
-      visit(key, Value(value, fmt::format("{}.{}", where_, key.substr(0, 40))));
+      visit(key, SceneValue(value, fmt::format("{}.{}", where_, key.substr(0, 40))));
   }
 
   [[noreturn]] void Fail(const std::string& what) const {
@@ -89,21 +89,21 @@ Json MapJson(const std::map<std::string, double>& values) {
 }
 
 /// A marker id that is the key of an object.
-int MarkerId(const std::string& key, const Value& value) {
+int MarkerId(const std::string& key, const SceneValue& value) {
   const std::optional<int> id = ParseNumber<int>(key);
   if (!id || *id < 0 || *id > kMaxMarkerId)
     value.Fail(fmt::format("is not a marker id from 0 to {}", kMaxMarkerId));
   return *id;
 }
 
-void ReadMarkers(const Value& root, Scene& scene) {
-  root["markers"].ForEach([&](const std::string& key, const Value& corners) {
+void ReadMarkers(const SceneValue& root, Scene& scene) {
+  root["markers"].ForEach([&](const std::string& key, const SceneValue& corners) {
     SceneMarker& marker = scene.markers[MarkerId(key, corners)];
     if (scene.markers.size() > kMaxMarkers)
       corners.Fail(fmt::format("is one of more than {} markers", kMaxMarkers));
     corners.RequireArray(4);
     for (std::size_t k = 0; k < 4; ++k) {
-      const Value corner = corners.At(k);
+      const SceneValue corner = corners.At(k);
       corner.RequireArray(3);
       for (std::size_t axis = 0; axis < 3; ++axis) {
         marker.corners[k][static_cast<Eigen::Index>(axis)] =
@@ -111,27 +111,27 @@ void ReadMarkers(const Value& root, Scene& scene) {
       }
     }
   });
-  const auto find = [&](const std::string& key, const Value& value) -> SceneMarker& {
+  const auto find = [&](const std::string& key, const SceneValue& value) -> SceneMarker& {
     const auto marker = scene.markers.find(MarkerId(key, value));
     if (marker == scene.markers.end()) value.Fail("belongs to no marker of the scene");
     return marker->second;
   };
   if (root.has("marker_views")) {
-    root["marker_views"].ForEach([&](const std::string& key, const Value& views) {
+    root["marker_views"].ForEach([&](const std::string& key, const SceneValue& views) {
       find(key, views).num_views = static_cast<int>(views.Integer(0, kMaxCount));
     });
   }
   if (root.has("marker_sigma_m")) {
-    root["marker_sigma_m"].ForEach([&](const std::string& key, const Value& sigma) {
+    root["marker_sigma_m"].ForEach([&](const std::string& key, const SceneValue& sigma) {
       find(key, sigma).sigma_m = sigma.Number(0, 1e3);
     });
   }
 }
 
 /// Keys that Plumb writes but other programs may leave out.
-void ReadMarkerKind(const Value& root, Scene& scene) {
+void ReadMarkerKind(const SceneValue& root, Scene& scene) {
   if (root.has("marker_dictionary")) {
-    const Value value = root["marker_dictionary"];
+    const SceneValue value = root["marker_dictionary"];
     const std::string name = value.Text();
     if (!name.empty() && !MarkerDictionary::Find(name))
       value.Fail(fmt::format("is \"{}\", which is not a known dictionary", name.substr(0, 60)));
@@ -143,7 +143,7 @@ void ReadMarkerKind(const Value& root, Scene& scene) {
   }
 }
 
-std::optional<GridShape> ReadGrid(const Value& heightmap) {
+std::optional<GridShape> ReadGrid(const SceneValue& heightmap) {
   if (heightmap.is_null()) return std::nullopt;
   GridShape grid;
   grid.x_min = heightmap["x_min"].Number(-kMaxCoordinate_m, kMaxCoordinate_m);
@@ -167,7 +167,7 @@ Json ParseText(std::string_view text, const std::string& name) {
 
 std::string SceneJson(const Scene& scene) {
   Json json;
-  json["format"] = kFormat;
+  json["format"] = kSceneFormat;
   json["preset"] = Name(scene.preset);
   json["frame"] = Name(scene.frame);
   json["marker_dictionary"] = scene.marker_dictionary;
@@ -219,16 +219,17 @@ std::string SceneJson(const Scene& scene) {
 
 SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   const Json json = ParseText(text, name);
-  const Value root(json, name);
-  const Value format_value = root["format"];
+  const SceneValue root(json, name);
+  const SceneValue format_value = root["format"];
   const std::int64_t format = format_value.Integer(-kMaxCount, kMaxCount);
-  if (format > kFormat) {
+  if (format > kSceneFormat) {
     throw DataError(
         fmt::format("{} has format {}, this version reads format {}; update Plumb or make the "
                     "scene again with this version",
-                    name, format, kFormat));
+                    name, format, kSceneFormat));
   }
-  if (format < kFormat) format_value.Fail(fmt::format("is {}, expected {}", format, kFormat));
+  if (format < kSceneFormat)
+    format_value.Fail(fmt::format("is {}, expected {}", format, kSceneFormat));
 
   SceneHeader header;
   Scene& scene = header.scene;
@@ -242,7 +243,7 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   ReadMarkers(root, scene);
   header.grid = ReadGrid(root["heightmap"]);
   header.num_keyframes = static_cast<std::size_t>(root["keyframes"].Integer(0, kMaxCount));
-  const Value frames = root["frames"];
+  const SceneValue frames = root["frames"];
   scene.frames_total = frames["total"].Integer(0, kMaxCount);
   scene.frames_tracked = frames["tracked"].Integer(0, kMaxCount);
   scene.frames_dropped = frames["dropped"].Integer(0, kMaxCount);
@@ -250,7 +251,7 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
     scene.frames_fewer_keypoints = frames["fewer_keypoints"].Integer(0, kMaxCount);
   if (root.has("longest_lost_s")) scene.longest_lost_s = root["longest_lost_s"].Number(0, 1e9);
   if (root.has("breathing") && !root["breathing"].is_null()) {
-    const Value breathing = root["breathing"];
+    const SceneValue breathing = root["breathing"];
     scene.breathing = Breathing{.amplitude_m = breathing["amplitude_m"].Number(0, 1),
                                 .sigma_m = breathing["sigma_m"].Number(0, 1),
                                 .period_s = breathing["period_s"].Number(0, 1e3),
@@ -261,7 +262,7 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   const auto read = [&](const char* map_name, double least, double most,
                         std::map<std::string, double>& values) {
     if (!root.has(map_name)) return;
-    root[map_name].ForEach([&](const std::string& key, const Value& value) {
+    root[map_name].ForEach([&](const std::string& key, const SceneValue& value) {
       values[key] = value.Number(least, most);
     });
   };
@@ -270,7 +271,7 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   read("calibration_prior_sigma", 0, 1e12, scene.calibration_prior_sigma);
   read("timings_s", 0, 1e9, scene.timings_s);
   if (root.has("warnings")) {
-    const Value warnings = root["warnings"];
+    const SceneValue warnings = root["warnings"];
     if (!warnings.json().is_array()) warnings.Fail("is not a list");
     for (std::size_t i = 0; i < warnings.json().size(); ++i)
       scene.warnings.push_back(warnings.At(i).Text());

@@ -13,11 +13,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormat = 1;
+constexpr int kSensitivityFormat = 1;
 constexpr std::size_t kMaxTerms = 256;
 constexpr std::size_t kMaxPatches = 4096;
 constexpr std::size_t kMaxSerialBytes = 256;
-constexpr std::size_t kMaxMarkers = 4096;
+constexpr std::size_t kMaxSensitiveMarkers = 4096;
 constexpr double kLargest = 1e12;
 
 // Four digits are more than a sensitivity is known to.
@@ -90,7 +90,7 @@ Intrinsics ToIntrinsics(const Eigen::VectorXd& v) {
 
 std::string SensitivityJson(const SensorSensitivity& sensitivity) {
   Json json;
-  json["format"] = kFormat;
+  json["format"] = kSensitivityFormat;
   json["stated"] = IntrinsicsJson(sensitivity.stated);
   json["stated_for_this_unit"] = sensitivity.stated_for_this_unit;
   json["serial"] = sensitivity.serial;
@@ -122,8 +122,8 @@ SensorSensitivity ParseSensitivityJson(std::string_view text, const std::string&
   } catch (const DataError& error) {
     reader.Fail(error.what());
   }
-  if (reader.Number(reader.At(json, "format"), "format") != kFormat)
-    reader.Fail(fmt::format("format is not {}", kFormat));
+  if (reader.Number(reader.At(json, "format"), "format") != kSensitivityFormat)
+    reader.Fail(fmt::format("format is not {}", kSensitivityFormat));
   SensorSensitivity result;
   result.stated = ToIntrinsics(reader.Vector(reader.At(json, "stated"), 11, "stated"));
   const Json& own = reader.At(json, "stated_for_this_unit");
@@ -155,8 +155,8 @@ SensorSensitivity ParseSensitivityJson(std::string_view text, const std::string&
     read.derivative = reader.Derivative(reader.At(patch, "derivative"), terms);
   }
   const Json& markers = reader.At(json, "markers");
-  if (!markers.is_object() || markers.size() > kMaxMarkers)
-    reader.Fail(fmt::format("markers is no object of at most {}", kMaxMarkers));
+  if (!markers.is_object() || markers.size() > kMaxSensitiveMarkers)
+    reader.Fail(fmt::format("markers is no object of at most {}", kMaxSensitiveMarkers));
   for (const auto& [id, derivative] : markers.items()) {
     if (id.empty() || id.size() > 5 || id.find_first_not_of("0123456789") != std::string::npos)
       reader.Fail("a marker has no id");

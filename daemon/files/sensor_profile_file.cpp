@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFormat = "plumb-sensor-profile";
+constexpr const char* kProfileFormat = "plumb-sensor-profile";
 constexpr int kVersion = 1;
 constexpr std::size_t kMaxBytes = 1U << 20U;
 
@@ -38,7 +38,7 @@ std::vector<double> Numbers(const Json& json, const char* key, std::size_t count
   return values;
 }
 
-Json IntrinsicsJson(const Intrinsics& k) {
+Json StatedIntrinsicsJson(const Intrinsics& k) {
   return {{"width", k.width},
           {"height", k.height},
           {"fx_px", k.fx},
@@ -62,7 +62,7 @@ Intrinsics ParseIntrinsics(const Json& json) {
 
 SensorProfile Parse(const std::string& text) {
   const Json json = ParseBoundedJson<Json>(text);
-  if (json.at("format") != kFormat) throw DataError("it is not a sensor profile");
+  if (json.at("format") != kProfileFormat) throw DataError("it is not a sensor profile");
   if (json.at("version") != kVersion)
     throw DataError(
         fmt::format("its version is {}, expected {}", json.at("version").dump(), kVersion));
@@ -113,10 +113,10 @@ std::string SensorProfileJson(const SensorProfile& profile) {
   CalibrationModel model;
   MoveCalibration(profile.mean, model);
   Json json;
-  json["format"] = kFormat;
+  json["format"] = kProfileFormat;
   json["version"] = kVersion;
   json["sweeps"] = profile.num_sweeps;
-  json["stated_intrinsics"] = IntrinsicsJson(profile.stated);
+  json["stated_intrinsics"] = StatedIntrinsicsJson(profile.stated);
   json["calibration"] = model.Named();  // for people; the vector below is what is read
   json["mean"] = Flat(profile.mean);
   json["covariance"] = Flat(profile.covariance);

@@ -11,7 +11,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kMaxCoordinate_m = 1e4;
+constexpr double kMaxTranslation_m = 1e4;
 constexpr double kQuaternionTolerance = 1e-3;
 
 /// Removes the next number from the line; false if there is none.
@@ -62,11 +62,11 @@ std::vector<StampedPose> ParseTrajectory(std::string_view text, const std::strin
     const Eigen::Vector3d translation_m(v[1], v[2], v[3]);
     const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
     if (std::abs(q.norm() - 1) > kQuaternionTolerance ||
-        translation_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) {
+        translation_m.cwiseAbs().maxCoeff() > kMaxTranslation_m) {
       throw DataError(
           fmt::format("{} line {}: the pose has a quaternion of length {} at {:.3g} m; expected "
                       "length 1 within {} m",
-                      name, line_number, q.norm(), translation_m.norm(), kMaxCoordinate_m));
+                      name, line_number, q.norm(), translation_m.norm(), kMaxTranslation_m));
     }
     if (!poses.empty() && !(v[0] > poses.back().time_s)) {
       throw DataError(

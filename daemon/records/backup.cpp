@@ -32,11 +32,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kFormat = 1;
-constexpr const char* kAbout = "backup.json";
-constexpr const char* kSums = "SHA256SUMS";
-constexpr const char* kDatabase = "plumb.db";
-constexpr const char* kScans = "scans";
+constexpr int kBackupFormat = 1;
+constexpr const char* kAboutBackup = "backup.json";
 /// The other parts of a state folder that are copied if they exist.
 constexpr std::array<const char*, 4> kOtherFolders = {ScanFolders::kSetAside, "calibration",
                                                       "imports", "sensor-profiles"};
@@ -50,15 +47,18 @@ constexpr const char* kRestored = "restored.json";
 constexpr const char* kProvisionedDisplay = "provisioned-display";
 
 /// True for the paths that a backup can contain: nothing outside it, nothing unknown.
-bool MayHold(const std::string& path) {
+bool BackupMayHold(const std::string& path) {
   const std::string first = fs::path(path).begin()->string();
-  return path == kDatabase ||
-         (first != path && (first == kScans || std::find(kOtherFolders.begin(), kOtherFolders.end(),
-                                                         first) != kOtherFolders.end()));
+  return path == kDatabaseFile ||
+         (first != path &&
+          (first == kScansFolder ||
+           std::find(kOtherFolders.begin(), kOtherFolders.end(), first) != kOtherFolders.end()));
 }
 
-const SummedKind kKind{
-    .name = "backup", .about_file = kAbout, .format = kFormat, .may_hold = MayHold};
+const SummedKind kBackupKind{.name = "backup",
+                             .about_file = kAboutBackup,
+                             .format = kBackupFormat,
+                             .may_hold = BackupMayHold};
 
 /// A copy of the database beside the store, because the folder of an encrypted backup must never
 /// contain a plain one.
@@ -71,7 +71,7 @@ class DatabaseCopy {
     if (error) throw IoError(DescribeWriteError(folder_, error.value()));
     ::chmod(folder_.c_str(), 0700);
     try {
-      database.CopyTo(folder_ / kDatabase);
+      database.CopyTo(folder_ / kDatabaseFile);
     } catch (...) {
       fs::remove_all(folder_, error);
       throw;
@@ -94,20 +94,20 @@ class Writing {
  public:
   Writing(const fs::path& state, const fs::path& target, const BackupSecret* secret,
           const std::stop_token& stop)
-      : state_(state), output_(target, kKind, BackupOutput(), secret, stop) {}
+      : state_(state), output_(target, kBackupKind, BackupOutput(), secret, stop) {}
 
   BackupReport Write(Database& database) {
     const DatabaseCopy copy(state_, database);
-    output_.AddOwn(copy.folder(), kDatabase);
+    output_.AddOwn(copy.folder(), kDatabaseFile);
     std::size_t scans = 0;
-    for (const auto& [scan, stored] : ScansIn(copy.folder() / kDatabase)) {
+    for (const auto& [scan, stored] : ScansIn(copy.folder() / kDatabaseFile)) {
       AddScan(scan, stored);
       ++scans;
     }
     for (const char* folder : kOtherFolders) {
       for (const std::string& file : ListedOrTold(state_ / folder)) (void)output_.Add(state_, file);
     }
-    const fs::path aside_with_scans = state_ / kScans / ScanFolders::kSetAside;
+    const fs::path aside_with_scans = state_ / kScansFolder / ScanFolders::kSetAside;
     for (const std::string& file : ListedOrTold(aside_with_scans)) (void)output_.Add(state_, file);
     output_.Commit({{"scans", scans}});
     return {.scans = scans,
@@ -140,7 +140,7 @@ class Writing {
   }
 
   void AddScan(const std::string& scan, const std::vector<FileDigest>& stored) {
-    const std::string folder = fmt::format("{}/{}", kScans, scan);
+    const std::string folder = fmt::format("{}/{}", kScansFolder, scan);
     std::map<std::string, std::string> found;
     for (const std::string& file : ListedOrTold(state_ / folder)) {
       if (const std::string digest = output_.Add(state_, file); !digest.empty())
@@ -197,9 +197,9 @@ void RequireEmpty(const fs::path& state) {
 }
 
 void MoveIn(const fs::path& made, const fs::path& state) {
-  std::vector<std::string> names = {kRestored, kScans};
+  std::vector<std::string> names = {kRestored, kScansFolder};
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
-  names.emplace_back(kDatabase);
+  names.emplace_back(kDatabaseFile);
   for (const std::string& name :
        names) {  // the database last, because a folder without it does not count as complete
     std::error_code error;
@@ -234,10 +234,11 @@ void MoveDatabase(const fs::path& from, const fs::path& to) {
     drop(to);
     throw;
   }
-  if (::rename((from / kDatabase).c_str(), (to / kDatabase).c_str()) != 0 && errno != ENOENT) {
+  if (::rename((from / kDatabaseFile).c_str(), (to / kDatabaseFile).c_str()) != 0 &&
+      errno != ENOENT) {
     const int error = errno;
     drop(to);
-    throw IoError(DescribeWriteError(to / kDatabase, error));
+    throw IoError(DescribeWriteError(to / kDatabaseFile, error));
   }
   SyncWholeDisk(to);
   drop(from);
@@ -251,7 +252,7 @@ fs::path MoveOldAside(const fs::path& state) {
     aside = state / fmt::format("before-restore-{}", n);
   fs::create_directory(aside);
   GiveToOwnerOf(state, aside);
-  std::vector<std::string> names = {kRestored, kProvisionedDisplay, kScans};
+  std::vector<std::string> names = {kRestored, kProvisionedDisplay, kScansFolder};
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
   std::vector<std::string> moved;
   try {
@@ -285,9 +286,9 @@ fs::path MoveOldAside(const fs::path& state) {
 }  // namespace
 
 OutputKind BackupOutput() {
-  std::vector<std::string_view> entries = {kAbout, kSums, kDatabase, kScans};
+  std::vector<std::string_view> entries = {kAboutBackup, kSumsFile, kDatabaseFile, kScansFolder};
   entries.insert(entries.end(), kOtherFolders.begin(), kOtherFolders.end());
-  return {"backup", kAbout, entries};
+  return {"backup", kAboutBackup, entries};
 }
 
 std::string Described(const fs::path& target, const BackupReport& report, bool is_encrypted) {
@@ -305,11 +306,11 @@ BackupReport WriteBackup(const fs::path& state, Database& database, const fs::pa
 BackupReport BackUpStopped(const fs::path& state, const fs::path& target,
                            const std::stop_token& stop, const BackupSecret* secret) {
   std::error_code error;
-  if (!fs::is_regular_file(state / kDatabase, error)) {
+  if (!fs::is_regular_file(state / kDatabaseFile, error)) {
     throw IoError(fmt::format("cannot back up {}: it holds no {}; name plumbd's state folder",
-                              state.string(), kDatabase));
+                              state.string(), kDatabaseFile));
   }
-  Database database(state / kDatabase, Database::Access::kReadWrite);
+  Database database(state / kDatabaseFile, Database::Access::kReadWrite);
   Migrate(database);
   BackupReport report = WriteBackup(state, database, target, stop, secret);
   Transaction transaction(database);
@@ -322,28 +323,28 @@ BackupReport BackUpStopped(const fs::path& state, const fs::path& target,
 BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
                            const std::stop_token& stop, const BackupSecret* secret) {
   RequireEmpty(state);
-  const SummedReader reader(backup, kKind, secret);
-  if (reader.files().empty() || reader.files().front().path != kDatabase)
-    reader.Fail(fmt::format("it holds no {}", kDatabase));
+  const SummedReader reader(backup, kBackupKind, secret);
+  if (reader.files().empty() || reader.files().front().path != kDatabaseFile)
+    reader.Fail(fmt::format("it holds no {}", kDatabaseFile));
   reader.Verify(stop);
   BackupReport report;
   const fs::path made = state / kRestoring;
   const bool is_new = !fs::exists(state);
   try {
     fs::remove_all(made);  // left by an interrupted restore
-    fs::create_directories(made / kScans);
+    fs::create_directories(made / kScansFolder);
     ::chmod(state.c_str(), 0750);
     for (const FileDigest& file : reader.files()) {
       CheckStop(stop);
       report.bytes += reader.CopyTo(made, file, stop).bytes;
       if (report.files++ > 0) continue;
       try {  // the database is the first
-        Database(made / kDatabase, Database::Access::kFrozen).CheckIntegrity();
+        Database(made / kDatabaseFile, Database::Access::kFrozen).CheckIntegrity();
       } catch (const IoError& error) {
         reader.Fail(error.what());
       }
     }
-    for (const fs::directory_entry& scan : fs::directory_iterator(made / kScans))
+    for (const fs::directory_entry& scan : fs::directory_iterator(made / kScansFolder))
       report.scans += scan.is_directory() ? 1 : 0;
     WriteWholeFile(made / kRestored, nlohmann::ordered_json{{"backup", ValidUtf8(backup.string())},
                                                             {"sha256", reader.digest()},
@@ -383,7 +384,7 @@ BackupReport RestoreOver(const fs::path& backup, const fs::path& state, const st
       // stay: without both, the next start would begin with an empty store
       // (IsRestoreInterrupted()).
       std::error_code ignored;
-      if (!is_unpacked || fs::exists(state / kDatabase, ignored)) fs::remove_all(made, ignored);
+      if (!is_unpacked || fs::exists(state / kDatabaseFile, ignored)) fs::remove_all(made, ignored);
       throw;
     }
     try {
@@ -401,7 +402,7 @@ BackupReport RestoreOver(const fs::path& backup, const fs::path& state, const st
 
 bool IsRestoreInterrupted(const fs::path& state) {
   std::error_code ignored;
-  return fs::exists(state / kRestoringOver / kDatabase, ignored);
+  return fs::exists(state / kRestoringOver / kDatabaseFile, ignored);
 }
 
 void NoteRestore(const fs::path& state, Database& database) {

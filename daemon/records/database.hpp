@@ -21,6 +21,9 @@ struct sqlite3_stmt;
 
 namespace plumb {
 
+/// In the state folder.
+inline constexpr const char* kDatabaseFile = "plumb.db";
+
 /// The file is not a database, or a damaged one.
 class DatabaseCorrupt : public IoError {
  public:

@@ -14,6 +14,7 @@
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/records/file_copy.hpp"
+#include "daemon/records/scan_folders.hpp"
 #include "daemon/records/store.hpp"
 #include "drivers/files/file_io.hpp"
 
@@ -21,9 +22,9 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMaxBytes = 4096;
+constexpr std::size_t kMaxRequestBytes = 4096;
 constexpr const char* kKeep = "keep_records";
 constexpr const char* kWipe = "wipe";
 constexpr const char* kOfFileSystem = "lost+found";  // root's, on the root of a disk
@@ -38,7 +39,7 @@ struct Request {
 
 /// @throws DataError
 Request ReadRequest(const fs::path& file) {
-  const Json json = ParseBoundedJsonOrNothing(ReadTextFile(file, kMaxBytes));
+  const Json json = ParseBoundedJsonOrNothing(ReadTextFile(file, kMaxRequestBytes));
   try {
     const std::string kind = json.at("kind").get<std::string>();
     if (kind != kKeep && kind != kWipe)
@@ -78,7 +79,7 @@ std::vector<fs::path> EntriesOf(const fs::path& folder) {
 void Wipe(const fs::path& state) {
   FolderLock lock;
   lock.Take(state);
-  const fs::path scans = state / "scans";
+  const fs::path scans = state / kScansFolder;
   if (fs::is_directory(scans)) {  // or a link to one, on another disk
     for (const fs::path& entry : EntriesOf(scans)) {
       if (entry.filename() != kOfFileSystem) Remove(entry);

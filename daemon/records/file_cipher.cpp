@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMinSecret = 16, kMaxSecret = 1024;
-constexpr std::size_t kPiece = std::size_t{64} << 10;
+constexpr std::size_t kCipherPiece = std::size_t{64} << 10;
 constexpr std::size_t kOverhead = crypto_secretstream_xchacha20poly1305_ABYTES;
 // Limits for the work that a backup may demand of the machine that restores it.
 constexpr std::uint64_t kMaxOperations = 16, kMaxMemory = std::uint64_t{512} << 20;
@@ -176,7 +176,7 @@ std::string FileCipher::Signature(const std::string& text) const {
 FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
                                      const std::string& path, const std::stop_token& stop) const {
   const std::string& place = PlaceOf(path);
-  Pieces pieces(from / path, kPiece);
+  Pieces pieces(from / path, kCipherPiece);
   pieces.Begin();
   DigestingWriter target(to, path);
   crypto_secretstream_xchacha20poly1305_state state;
@@ -208,7 +208,7 @@ FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
     throw DataError(path + " is not what was encrypted there: it was changed or reassembled");
   };
   const std::string& place = PlaceOf(path);
-  Pieces pieces(from / path, kPiece + kOverhead);
+  Pieces pieces(from / path, kCipherPiece + kOverhead);
   const std::vector<std::uint8_t> header =
       pieces.Exactly(crypto_secretstream_xchacha20poly1305_HEADERBYTES);
   crypto_secretstream_xchacha20poly1305_state state;

@@ -28,7 +28,7 @@ void MakeFolders(const fs::path& folder) {
   if (error) throw IoError(DescribeWriteError(folder, error.value()));
 }
 
-[[noreturn]] void FailToRead(const fs::path& path, int error) {
+[[noreturn]] void FailToCopy(const fs::path& path, int error) {
   throw SourceUnreadable(fmt::format("cannot read {}: {}", path.string(), std::strerror(error)));
 }
 
@@ -60,15 +60,15 @@ FileDigest Copy(const fs::path& from, const fs::path& to, const std::string& pat
   const fs::path source = from / path;
   const Descriptor file(::open(source.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   struct stat status {};
-  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailToRead(source, errno);
-  if (!S_ISREG(status.st_mode)) FailToRead(source, EINVAL);
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailToCopy(source, errno);
+  if (!S_ISREG(status.st_mode)) FailToCopy(source, EINVAL);
   DigestingWriter copy(to, path);
   std::vector<std::uint8_t> buffer(std::size_t{256} << 10);
   for (;;) {
     CheckStop(stop);
     const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) FailToRead(source, errno);
+    if (count < 0) FailToCopy(source, errno);
     if (count == 0) break;
     copy.Write({buffer.data(), static_cast<std::size_t>(count)});
   }

@@ -17,6 +17,7 @@
 #include "daemon/records/audit_store.hpp"
 #include "daemon/records/file_copy.hpp"
 #include "daemon/records/patient_record.hpp"
+#include "daemon/records/scan_folders.hpp"
 #include "daemon/records/schema.hpp"
 #include "daemon/records/store.hpp"
 #include "daemon/records/stored_values.hpp"
@@ -32,9 +33,8 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr const char* kAbout = "patient.json";
+constexpr const char* kAboutExport = "patient.json";
 constexpr const char* kRecord = "record.json";
-constexpr const char* kScans = "scans";
 constexpr const char* kImports = "imports";
 constexpr const char* kImporting = ".import";
 constexpr std::size_t kMaxRecord = std::size_t{256} << 20;
@@ -43,26 +43,27 @@ constexpr std::size_t kMaxRecord = std::size_t{256} << 20;
 std::optional<std::int64_t> ScanOf(const std::string& path) {
   const fs::path parts(path);
   auto part = parts.begin();
-  if (*part++ != kScans || part == parts.end()) return std::nullopt;
+  if (*part++ != kScansFolder || part == parts.end()) return std::nullopt;
   const std::optional<std::int64_t> scan = ParseId(part->string());
   const bool is_ours = scan && ScanId(*scan) == part->string() && ++part != parts.end();
   return is_ours ? scan : std::nullopt;
 }
 
-bool MayHold(const std::string& path) { return path == kRecord || ScanOf(path).has_value(); }
+bool ExportMayHold(const std::string& path) { return path == kRecord || ScanOf(path).has_value(); }
 
-const SummedKind kKind{.name = "export", .about_file = kAbout, .format = 1, .may_hold = MayHold};
+const SummedKind kExportKind{
+    .name = "export", .about_file = kAboutExport, .format = 1, .may_hold = ExportMayHold};
 
 /// Opens the source of an export; a backup is not changed.
 std::unique_ptr<Database> OpenSource(const fs::path& state, bool is_backup) {
   std::error_code error;
-  if (!fs::is_regular_file(state / "plumb.db", error))
+  if (!fs::is_regular_file(state / kDatabaseFile, error))
     throw IoError(
         fmt::format("cannot export from {}: it holds no plumb.db; name a state folder or "
                     "a backup",
                     state.string()));
   auto database = std::make_unique<Database>(
-      state / "plumb.db", is_backup ? Database::Access::kFrozen : Database::Access::kReadWrite);
+      state / kDatabaseFile, is_backup ? Database::Access::kFrozen : Database::Access::kReadWrite);
   if (!is_backup) {
     Migrate(*database);
     return database;
@@ -112,18 +113,19 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
                                             {"evidence", PatientEvidence(*database, *patient)},
                                             {"earlier", EarlierEvidence(state, *patient)}}
                                            .dump(1, ' ', false, Json::error_handler_t::replace));
-  SummedWriter output(target, kKind, {"export", kAbout, {kAbout, "SHA256SUMS", kRecord, kScans}},
+  SummedWriter output(target, kExportKind,
+                      {"export", kAboutExport, {kAboutExport, kSumsFile, kRecord, kScansFolder}},
                       secret, stop);
   output.AddOwn(own.path(), kRecord);
   std::map<std::string, std::string> found;
   for (const Json& scan : rows["scans"]) {
     if (scan["has_folder"] == 0) continue;
-    for (const std::string& file : FilesBelow(state, state / kScans / ScanId(scan["id"])))
+    for (const std::string& file : FilesBelow(state, state / kScansFolder / ScanId(scan["id"])))
       found[file] = output.Add(state, file);
   }
   for (const Json& file : rows["scan_files"]) {
-    const std::string path =
-        fmt::format("{}/{}/{}", kScans, ScanId(file["scan_id"]), file["path"].get<std::string>());
+    const std::string path = fmt::format("{}/{}/{}", kScansFolder, ScanId(file["scan_id"]),
+                                         file["path"].get<std::string>());
     if (file["path"] == kRecordingFolder) continue;  // checked separately
     if (const auto copy = found.find(path); copy == found.end() || copy->second != file["sha256"])
       output.Report(path + (copy == found.end() ? " is missing" : " is not what was stored"));
@@ -150,7 +152,7 @@ class PatientImport {
  public:
   PatientImport(const fs::path& folder, const fs::path& state, const BackupSecret* secret,
                 std::stop_token stop)
-      : reader_(folder, kKind, secret),
+      : reader_(folder, kExportKind, secret),
         store_(state),
         database_(store_.database().ForChanges()),
         stop_(std::move(stop)) {}
@@ -239,7 +241,7 @@ class PatientImport {
       InsertRows();
       const std::int64_t patient = new_ids_["patients"].begin()->second;
       for (const auto& [before, now] : new_ids_["scans"]) {
-        const fs::path from = Made() / kScans / ScanId(before),
+        const fs::path from = Made() / kScansFolder / ScanId(before),
                        to = store_.folders.Scan(ScanId(now));
         if (!fs::exists(from)) continue;
         if (::rename(from.c_str(), to.c_str()) != 0) throw IoError(DescribeWriteError(to, errno));
@@ -337,7 +339,7 @@ class PatientImport {
 PatientReport ImportPatient(const fs::path& folder, const fs::path& state,
                             const std::stop_token& stop, const BackupSecret* secret) {
   std::error_code error;
-  if (!fs::is_regular_file(state / "plumb.db", error))
+  if (!fs::is_regular_file(state / kDatabaseFile, error))
     throw IoError(
         fmt::format("cannot import into {}: it holds no plumb.db; name the state folder "
                     "of a plumbd that has run",

@@ -25,7 +25,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kHead = "plumb-profile-version 1 ";
 constexpr const char* kEnding = ".profile";
 constexpr const char* kSetAside = "set-aside";
-constexpr std::size_t kMaxBytes = 1U << 20U;
+constexpr std::size_t kMaxProfileBytes = 1U << 20U;
 constexpr int kMaxVersion = 999'999'999;
 
 // Includes a plain serial itself, so that two serials never share a folder.
@@ -67,7 +67,7 @@ ProfileVersion Parse(const std::string& text, const std::string& serial, int ver
 
 ProfileVersion ReadVersion(const fs::path& file, const std::string& serial, int version) {
   try {
-    return Parse(ReadTextFile(file, kMaxBytes), serial, version);
+    return Parse(ReadTextFile(file, kMaxProfileBytes), serial, version);
   } catch (const nlohmann::json::exception& error) {
     throw DataError(error.what());
   }

@@ -18,7 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormat = 1;
+constexpr int kCalibrationFormat = 1;
 
 Json PoseJson(const Pose& T) {
   Json rows = Json::array();
@@ -44,7 +44,7 @@ Pose PoseIn(const Json& rows) {
 }
 
 std::string JsonOf(const RoomFit& fit, std::span<const BoardScan> scans) {
-  Json json = {{"format", kFormat},
+  Json json = {{"format", kCalibrationFormat},
                {"dictionary", scans[0].dictionary},
                {"marker_length_m", scans[0].marker_length_m},
                {"reference_marker", scans[0].reference_marker.value()},
@@ -135,8 +135,9 @@ RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibratio
 SignedRoom SignedRoomIn(const std::string& text) {
   try {
     const Json json = ParseBoundedJson<Json>(text);
-    if (json.at("format").get<int>() != kFormat)
-      throw DataError(fmt::format("expected format {}, found {}", kFormat, json["format"].dump()));
+    if (json.at("format").get<int>() != kCalibrationFormat)
+      throw DataError(
+          fmt::format("expected format {}, found {}", kCalibrationFormat, json["format"].dump()));
     SignedRoom room;
     room.digest = Sha256Of(text);
     room.dictionary = json.at("dictionary").get<std::string>();

@@ -8,6 +8,9 @@
 
 namespace plumb {
 
+/// In the state folder, in a backup and in an export.
+inline constexpr const char* kScansFolder = "scans";
+
 /// STATE/scans/ID/, and STATE/scans/.staging-ID/ until the scan has ended.
 class ScanFolders {
  public:
@@ -15,7 +18,7 @@ class ScanFolders {
   explicit ScanFolders(std::filesystem::path state) : state_(std::move(state)) {}
 
   [[nodiscard]] const std::filesystem::path& state() const { return state_; }
-  [[nodiscard]] std::filesystem::path scans() const { return state_ / "scans"; }
+  [[nodiscard]] std::filesystem::path scans() const { return state_ / kScansFolder; }
   [[nodiscard]] std::filesystem::path Scan(const std::string& scan_id) const {
     return scans() / scan_id;
   }

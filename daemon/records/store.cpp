@@ -21,8 +21,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kDatabase = "plumb.db";
-
 FolderPlace PlaceOf(const fs::path& folder) {
   struct stat status {};
   if (::stat(folder.c_str(), &status) != 0) return {};
@@ -55,7 +53,7 @@ std::unique_ptr<Database> OpenChecked(const fs::path& state, const StoreOptions&
                                       bool& is_checked) {
   constexpr std::chrono::milliseconds kPause(500);
   return RetryWhileBusy(options.lock_wait, kPause, options.sleep, [&] {
-    auto database = std::make_unique<Database>(state / kDatabase, Database::Access::kReadWrite,
+    auto database = std::make_unique<Database>(state / kDatabaseFile, Database::Access::kReadWrite,
                                                options.busy_wait);
     is_checked = database->CheckIntegrity(options.check_limit);
     return database;
@@ -99,7 +97,7 @@ int RestrictAccess(const fs::path& state) {
     for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error))
       if (!entry->is_symlink(ignored) && entry->path() != scans) restrict(entry->path());
   }
-  for (const char* name : {kDatabase, "plumb.db-wal", "plumb.db-shm"}) restrict(state / name);
+  for (const char* name : {kDatabaseFile, "plumb.db-wal", "plumb.db-shm"}) restrict(state / name);
   restrict(scans);
   restrict(state);
   return num_changed;
@@ -120,7 +118,7 @@ void FolderLock::Take(const fs::path& folder) {
 
 Store::Store(const fs::path& folder, const StoreOptions& options)
     : folders(fs::absolute(folder)),
-      database_(OpenForChanges(folders, options, lock_, recovery_), folders.state() / kDatabase,
+      database_(OpenForChanges(folders, options, lock_, recovery_), folders.state() / kDatabaseFile,
                 Database::Access::kReadOnly),
       settings(database_, options.first_settings),
       integrity(database_, folders, options.look) {
@@ -134,8 +132,9 @@ Store::Store(const fs::path& folder, const StoreOptions& options)
 
 Store::Store(const fs::path& folder, const Settings& first_settings, ReadOnly)
     : folders(fs::absolute(folder)),
-      database_(std::make_unique<Database>(folders.state() / kDatabase, Database::Access::kFrozen),
-                folders.state() / kDatabase, Database::Access::kFrozen),
+      database_(
+          std::make_unique<Database>(folders.state() / kDatabaseFile, Database::Access::kFrozen),
+          folders.state() / kDatabaseFile, Database::Access::kFrozen),
       settings(database_, first_settings),
       integrity(database_, folders, LookAt) {
   (void)patients.List();  // fails if the tables do not exist

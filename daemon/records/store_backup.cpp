@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "daemon/records/audit_store.hpp"
+#include "daemon/records/database.hpp"
 #include "daemon/records/file_copy.hpp"
 
 namespace plumb {
@@ -84,7 +85,7 @@ BackupReport StoreBackup::Make(const Actor& actor, const std::filesystem::path& 
   const RemovalGate::Backup guard(gate_);
   BackupReport report;
   {
-    Database source(folders_.state() / "plumb.db", Database::Access::kReadOnly);
+    Database source(folders_.state() / kDatabaseFile, Database::Access::kReadOnly);
     report = WriteBackup(folders_.state(), source, target, stop, secret);
   }
   AuditStore(database_).Log(actor, "backup.make", "", Described(target, report, secret != nullptr));

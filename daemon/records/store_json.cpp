@@ -19,7 +19,7 @@
 namespace plumb {
 namespace {
 
-using Json = nlohmann::json;
+using StoredJson = nlohmann::json;
 
 [[noreturn]] void RefuseResult(const std::string& why) {
   throw DataError(fmt::format(
@@ -33,7 +33,7 @@ static_assert(std::ranges::equal(kNumberAxes, kNumberNames, std::equal_to<std::s
                                  &NumberAxis::name));
 
 /// Couch-fixed markers do not determine shifts; a missing angle is never treated as zero.
-ReportedNumbers NumbersOf(const Json& json) {
+ReportedNumbers NumbersOf(const StoredJson& json) {
   ReportedNumbers numbers;
   for (const NumberAxis& axis : kNumberAxes) {
     const auto found = json.find(axis.key);
@@ -46,14 +46,14 @@ ReportedNumbers NumbersOf(const Json& json) {
 }
 
 /// An object; nothing if it is missing or null.
-const Json* ObjectIn(const Json& json, const char* key) {
+const StoredJson* ObjectIn(const StoredJson& json, const char* key) {
   const auto found = json.find(key);
   if (found == json.end() || found->is_null()) return nullptr;
   if (!found->is_object()) RefuseResult(fmt::format("{} is not an object", key));
   return &*found;
 }
 
-Verdict VerdictIn(const Json& json) {
+Verdict VerdictIn(const StoredJson& json) {
   const auto found = json.find("verdict");
   if (found != json.end() && found->is_string()) {
     if (const auto verdict = Named<Verdict>(found->get_ref<const std::string&>())) return *verdict;
@@ -61,18 +61,18 @@ Verdict VerdictIn(const Json& json) {
   RefuseResult("it has no verdict that this version knows");
 }
 
-void ReadWords(const Json& result, ResultSummary& summary) {
-  const auto text = [](const Json& json, const char* key) {
+void ReadWords(const StoredJson& result, ResultSummary& summary) {
+  const auto text = [](const StoredJson& json, const char* key) {
     const auto found = json.find(key);
     return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
   };
-  if (const auto words = result.value(Json::json_pointer("/correction/words"), Json());
+  if (const auto words = result.value(StoredJson::json_pointer("/correction/words"), StoredJson());
       words.is_object()) {
     for (std::size_t i = 0; i < summary.words.size(); ++i)
       summary.words[i] = text(words, kNumberAxes[i].name);
   }
-  const auto parts = result.value(Json::json_pointer("/body/parts"), Json());
-  for (const Json& part : parts.is_array() ? parts : Json::array()) {
+  const auto parts = result.value(StoredJson::json_pointer("/body/parts"), StoredJson());
+  for (const StoredJson& part : parts.is_array() ? parts : StoredJson::array()) {
     if (!part.is_object()) continue;
     if (std::string words = text(part, "words_now"); !words.empty())
       summary.body_now.push_back(std::move(words));
@@ -97,12 +97,12 @@ class Stored {
                     "failed. Put a backup of the database in its place, or save it again",
                     what_, why));
   }
-  [[nodiscard]] const Json* Find(const char* key) const {
+  [[nodiscard]] const StoredJson* Find(const char* key) const {
     const auto found = json_.find(key);
     return found == json_.end() ? nullptr : &*found;
   }
   [[nodiscard]] double Number(const char* key, Range range) const {
-    const Json* value = Find(key);
+    const StoredJson* value = Find(key);
     if (value == nullptr || !value->is_number()) Fail(fmt::format("{} is not a number", key));
     return InRange(key, value->get<double>(), range);
   }
@@ -111,12 +111,12 @@ class Stored {
             .rotation_deg = Number("rotation_tolerance_deg", kRotationTolerance_deg.stored)};
   }
   [[nodiscard]] bool Flag(const char* key) const {
-    const Json* value = Find(key);
+    const StoredJson* value = Find(key);
     if (value == nullptr || !value->is_boolean()) Fail(fmt::format("{} is not true or false", key));
     return value->get<bool>();
   }
   [[nodiscard]] std::string Posture(const char* key) const {
-    const Json* value = Find(key);
+    const StoredJson* value = Find(key);
     for (const std::string_view posture : kPostures) {
       if (value != nullptr && *value == posture) return std::string(posture);
     }
@@ -124,7 +124,7 @@ class Stored {
   }
   /// A point of finite numbers.
   template <std::size_t kSize>
-  [[nodiscard]] std::array<double, kSize> Point(const char* key, const Json& json) const {
+  [[nodiscard]] std::array<double, kSize> Point(const char* key, const StoredJson& json) const {
     std::array<double, kSize> point{};
     if (!json.is_array() || json.size() != kSize)
       Fail(fmt::format("{} is not a point of {} numbers", key, kSize));
@@ -144,18 +144,18 @@ class Stored {
     return value;
   }
 
-  Json json_;
+  StoredJson json_;
   const char* what_;
 };
 
 }  // namespace
 
 std::string PlanJson(const ReferencePlan& plan) {
-  Json json = {{"region_m", plan.region_m},
-               {"shift_tolerance_mm", plan.tolerance.shift_mm},
-               {"rotation_tolerance_deg", plan.tolerance.rotation_deg},
-               {"posture", plan.posture},
-               {"couch_markers", plan.couch_markers}};
+  StoredJson json = {{"region_m", plan.region_m},
+                     {"shift_tolerance_mm", plan.tolerance.shift_mm},
+                     {"rotation_tolerance_deg", plan.tolerance.rotation_deg},
+                     {"posture", plan.posture},
+                     {"couch_markers", plan.couch_markers}};
   if (plan.isocentre_m) json["isocentre_m"] = *plan.isocentre_m;
   return json.dump();
 }
@@ -163,30 +163,33 @@ std::string PlanJson(const ReferencePlan& plan) {
 ReferencePlan ParsePlan(const std::string& text) {
   const Stored stored(text, "a stored plan");
   ReferencePlan plan;
-  const Json* region = stored.Find("region_m");
+  const StoredJson* region = stored.Find("region_m");
   if (region == nullptr || !region->is_array()) stored.Fail("region_m is not a list of points");
-  for (const Json& point : *region) plan.region_m.push_back(stored.Point<2>("region_m", point));
+  for (const StoredJson& point : *region)
+    plan.region_m.push_back(stored.Point<2>("region_m", point));
   if (plan.region_m.size() == 1 || plan.region_m.size() == 2)
     stored.Fail("region_m has fewer than 3 points");
   plan.tolerance = stored.ReadTolerance();
   plan.posture = stored.Posture("posture");
   plan.couch_markers = stored.Flag("couch_markers");
-  if (const Json* isocentre = stored.Find("isocentre_m"))
+  if (const StoredJson* isocentre = stored.Find("isocentre_m"))
     plan.isocentre_m = stored.Point<3>("isocentre_m", *isocentre);
   return plan;
 }
 
-std::string SettingsJson(const Settings& settings) { return SettingsAs<Json>(settings).dump(); }
+std::string SettingsJson(const Settings& settings) {
+  return SettingsAs<StoredJson>(settings).dump();
+}
 
 std::string SettingsChanges(const std::string& stored, const Settings& settings) {
-  const Json before = ParseBoundedJsonOrNothing(stored);
-  const Json wanted = SettingsAs<Json>(settings);
-  Json changes = Json::object();
+  const StoredJson before = ParseBoundedJsonOrNothing(stored);
+  const StoredJson wanted = SettingsAs<StoredJson>(settings);
+  StoredJson changes = StoredJson::object();
   for (const auto& [name, after] : wanted.items()) {
     if (!before.is_object() || !before.contains(name)) {
-      changes[name] = Json::array({after});
+      changes[name] = StoredJson::array({after});
     } else if (before[name] != after) {
-      changes[name] = Json::array({before[name], after});
+      changes[name] = StoredJson::array({before[name], after});
     }
   }
   return changes.dump();
@@ -215,18 +218,18 @@ Settings ParseSettings(const std::string& text) {
 }
 
 ResultSummary SummaryOf(const std::string& result_json) {
-  const Json json = ParseBoundedJsonOrNothing(result_json);
+  const StoredJson json = ParseBoundedJsonOrNothing(result_json);
   if (!json.is_object()) RefuseResult("expected a JSON object, found none");
   ResultSummary summary{.verdict = VerdictIn(json)};
   ReadWords(json, summary);
   if (const auto reasons = json.find("reasons"); reasons != json.end()) {
     if (!reasons->is_array()) RefuseResult("its reasons are not a list");
-    for (const Json& reason : *reasons)
+    for (const StoredJson& reason : *reasons)
       summary.reasons.push_back(reason.is_string() ? reason.get<std::string>() : reason.dump());
   }
-  if (const Json* correction = ObjectIn(json, "correction")) {
+  if (const StoredJson* correction = ObjectIn(json, "correction")) {
     summary.correction = NumbersOf(*correction);
-    if (const Json* u95 = ObjectIn(*correction, "uncertainty")) summary.u95 = NumbersOf(*u95);
+    if (const StoredJson* u95 = ObjectIn(*correction, "uncertainty")) summary.u95 = NumbersOf(*u95);
   }
   return summary;
 }

@@ -268,7 +268,7 @@ void RefuseScansOfAnother(Database& database, const ScanFolders& scans) {
       fmt::format("the database {} is empty or missing, but there are scans of another one ({} and "
                   "{} more): put a backup of the database in "
                   "its place, or move the folder {} away too to start over",
-                  (scans.state() / "plumb.db").string(), folders.front().string(),
+                  (scans.state() / kDatabaseFile).string(), folders.front().string(),
                   folders.size() - 1, (scans.scans()).string()));
 }
 

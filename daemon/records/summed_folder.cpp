@@ -23,7 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSums = "SHA256SUMS";
 constexpr const char* kEncryption = "encryption";
 constexpr const char* kSignature = "signature";
 constexpr std::size_t kMaxAbout = std::size_t{16} << 20, kMaxSums = std::size_t{512} << 20;
@@ -37,7 +36,7 @@ bool IsArchiveOf(const fs::path& file, const SummedKind& kind) {
   try {
     const TarReader tar(file);
     const Json about = ParseBoundedJsonOrNothing<Json>(tar.Text(kind.about_file, kMaxAbout));
-    return tar.entries().contains(kSums) && about.is_object() && about.contains("format") &&
+    return tar.entries().contains(kSumsFile) && about.is_object() && about.contains("format") &&
            about.contains("sha256sums");
   } catch (const std::runtime_error&) {
     return false;
@@ -128,13 +127,13 @@ void SummedWriter::Commit(Json about) {
   std::error_code error;
   fs::create_directories(place_, error);
   if (error) throw IoError(DescribeWriteError(place_, error.value()));
-  WriteWholeFile(place_ / kSums, std::string_view(sums_));
+  WriteWholeFile(place_ / kSumsFile, std::string_view(sums_));
   about["format"] = kind_.format;
   about["schema"] = kSchemaVersion;
   about["made_at"] = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
   about["files"] = files_;
   about["bytes"] = bytes_;
-  about["sha256sums"] = DigestOfFile(place_, kSums).sha256;
+  about["sha256sums"] = DigestOfFile(place_, kSumsFile).sha256;
   about["problems"] = problems_;
   if (cipher_) {
     about[kEncryption] = cipher_->Header();
@@ -143,7 +142,7 @@ void SummedWriter::Commit(Json about) {
   WriteWholeFile(place_ / kind_.about_file,
                  about.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   if (!tar_) return output_.Commit();
-  Pack(kSums);
+  Pack(kSumsFile);
   Pack(kind_.about_file);
   tar_->Close();
   output_.CommitFile(output_.path() / kArchive);
@@ -156,7 +155,7 @@ SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret*
   try {
     OpenArchive();
     about = ParseBoundedJsonOrNothing<Json>(Text(kind_.about_file, kMaxAbout));
-    text = Text(kSums, kMaxSums);
+    text = Text(kSumsFile, kMaxSums);
   } catch (const DataError& error) {
     Fail(error.what());
   }
@@ -165,9 +164,9 @@ SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret*
   const Json schema = about.value("schema", Json());
   if (!schema.is_number_integer() || schema > kSchemaVersion)
     Fail("it was made by a newer Plumb: install that one first");
-  digest_ = Digest(kSums, {}).sha256;
+  digest_ = Digest(kSumsFile, {}).sha256;
   if (about.value("sha256sums", Json()) != digest_)
-    Fail(fmt::format("{} is not the one that was written", kSums));
+    Fail(fmt::format("{} is not the one that was written", kSumsFile));
   const bool is_encrypted = about.contains(kEncryption);
   if (is_encrypted && secret == nullptr)
     Fail("it is encrypted: name the file of its key with --key-file");
@@ -180,7 +179,7 @@ SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret*
       Fail(error.what());
     }
     if (about.value(kSignature, Json()) != cipher_->Signature(text))
-      Fail(fmt::format("{} is not signed with the key", kSums));
+      Fail(fmt::format("{} is not signed with the key", kSumsFile));
   }
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
@@ -189,7 +188,7 @@ SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret*
     constexpr std::size_t kHex = 64;
     if (line.size() < kHex + 3 || line.substr(kHex, 2) != "  " ||
         !IsPlainPath(line.substr(kHex + 2)) || !kind_.may_hold(line.substr(kHex + 2)))
-      Fail(fmt::format("{} has a line that is none of a {}: {:?}", kSums, kind_.name,
+      Fail(fmt::format("{} has a line that is none of a {}: {:?}", kSumsFile, kind_.name,
                        line.substr(0, 120)));
     files_.push_back({.path = line.substr(kHex + 2), .sha256 = line.substr(0, kHex)});
   }
@@ -203,7 +202,7 @@ void SummedReader::OpenArchive() {
   if (!fs::is_regular_file(folder_, error)) return;
   tar_ = std::make_unique<TarReader>(folder_);
   for (const auto& [path, entry] : tar_->entries()) {
-    if (path != kSums && path != kind_.about_file && !kind_.may_hold(path))
+    if (path != kSumsFile && path != kind_.about_file && !kind_.may_hold(path))
       throw DataError(fmt::format("{:?} in it is none of a {}", path.substr(0, 120), kind_.name));
   }
 }

@@ -18,6 +18,8 @@
 
 namespace plumb {
 
+inline constexpr const char* kSumsFile = "SHA256SUMS";
+
 /// A kind of folder. `may_hold` decides whether a path in it can be one of its files.
 struct SummedKind {
   const char* name;        ///< For messages: "backup".

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kPiece = std::size_t{256} << 10, kMaxPath = 4000;
+constexpr std::size_t kTarPiece = std::size_t{256} << 10, kMaxPath = 4000;
 /// What the names of one archive may take of the memory.
 constexpr std::size_t kMaxFiles = 500'000, kMaxNames = std::size_t{64} << 20;
 
@@ -49,7 +49,7 @@ Reader OpenAt(int fd, std::int64_t position) {
   if (!reader || ::archive_read_support_format_tar(reader.get()) != ARCHIVE_OK)
     throw IoError("libarchive cannot be used");
   if (::lseek(fd, position, SEEK_SET) != position ||
-      ::archive_read_open_fd(reader.get(), fd, kPiece) != ARCHIVE_OK)
+      ::archive_read_open_fd(reader.get(), fd, kTarPiece) != ARCHIVE_OK)
     throw SourceUnreadable(fmt::format("cannot be opened: {}", ReasonOf(reader.get())));
   return reader;
 }
@@ -107,7 +107,7 @@ TarWriter::TarWriter(fs::path file) : file_(std::move(file)) {
     Check(archive_ != nullptr ? ARCHIVE_OK : ARCHIVE_FATAL);
     // Names are written as they are, in the GNU format. Others convert them by the locale.
     Check(::archive_write_set_format_gnutar(archive_));
-    Check(::archive_write_set_bytes_per_block(archive_, static_cast<int>(kPiece)));
+    Check(::archive_write_set_bytes_per_block(archive_, static_cast<int>(kTarPiece)));
     Check(::archive_write_set_bytes_in_last_block(archive_, 1));  // no padding
     Check(::archive_write_open(archive_, &sink_, nullptr, take, nullptr));
   } catch (...) {
@@ -144,7 +144,7 @@ void TarWriter::Add(const fs::path& from, const std::string& path, const std::st
   ::archive_entry_set_mtime(entry.get(), std::time(nullptr), 0);
   ::archive_entry_set_size(entry.get(), status.st_size);
   Check(::archive_write_header(archive_, entry.get()));
-  std::vector<std::uint8_t> piece(kPiece);
+  std::vector<std::uint8_t> piece(kTarPiece);
   for (std::int64_t left = status.st_size; left > 0;) {
     CheckStop(stop);
     const ssize_t count = ::read(file.get(), piece.data(), piece.size());
@@ -210,7 +210,7 @@ void TarReader::Read(const std::string& path, const Take& take) const {
   if (::archive_read_next_header(reader.get(), &entry) != ARCHIVE_OK) fail(ReasonOf(reader.get()));
   const char* name = ::archive_entry_pathname(entry);
   if (name == nullptr || path != name) fail("the archive has changed");
-  std::vector<std::uint8_t> piece(kPiece);
+  std::vector<std::uint8_t> piece(kTarPiece);
   for (std::uint64_t left = found->second.bytes;;) {
     const la_ssize_t count = ::archive_read_data(reader.get(), piece.data(), piece.size());
     if (count < 0) fail(ReasonOf(reader.get()));

@@ -20,7 +20,6 @@ namespace {
 /// A bundle ends with its signature and the signature's size in eight bytes; it begins as a
 /// squashfs.
 constexpr std::string_view kSquashfs = "hsqs";
-constexpr std::uint64_t kMaxSignature = 64 << 10;
 constexpr std::uint64_t kLeastBundle = 4096;
 constexpr int kMaxVersion = 64;
 

@@ -7,6 +7,9 @@
 
 namespace plumb {
 
+/// Bytes of a bundle's signature at most.
+inline constexpr std::uint64_t kMaxSignature = 64 << 10;
+
 /// Empty, or why the file cannot be a bundle: not a regular file, empty, too large, not a squashfs
 /// followed by a signature. RAUC takes ownership of files that it has checked (owner root, readable
 /// by root only); such a file passes here, because nobody can have changed it since.

@@ -19,7 +19,6 @@
 namespace plumb {
 namespace {
 
-constexpr std::uint64_t kMaxSignature = 64 << 10;
 constexpr std::string_view kManifestBegin = "[update]";
 /// Object identifier of SHA-256 in DER; without it another digest was used.
 constexpr std::array<unsigned char, 11> kSha256{0x06, 0x09, 0x60, 0x86, 0x48, 0x01,

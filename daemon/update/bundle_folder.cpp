@@ -21,7 +21,6 @@ namespace plumb {
 
 namespace {
 
-constexpr std::size_t kMaxListed = 32;
 constexpr std::size_t kMaxKept = 4;
 constexpr std::string_view kEnding = ".raucb";
 
@@ -53,7 +52,7 @@ std::vector<std::string> BundleFolder::List() const {
   for (std::filesystem::directory_iterator entry(folder_, error), end; !error && entry != end;
        entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (name.ends_with(kEnding) && !name.starts_with('.') && names.size() < kMaxListed)
+    if (name.ends_with(kEnding) && !name.starts_with('.') && names.size() < kMaxListedBundles)
       names.push_back(name);
   }
   std::sort(names.begin(), names.end());

@@ -11,6 +11,8 @@
 
 namespace plumb {
 
+inline constexpr std::size_t kMaxListedBundles = 32;
+
 /// Files named NAME.raucb. Not thread-safe.
 class BundleFolder {
  public:

@@ -10,7 +10,7 @@
 namespace plumb {
 namespace {
 
-constexpr std::chrono::seconds kCallTimeout{20};
+constexpr std::chrono::seconds kRestartTimeout{20};
 
 class LogindRestart : public SystemRestart {
  public:
@@ -22,7 +22,7 @@ class LogindRestart : public SystemRestart {
     if (done_) return done("the machine is being asked to restart already");
     done_ = std::move(done);
     constexpr int kNotInteractive = 0;  // no dialogue: nobody sits at this machine
-    if (!bus_.Open(address_, kCallTimeout) ||
+    if (!bus_.Open(address_, kRestartTimeout) ||
         sd_bus_call_method_async(bus_.get(), nullptr, "org.freedesktop.login1",
                                  "/org/freedesktop/login1", "org.freedesktop.login1.Manager",
                                  "Reboot", &LogindRestart::OnAnswer, this, "b",

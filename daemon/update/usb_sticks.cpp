@@ -6,11 +6,12 @@
 #include <string_view>
 #include <system_error>
 
+#include "daemon/update/bundle_folder.hpp"
+
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::size_t kMaxListed = 32;
 // files of a stick that are examined; it may contain anything
 constexpr std::size_t kMaxLookedAt = 4096;
 
@@ -40,7 +41,7 @@ std::vector<fs::path> UsbSticks::Files() const {
   ForEachEntry(root_, [&](const fs::path& stick) {
     ForEachEntry(stick, [&](const fs::path& file) {
       std::error_code error;
-      if (files.size() < kMaxListed && IsBundleName(file.filename().string()) &&
+      if (files.size() < kMaxListedBundles && IsBundleName(file.filename().string()) &&
           fs::is_regular_file(fs::symlink_status(file, error)))
         files.push_back(file);
     });

@@ -60,21 +60,21 @@ jpeg_error_mgr* Prepare(ErrorManager& error) {
 
 // ---- reading
 
-struct Reader {
+struct JpegReader {
   ErrorManager error{};
   jpeg_progress_mgr progress{};
   jpeg_decompress_struct info{};
 
-  Reader() {
+  JpegReader() {
     info.err = Prepare(error);
     progress.progress_monitor = OnProgress;
   }
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
-  ~Reader() { jpeg_destroy_decompress(&info); }
+  JpegReader(const JpegReader&) = delete;
+  JpegReader& operator=(const JpegReader&) = delete;
+  ~JpegReader() { jpeg_destroy_decompress(&info); }
 };
 
-bool ReadHeader(Reader& reader, const std::uint8_t* bytes, std::size_t size) {
+bool ReadHeader(JpegReader& reader, const std::uint8_t* bytes, std::size_t size) {
   if (setjmp(reader.error.target)) return false;
   jpeg_create_decompress(&reader.info);
   reader.info.progress = &reader.progress;
@@ -84,7 +84,7 @@ bool ReadHeader(Reader& reader, const std::uint8_t* bytes, std::size_t size) {
   return true;
 }
 
-bool ReadRows(Reader& reader, std::uint8_t* pixels, std::size_t stride) {
+bool ReadRows(JpegReader& reader, std::uint8_t* pixels, std::size_t stride) {
   if (setjmp(reader.error.target)) return false;
   jpeg_start_decompress(&reader.info);
   while (reader.info.output_scanline < reader.info.output_height) {
@@ -95,29 +95,30 @@ bool ReadRows(Reader& reader, std::uint8_t* pixels, std::size_t stride) {
   return true;
 }
 
-[[noreturn]] void ThrowDamaged(const std::string& name, const Reader& reader, std::size_t size) {
+[[noreturn]] void ThrowDamaged(const std::string& name, const JpegReader& reader,
+                               std::size_t size) {
   throw DataError(fmt::format("image {} is damaged: {} (JPEG of {} bytes); copy or record it again",
                               name, reader.error.text, size));
 }
 
 // ---- writing
 
-struct Writer {
+struct JpegWriter {
   ErrorManager error{};
   jpeg_compress_struct info{};
   unsigned char* bytes = nullptr;  ///< Allocated by libjpeg with malloc.
   unsigned long size = 0;
 
-  Writer() { info.err = Prepare(error); }
-  Writer(const Writer&) = delete;
-  Writer& operator=(const Writer&) = delete;
-  ~Writer() {
+  JpegWriter() { info.err = Prepare(error); }
+  JpegWriter(const JpegWriter&) = delete;
+  JpegWriter& operator=(const JpegWriter&) = delete;
+  ~JpegWriter() {
     jpeg_destroy_compress(&info);
     std::free(bytes);
   }
 };
 
-bool WriteRows(Writer& writer, const cv::Mat& rgb, int quality) {
+bool WriteRows(JpegWriter& writer, const cv::Mat& rgb, int quality) {
   if (setjmp(writer.error.target)) return false;
   jpeg_create_compress(&writer.info);
   jpeg_mem_dest(&writer.info, &writer.bytes, &writer.size);
@@ -139,7 +140,7 @@ bool WriteRows(Writer& writer, const cv::Mat& rgb, int quality) {
 }  // namespace
 
 cv::Mat codec::DecodeJpeg(std::span<const std::uint8_t> bytes, const std::string& name) {
-  Reader reader;
+  JpegReader reader;
   if (!ReadHeader(reader, bytes.data(), bytes.size())) ThrowDamaged(name, reader, bytes.size());
   CheckImageSide(name, static_cast<long>(reader.info.image_width),
                  static_cast<long>(reader.info.image_height), kMaxImageSide);
@@ -161,7 +162,7 @@ std::vector<std::uint8_t> EncodeJpeg(const cv::Mat& rgb, int quality) {
     throw std::invalid_argument("EncodeJpeg needs a CV_8UC3 image with pixels");
   if (quality < 1 || quality > 100)
     throw std::invalid_argument(fmt::format("JPEG quality is 1 to 100, got {}", quality));
-  Writer writer;
+  JpegWriter writer;
   if (!WriteRows(writer, rgb, quality)) {
     throw std::invalid_argument(
         fmt::format("cannot encode a JPEG of {}x{}: {}", rgb.cols, rgb.rows, writer.error.text));

@@ -19,12 +19,12 @@ constexpr png_alloc_size_t kMaxChunkBytes =
     << 20;
 constexpr int kCompressionLevel = 1;
 
-struct ErrorText {
+struct PngError {
   char text[160] = "unknown error";
 };
 
 void OnError(png_structp png, png_const_charp message) {
-  auto* error = static_cast<ErrorText*>(png_get_error_ptr(png));
+  auto* error = static_cast<PngError*>(png_get_error_ptr(png));
   std::snprintf(error->text, sizeof error->text, "%s", message);
   png_longjmp(png, 1);
 }
@@ -34,28 +34,28 @@ void OnWarning(png_structp, png_const_charp) {}
 // ---- reading
 
 /// Bytes to decode and libpng's own structs, which are freed at the end.
-struct Reader {
+struct PngReader {
   std::span<const std::uint8_t> bytes;
   std::size_t offset = 0;
-  ErrorText error;
+  PngError error;
   png_structp png = nullptr;
   png_infop info = nullptr;
 
-  Reader() = default;
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
-  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
+  PngReader() = default;
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+  ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
 };
 
 void ReadBytes(png_structp png, png_bytep out, png_size_t count) {
-  auto* reader = static_cast<Reader*>(png_get_io_ptr(png));
+  auto* reader = static_cast<PngReader*>(png_get_io_ptr(png));
   if (count > reader->bytes.size() - reader->offset) png_error(png, "the file ends too early");
   std::memcpy(out, reader->bytes.data() + reader->offset, count);
   reader->offset += count;
 }
 
 /// Reads all chunks before the pixels. False: reader.error states why.
-bool ReadHeader(Reader& reader) {
+bool ReadHeader(PngReader& reader) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_set_chunk_malloc_max(reader.png, kMaxChunkBytes);
   png_set_read_fn(reader.png, &reader, ReadBytes);
@@ -65,7 +65,7 @@ bool ReadHeader(Reader& reader) {
 
 /// Requests 8-bit RGB, or 16-bit values in the machine's byte order. False: reader.error states
 /// why.
-bool SetTransforms(Reader& reader, codec::PngKind kind) {
+bool SetTransforms(PngReader& reader, codec::PngKind kind) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   if (kind == codec::PngKind::kDepth) {
     if constexpr (std::endian::native == std::endian::little) png_set_swap(reader.png);
@@ -82,20 +82,20 @@ bool SetTransforms(Reader& reader, codec::PngKind kind) {
 
 /// Reads all rows and the chunks after them, so that truncation anywhere is found. False:
 /// reader.error states why.
-bool ReadRows(Reader& reader, png_bytepp rows) {
+bool ReadRows(PngReader& reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_image(reader.png, rows);
   png_read_end(reader.png, nullptr);
   return true;
 }
 
-[[noreturn]] void ThrowDamaged(const std::string& name, const Reader& reader) {
+[[noreturn]] void ThrowDamaged(const std::string& name, const PngReader& reader) {
   throw DataError(
       fmt::format("image {} is damaged: {} ({} of {} bytes read); copy or record it again", name,
                   reader.error.text, reader.offset, reader.bytes.size()));
 }
 
-void CheckDepthFormat(const std::string& name, const Reader& reader) {
+void CheckDepthFormat(const std::string& name, const PngReader& reader) {
   const int bits = png_get_bit_depth(reader.png, reader.info);
   const int channels = png_get_channels(reader.png, reader.info);
   if (bits == 16 && png_get_color_type(reader.png, reader.info) == PNG_COLOR_TYPE_GRAY) return;
@@ -107,20 +107,20 @@ void CheckDepthFormat(const std::string& name, const Reader& reader) {
 
 // ---- writing
 
-struct Writer {
+struct PngWriter {
   std::vector<std::uint8_t> bytes;
-  ErrorText error;
+  PngError error;
   png_structp png = nullptr;
   png_infop info = nullptr;
 
-  Writer() = default;
-  Writer(const Writer&) = delete;
-  Writer& operator=(const Writer&) = delete;
-  ~Writer() { png_destroy_write_struct(&png, &info); }
+  PngWriter() = default;
+  PngWriter(const PngWriter&) = delete;
+  PngWriter& operator=(const PngWriter&) = delete;
+  ~PngWriter() { png_destroy_write_struct(&png, &info); }
 };
 
 void WriteBytes(png_structp png, png_bytep data, png_size_t count) {
-  auto* writer = static_cast<Writer*>(png_get_io_ptr(png));
+  auto* writer = static_cast<PngWriter*>(png_get_io_ptr(png));
   bool out_of_memory = false;
   try {
     writer->bytes.insert(writer->bytes.end(), data, data + count);
@@ -132,7 +132,8 @@ void WriteBytes(png_structp png, png_bytep data, png_size_t count) {
 
 void FlushNothing(png_structp) {}
 
-bool WriteRows(Writer& writer, int width, int height, int bits, int color_type, png_bytepp rows) {
+bool WriteRows(PngWriter& writer, int width, int height, int bits, int color_type,
+               png_bytepp rows) {
   if (setjmp(png_jmpbuf(writer.png))) return false;
   png_set_write_fn(writer.png, &writer, WriteBytes, FlushNothing);
   png_set_compression_level(writer.png, kCompressionLevel);
@@ -160,7 +161,7 @@ std::vector<png_bytep> RowPointers(const cv::Mat& image) {
 
 cv::Mat codec::DecodePng(std::span<const std::uint8_t> bytes, const std::string& name,
                          PngKind kind) {
-  Reader reader;
+  PngReader reader;
   reader.bytes = bytes;
   reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader.error, OnError, OnWarning);
   if (reader.png != nullptr) reader.info = png_create_info_struct(reader.png);
@@ -190,7 +191,7 @@ std::vector<std::uint8_t> EncodePng(const cv::Mat& image) {
       (image.type() != CV_8UC1 && image.type() != CV_8UC3 && image.type() != CV_16UC1)) {
     throw std::invalid_argument("EncodePng needs a CV_8UC1, CV_8UC3 or CV_16UC1 image with pixels");
   }
-  Writer writer;
+  PngWriter writer;
   writer.bytes.reserve(image.total() * image.elemSize() / 2);
   writer.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &writer.error, OnError, OnWarning);
   if (writer.png != nullptr) writer.info = png_create_info_struct(writer.png);

@@ -16,16 +16,17 @@
 #include "algo/base/errors.hpp"
 
 namespace plumb {
+
+struct GpioChipCloser {
+  void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // releases its lines too
+};
+using GpioChip = std::unique_ptr<gpiod_chip, GpioChipCloser>;
+
 namespace {
 
 constexpr char kConsumer[] = "plumb";
 constexpr int kMaxEvents =
     64;  // per dispatch; a line that never stops bouncing must not block the loop
-
-struct ChipCloser {
-  void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // releases its lines too
-};
-using Chip = std::unique_ptr<gpiod_chip, ChipCloser>;
 
 std::string Reason(int error) {
   if (error == EACCES || error == EPERM)
@@ -36,13 +37,13 @@ std::string Reason(int error) {
   return std::strerror(error);
 }
 
-Chip OpenChip(const std::string& name) {
-  Chip chip(gpiod_chip_open_lookup(name.c_str()));
+GpioChip OpenChip(const std::string& name) {
+  GpioChip chip(gpiod_chip_open_lookup(name.c_str()));
   if (!chip) throw DeviceError(fmt::format("GPIO chip {}: {}", name, Reason(errno)));
   return chip;
 }
 
-gpiod_line* FindLine(const Chip& chip, const GpioLineName& where) {
+gpiod_line* FindLine(const GpioChip& chip, const GpioLineName& where) {
   gpiod_line* line = nullptr;
   unsigned number = 0;
   if (where.line.starts_with('#')) {
@@ -62,7 +63,7 @@ gpiod_line* FindLine(const Chip& chip, const GpioLineName& where) {
 }  // namespace
 
 struct GpioButton::Impl {
-  Chip chip;
+  GpioChip chip;
   gpiod_line* line = nullptr;
   std::string name;
   std::optional<ButtonDebouncer> debouncer;
@@ -138,7 +139,7 @@ void GpioButton::Dispatch(Clock::time_point now) {
 }
 
 struct GpioIndicator::Impl {
-  Chip chip;
+  GpioChip chip;
   std::array<gpiod_line*, 4> lines{};  ///< In the order of the bits of IndicatorOutput.
   int num_lights = 0;
   IndicatorPlayer player;
@@ -200,7 +201,7 @@ std::vector<GpioChipDescription> ListGpioChips() {
     if (!name.starts_with("gpiochip")) continue;
     GpioChipDescription& description = chips.emplace_back();
     description.name = name;
-    const Chip chip(gpiod_chip_open(entry.path().c_str()));
+    const GpioChip chip(gpiod_chip_open(entry.path().c_str()));
     if (!chip) {
       description.problem = Reason(errno);
       continue;

@@ -29,7 +29,7 @@ constexpr std::array<std::uint8_t, 4> kRecordMagic{'N', 'I', 'R', 0};
 constexpr std::uint64_t kRecordHeader = 28;
 constexpr std::uint32_t kDataBegin = 8;
 constexpr std::uint32_t kNewData = 10;  // its fields begin with the stamp
-constexpr std::uint32_t kEnd = 11;
+constexpr std::uint32_t kEndRecord = 11;
 constexpr std::uint32_t kNodeAdded = 13;  // fields: length of the name, the name, kind of the node
 constexpr std::uint32_t kDepthNode = 2;
 constexpr std::uint32_t kColorNode = 3;
@@ -91,7 +91,7 @@ std::optional<OniFileSummary> SummariseOniFile(const ReadBytes& read) {
       if (kinds[node] == kColorNode) found.color_us.push_back(stamp_us);
     }
     found.end += size + payload;
-    if (kind == kEnd) return found;
+    if (kind == kEndRecord) return found;
   }
   return std::nullopt;
 }

@@ -15,7 +15,7 @@
 namespace plumb {
 namespace {
 
-constexpr float kMinDepth_m = 0.3F;
+constexpr float kMinEdgeDepth_m = 0.3F;
 constexpr float kStep = 0.08F;  // Relative difference of depths on both sides of an edge.
 constexpr int kStepWidth = 2;   // Pixels over which a step is searched.
 constexpr int kBorder = 8;      // Pixels at the borders of the images in which no edges are used.
@@ -65,7 +65,7 @@ std::vector<EdgePoint> DepthSteps(const cv::Mat& depth_m, bool along_x) {
       const float here = depth_m.at<float>(y, x);
       const float before = depth_m.at<float>(y + back.y, x + back.x);
       const float nearer = std::min(here, before);
-      if (!(nearer > kMinDepth_m && std::abs(here - before) > kStep * nearer)) continue;
+      if (!(nearer > kMinEdgeDepth_m && std::abs(here - before) > kStep * nearer)) continue;
       steps.push_back(
           {static_cast<float>(x) + middle.x, static_cast<float>(y) + middle.y, 1.0F / nearer});
     }

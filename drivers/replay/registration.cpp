@@ -14,7 +14,7 @@ constexpr double kSameSurface =
     0.02;  // relative depth difference within which samples belong to one surface
 constexpr double kOverlap =
     1.1;  // samples cover slightly more than their own area, so that slopes have no seams
-constexpr double kMinDepth_m = 0.05;
+constexpr double kMinColorDepth_m = 0.05;
 constexpr double kMaxReach_px =
     8.0;  // of one sample; a colour image has at most a few times the resolution of its depth image
 
@@ -67,7 +67,7 @@ cv::Mat DepthRegistration::Register(const cv::Mat& depth_m) const {
       const double z_depth = depth_row[column];
       if (!(z_depth > 0)) continue;
       const Eigen::Vector3d p_color = *ray * z_depth + baseline_m_;
-      if (!(p_color.z() > kMinDepth_m)) continue;
+      if (!(p_color.z() > kMinColorDepth_m)) continue;
       const Eigen::Array2d view = p_color.head<2>().array() / p_color.z();
       if ((view < min_view_).any() || (view > max_view_).any()) continue;
       const Eigen::Vector2d centre = Project(color_, p_color);

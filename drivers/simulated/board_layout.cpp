@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -16,7 +15,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kViewsPerSweep = 16;
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // A board on the support, with its lowest corner two millimetres above it.
 Pose BoardPose(double x, double y, double yaw, double tilt, double tilt_direction) {

@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>
 
 namespace plumb::simulated {
 namespace {
-
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // Solution of the eikonal equation at one node from its smallest neighbours along x, y and z (Zhao
 // 2005).

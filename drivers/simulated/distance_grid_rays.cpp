@@ -1,14 +1,12 @@
 // Casts rays against the distance grid, four at a time.
 #include <array>
 #include <cstring>
-#include <limits>
 
 #include "drivers/simulated/distance_grid.hpp"
 
 namespace plumb::simulated {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kTolerance = 2e-5F;
 // Below 1, because the interpolated distance may be slightly too large.
 constexpr float kFree = 0.9F;

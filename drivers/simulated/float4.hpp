@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 #include <Eigen/Core>
 
@@ -12,6 +13,8 @@ namespace plumb::simulated {
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 =
     std::int32_t __attribute__((vector_size(16)));  ///< As a mask: -1 where true, 0 where false.
+
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 inline Float4 Splat(float a) { return Float4{a, a, a, a}; }
 inline Int4 Splat(std::int32_t a) { return Int4{a, a, a, a}; }

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <map>
-#include <numbers>
 
 #include "algo/base/units.hpp"
 #include "drivers/simulated/random.hpp"
@@ -12,7 +11,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 // An estimate for a printer that fits the page to its margins.
 constexpr double kPrintScale = 0.005;
 // An estimate, along against across the paper's direction of travel.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "algo/base/units.hpp"
 #include "drivers/simulated/random.hpp"
@@ -13,7 +12,6 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 const Vector3f kSleeve(0.20F, 0.33F, 0.36F);
 
 // From 0 to 1 with zero velocity at both ends.

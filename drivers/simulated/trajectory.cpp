@@ -2,15 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "algo/base/units.hpp"
 #include "drivers/simulated/random.hpp"
 
 namespace plumb::simulated {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // From 0 to 1 over [0, 1]: constant speed with soft ends (an eighth of the time each).
 double SoftRamp(double s) {

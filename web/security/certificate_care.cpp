@@ -15,8 +15,6 @@
 namespace plumb::web {
 namespace {
 
-constexpr unsigned kMaxChain = 8;
-
 using Certificate = std::unique_ptr<gnutls_x509_crt_int, decltype(&gnutls_x509_crt_deinit)>;
 
 std::vector<Certificate> ChainOf(const std::string& pem) {

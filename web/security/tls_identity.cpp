@@ -20,7 +20,6 @@ namespace plumb::web {
 namespace {
 
 constexpr std::time_t kValidFrom = 1577836800;  // 2020-01-01
-constexpr unsigned kMaxChain = 8;
 
 void Check(int result, std::string_view what) {
   if (result < 0) throw IoError(fmt::format("{}: {}", what, gnutls_strerror(result)));

@@ -12,6 +12,8 @@ struct TlsIdentity {
   std::string fingerprint;  ///< SHA-256 of the certificate: "AB:CD:...", as browsers show it.
 };
 
+inline constexpr unsigned kMaxChain = 8;  ///< Certificates of one identity at most.
+
 /// The supported TLS versions, with forward secrecy only, as a priority string of GnuTLS.
 inline constexpr const char* kTlsPriorities =
     "SECURE128:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2:-RSA:%SERVER_PRECEDENCE";

@@ -94,9 +94,9 @@ TEST(SweepGuidanceTest, ASweepThatSeesNoMarkersIsToldAndEndsWithTheNextMarker) {
 
 TEST(SweepGuidanceTest, TimeWithoutNewCoverageRunsWhileTheCameraHoldsStillAndNotWhileItMoves) {
   SweepGuide guide(kCamera);
-  EXPECT_LT(Sweep(guide, 0.2, 0.9, 4.0).without_new_area_s, 0.5);
+  EXPECT_LT(Sweep(guide, 0.2, 0.9, 4.0).without_new_surface_s, 0.5);
   for (double t = 4.0; t < 9.0; t += kFrame_s) guide.Add(TableAt(0.9, t), SeenFrom(0.8, 0.9));
-  EXPECT_NEAR(guide.guidance().without_new_area_s, 5.0, 0.6);
+  EXPECT_NEAR(guide.guidance().without_new_surface_s, 5.0, 0.6);
 }
 
 TEST(SweepGuidanceTest, LongSweepsWithTremblingHandsStillEnd) {
@@ -108,7 +108,7 @@ TEST(SweepGuidanceTest, LongSweepsWithTremblingHandsStillEnd) {
     const double shake_m = (static_cast<double>(random >> 16) / 65536 - 0.5) * 6 * kMillimetre;
     guide.Add(TableAt(0.9 + shake_m, t), SeenFrom(shake_m, 0.9 + shake_m));
   }
-  EXPECT_GT(guide.guidance().without_new_area_s, 9.0);
+  EXPECT_GT(guide.guidance().without_new_surface_s, 9.0);
 }
 
 }  // namespace
