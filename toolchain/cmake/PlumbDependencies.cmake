@@ -1,6 +1,9 @@
 # Libraries of the system, each by its package's own config where it has one.
 include(PlumbMethodDependencies)
 find_package(nlohmann_json 3.11 REQUIRED)
+# An enumeration goes into JSON by its name (algo/base/names.hpp), never as a number unnoticed.
+set_property(TARGET nlohmann_json::nlohmann_json APPEND PROPERTY
+  INTERFACE_COMPILE_DEFINITIONS JSON_DISABLE_ENUM_SERIALIZATION=1)
 find_package(CLI11 REQUIRED)
 find_package(PNG REQUIRED)
 find_package(TIFF REQUIRED)
