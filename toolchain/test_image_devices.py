@@ -7,8 +7,8 @@ import time
 
 
 class UsbUnit:
-    """A USB device with the identifiers of an Xtion Pro Live, connected to QEMU's usb-redir device. It
-    has descriptors and three endpoints and refuses all other requests, so that a driver finds it
+    """A USB device with the identifiers of an Xtion Pro Live, connected to QEMU's usb-redir device.
+    It has descriptors and three endpoints and refuses all other requests, so that a driver finds it
     but cannot open it. `path` is the socket of QEMU's chardev."""
 
     VENDOR, PRODUCT, VERSION = 0x1D27, 0x0601, 0x0001
@@ -27,7 +27,8 @@ class UsbUnit:
         self.configuration = 0
         # The first packet of each side has a short identifier; its capabilities decide the length
         # of those that follow.
-        self.socket.sendall(struct.pack("<III64sI", self.HELLO, 68, 0, b"plumb test", self.CAPABILITIES))
+        self.socket.sendall(
+            struct.pack("<III64sI", self.HELLO, 68, 0, b"plumb test", self.CAPABILITIES))
         kind, length, _ = struct.unpack("<III", self._receive(12))
         self._receive(length)
         if kind != self.HELLO:
@@ -39,10 +40,13 @@ class UsbUnit:
         kinds, intervals, sizes = bytearray(b"\xff" * 32), bytearray(32), [0] * 32
         kinds[0] = kinds[16] = 0
         for address, kind in self.ENDPOINTS.items():
-            kinds[16 + (address & 15)], intervals[16 + (address & 15)], sizes[16 + (address & 15)] = kind, 1, 512
+            place = 16 + (address & 15)
+            kinds[place], intervals[place], sizes[place] = kind, 1, 512
         sizes[0] = sizes[16] = 64
-        self._send(self.ENDPOINT_LIST, bytes(kinds + intervals) + bytes(32) + struct.pack("<32H", *sizes))
-        self._send(self.CONNECT, struct.pack("<4B3H", 2, 0, 0, 0, self.VENDOR, self.PRODUCT, self.VERSION))  # 2: 480 Mbit/s
+        self._send(self.ENDPOINT_LIST,
+                   bytes(kinds + intervals) + bytes(32) + struct.pack("<32H", *sizes))
+        self._send(self.CONNECT, struct.pack("<4B3H", 2, 0, 0, 0,  # 2: 480 Mbit/s
+                                             self.VENDOR, self.PRODUCT, self.VERSION))
 
     def unplug(self):
         self.configuration = 0
@@ -84,15 +88,19 @@ class UsbUnit:
         data = self._descriptor(value >> 8, value & 255) if (kind, request) == (0x80, 6) else None
         status = 0 if data is not None else self.STALL
         data = (data or b"")[:length]
-        self._send(self.CONTROL, struct.pack("<4B3H", endpoint, request, kind, status, value, index, len(data)) + data, identifier)
+        self._send(self.CONTROL, struct.pack("<4B3H", endpoint, request, kind, status, value, index,
+                                             len(data)) + data, identifier)
 
     def _descriptor(self, kind, index):
         if kind == 1:
-            return struct.pack("<BBH4B3H4B", 18, 1, 0x0200, 0, 0, 0, 64, self.VENDOR, self.PRODUCT, self.VERSION, 1, 2, 0, 1)
+            return struct.pack("<BBH4B3H4B", 18, 1, 0x0200, 0, 0, 0, 64,
+                               self.VENDOR, self.PRODUCT, self.VERSION, 1, 2, 0, 1)
         if kind == 2:
-            endpoints = b"".join(struct.pack("<4BHB", 7, 5, address, type_, 512, 1) for address, type_ in self.ENDPOINTS.items())
+            endpoints = b"".join(struct.pack("<4BHB", 7, 5, address, type_, 512, 1)
+                                 for address, type_ in self.ENDPOINTS.items())
             interface = struct.pack("<9B", 9, 4, 0, 0, len(self.ENDPOINTS), 255, 0, 0, 0)
-            return struct.pack("<BBH5B", 9, 2, 9 + len(interface + endpoints), 1, 1, 0, 0x80, 250) + interface + endpoints
+            return struct.pack("<BBH5B", 9, 2, 9 + len(interface + endpoints),
+                               1, 1, 0, 0x80, 250) + interface + endpoints
         if kind == 3:
             text = "\u0409" if index == 0 else ("PrimeSense", "PrimeSense Device")[index == 2]
             return bytes([2 + 2 * len(text), 3]) + text.encode("utf-16-le")
@@ -100,15 +108,17 @@ class UsbUnit:
 
 
 class GpioLines:
-    """The lines of the GPIO controller (PL061) of QEMU's arm64 machine: sets inputs and reads outputs
-    through QEMU's test interface."""
+    """The lines of the GPIO controller (PL061) of QEMU's arm64 machine: sets inputs and reads
+    outputs through QEMU's test interface."""
 
     REGISTERS = 0x09030000
     DATA, DIRECTION = 0x3FC, 0x400
 
     def __init__(self, path, monitor):
         """`monitor`: a function that sends a command to QEMU's monitor and returns the answer."""
-        found = [line.strip().split(" ")[0].lstrip("/") for line in monitor("info qom-tree /machine/unattached").splitlines() if "(pl061)" in line]
+        found = [line.strip().split(" ")[0].lstrip("/")
+                 for line in monitor("info qom-tree /machine/unattached").splitlines()
+                 if "(pl061)" in line]
         if len(found) != 1:
             raise RuntimeError(f"expected one pl061 in the machine, found {found}")
         self.device = "/machine/unattached/" + found[0]
@@ -126,7 +136,8 @@ class GpioLines:
 
     def output(self, line):
         """The level of an output of the guest; None if the line is not an output."""
-        direction, data = (int(self._ask(f"readl {self.REGISTERS + at:#x}").split()[1], 16) for at in (self.DIRECTION, self.DATA))
+        direction, data = (int(self._ask(f"readl {self.REGISTERS + at:#x}").split()[1], 16)
+                           for at in (self.DIRECTION, self.DATA))
         return (data >> line) & 1 if (direction >> line) & 1 else None
 
     def _ask(self, command):

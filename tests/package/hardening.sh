@@ -11,7 +11,8 @@ while IFS= read -r -d '' file; do
   name=${file#"$1"/} missing=()
   case "$name" in *libOpenNI2.so* | *libOniFile.so*) echo "Debian's  $name"; continue ;; esac
   files=$((files + 1))
-  header=$(readelf -hW "$file") segments=$(readelf -lW "$file") dynamic=$(readelf -dW "$file") notes=$(readelf -nW "$file")
+  header=$(readelf -hW "$file") segments=$(readelf -lW "$file") \
+    dynamic=$(readelf -dW "$file") notes=$(readelf -nW "$file")
   symbols=$(readelf --dyn-syms -W "$file")
   has() { grep -Eq "$2" <<<"$1"; }
   has "$header" 'Type: +DYN' || missing+=(PIE)
@@ -23,12 +24,14 @@ while IFS= read -r -d '' file; do
   has "$symbols" '__stack_chk_fail' || missing+=("the stack protector")
   # The reader and the plug-in are small and call nothing that has a checked form.
   case "$name" in */bin/*) has "$symbols" '__[a-z]+_chk@' || missing+=(fortify)
-    has "$symbols" '__glibcxx_assert_fail' || missing+=("the checks of the standard library") ;; esac
+    has "$symbols" '__glibcxx_assert_fail' ||
+      missing+=("the checks of the standard library") ;; esac
   has "$notes" 'Build ID' || missing+=("a build id")
   # The code is made for CET. The note that says so of a whole program is lost to Debian 12's start
   # files (crti.o), which lack it.
   if has "$header" 'X86-64'; then
-    [ "$(grep -aoP '\xf3\x0f\x1e\xfa' "$file" | wc -l)" -ge 50 ] || missing+=("the landing pads of CET (endbr64)")
+    [ "$(grep -aoP '\xf3\x0f\x1e\xfa' "$file" | wc -l)" -ge 50 ] ||
+      missing+=("the landing pads of CET (endbr64)")
   fi
   if [ ${#missing[@]} -gt 0 ]; then
     failed=1

@@ -32,7 +32,8 @@ export SYSTEMD_FSTAB=$PWD/root/etc/fstab
 export SYSTEMD_PROC_CMDLINE="root=PARTLABEL=root-a ro systemd.volatile=state"
 $generator out/normal out/early out/late
 check "a start needs its own partitions, and no other disk" \
-  '^boot-efi.mount data.mount etc-plumb.mount tmp.mount var-lib-plumb.mount var-log-journal.mount $' \
+  "^boot-efi.mount data.mount etc-plumb.mount tmp.mount var-lib-plumb.mount \
+var-log-journal.mount \$" \
   "$(ls out/normal/local-fs.target.requires | tr '\n' ' ')"
 check "nor does it wait for one" '^$' "$(find out/normal/local-fs.target.wants -name "*backup*")"
 backup=$(cat out/normal/var-lib-plumb*backup.mount)
@@ -51,9 +52,12 @@ check "rules name services" \
 for unit in $named; do
   check "$unit is there" "^there$" "$([ -s "root/etc/systemd/system/$unit" ] && echo there)"
 done
-check "fsck repairs the data partition without prompting" ' fsck.repair=yes ' "$(grep 'set CMD=' "$source/toolchain/image.grub.cfg")"
+check "fsck repairs the data partition without prompting" ' fsck.repair=yes ' \
+  "$(grep 'set CMD=' "$source/toolchain/image.grub.cfg")"
 check "plumbd may not mark a system" '^send_member="InstallBundle" send_member="Info" $' \
-  "$(grep -oE 'rauc.Installer".*send_member="[A-Za-z]*"' root/usr/share/dbus-1/system.d/plumb-rauc.conf | grep -oE 'send_member="[A-Za-z]*"' | tr '\n' ' ')"
+  "$(grep -oE 'rauc.Installer".*send_member="[A-Za-z]*"' \
+    root/usr/share/dbus-1/system.d/plumb-rauc.conf |
+    grep -oE 'send_member="[A-Za-z]*"' | tr '\n' ' ')"
 check "a wrong clock refuses no update" \
   'use-bundle-signing-time=true' "$(cat root/etc/rauc/system.conf)"
 units=(root/etc/systemd/system/plumb-*.service)

@@ -19,7 +19,9 @@ await() { # NAME PATTERN SECONDS COMMAND...: until its output is like the patter
   done
   check "$name" "$pattern" "$found"
 }
-health() { curl -fsSk https://127.0.0.1:8080/health 2>/dev/null || curl -fsS http://127.0.0.1:8080/health; }
+health() {
+  curl -fsSk https://127.0.0.1:8080/health 2>/dev/null || curl -fsS http://127.0.0.1:8080/health
+}
 apt() { apt-get -q -y --no-install-recommends "$@" >>/checks/apt 2>&1; echo $?; }
 version() { plumbd --version | head -1; }
 
@@ -27,11 +29,13 @@ begin=$(date +%s)
 check "apt install ./plumbd.deb" 0 "$(apt install /debs/old/plumbd_*.deb)"
 echo "CHECK time    apt install took $(($(date +%s) - begin)) s"
 await "the service runs" "running" 20 systemctl show plumbd -p SubState --value
-check "it starts at the boot" "enabled enabled" "$(systemctl is-enabled plumbd.service plumbd.socket | xargs)"
+check "it starts at the boot" "enabled enabled" \
+  "$(systemctl is-enabled plumbd.service plumbd.socket | xargs)"
 await "page" '*"status":"ok"*' 20 health
 check "account" "uid=*(plumb) gid=*(plumb)*" "$(id plumb)"
 check "state folder" "plumb plumb 7[05]0" "$(stat -c '%U %G %a' /var/lib/plumb)"
-check "configuration cannot be read by everybody" "root plumb 750" "$(stat -c '%U %G %a' /etc/plumb)"
+check "configuration cannot be read by everybody" "root plumb 750" \
+  "$(stat -c '%U %G %a' /etc/plumb)"
 check "plumb can be added" 0 "$(apt install /debs/old/plumb_*.deb)"
 check "plumb speaks to the service" "no_sensor" "$(plumb status --get state 2>&1)"
 check "files are as delivered" "" "$(dpkg -V plumb plumbd 2>&1 | grep -v /usr/share/)"
@@ -39,11 +43,14 @@ check "files are as delivered" "" "$(dpkg -V plumb plumbd 2>&1 | grep -v /usr/sh
 echo '# changed by the operator' >>/etc/plumb/plumb.toml
 echo data >/var/lib/plumb/scans-of-the-operator
 before=$(systemctl show plumbd -p MainPID --value)
-check "upgrade" 0 "$(apt -o Dpkg::Options::=--force-confold install /debs/new/plumbd_*.deb /debs/new/plumb_*.deb)"
+check "upgrade" 0 \
+  "$(apt -o Dpkg::Options::=--force-confold install /debs/new/plumbd_*.deb /debs/new/plumb_*.deb)"
 check "another version" "*0.2*" "$(dpkg-query -W -f '${Version}' plumbd)"
-check "the changed configuration is kept" "# changed by the operator" "$(tail -1 /etc/plumb/plumb.toml)"
+check "the changed configuration is kept" "# changed by the operator" \
+  "$(tail -1 /etc/plumb/plumb.toml)"
 await "page after the upgrade" '*"status":"ok"*' 20 health
-check "the service was started again" "yes" "$([ "$(systemctl show plumbd -p MainPID --value)" != "$before" ] && echo yes)"
+check "the service was started again" "yes" \
+  "$([ "$(systemctl show plumbd -p MainPID --value)" != "$before" ] && echo yes)"
 
 check "remove" 0 "$(apt remove plumbd)"
 check "the service is gone" "inactive" "$(systemctl is-active plumbd.service)"
@@ -60,7 +67,8 @@ await "page over the old data" '*"status":"ok"*' 20 health
 check "the account kept its number" "plumb" "$(stat -c '%U' /var/lib/plumb/plumb.db)"
 check "plumb again" 0 "$(apt install /debs/new/plumb_*.deb)"
 check "another account may not restart the machine" "*uthentication required*" \
-  "$(setpriv --reuid nobody --regid nogroup --clear-groups busctl call org.freedesktop.login1 /org/freedesktop/login1 org.freedesktop.login1.Manager Reboot b false 2>&1)"
+  "$(setpriv --reuid nobody --regid nogroup --clear-groups busctl call org.freedesktop.login1 \
+    /org/freedesktop/login1 org.freedesktop.login1.Manager Reboot b false 2>&1)"
 journalctl -u plumbd --no-pager >/checks/journal
 echo "CHECKS DONE"
 # The real logind and polkit, with the rule of the package: install_in_container.sh sees whether the

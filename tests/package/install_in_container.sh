@@ -17,8 +17,10 @@ sources=$(cat /etc/apt/sources.list /etc/apt/sources.list.d/debian.sources 2>/de
 wanted=$(echo "2 $sources" | sha256sum)
 if [ "$(cat "$work/wanted" 2>/dev/null)" != "$wanted" ]; then
   rm -rf "$root" "$work/wanted" "$work/cache"
-  mmdebstrap --variant=minbase --include=systemd,systemd-sysv,udev,dbus,curl,polkitd --aptopt='APT::Install-Recommends "false"' \
-    --skip=cleanup/apt "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$root" - <<<"$sources" || skip "no Debian could be made: see above"
+  mmdebstrap --variant=minbase --include=systemd,systemd-sysv,udev,dbus,curl,polkitd \
+    --aptopt='APT::Install-Recommends "false"' \
+    --skip=cleanup/apt "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$root" - <<<"$sources" ||
+    skip "no Debian could be made: see above"
   echo "$wanted" >"$work/wanted"
 fi
 
@@ -32,14 +34,18 @@ for package in plumb plumbd; do
   sed -Ei 's/^Version: .*/Version: 0.0.1-1/; s/\bplumb \(= [^)]*\)/plumb (= 0.0.1-1)/' \
     "$work/debs/unpacked/DEBIAN/control"
   # dpkg asks about a changed configuration file only if the packaged one has changed as well.
-  [ ! -f "$work/debs/unpacked/etc/plumb/plumb.toml" ] || echo "# of the older package" >>"$work/debs/unpacked/etc/plumb/plumb.toml"
+  [ ! -f "$work/debs/unpacked/etc/plumb/plumb.toml" ] ||
+    echo "# of the older package" >>"$work/debs/unpacked/etc/plumb/plumb.toml"
   dpkg-deb -Zgzip -z1 -b "$work/debs/unpacked" "$work/debs/old/" >/dev/null
   rm -r "$work/debs/unpacked"
 done
 # The container has no network: what the packages depend on is fetched here.
 apt-get -q -y -o Dir::State="$root/var/lib/apt" -o Dir::State::status="$root/var/lib/dpkg/status" \
-  -o Dir::Etc::sourcelist="$root/etc/apt/sources.list" -o Dir::Etc::sourceparts="$root/etc/apt/sources.list.d" \
-  -o Dir::Cache="$work/cache" -o APT::Sandbox::User=root --no-install-recommends --download-only install "$work"/debs/new/plumb{,d}_*.deb >"$work/out/fetch" 2>&1 || { tail -5 "$work/out/fetch"; exit 1; }
+  -o Dir::Etc::sourcelist="$root/etc/apt/sources.list" \
+  -o Dir::Etc::sourceparts="$root/etc/apt/sources.list.d" \
+  -o Dir::Cache="$work/cache" -o APT::Sandbox::User=root --no-install-recommends \
+  --download-only install "$work"/debs/new/plumb{,d}_*.deb >"$work/out/fetch" 2>&1 ||
+  { tail -5 "$work/out/fetch"; exit 1; }
 
 install -m 755 "$here/in_container.sh" "$work/debs/checks"
 cat >"$root/etc/systemd/system/plumb-checks.service" <<'UNIT'
@@ -50,17 +56,25 @@ Type=oneshot
 ExecStart=/debs/checks
 UNIT
 mkdir -p "$root/etc/systemd/system/multi-user.target.wants"
-ln -sf ../plumb-checks.service "$root/etc/systemd/system/multi-user.target.wants/plumb-checks.service"
+ln -sf ../plumb-checks.service \
+  "$root/etc/systemd/system/multi-user.target.wants/plumb-checks.service"
 ended=0
-timeout -k 5 240 systemd-nspawn --directory="$root" --volatile=overlay --bind="$work/out:/checks" --bind-ro="$work/debs:/debs" \
+timeout -k 5 240 systemd-nspawn --directory="$root" --volatile=overlay \
+  --bind="$work/out:/checks" --bind-ro="$work/debs:/debs" \
   --bind="$work/cache/archives:/var/cache/apt/archives" \
-  --register=no --keep-unit --boot --quiet --private-network </dev/null >"$work/console" 2>&1 || ended=$?
-[ -e "$work/out/log" ] || { tail -5 "$work/console"; skip "systemd does not boot in a container here: see above"; }
+  --register=no --keep-unit --boot --quiet --private-network </dev/null >"$work/console" 2>&1 ||
+  ended=$?
+[ -e "$work/out/log" ] || {
+  tail -5 "$work/console"
+  skip "systemd does not boot in a container here: see above"
+}
 # With --keep-unit systemd-nspawn ends with this code when its machine restarts.
 if [ "$ended" = 133 ]; then
-  echo "CHECK ok      logind restarts the machine for plumbd: systemd-nspawn ended with 133" >>"$work/out/log"
+  echo "CHECK ok      logind restarts the machine for plumbd: systemd-nspawn ended with 133" \
+    >>"$work/out/log"
 else
-  echo "CHECK FAILED  logind restarts the machine for plumbd: expected systemd-nspawn to end with 133, it ended with $ended" >>"$work/out/log"
+  echo "CHECK FAILED  logind restarts the machine for plumbd:" \
+    "expected systemd-nspawn to end with 133, it ended with $ended" >>"$work/out/log"
 fi
 cat "$work/out/log"
 if grep -q '^CHECK FAILED' "$work/out/log" || ! grep -q '^CHECKS DONE' "$work/out/log"; then

@@ -268,7 +268,8 @@ class ExampleTest(unittest.TestCase):
         table = {line.rsplit(None, 2)[0].strip(): line.split()[-2:]
                  for line in run.stdout.splitlines()[1:]}
         # The demo has one pair, which is every summary of itself.
-        (pair,) = (values for name, values in table.items() if name.split() == ["reference", "moved"])
+        (pair,) = (values for name, values in table.items()
+                   if name.split() == ["reference", "moved"])
         for name in ("mean", "median", "maximum"):
             self.assertEqual(table[name], pair)
         self.assertTrue(0.0 < float(pair[0]) < 1.5, pair)  # measured: 1.24 mm

@@ -9,11 +9,15 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
 mkdir bin state gate
-for program in systemctl curl rauc; do printf '#!/bin/sh\necho "%s $*" >>%s/calls\n. %s/%s\n' $program "$work" "$work" $program >bin/$program; done
+for program in systemctl curl rauc; do
+  printf '#!/bin/sh\necho "%s $*" >>%s/calls\n. %s/%s\n' $program "$work" "$work" $program \
+    >bin/$program
+done
 ln -s "$plumb" bin/plumb
 chmod +x bin/systemctl bin/curl bin/rauc
 echo "0.2.0 one" >release
-export PATH=$work/bin:$PATH PLUMB_STATE=$work/state PLUMB_GATE_STATE=$work/gate PLUMB_RELEASE=$work/release PLUMB_GATE_WAIT=2 PLUMB_GATE_FRAMES=30
+export PATH=$work/bin:$PATH PLUMB_STATE=$work/state PLUMB_GATE_STATE=$work/gate \
+  PLUMB_RELEASE=$work/release PLUMB_GATE_WAIT=2 PLUMB_GATE_FRAMES=30
 healthy() {
   : >calls
   rm -rf gate/*
@@ -34,7 +38,8 @@ check "nor by the boot loader at a later start" '^2$' "$(is_marked)"
 echo "0.2.1 two" >release
 run roll-back
 check "a new one is, and the boot loader takes the other at once" \
-  '^0 rauc status mark-bad systemctl --no-block reboot $' "$code $(grep -E 'reboot|mark-bad' calls | tr '\n' ' ')"
+  '^0 rauc status mark-bad systemctl --no-block reboot $' \
+  "$code $(grep -E 'reboot|mark-bad' calls | tr '\n' ' ')"
 echo 'exit 1' >rauc
 run roll-back
 check "also where RAUC cannot mark it" '^0 .*cannot mark this system as bad' "$code $(cat log)"
@@ -58,16 +63,22 @@ healthy; echo 'echo "{\"status\":\"failed\",\"reason\":\"storage: no\"}"' >curl
 refused "a fault of the storage" "the page reports: .*storage: no"
 healthy
 PLUMB_STATE=$work/none refused "a state folder that cannot be written" "nothing can be written to"
-healthy; rm bin/plumb; printf '#!/bin/sh\necho "out of memory"; exit 1\n' >bin/plumb; chmod +x bin/plumb
+healthy; rm bin/plumb
+printf '#!/bin/sh\necho "out of memory"; exit 1\n' >bin/plumb
+chmod +x bin/plumb
 PLUMB_GATE_SELF_TEST=yes refused "a self test that fails" "the self test failed: out of memory"
-healthy; printf '#!/bin/sh\nmkdir -p "$5" 2>/dev/null; [ "$1" != compare ] || echo "{\\"verdict\\": \\"in_tolerance\\"}" >"$5/result.json"\n' >bin/plumb
+healthy
+printf '%s\n' '#!/bin/sh' 'mkdir -p "$5" 2>/dev/null' \
+  '[ "$1" != compare ] || echo "{\"verdict\": \"in_tolerance\"}" >"$5/result.json"' >bin/plumb
 PLUMB_GATE_SELF_TEST=yes refused "a self test with a wrong answer" "the self test's body moved"
 healthy; echo 'exit 1' >rauc
 run
 check "RAUC refuses" '^1 .*RAUC cannot mark' "$code $(cat log)"
 
 healthy
-echo 'echo x >>asked; [ "$(wc -l <asked)" -gt 3 ] && echo "{\"status\":\"ok\"}" || echo "{\"status\":\"failed\",\"reason\":\"storage: no\"}"' >curl
+echo 'echo x >>asked
+[ "$(wc -l <asked)" -gt 3 ] && echo "{\"status\":\"ok\"}" ||
+  echo "{\"status\":\"failed\",\"reason\":\"storage: no\"}"' >curl
 PLUMB_GATE_WAIT=10 run
 check "a storage fault that goes away" '^0 1$' "$code $(is_marked)"
 

@@ -7,8 +7,10 @@ set -euo pipefail
 . "$(dirname "$0")/../support/check.sh"
 . "$(dirname "$0")/../support/left_out.sh"
 require rauc dbus-daemon openssl
-[ "$(id -u)" = 0 ] && [ -w /dev/loop-control ] || skip "needs root and loop devices: RAUC mounts bundles"
-plumbd=$(realpath "$1/daemon/plumbd") plumb=$(realpath "$1/daemon/plumb") here=$(cd "$(dirname "$0")" && pwd)
+[ "$(id -u)" = 0 ] && [ -w /dev/loop-control ] ||
+  skip "needs root and loop devices: RAUC mounts bundles"
+plumbd=$(realpath "$1/daemon/plumbd") plumb=$(realpath "$1/daemon/plumb") \
+  here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
 cd "$work"
 pids=
@@ -34,7 +36,8 @@ echo 01 >short/serial
 {
   openssl req -newkey rsa:2048 -nodes -subj "/CN=short" -keyout short/key -out short/csr
   ends=$(($(date +%s) + 10))
-  openssl ca -batch -config short/ca.conf -in short/csr -out short/pem -cert machine/pki/own-ca.pem \
+  openssl ca -batch -config short/ca.conf -in short/csr -out short/pem \
+    -cert machine/pki/own-ca.pem \
     -keyfile machine/pki/own-ca.key -startdate "$(date -u -d '-1 hour' +%Y%m%d%H%M%SZ)" \
     -enddate "$(date -u -d "@$ends" +%Y%m%d%H%M%SZ)" -extfile <(
       printf '%s\n' basicConstraints=CA:FALSE keyUsage=digitalSignature extendedKeyUsage=codeSigning
@@ -46,20 +49,29 @@ echo 01 >short/serial
 } >made 2>&1 || { cat made; exit 1; }
 cat >bus.conf <<CONF
 <!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-BUS Bus Configuration 1.0//EN"
- "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd"><busconfig><type>session</type><listen>unix:path=$work/bus</listen>
-<policy context="default"><allow send_destination="*" eavesdrop="true"/><allow eavesdrop="true"/><allow own="*"/></policy></busconfig>
+ "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd">
+<busconfig><type>session</type><listen>unix:path=$work/bus</listen>
+<policy context="default"><allow send_destination="*" eavesdrop="true"/><allow eavesdrop="true"/>
+<allow own="*"/></policy></busconfig>
 CONF
 export DBUS_SYSTEM_BUS_ADDRESS=unix:path=$work/bus DBUS_STARTER_BUS_TYPE=system
 dbus-daemon --nofork --config-file=bus.conf >bus.log 2>&1 & pids="$pids $!"
 # The socket exists a moment before the bus listens: wait until it answers.
-for _ in $(seq 100); do dbus-send --bus="unix:path=$work/bus" / org.freedesktop.DBus.Peer.Ping 2>/dev/null && break; sleep 0.05; done
+for _ in $(seq 100); do
+  dbus-send --bus="unix:path=$work/bus" / org.freedesktop.DBus.Peer.Ping 2>/dev/null && break
+  sleep 0.05
+done
 rauc --conf=machine/system.conf service --override-boot-slot=A >rauc.log 2>&1 & pids="$pids $!"
 
 start() { # BOOT
-  PLUMB_BOOT_ID=$1 "$plumbd" --state "$work/state" --control "$work/control" --listen 127.0.0.1:0 >log 2>&1 &
+  PLUMB_BOOT_ID=$1 "$plumbd" --state "$work/state" --control "$work/control" \
+    --listen 127.0.0.1:0 >log 2>&1 &
   daemon=$!
   pids="$pids $daemon"
-  for _ in $(seq 300); do "$plumb" --control control status >/dev/null 2>&1 && return; sleep 0.1; done
+  for _ in $(seq 300); do
+    "$plumb" --control control status >/dev/null 2>&1 && return
+    sleep 0.1
+  done
   echo "plumbd does not answer:"; cat log
   exit 1
 }
@@ -79,7 +91,8 @@ run machine/damaged.raucb
 check "a damaged one" '^3 .*damaged on its way' "$(seen)"
 run machine/truncated.raucb
 check "half of one" '^3 .*truncated.raucb' "$(seen)"
-check "none of them has touched a system" '^same$' "$(cmp -s machine/slots/a.img machine/slots/b.img && echo same)"
+check "none of them has touched a system" '^same$' \
+  "$(cmp -s machine/slots/a.img machine/slots/b.img && echo same)"
 run "$work"
 check "a folder" '^3 .*not a regular file' "$(seen)"
 run machine/none.raucb
@@ -93,8 +106,10 @@ check "nothing is left of the refused ones" '^0$' "$(find state/updates -type f 
 
 run machine/good.raucb --restart
 check "a good one is installed" 'good.raucb is installed and starts at the next restart' "$(seen)"
-check "and written to the other system" '^same$' "$(cmp -s -n 1500000 machine/good.img machine/slots/b.img && echo same)"
-check "a machine without logind says that it cannot restart" '^5 .*cannot be restarted from here' "$(seen)"
+check "and written to the other system" '^same$' \
+  "$(cmp -s -n 1500000 machine/good.img machine/slots/b.img && echo same)"
+check "a machine without logind says that it cannot restart" \
+  '^5 .*cannot be restarted from here' "$(seen)"
 for time in second third fourth fifth; do
   run machine/good.raucb
   check "a $time time" '^0 .*is installed' "$(seen)"
@@ -110,7 +125,12 @@ check "it was valid when the bundle was signed: the machine's clock does not cou
 kill -TERM $daemon
 wait $daemon || true
 start two # the same system, though the other was installed
-for _ in $(seq 50); do said=$("$plumb" --control control status --get rolled_back); [ -z "$said" ] || break; sleep 0.1; done
-check "a machine that starts the previous system says so" 'version 9.1.0 was installed, but the machine has gone back' "$said"
+for _ in $(seq 50); do
+  said=$("$plumb" --control control status --get rolled_back)
+  [ -z "$said" ] || break
+  sleep 0.1
+done
+check "a machine that starts the previous system says so" \
+  'version 9.1.0 was installed, but the machine has gone back' "$said"
 check "in the journal too" 'gone back to the previous system' "$(cat log)"
 exit $failed

@@ -16,9 +16,11 @@ bundle() { # NAME VERSION COMPATIBLE SIGNER FORMAT [IMAGE]: noise where no image
   if [ $# -gt 5 ]; then
     cp "$6" content/rootfs.img
   else
-    head -c 1500000 /dev/zero | openssl enc -aes-128-ctr -K "$(printf '%032x' "${2//[^0-9]/}")" -iv "$(printf '%032x' 1)" >content/rootfs.img
+    head -c 1500000 /dev/zero | openssl enc -aes-128-ctr \
+      -K "$(printf '%032x' "${2//[^0-9]/}")" -iv "$(printf '%032x' 1)" >content/rootfs.img
   fi
-  printf '[update]\ncompatible=%s\nversion=%s\n\n[bundle]\nformat=%s\n\n[image.rootfs]\nfilename=rootfs.img\n' "$3" "$2" "$5" >content/manifest.raucm
+  printf '%s\n' '[update]' "compatible=$3" "version=$2" '' '[bundle]' "format=$5" '' \
+    '[image.rootfs]' filename=rootfs.img >content/manifest.raucm
   rm -f "$1.raucb"
   rauc --cert="pki/$4.pem" --key="pki/$4.key" bundle content "$1.raucb"
   cp content/rootfs.img "$1.img"

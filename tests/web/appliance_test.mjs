@@ -1,4 +1,5 @@
-// The page on the real appliance with its virtual sensor: appliance_test.mjs NODE_MODULES PLUMBD PLUMB OUT_FOLDER CHROMIUM
+// The page on the real appliance with its virtual sensor: appliance_test.mjs NODE_MODULES PLUMBD
+// PLUMB OUT_FOLDER CHROMIUM
 import { execFile } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -8,12 +9,14 @@ import { Harness } from './harness.mjs';
 const [modules, plumbd, plumb, folder, chromium] = process.argv.slice(2);
 const socket = join(folder, 'data', 'control.sock');
 // Small and short sweeps: what is tested is the way through the page, not the accuracy.
-const h = await Harness.start({ modules, folder, chromium, command: [plumbd, '--simulated', 'demo', '--sim-size', '320x240', '--sim-frames', '120',
-  '--state', 'FOLDER', '--listen', '127.0.0.1:0', '--control', socket] });
+const h = await Harness.start(
+  { modules, folder, chromium, command: [plumbd, '--simulated', 'demo', '--sim-size', '320x240',
+    '--sim-frames', '120', '--state', 'FOLDER', '--listen', '127.0.0.1:0', '--control', socket] });
 const { check, equal } = h;
 const kSlow = { timeout: 180000 };
 const sim = (command) => promisify(execFile)(plumb, ['--control', socket, 'sim', command]);
-const memory_kB = () => Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${h.server.pid}/status`, 'utf8'))[1]);
+const memory_kB = () =>
+  Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${h.server.pid}/status`, 'utf8'))[1]);
 
 const page = await h.person('engineer');
 /// Ends the sweep once nothing new comes into view, as a person would.
@@ -48,14 +51,17 @@ await h.step('the first sweep, closed and opened again midway, becomes the refer
   await page.goto(`${h.url}#/scan`);
   await page.getByRole('button', { name: 'Start sweep' }).click();
   await page.getByRole('button', { name: 'End sweep' }).waitFor();
-  await page.waitForFunction(() => document.querySelector('.facts')?.textContent.match(/tracked\s*[1-9]/));
+  await page.waitForFunction(
+    () => document.querySelector('.facts')?.textContent.match(/tracked\s*[1-9]/));
   await page.locator('.preview img').waitFor();
   await h.look(page, 'scan-sweep');
-  const id = await page.evaluate(() => fetch('/api/v1/status').then((response) => response.json()).then((status) => status.scan.id));
+  const id = await page.evaluate(() =>
+    fetch('/api/v1/status').then((response) => response.json()).then((status) => status.scan.id));
   await page.goto('about:blank');
   await page.goto(`${h.url}#/scan`);
   await page.locator('.verdict').waitFor(kSlow);
-  const scans = await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
+  const scans =
+    await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
   equal(scans.scans.length, 1, 'one scan');
   equal(scans.scans[0].id, id, 'the same scan');
   await page.locator('canvas.map').waitFor();
@@ -93,17 +99,21 @@ await h.step('five viewers cost little memory', async () => {
 });
 
 await h.step('a third sweep, watched by five and with a download, makes a trend', async () => {
-  const { scans } = await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
+  const { scans } =
+    await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
   const download = viewers[0].evaluate(async (id) => {
     let bytes = 0;
-    for (let i = 0; i < 5; ++i) bytes += (await (await fetch(`/api/v1/scans/${id}/files/mesh.ply`)).arrayBuffer()).byteLength;
+    for (let i = 0; i < 5; ++i) {
+      bytes += (await (await fetch(`/api/v1/scans/${id}/files/mesh.ply`)).arrayBuffer()).byteLength;
+    }
     return bytes;
   }, scans[0].id);
   await scan();
   const bytes = await download;
   check(bytes > 0, 'the download came');
   // Reported, not judged: on a loaded machine frames drop for other reasons too.
-  console.log(`    ${bytes} bytes downloaded meanwhile; plumbd says: ${h.log.filter((line) => line.includes('frames,')).at(-1)}`);
+  console.log(`    ${bytes} bytes downloaded meanwhile; plumbd says: `
+    + `${h.log.filter((line) => line.includes('frames,')).at(-1)}`);
   for (const viewer of viewers) await viewer.context().close();
   await page.locator('.trend').first().waitFor();
   equal(await page.locator('.trend').count(), 6, 'six trends');
@@ -118,11 +128,14 @@ await h.step('a physicist plans a new version, a second one approves', async () 
   const map = bob.getByRole('application');
   await map.scrollIntoViewIfNeeded();
   const box = await map.boundingBox();
-  for (const [x, y] of [[0.3, 0.3], [0.65, 0.3], [0.65, 0.65], [0.3, 0.65]]) await bob.mouse.click(box.x + x * box.width, box.y + y * box.height);
+  for (const [x, y] of [[0.3, 0.3], [0.65, 0.3], [0.65, 0.65], [0.3, 0.65]]) {
+    await bob.mouse.click(box.x + x * box.width, box.y + y * box.height);
+  }
   await h.look(bob, 'plan', { axe: false });
   await bob.getByRole('button', { name: 'Save plan' }).click();
   await bob.getByText('Waiting for a second physicist').waitFor();
-  equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0, 'not by who planned it');
+  equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0,
+    'not by who planned it');
   const clara = await h.person('clara');
   await h.logIn(clara, 'clara');
   await clara.goto(bob.url());
@@ -148,7 +161,8 @@ await h.step('the daily check of the real markers: no baseline, then passed', as
     await endSweep(bob);
     await bob.waitForURL(/#\/check/, kSlow);
     await bob.locator('.verdict', { hasText: verdict }).waitFor(kSlow);
-    console.log(`    ${(await bob.locator('tbody tr').allInnerTexts()).slice(0, 6).join(' | ').replace(/\s+/g, ' ')}`);
+    const rows = await bob.locator('tbody tr').allInnerTexts();
+    console.log(`    ${rows.slice(0, 6).join(' | ').replace(/\s+/g, ' ')}`);
   };
   await takeCheck('NO BASELINE');
   await bob.getByText('A physicist other than the one who took this check').waitFor();
@@ -173,8 +187,10 @@ await h.step('unplugging during a sweep is said, and the scan is discarded', asy
   await page.getByRole('alert').getByText('The sensor was unplugged').waitFor();
   await sim('plug');
   await page.locator('.headline', { hasText: 'Ready' }).waitFor(kSlow);
-  const { scans } = await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
-  check(['failed', 'cancelled'].includes(scans[0].outcome), `the scan is no result: ${scans[0].outcome}`);
+  const { scans } =
+    await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
+  check(['failed', 'cancelled'].includes(scans[0].outcome),
+    `the scan is no result: ${scans[0].outcome}`);
 });
 
 await h.step('settings and update', async () => {

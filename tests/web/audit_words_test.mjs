@@ -1,4 +1,5 @@
-// What the audit log's page says of stored entries, in both languages: audit_words_test.mjs SOURCE_FOLDER
+// What the audit log's page says of stored entries, in both languages: audit_words_test.mjs
+// SOURCE_FOLDER
 import { cpSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -65,7 +66,8 @@ const kDetails = [
     'Postura de las referencias nuevas: Cabeza primero, supino → Pies primero, prono; '
     + 'Los marcadores están fijos a la camilla: no → sí'],
   ['settings.change', '{"retention_days":[0,365],"auto_stop_s":[2.5]}',
-    'Delete scans after … days (0: never): 0 → 365; Stop a sweep after … s without new surface: 2.5',
+    'Delete scans after … days (0: never): 0 → 365; '
+    + 'Stop a sweep after … s without new surface: 2.5',
     'Borrar los escaneos tras … días (0: nunca): 0 → 365; '
     + 'Detener un barrido tras … s sin superficie nueva: 2,5'],
   ['config.reload',
@@ -100,11 +102,13 @@ for (const language of ['en', 'es']) {
     'scan.accept', 'scan.accept_outside', 'user.add', 'user.change', 'recording.remove',
     'settings.change', 'config.reload', 'reference.plan', 'an.action', 'toString']) {
     for (const detail of ['later_word', 'toString', 'a, b; c', '{"a']) {
-      equal(detailWords({ action, user: 'plumbd', detail }), detail, `${language} ${action}, unknown`);
+      equal(detailWords({ action, user: 'plumbd', detail }), detail,
+        `${language} ${action}, unknown`);
     }
   }
-  equal(detailWords({ action: 'scan.remove', user: 'plumbd', address: '10.0.0.2', detail: 'quota' }), 'quota',
-    'of an account of that name');
+  equal(
+    detailWords({ action: 'scan.remove', user: 'plumbd', address: '10.0.0.2', detail: 'quota' }),
+    'quota', 'of an account of that name');
   equal(detailWords({ action: 'scan.remove', user: 'anna', detail: 'quota' }), 'quota',
     `${language}: a person's reason`);
   if (detailWords({ action: 'reference.plan', user: 'anna', detail: kPlan }).includes('HFS')) {

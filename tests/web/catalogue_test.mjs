@@ -40,8 +40,8 @@ function compare(a, b, path) {
 compare(en, es, '');
 
 /// The actions of one source file: the second argument of every call that writes an audit entry,
-/// which is a literal or a choice of literals. A definition is recognised by its typed parameter; the
-/// journal's Log() begins with a level.
+/// which is a literal or a choice of literals. A definition is recognised by its typed parameter;
+/// the journal's Log() begins with a level.
 function actionsOf(text, file) {
   const actions = new Set();
   for (const call of text.matchAll(/(\b(?:AppendAuditEntry|Audit|Write|Log)|\blog_?)\(/g)) {
@@ -124,11 +124,11 @@ for (const [text, expected] of [
   'plumb-2.raucb no se instaló: este archivo contiene la versión «0.2.1-rc1»: se esperaban números '
     + 'separados por puntos, como 0.2.1; pregunte a quien lo hizo'],
   ['what is stored cannot be read: the stored settings cannot be read: expected a JSON object, '
-    + 'found none; it was changed from outside, or its disk failed. Put a backup of the database in '
-    + 'its place, or save it again',
+    + 'found none; it was changed from outside, or its disk failed. Put a backup of the database '
+    + 'in its place, or save it again',
   'no se puede leer lo guardado: no es posible leer los ajustes guardados: expected a JSON object, '
-    + 'found none; se cambió desde fuera o falló el disco. Ponga una copia de la base de datos en su '
-    + 'lugar o guárdelo de nuevo'],
+    + 'found none; se cambió desde fuera o falló el disco. Ponga una copia de la base de datos en '
+    + 'su lugar o guárdelo de nuevo'],
   ['the page\'s certificate CN=plumb ends on 2026-12-24 10:00 UTC: browsers refuse it from then '
     + 'on; put a new one in its place before',
   'el certificado de la página, CN=plumb, caduca el 2026-12-24 10:00 UTC: desde entonces los '

@@ -1,4 +1,5 @@
-// The page over TLS, and its certificate replaced on the page: certificate_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
+// The page over TLS, and its certificate replaced on the page: certificate_test.mjs NODE_MODULES
+// SERVER OUT_FOLDER CHROMIUM
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { connect } from 'node:tls';
@@ -12,7 +13,8 @@ const card = engineer.locator('.certificate');
 
 /// Of the certificate that a new connection is shown.
 const shown = () => new Promise((found, failed) => {
-  const socket = connect({ host: '127.0.0.1', port: Number(new URL(h.url).port), rejectUnauthorized: false }, () => {
+  const socket = connect(
+    { host: '127.0.0.1', port: Number(new URL(h.url).port), rejectUnauthorized: false }, () => {
     found(socket.getPeerCertificate().fingerprint256);
     socket.end();
   });
@@ -21,8 +23,9 @@ const shown = () => new Promise((found, failed) => {
 
 function madeCertificate(name) {
   const files = { chain: h.file(`${name}.pem`), key: h.file(`${name}.key`) };
-  execFileSync('openssl', ['req', '-x509', '-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:prime256v1', '-nodes', '-days', '90',
-    '-subj', `/CN=${name}`, '-keyout', files.key, '-out', files.chain], { stdio: 'ignore' });
+  execFileSync('openssl', ['req', '-x509', '-newkey', 'ec', '-pkeyopt',
+    'ec_paramgen_curve:prime256v1', '-nodes', '-days', '90', '-subj', `/CN=${name}`, '-keyout',
+    files.key, '-out', files.chain], { stdio: 'ignore' });
   return files;
 }
 
@@ -56,7 +59,8 @@ await h.step('a new self-signed one is used for new connections at once', async 
   equal(await shown(), second, 'what a new connection is shown');
 });
 
-await h.step('a key that does not belong to the certificate is refused with the reason', async () => {
+await h.step('a key that does not belong to the certificate is refused with the reason',
+  async () => {
   const [one, other] = [madeCertificate('one'), madeCertificate('other')];
   await card.getByLabel('What to do').selectOption('given');
   await card.getByLabel('Certificate, followed by').setInputFiles(one.chain);
@@ -69,7 +73,8 @@ await h.step('a key that does not belong to the certificate is refused with the 
 
 await h.step('a certificate of one’s own, sent with the line ends of another system', async () => {
   const own = madeCertificate('plumb-room-2');
-  const file = (name, path) => ({ name, mimeType: 'text/plain', buffer: Buffer.from(readFileSync(path, 'utf8').replaceAll('\n', '\r\n')) });
+  const file = (name, path) => ({ name, mimeType: 'text/plain',
+    buffer: Buffer.from(readFileSync(path, 'utf8').replaceAll('\n', '\r\n')) });
   await card.getByLabel('Certificate, followed by').setInputFiles(file('room.pem', own.chain));
   await card.getByLabel('Private key').setInputFiles(file('room.key', own.key));
   await replace(h.password);

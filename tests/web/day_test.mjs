@@ -1,5 +1,6 @@
-// A whole day on the real appliance with its virtual sensor, as people work through it: the room's calibration, the daily check, a reference,
-// its plan, the approval by a second person, three fractions with moves and accepts, and the report.
+// A whole day on the real appliance with its virtual sensor, as people work through it: the room's
+// calibration, the daily check, a reference, its plan, the approval by a second person, three
+// fractions with moves and accepts, and the report.
 // day_test.mjs NODE_MODULES PLUMBD PLUMB OUT_FOLDER CHROMIUM
 import { execFile } from 'node:child_process';
 import { writeFileSync } from 'node:fs';
@@ -13,15 +14,18 @@ const kReference = 3;  // scenes: three of the board, the body, the body moved
 const kMoved = 4;
 const kScenes = 5;
 // Small and short sweeps: what is tested is the way through the day, not the accuracy.
-const h = await Harness.start({ modules, folder, chromium, command: [plumbd, '--simulated', 'demo', '--sim-board', '--sim-size', '320x240',
-  '--sim-scenes', String(kScenes), '--sim-frames', '120', '--state', 'FOLDER', '--listen', '127.0.0.1:0', '--control', socket] });
+const h = await Harness.start({ modules, folder, chromium, command: [plumbd, '--simulated', 'demo',
+  '--sim-board', '--sim-size', '320x240', '--sim-scenes', String(kScenes), '--sim-frames', '120',
+  '--state', 'FOLDER', '--listen', '127.0.0.1:0', '--control', socket] });
 const { check, equal } = h;
 const kSlow = { timeout: 180000 };
 const run = promisify(execFile);
 let shown = 0;
 /// The next scene of the last one is the first.
 async function scene(number) {
-  for (; shown !== number; shown = (shown + 1) % kScenes) await run(plumb, ['--control', socket, 'sim', 'next-scene']);
+  for (; shown !== number; shown = (shown + 1) % kScenes) {
+    await run(plumb, ['--control', socket, 'sim', 'next-scene']);
+  }
 }
 const button = () => run(plumb, ['--control', socket, 'press']);
 
@@ -47,16 +51,21 @@ async function scanOn(page) {
 async function scanByButton() {
   const before = (await state()).last_result?.id;
   await button();
-  await until('a result', (status) => status.state === 'result' && status.last_result?.id !== before);
+  await until('a result',
+    (status) => status.state === 'result' && status.last_result?.id !== before);
 }
 
 await h.step('first start, three accounts, and the screen in the room', async () => {
   await h.firstStart(engineer);
   await engineer.locator('.headline', { hasText: 'Ready' }).waitFor(kSlow);
   await engineer.goto(`${h.url}#/users`);
-  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) await h.addAccount(engineer, name, role);
+  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'],
+    ['clara', 'physicist']]) {
+    await h.addAccount(engineer, name, role);
+  }
   await room.goto(`${h.url}room`);
-  await engineer.getByLabel('Code on the screen').fill(await room.locator('.pair-code').innerText());
+  await engineer.getByLabel('Code on the screen')
+    .fill(await room.locator('.pair-code').innerText());
   await engineer.getByLabel('Name of the screen').fill('couch side');
   await engineer.getByRole('button', { name: 'Pair the screen' }).click();
   await room.locator('.room-code').waitFor(kSlow);
@@ -64,16 +73,22 @@ await h.step('first start, three accounts, and the screen in the room', async ()
   await engineer.getByLabel('Stop a sweep after').fill('3');
   await engineer.getByRole('button', { name: 'Save', exact: true }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
-  for (const [page, name] of [[anna, 'anna'], [bob, 'bob'], [clara, 'clara']]) await h.logIn(page, name);
+  for (const [page, name] of [[anna, 'anna'], [bob, 'bob'], [clara, 'clara']]) {
+    await h.logIn(page, name);
+  }
   // The demo opens a patient of its own; this day has another one.
   const { session } = await state();
-  if (session) equal((await h.api(anna, 'treatment/close', 'POST', { session_id: session.id })).status, 200, 'closed');
+  if (session) {
+    equal((await h.api(anna, 'treatment/close', 'POST', { session_id: session.id })).status, 200,
+      'closed');
+  }
   await h.acknowledge(engineer, anna, bob, clara);
 });
 
 await h.step('the room is calibrated: three scans of the board, signed', async () => {
   const card = bob.locator('.room-calibration');
-  for (const [number, said] of [[0, '1 of 3 scans of the board have been made'], [1, '2 of 3 scans of the board have been made'], [2, 'The newest 3 scans differ by']]) {
+  for (const [number, said] of [[0, '1 of 3 scans of the board have been made'],
+    [1, '2 of 3 scans of the board have been made'], [2, 'The newest 3 scans differ by']]) {
     await scene(number);
     await bob.goto(`${h.url}#/check`);
     await card.getByRole('button', { name: 'Start a scan of the board' }).click();
@@ -122,7 +137,8 @@ await h.step('a new patient is scanned for a reference; it waits as a draft', as
 
 await h.step('one physicist plans, a second one approves', async () => {
   await bob.goto(`${h.url}#/status`);
-  await bob.locator('.tile', { hasText: 'Draft references' }).getByRole('link', { name: 'PX-0100' }).click();
+  await bob.locator('.tile', { hasText: 'Draft references' })
+    .getByRole('link', { name: 'PX-0100' }).click();
   const map = await h.drawRegion(bob, [[0.35, 0.35], [0.65, 0.35], [0.65, 0.65], [0.35, 0.65]]);
   await map.press('i');
   // Wider than usual: sweeps of this size leave 1 to 2 mm of uncertainty.
@@ -151,12 +167,14 @@ async function closeSession() {
 }
 const verdict = (page, kind) => page.locator(`.verdict.${kind}`).waitFor(kSlow);
 
-await h.step('fraction 1: one tap to six numbers, the couch is moved, the next scan is accepted', async () => {
+await h.step('fraction 1: one tap to six numbers, the couch is moved, the next scan is accepted',
+  async () => {
   await openSession(1);
   await scene(kMoved);
   let taps = 0;
   await anna.exposeFunction('plumbTapped', () => { ++taps; });
-  await anna.evaluate(() => addEventListener('pointerdown', () => globalThis.plumbTapped(), { capture: true }));
+  await anna.evaluate(
+    () => addEventListener('pointerdown', () => globalThis.plumbTapped(), { capture: true }));
   await scanOn(anna);
   await verdict(anna, 'move');
   equal(await anna.locator('.number').count(), 6, 'six numbers');
@@ -184,7 +202,8 @@ await h.step('fraction 2: accepted outside tolerance, with a reason and the pass
   await anna.getByLabel('Reason', { exact: true }).fill('the couch is at its end stop');
   await anna.getByLabel('Your password').fill(h.password);
   await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
-  await anna.getByText(/Accepted outside tolerance by anna, .*: the couch is at its end stop/).waitFor();
+  await anna.getByText(/Accepted outside tolerance by anna, .*: the couch is at its end stop/)
+    .waitFor();
   await closeSession();
 });
 
@@ -202,7 +221,8 @@ await h.step('fraction 3: one press of the button, and the sweep ends by itself'
   await closeSession();
 });
 
-await h.step('on a slow line: 1.5 MB at most before the map is there, 10 s at 1 Mbit/s', async () => {
+await h.step('on a slow line: 1.5 MB at most before the map is there, 10 s at 1 Mbit/s',
+  async () => {
   const slow = await h.person('slow');
   const line = await slow.context().newCDPSession(slow);
   await line.send('Network.enable');
@@ -222,20 +242,25 @@ await h.step('on a slow line: 1.5 MB at most before the map is there, 10 s at 1 
   const logIn = bytes;
   const own = await seconds(moved[1]);
   await slow.goto(`${h.url}#/status`);
-  await line.send('Network.emulateNetworkConditions', { offline: false, latency: 50, downloadThroughput: 125000, uploadThroughput: 125000 });
+  await line.send('Network.emulateNetworkConditions',
+    { offline: false, latency: 50, downloadThroughput: 125000, uploadThroughput: 125000 });
   bytes = logIn;
   const whole = await seconds(moved[0]);
-  console.log(`    ${bytes} bytes since the login page, ${bytes - logIn} of them for the result; the map after ${whole.toFixed(1)} s, ${own.toFixed(1)} s on a fast line`);
+  console.log(`    ${bytes} bytes since the login page, ${bytes - logIn} of them for the result; `
+    + `the map after ${whole.toFixed(1)} s, ${own.toFixed(1)} s on a fast line`);
   check(bytes < 1.5e6, `at most 1.5 MB before the map is there, found ${bytes} bytes`);
-  check(whole < 10 + own, `the map is there within 10 s on a slow line, found ${whole} s, ${own} s on a fast one`);
+  check(whole < 10 + own,
+    `the map is there within 10 s on a slow line, found ${whole} s, ${own} s on a fast one`);
   await slow.context().close();
 });
 
-await h.step('the history, the reports and the log tell the day in the words that people know', async () => {
+await h.step('the history, the reports and the log tell the day in the words that people know',
+  async () => {
   await clara.goto(`${h.url}#/patients`);
   await clara.getByRole('link', { name: 'PX-0100', exact: true }).click();
   await clara.getByRole('region', { name: 'Scans' }).locator('tbody tr').nth(4).waitFor();
-  const rows = await clara.getByRole('region', { name: 'Scans' }).locator('tbody tr').allInnerTexts();
+  const rows =
+    await clara.getByRole('region', { name: 'Scans' }).locator('tbody tr').allInnerTexts();
   equal(rows.length, 5, 'a reference and four scans');
   equal(rows.filter((row) => row.includes('anna')).length, 3, 'three were accepted');
   await h.look(clara, 'patient');
@@ -244,8 +269,10 @@ await h.step('the history, the reports and the log tell the day in the words tha
     const response = await fetch(`/api/v1/${where}`);
     return { status: response.status, bytes: [...new Uint8Array(await response.arrayBuffer())] };
   }, path);
-  for (const [name, path] of [['report', `scans/${scans[0].id}/report.pdf`], ['report-outside', `scans/${scans[1].id}/report.pdf`],
-    ['report-es', `scans/${scans[0].id}/report.pdf?language=es`], ['course', `patients/${scans[0].patient_id}/report.pdf`],
+  for (const [name, path] of [['report', `scans/${scans[0].id}/report.pdf`],
+    ['report-outside', `scans/${scans[1].id}/report.pdf`],
+    ['report-es', `scans/${scans[0].id}/report.pdf?language=es`],
+    ['course', `patients/${scans[0].patient_id}/report.pdf`],
     ['course-es', `patients/${scans[0].patient_id}/report.pdf?language=es`]]) {
     const { status, bytes } = await fetched(path);
     equal(status, 200, path);
@@ -254,16 +281,18 @@ await h.step('the history, the reports and the log tell the day in the words tha
   }
   await clara.goto(`${h.url}#/audit`);
   await clara.getByRole('cell', { name: 'Scan accepted outside tolerance' }).waitFor();
-  const on = async (action) => (await clara.locator('tbody tr', { has: clara.getByRole('cell', { name: action, exact: true }) }).first()
-    .locator('td').nth(3).innerText());
+  const on = async (action) => (await clara.locator('tbody tr',
+    { has: clara.getByRole('cell', { name: action, exact: true }) })
+    .first().locator('td').nth(3).innerText());
   equal(await on('Reference approved'), 'PX-0100, reference version 1', 'the approval');
   equal(await on('Session opened'), 'PX-0100, Fraction 3', 'the newest session');
   equal(await on('Scan accepted'), `PX-0100, scan ${scans[0].id}`, 'the newest accept');
   equal(await on('Scan started'), 'PX-0100, Fraction 3', 'the newest scan');
-  const started = await clara.locator('tbody tr', { has: clara.getByRole('cell', { name: 'Scan started', exact: true }) })
-    .allInnerTexts();
+  const started = await clara.locator('tbody tr',
+    { has: clara.getByRole('cell', { name: 'Scan started', exact: true }) }).allInnerTexts();
   check(/the control socket/.test(started[0]), `the press on the control socket: ${started[0]}`);
-  check(started.some((row) => /\banna\b.*PX-0100, Fraction 1/s.test(row)), `the first on the page: ${started.join(' | ')}`);
+  check(started.some((row) => /\banna\b.*PX-0100, Fraction 1/s.test(row)),
+    `the first on the page: ${started.join(' | ')}`);
   equal(await on('Patient added'), 'PX-0100', 'the patient');
   equal(await on('Screen paired'), 'couch side', 'the screen');
   check(/^check of /.test(await on('Baseline set')), `the check: ${await on('Baseline set')}`);

@@ -9,8 +9,8 @@ const kSkip = 77;
 const kPassword = 'correct horse battery';
 const kFirstPassword = 'first horse of the day';  // that an engineer gives a new account
 const kPatience_ms = 30000;
-/// Screenshots are only for people to look at; without them, WebScreens takes 360 instead of 479 s of
-/// processor time.
+/// Screenshots are only for people to look at; without them, WebScreens takes 360 instead of 479 s
+/// of processor time.
 export const keepsPictures = process.env.PLUMB_PICTURES === '1';
 // Every size is in screens_test.mjs; painting a larger window would only take the others longer.
 const kSize = { width: 1280, height: 800 };
@@ -27,17 +27,20 @@ function definePixelsOf() {
   };
 }
 
-/// Runs in the page: switches off antialiasing in 3-D, for which the software renderer draws four samples per pixel.
+/// Runs in the page: switches off antialiasing in 3-D, for which the software renderer draws four
+/// samples per pixel.
 function switchOffAntialiasing() {
   const { prototype } = HTMLCanvasElement;
   const { getContext } = prototype;
   prototype.getContext = function get(kind, attributes) {
-    return getContext.call(this, kind, kind.startsWith('webgl') ? { ...attributes, antialias: false } : attributes);
+    return getContext.call(this, kind,
+      kind.startsWith('webgl') ? { ...attributes, antialias: false } : attributes);
   };
 }
 
 export class Harness {
-  /// @param command  Of the server, with its arguments; it names its address and the setup code on stdout or stderr. FOLDER is replaced.
+  /// @param command  Of the server, with its arguments; it names its address and the setup code on
+  /// stdout or stderr. FOLDER is replaced.
   static async start({ modules, command, folder, chromium }) {
     if (!chromium || !existsSync(chromium)) {
       console.log('skipped: no browser (Debian package chromium-headless-shell)');
@@ -56,11 +59,18 @@ export class Harness {
     h.log = [];
     h.contexts = [];
     h.check = (holds, what) => { if (!holds) throw new Error(`expected: ${what}`); };
-    h.equal = (found, expected, what) => h.check(found === expected, `${what}: ${JSON.stringify(expected)}, found ${JSON.stringify(found)}`);
+    h.equal = (found, expected, what) => h.check(found === expected,
+      `${what}: ${JSON.stringify(expected)}, found ${JSON.stringify(found)}`);
     const [program, ...rest] = command.map((part) => part.replace('FOLDER', join(folder, 'data')));
     h.server = spawn(program, rest, { stdio: ['pipe', 'pipe', 'pipe'] });
-    process.on('exit', () => h.server.kill('SIGKILL'));  // whatever goes wrong here, nothing stays behind
-    h.server.on('exit', (code, signal) => { if (!h.finished) { console.error(`the server ended: ${code ?? signal}\n${h.log.join('\n')}`); process.exit(1); } });
+    // Whatever goes wrong here, nothing stays behind.
+    process.on('exit', () => h.server.kill('SIGKILL'));
+    h.server.on('exit', (code, signal) => {
+      if (!h.finished) {
+        console.error(`the server ended: ${code ?? signal}\n${h.log.join('\n')}`);
+        process.exit(1);
+      }
+    });
     await new Promise((ready) => {
       for (const input of [h.server.stdout, h.server.stderr]) {
         createInterface({ input }).on('line', (line) => {
@@ -73,7 +83,9 @@ export class Harness {
     });
     // WebGL by SwiftShader, but not the page itself: painting it by an emulated graphics card took
     // fifteen times as long (3 pictures of 1920x1080 on a loaded machine: 87 s, so 6 s).
-    const args = ['--no-sandbox', '--disable-dev-shm-usage', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-gpu-compositing', '--disable-gpu-rasterization'];
+    const args = ['--no-sandbox', '--disable-dev-shm-usage', '--use-gl=angle',
+      '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-gpu-compositing',
+      '--disable-gpu-rasterization'];
     h.browser = await load('playwright-core').chromium.launch({ executablePath: chromium, args });
     return h;
   }
@@ -83,7 +95,8 @@ export class Harness {
 
   /// A browser of one's own; complaints of its console are failures.
   async person(name, viewport = kSize, options = {}) {
-    const context = await this.browser.newContext({ viewport, reducedMotion: 'reduce', ignoreHTTPSErrors: this.url.startsWith('https'), ...options });
+    const context = await this.browser.newContext({ viewport, reducedMotion: 'reduce',
+      ignoreHTTPSErrors: this.url.startsWith('https'), ...options });
     await context.addInitScript(definePixelsOf);
     await context.addInitScript(switchOffAntialiasing);
     const page = await context.newPage();
@@ -91,7 +104,9 @@ export class Harness {
     page.on('pageerror', (error) => this.failures.push(`${name}: script error: ${error.message}`));
     page.on('console', (message) => {
       // The browser itself reports answers such as 401 and 404, which the page expects.
-      if (message.type() === 'error' && !message.text().startsWith('Failed to load resource')) this.failures.push(`${name}: console: ${message.text()}`);
+      if (message.type() === 'error' && !message.text().startsWith('Failed to load resource')) {
+        this.failures.push(`${name}: console: ${message.text()}`);
+      }
     });
     return page;
   }
@@ -109,7 +124,8 @@ export class Harness {
 
   /// Below what is to be approved.
   async sign(page, password = kPassword) {
-    await page.getByRole('region', { name: 'You are signing exactly this' }).getByLabel('Your password').fill(password);
+    await page.getByRole('region', { name: 'You are signing exactly this' })
+      .getByLabel('Your password').fill(password);
     await page.getByRole('button', { name: 'Sign and approve' }).click();
   }
 
@@ -132,7 +148,8 @@ export class Harness {
 
   /// On the screen of accounts.
   async addAccount(page, name, role) {
-    const card = page.locator('section', { has: page.getByRole('heading', { name: 'Add an account' }) });
+    const card = page.locator('section',
+      { has: page.getByRole('heading', { name: 'Add an account' }) });
     await card.getByLabel('Name').fill(name);
     await card.getByLabel('Role').selectOption(role);
     await card.getByLabel('Password').fill(kFirstPassword);
@@ -154,14 +171,17 @@ export class Harness {
     const map = page.getByRole('application');
     await map.scrollIntoViewIfNeeded();
     const box = await map.boundingBox();
-    for (const [x, y] of corners) await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+    for (const [x, y] of corners) {
+      await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+    }
     await page.getByText(`${corners.length} corners`).waitFor();
     return map;
   }
 
   /// Like addAccount(), through the interface.
   async addAccountByApi(page, name, role) {
-    const { status } = await this.api(page, 'users', 'POST', { name, role, password: kFirstPassword });
+    const { status } = await this.api(page, 'users', 'POST',
+      { name, role, password: kFirstPassword });
     this.equal(status, 201, `the account ${name}`);
     this.fresh.add(name);
   }
@@ -170,8 +190,10 @@ export class Harness {
   async api(page, path, method = 'GET', body = undefined) {
     return page.evaluate(async ([where, how, what]) => {
       const { csrf_token } = await (await fetch('/api/v1/session')).json();
-      const headers = { 'X-CSRF-Token': csrf_token, ...(what === undefined ? {} : { 'Content-Type': 'application/json' }) };
-      const response = await fetch(`/api/v1/${where}`, { method: how, headers, body: what === undefined ? undefined : JSON.stringify(what) });
+      const headers = { 'X-CSRF-Token': csrf_token,
+        ...(what === undefined ? {} : { 'Content-Type': 'application/json' }) };
+      const response = await fetch(`/api/v1/${where}`,
+        { method: how, headers, body: what === undefined ? undefined : JSON.stringify(what) });
       return { status: response.status, body: await response.json().catch(() => null) };
     }, [path, method, body]);
   }
@@ -184,14 +206,17 @@ export class Harness {
       if (!response.ok) return;  // nobody is logged in
       const { session } = await response.json();
       for (const begun = Date.now(); seen() !== session?.id;) {
-        if (Date.now() - begun > 20000) throw new Error(`the session that is known is ${seen()}, not ${session?.id}`);
+        if (Date.now() - begun > 20000) {
+          throw new Error(`the session that is known is ${seen()}, not ${session?.id}`);
+        }
         document.querySelector('.session-alert button')?.click();
         await new Promise((ready) => { setTimeout(ready, 20); });
       }
     })));
   }
 
-  /// The machine of that page's browser sleeps: no network, and while the time goes on its steady clock stands still.
+  /// The machine of that page's browser sleeps: no network, and while the time goes on its steady
+  /// clock stands still.
   async sleep(page, seconds) {
     await page.context().setOffline(true);
     await this.setClockOn(page, seconds);
@@ -216,7 +241,12 @@ export class Harness {
       console.log(`FAILED  ${name}: ${error.message}`);
       this.failures.push(`${name}: ${error.message}`);
       let i = 0;
-      for (const context of this.browser.contexts()) for (const page of context.pages()) await page.screenshot({ path: this.file(`failed-${name.replace(/\W+/g, '-')}-${i++}.png`) }).catch(() => {});
+      for (const context of this.browser.contexts()) {
+        for (const page of context.pages()) {
+          await page.screenshot(
+            { path: this.file(`failed-${name.replace(/\W+/g, '-')}-${i++}.png`) }).catch(() => {});
+        }
+      }
       await this.finish();  // the steps after it build on this one
     }
   }
@@ -226,15 +256,20 @@ export class Harness {
     if (keepsPictures) await page.screenshot({ path: this.file(name), fullPage, timeout: 90000 });
   }
 
-  /// Takes a screenshot and checks the screen with axe. Leave axe out where screens_test.mjs checks the
-  /// same screen.
+  /// Takes a screenshot and checks the screen with axe. Leave axe out where screens_test.mjs checks
+  /// the same screen.
   async look(page, name, { axe = true, fullPage = true } = {}) {
     await this.picture(page, `${name}.png`, { fullPage });
     if (!axe) return;
     // Through the debugger, not as a script element: the page's policy stays in force.
     if (!await page.evaluate(() => 'axe' in window)) await page.evaluate(this.axe);
-    const { violations } = await page.evaluate(() => window.axe.run({ resultTypes: ['violations'], runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'best-practice'] }));
-    for (const violation of violations) this.failures.push(`axe, ${name}: ${violation.id}: ${violation.help}: ${violation.nodes.slice(0, 3).map((node) => `${node.target.join(' ')} (${node.failureSummary?.split('\n')[1]?.trim()})`).join('; ')}`);
+    const { violations } = await page.evaluate(() => window.axe.run({ resultTypes: ['violations'],
+      runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'best-practice'] }));
+    for (const { id, help, nodes } of violations) {
+      const where = nodes.slice(0, 3).map((node) =>
+        `${node.target.join(' ')} (${node.failureSummary?.split('\n')[1]?.trim()})`);
+      this.failures.push(`axe, ${name}: ${id}: ${help}: ${where.join('; ')}`);
+    }
   }
 
   async finish() {

@@ -1,8 +1,8 @@
 // What can be wrong with a screen that is drawn, found by measuring it in the browser; and which
 // words a Spanish screen must not show.
 
-/// What differs between the catalogues: whole English texts, and the pieces of those that are filled
-/// in. Words that are also Spanish are left out.
+/// What differs between the catalogues: whole English texts, and the pieces of those that are
+/// filled in. Words that are also Spanish are left out.
 export function englishTexts(en, es) {
   const leaves = (of) => Object.entries(of).flatMap(([key, value]) =>
     (key === 'languageName' || key === 'translate' ? []
@@ -12,8 +12,10 @@ export function englishTexts(en, es) {
   const texts = leaves(en).filter((one) => typeof one === 'string');
   // Of a function the quoted parts, without what is filled in.
   const pieces = leaves(en).filter((one) => typeof one === 'function').flatMap((one) =>
-    [...`${one}`.matchAll(/'([^']*)'|`([^`]*)`/g)].flatMap(([, a, b]) => (a ?? b).split(/\$\{[^}]*\}/)));
-  const isTelling = (text) => /[a-z]{2,} [a-z]{2,}/i.test(text) && !spanish.some((one) => one.includes(text));
+    [...`${one}`.matchAll(/'([^']*)'|`([^`]*)`/g)]
+      .flatMap(([, a, b]) => (a ?? b).split(/\$\{[^}]*\}/)));
+  const isTelling = (text) =>
+    /[a-z]{2,} [a-z]{2,}/i.test(text) && !spanish.some((one) => one.includes(text));
   return {
     whole: texts.filter((text) => /[a-z]{2}/i.test(text) && !all.has(text)),
     parts: [...texts, ...pieces].map((text) => text.trim()).filter(isTelling),
@@ -27,19 +29,24 @@ export function englishTexts(en, es) {
 export function faultsOfLayout({ touched, wall, english }) {
   const found = new Set();
   const shorten = (text) => text.trim().replace(/\s+/g, ' ').slice(0, 60);
-  const nameOf = (element) => `${element.tagName.toLowerCase()}${[...element.classList].map((one) => `.${one}`).join('')} “${shorten(element.textContent || element.getAttribute('aria-label') || element.id)}”`;
+  const nameOf = (element) =>
+    `${element.tagName.toLowerCase()}${[...element.classList].map((one) => `.${one}`).join('')} `
+      + `“${shorten(element.textContent || element.getAttribute('aria-label') || element.id)}”`;
   const add = (kind, element, more = '') => found.add(`${kind}: ${nameOf(element)}${more}`);
   const px = (value) => `${Math.round(value)} px`;
   window.scrollTo(0, 0);
   const { clientWidth, clientHeight, scrollWidth } = document.documentElement;
-  if (scrollWidth > clientWidth) found.add(`sideways: the document is ${scrollWidth - clientWidth} px too wide`);
+  if (scrollWidth > clientWidth) {
+    found.add(`sideways: the document is ${scrollWidth - clientWidth} px too wide`);
+  }
 
   // A modal dialog covers what is behind it; what floats for some seconds may do so, too.
   const scope = document.querySelector('dialog:modal') ?? document.body;
   // A page that cannot be scrolled must fit into the window as a whole.
   const neverScrolls = getComputedStyle(document.body).overflowY === 'hidden';
   const kUnseen = '.visually-hidden, .skip:not(:focus), .toast, noscript, script, style';
-  const isShown = (element) => element.checkVisibility({ visibilityProperty: true }) && !element.closest(kUnseen);
+  const isShown = (element) =>
+    element.checkVisibility({ visibilityProperty: true }) && !element.closest(kUnseen);
   const kControls = 'a[href], button, input:not([type=hidden]), select, textarea, summary';
   const controls = [...scope.querySelectorAll(kControls)].filter(isShown);
   const texts = [];
@@ -49,29 +56,46 @@ export function faultsOfLayout({ touched, wall, english }) {
     if (!node.data.trim() || !isShown(owner)) continue;
     const range = document.createRange();
     range.selectNodeContents(node);
-    const boxes = [...range.getClientRects()].filter(({ width, height }) => width > 0 && height > 0);
-    if (boxes.length || owner.tagName === 'OPTION') texts.push({ node, owner, boxes, text: shorten(node.data) });
+    const boxes =
+      [...range.getClientRects()].filter(({ width, height }) => width > 0 && height > 0);
+    if (boxes.length || owner.tagName === 'OPTION') {
+      texts.push({ node, owner, boxes, text: shorten(node.data) });
+    }
   }
 
   // Nothing lies out of view, and nothing is cut off by what it stands in.
   const kTolerance_px = 1.5;
   const styles = new Map();
-  const styleOf = (element) => styles.get(element) ?? styles.set(element, getComputedStyle(element)).get(element);
+  const styleOf = (element) =>
+    styles.get(element) ?? styles.set(element, getComputedStyle(element)).get(element);
   const judge = (box, owner, text) => {
-    const tell = (kind, by) => found.add(`${kind}: ${nameOf(owner)}${text ? '' : ' (control)'}${by}`);
-    if (box.right > clientWidth + kTolerance_px || box.left < -kTolerance_px) tell('out of view', `, ${px(box.left)} to ${px(box.right)} of ${clientWidth}`);
-    if (neverScrolls && box.bottom > clientHeight + kTolerance_px) tell('out of view', `, down to ${px(box.bottom)} of ${clientHeight}`);
-    for (let around = text ? owner : owner.parentElement; around && around !== document.body; around = around.parentElement) {
+    const tell = (kind, by) =>
+      found.add(`${kind}: ${nameOf(owner)}${text ? '' : ' (control)'}${by}`);
+    if (box.right > clientWidth + kTolerance_px || box.left < -kTolerance_px) {
+      tell('out of view', `, ${px(box.left)} to ${px(box.right)} of ${clientWidth}`);
+    }
+    if (neverScrolls && box.bottom > clientHeight + kTolerance_px) {
+      tell('out of view', `, down to ${px(box.bottom)} of ${clientHeight}`);
+    }
+    for (let around = text ? owner : owner.parentElement; around && around !== document.body;
+      around = around.parentElement) {
       const style = styleOf(around);
       const frame = around.getBoundingClientRect();
       const wide = Math.max(box.right - frame.right, frame.left - box.left);
       const tall = Math.max(box.bottom - frame.bottom, frame.top - box.top);
       // A line's box is higher than its letters.
       const slack = text ? 0.25 * box.height : kTolerance_px;
-      if (style.overflowX !== 'visible' && wide > kTolerance_px) tell('cut off', ` at the side, by ${px(wide)} of ${nameOf(around)}`);
-      if (['hidden', 'clip'].includes(style.overflowY) && tall > slack) tell('cut off', ` above or below, by ${px(tall)} of ${nameOf(around)}`);
-      const painted = style.display !== 'inline' && (style.borderTopWidth !== '0px' || !/, 0\)$|transparent/.test(style.backgroundColor));
-      if (painted && (wide > kTolerance_px || tall > slack)) tell('sticks out', ` by ${px(Math.max(wide, tall))} of ${nameOf(around)}`);
+      if (style.overflowX !== 'visible' && wide > kTolerance_px) {
+        tell('cut off', ` at the side, by ${px(wide)} of ${nameOf(around)}`);
+      }
+      if (['hidden', 'clip'].includes(style.overflowY) && tall > slack) {
+        tell('cut off', ` above or below, by ${px(tall)} of ${nameOf(around)}`);
+      }
+      const painted = style.display !== 'inline'
+        && (style.borderTopWidth !== '0px' || !/, 0\)$|transparent/.test(style.backgroundColor));
+      if (painted && (wide > kTolerance_px || tall > slack)) {
+        tell('sticks out', ` by ${px(Math.max(wide, tall))} of ${nameOf(around)}`);
+      }
     }
   };
   for (const { owner, boxes } of texts) for (const box of boxes) judge(box, owner, true);
@@ -82,12 +106,16 @@ export function faultsOfLayout({ touched, wall, english }) {
   for (const control of controls.filter(({ tagName }) => ['INPUT', 'SELECT'].includes(tagName))) {
     const style = styleOf(control);
     const written = control.tagName === 'SELECT' ? control.selectedOptions[0]?.text ?? ''
-      : ['checkbox', 'radio', 'range', 'file', 'password'].includes(control.type) ? '' : control.value || control.placeholder;
+      : ['checkbox', 'radio', 'range', 'file', 'password'].includes(control.type) ? ''
+        : control.value || control.placeholder;
     ruler.font = style.font;
     ruler.letterSpacing = style.letterSpacing;
-    const room = control.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight) - (control.tagName === 'SELECT' ? 16 : 0);
+    const room = control.clientWidth - parseFloat(style.paddingLeft)
+      - parseFloat(style.paddingRight) - (control.tagName === 'SELECT' ? 16 : 0);
     const needed = ruler.measureText(written).width;
-    if (needed > room + kTolerance_px) add('cut off', control, `: “${written}” needs ${px(needed)} of ${px(room)}`);
+    if (needed > room + kTolerance_px) {
+      add('cut off', control, `: “${written}” needs ${px(needed)} of ${px(room)}`);
+    }
   }
 
   // No two things lie on each other. The marks on a picture belong on it.
@@ -99,7 +127,10 @@ export function faultsOfLayout({ touched, wall, english }) {
     for (const b of things.slice(i + 1)) {
       const wide = Math.min(a.box.right, b.box.right) - Math.max(a.box.left, b.box.left);
       const tall = Math.min(a.box.bottom, b.box.bottom) - Math.max(a.box.top, b.box.top);
-      if (wide < 2 || tall < 2 || a.owner === b.owner || a.owner.contains(b.owner) || b.owner.contains(a.owner)) continue;
+      if (wide < 2 || tall < 2 || a.owner === b.owner || a.owner.contains(b.owner)
+        || b.owner.contains(a.owner)) {
+        continue;
+      }
       if (a.isText && b.isText && tall < 0.3 * Math.min(a.box.height, b.box.height)) continue;
       found.add(`overlap: ${nameOf(a.owner)} and ${nameOf(b.owner)}, ${px(wide)} by ${px(tall)}`);
     }
@@ -108,8 +139,11 @@ export function faultsOfLayout({ touched, wall, english }) {
   // What is read first on a phone is there without scrolling, below what forbids to act on it.
   const value = document.querySelector('.result .number .value');
   const end = value?.getBoundingClientRect().bottom ?? 0;
-  if (touched && end > 0.65 * clientHeight) add('far down', value, `: it ends at ${px(end)} of ${clientHeight}`);
-  const last = wall && [...document.querySelectorAll('.screen:not(.is-old):has(.verdict:is(.move, .unsure)) .number')].at(-1);
+  if (touched && end > 0.65 * clientHeight) {
+    add('far down', value, `: it ends at ${px(end)} of ${clientHeight}`);
+  }
+  const last = wall && [...document.querySelectorAll(
+    '.screen:not(.is-old):has(.verdict:is(.move, .unsure)) .number')].at(-1);
   const below = last ? last.getBoundingClientRect().bottom : 0;
   if (below > clientHeight) add('far down', last, `: it ends at ${px(below)} of ${clientHeight}`);
 
@@ -125,17 +159,25 @@ export function faultsOfLayout({ touched, wall, english }) {
   // Every text is a text of the page's language: no key, no gap that was not filled, no English.
   const kInvisible = ['aria-label', 'alt', 'placeholder', 'title'];
   const said = [...texts.map(({ node, owner }) => [node.data, owner]),
-    ...[...scope.querySelectorAll(kInvisible.map((one) => `[${one}]`).join())].filter((one) => one.checkVisibility())
-      .flatMap((one) => kInvisible.filter((name) => one.hasAttribute(name)).map((name) => [one.getAttribute(name), one]))];
+    ...[...scope.querySelectorAll(kInvisible.map((one) => `[${one}]`).join())]
+      .filter((one) => one.checkVisibility())
+      .flatMap((one) => kInvisible.filter((name) => one.hasAttribute(name))
+        .map((name) => [one.getAttribute(name), one]))];
   const whole = new Set(english?.whole);
   for (const [raw, owner] of said) {
     const text = raw.trim().replace(/\s+/g, ' ');
-    if (/\{\w*\}|\$\{|\bundefined\b|\bNaN\b|\bnull\b|\bInfinity\b|\[object |=>/.test(text)) add('raw', owner, `: ${shorten(text)}`);
+    if (/\{\w*\}|\$\{|\bundefined\b|\bNaN\b|\bnull\b|\bInfinity\b|\[object |=>/.test(text)) {
+      add('raw', owner, `: ${shorten(text)}`);
+    }
     const isQuoted = owner.closest('code, [lang=en], .bundle');
-    if (!isQuoted && (/^[a-z]+(_[a-z]+)+$/.test(text) || /^[a-z]+[A-Z][A-Za-z]+$/.test(text))) add('raw', owner, `: ${text}`);
+    if (!isQuoted && (/^[a-z]+(_[a-z]+)+$/.test(text) || /^[a-z]+[A-Z][A-Za-z]+$/.test(text))) {
+      add('raw', owner, `: ${text}`);
+    }
     if (!english || isQuoted) continue;
     if (whole.has(text) || english.parts.some((part) => text.includes(part))
-      || /\b(the|of|and|is|are|was|were|with|this|not|by|for|from|to|it)\b/i.test(text)) add('English', owner, `: ${shorten(text)}`);
+      || /\b(the|of|and|is|are|was|were|with|this|not|by|for|from|to|it)\b/i.test(text)) {
+      add('English', owner, `: ${shorten(text)}`);
+    }
   }
   return [...found];
 }

@@ -1,4 +1,5 @@
-// The page's and its tests' JavaScript by ESLint, its style sheets by stylelint: lint.mjs NODE_MODULES SOURCE_FOLDER
+// The page's and its tests' JavaScript by ESLint, its style sheets by stylelint: lint.mjs
+// NODE_MODULES SOURCE_FOLDER
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
@@ -58,11 +59,8 @@ const eslint = new ESLint({
   overrideConfig: [
     { linterOptions: { reportUnusedDisableDirectives: 'error', noInlineConfig: true }, rules },
     { files: ['web/assets/**/*.js'], languageOptions: language(['browser']) },
-    // Tests hold functions that run in the browser; a step is a list of long lines.
-    {
-      files: ['**/*.mjs'], languageOptions: language(['node', 'browser']),
-      rules: { 'max-len': 'off' },
-    },
+    // Tests hold functions that run in the browser.
+    { files: ['**/*.mjs'], languageOptions: language(['node', 'browser']) },
   ],
 });
 const results = await eslint.lintFiles(
@@ -110,6 +108,7 @@ const styles = await stylelint.lint({
 console.log(styles.report || `all well: ${styles.results.length} style sheets`);
 
 // A glob that finds nothing is no success.
-const isWell = results.length > 30 && results.every((one) => one.errorCount + one.warningCount === 0)
+const isWell = results.length > 30
+  && results.every((one) => one.errorCount + one.warningCount === 0)
   && styles.results.length > 0 && !styles.errored;
 process.exit(isWell ? 0 : 1);

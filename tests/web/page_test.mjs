@@ -30,12 +30,16 @@ await h.step('set-up makes the first account and refuses a wrong code', async ()
   await fill(h.setupCode);
   await engineer.getByRole('navigation').waitFor();
   await engineer.goto(`${h.url}#/settings`);
-  equal(await engineer.getByLabel('Delete scans after').inputValue(), '730', 'what was chosen at the set-up');
+  equal(await engineer.getByLabel('Delete scans after').inputValue(), '730',
+    'what was chosen at the set-up');
 });
 
 await h.step('the engineer adds accounts', async () => {
   await engineer.goto(`${h.url}#/users`);
-  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) await h.addAccount(engineer, name, role);
+  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'],
+    ['clara', 'physicist']]) {
+    await h.addAccount(engineer, name, role);
+  }
   await h.look(engineer, 'users', { axe: false });
 });
 
@@ -56,7 +60,8 @@ await h.step('a wrong password is refused in words', async () => {
 });
 
 await h.step('roles see only their own screens', async () => {
-  equal(await anna.getByRole('link', { name: 'Audit log', exact: true }).count(), 0, 'the technician sees no log');
+  equal(await anna.getByRole('link', { name: 'Audit log', exact: true }).count(), 0,
+    'the technician sees no log');
   await anna.goto(`${h.url}#/audit`);
   await anna.getByText('Your role cannot open this page.').waitFor();
 });
@@ -64,7 +69,8 @@ await h.step('roles see only their own screens', async () => {
 await h.step('a new patient is scanned for a reference', async () => {
   await h.addPatient(anna, 'PX-0417', 'thorax');
   await anna.getByRole('heading', { name: 'PX-0417' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Start treatment session' }).isDisabled(), true, 'no fraction without a reference');
+  equal(await anna.getByRole('button', { name: 'Start treatment session' }).isDisabled(), true,
+    'no fraction without a reference');
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await anna.getByText('Press the button to start a sweep.').waitFor();
   await h.look(anna, 'scan-ready', { axe: false });
@@ -85,18 +91,22 @@ await h.step('a physicist plans, a second one approves', async () => {
   await bob.getByRole('link', { name: 'PX-0417' }).click();
   await bob.getByRole('link', { name: 'Plan, Version 1' }).click();
   await bob.getByText('Nobody has planned this reference yet.').waitFor();
-  equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0, 'nothing to approve before it is planned');
+  equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0,
+    'nothing to approve before it is planned');
   const map = await h.drawRegion(bob, [[0.3, 0.3], [0.7, 0.3], [0.72, 0.7], [0.28, 0.7]]);
   await map.press('n');
   await map.press('ArrowUp');
   await bob.getByRole('button', { name: 'Pick on the map' }).click();
   const scrolled = await map.boundingBox();
   await bob.mouse.click(scrolled.x + 0.5 * scrolled.width, scrolled.y + 0.5 * scrolled.height);
-  check(Number(await bob.getByLabel('Isocentre z').inputValue()) > 0.02, 'the isocentre lies on the body');
+  check(Number(await bob.getByLabel('Isocentre z').inputValue()) > 0.02,
+    'the isocentre lies on the body');
   // The same by keys, at the height that it has; what is undone stands in the fields again.
   const typed = async () => {
     const values = [];
-    for (const axis of ['x', 'y', 'z']) values.push(await bob.getByLabel(`Isocentre ${axis}`).inputValue());
+    for (const axis of ['x', 'y', 'z']) {
+      values.push(await bob.getByLabel(`Isocentre ${axis}`).inputValue());
+    }
     return values.map(Number);
   };
   const picked = await typed();
@@ -114,10 +124,13 @@ await h.step('a physicist plans, a second one approves', async () => {
   await bob.getByRole('button', { name: 'Use its centre' }).click();
   const { markers } = await bob.evaluate(async () => {
     const get = async (path) => (await fetch(`/api/v1/${path}`)).json();
-    return get(`scans/${(await get(`references/${location.hash.split('/')[2]}`)).scan_id}/files/scene.json`);
+    return get(
+      `scans/${(await get(`references/${location.hash.split('/')[2]}`)).scan_id}/files/scene.json`);
   });
-  const centre = [0, 1, 2].map((axis) => markers[1].reduce((sum, corner) => sum + corner[axis] / 4, 0));
-  (await typed()).forEach((value, axis) => check(Math.abs(value - centre[axis]) < 1e-4, `the marker's centre: ${value} for ${centre[axis]}`));
+  const centre =
+    [0, 1, 2].map((axis) => markers[1].reduce((sum, corner) => sum + corner[axis] / 4, 0));
+  (await typed()).forEach((value, axis) => check(Math.abs(value - centre[axis]) < 1e-4,
+    `the marker's centre: ${value} for ${centre[axis]}`));
   await bob.getByRole('button', { name: 'Undo' }).click();
   equal(await bob.getByLabel('Isocentre x').inputValue(), '', 'the marker is undone');
   await map.press('i');
@@ -130,7 +143,8 @@ await h.step('a physicist plans, a second one approves', async () => {
   await bob.getByText('There is no template for this site yet.').waitFor();
   await bob.getByLabel('Shifts (mm)').fill('4');
   await bob.getByRole('button', { name: 'Save this size and tolerance as the template' }).click();
-  await bob.getByText(/^Region \d+(\.\d+)? × \d+(\.\d+)? cm \(x × y\) about the isocentre, ±4 mm, ±1°/).waitFor();
+  await bob.getByText(
+    /^Region \d+(\.\d+)? × \d+(\.\d+)? cm \(x × y\) about the isocentre, ±4 mm, ±1°/).waitFor();
   const size = (await h.api(bob, 'templates')).body.templates[0];
   equal(size.site, 'thorax', 'of the site of the patient');
   await bob.getByRole('button', { name: 'Clear the region' }).click();
@@ -147,13 +161,15 @@ await h.step('a physicist plans, a second one approves', async () => {
   await bob.getByRole('status').getByText('Plan saved.').waitFor({ state: 'attached' });
   // Who planned it is not asked for a password that would be refused.
   await bob.getByText('Waiting for a second physicist').waitFor();
-  equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0, 'not by who planned it');
+  equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0,
+    'not by who planned it');
   await anna.locator('.tile li', { hasText: 'Waiting for approval: PX-0417 version 1' }).waitFor();
   await h.logIn(clara, 'clara');
   // If the check had failed before the scan, the summary says so, as the result does.
   await clara.route(/\/api\/v1\/scans\/[^/]+$/, async (route) => {
     const response = await route.fetch();
-    await route.fulfill({ response, json: { ...await response.json(), check_overdue: true, check_failed: true } });
+    await route.fulfill(
+      { response, json: { ...await response.json(), check_overdue: true, check_failed: true } });
   });
   await clara.goto(`${h.url}${new URL(bob.url()).hash}`);
   await clara.getByText('4 corners').waitFor();
@@ -167,7 +183,8 @@ await h.step('a physicist plans, a second one approves', async () => {
   // Without today's check nothing is approved, and the screen says what to do.
   h.tell('overdue');
   await clara.getByText('The daily check is overdue').waitFor();
-  equal(await review.getAttribute('aria-disabled'), 'true', 'no approval while the check is overdue');
+  equal(await review.getAttribute('aria-disabled'), 'true',
+    'no approval while the check is overdue');
   await h.look(clara, 'plan-overdue', { axe: false });
   h.tell('checked');
   await clara.getByText('The daily check is overdue').waitFor({ state: 'detached' });
@@ -178,7 +195,9 @@ await h.step('a physicist plans, a second one approves', async () => {
   equal(await signed.locator('input:not([type=password])').count(), 0, 'the summary is read-only');
   const facts = await signed.locator('dl').innerText();
   for (const axis of ['vertical', 'longitudinal', 'lateral', 'pitch', 'roll', 'yaw']) {
-    check(new RegExp(`Tolerance: ${axis}\\s+±${['pitch', 'roll', 'yaw'].includes(axis) ? '1°' : '3 mm'}`).test(facts), `the tolerance of ${axis}: ${facts}`);
+    check(new RegExp(
+      `Tolerance: ${axis}\\s+±${['pitch', 'roll', 'yaw'].includes(axis) ? '1°' : '3 mm'}`)
+      .test(facts), `the tolerance of ${axis}: ${facts}`);
   }
   await signed.getByText('The daily check had failed before this scan.').waitFor();
   await h.look(clara, 'plan-summary', { axe: false });
@@ -199,14 +218,16 @@ await h.step('corners by keys where the crosshair is, and one taken away by a fi
   await h.logIn(tablet, 'bob');
   await tablet.goto(`${h.url}#/patients`);
   await tablet.getByRole('link', { name: 'PX-0417' }).waitFor();
-  equal(await tablet.evaluate(() => document.activeElement.type), undefined, 'no keyboard covers the list');
+  equal(await tablet.evaluate(() => document.activeElement.type), undefined,
+    'no keyboard covers the list');
   await tablet.goto(`${h.url}${new URL(bob.url()).hash}`);
   await tablet.getByText('4 corners').waitFor();
   await tablet.getByRole('button', { name: 'Clear the region' }).click();
   const map = tablet.getByRole('application');
   const said = async (words) => {
     await tablet.locator('#status', { hasText: words }).waitFor({ state: 'attached' });
-    return (await tablet.locator('#status').innerText()).match(/x (\S+), y (\S+) m/).slice(1).map(Number);
+    return (await tablet.locator('#status').innerText())
+      .match(/x (\S+), y (\S+) m/).slice(1).map(Number);
   };
   await map.press('Shift+ArrowLeft');
   await map.press('ArrowUp');
@@ -215,7 +236,8 @@ await h.step('corners by keys where the crosshair is, and one taken away by a fi
   equal((await said('Corner 1')).join(), cross.join(), 'the corner lies at the crosshair');
   await map.press('Shift+ArrowRight');
   await map.press('Enter');
-  equal((await said('Corner 2'))[0], Number((cross[0] + 0.05).toFixed(3)), 'the next one 50 mm to the right');
+  equal((await said('Corner 2'))[0], Number((cross[0] + 0.05).toFixed(3)),
+    'the next one 50 mm to the right');
   await map.press('Shift+ArrowUp');
   await map.press('Enter');
   await tablet.getByText('3 corners').waitFor();
@@ -227,17 +249,20 @@ await h.step('corners by keys where the crosshair is, and one taken away by a fi
   const remove = tablet.getByRole('button', { name: 'Delete corner' });
   equal(await remove.getAttribute('aria-disabled'), 'true', 'no corner is selected');
   const box = await tablet.locator('circle.corner').first().boundingBox();
-  await tablet.touchscreen.tap(box.x + box.width / 2 + 8, box.y + box.height / 2 + 8);  // a finger aims badly
+  // A finger aims badly.
+  await tablet.touchscreen.tap(box.x + box.width / 2 + 8, box.y + box.height / 2 + 8);
   await tablet.getByText('3 corners').waitFor();
   await remove.tap();
   await tablet.getByText('2 corners').waitFor();
   await tablet.context().close();
 });
 
-await h.step('unsaved work: asked before it is left, kept for its person where the session ends, discarded where they say so', async () => {
+await h.step('unsaved work: asked before it is left, kept for its person where the session ends, '
+  + 'discarded where they say so', async () => {
   const shift = bob.getByLabel('Shifts (mm)');
   const note = bob.getByText('Your earlier unsaved changes were kept.');
-  const kept = () => bob.evaluate(() => Object.keys(sessionStorage).filter((key) => key.startsWith('plumb-plan-')).length);
+  const kept = () => bob.evaluate(
+    () => Object.keys(sessionStorage).filter((key) => key.startsWith('plumb-plan-')).length);
   const logInHere = async (name) => {
     await bob.getByLabel('Name').fill(name);
     await bob.getByLabel('Password').fill(h.password);
@@ -287,11 +312,13 @@ await h.step('unsaved work: asked before it is left, kept for its person where t
   bob.removeAllListeners('dialog');
 });
 
-await h.step('two minutes before the log-out the page warns; keys and pointer count as use', async () => {
+await h.step('two minutes before the log-out the page warns; keys and pointer count as use',
+  async () => {
   const idle = await h.person('idle');
   await h.logIn(idle, 'anna');
   await idle.locator('.tile').first().waitFor();
-  const warning = idle.locator('#idle').getByText(/^You will be logged out in \d+ s because of inactivity\.$/);
+  const warning =
+    idle.locator('#idle').getByText(/^You will be logged out in \d+ s because of inactivity\.$/);
   await h.setClockOn(idle, 12 * 60);  // of 15 min
   await idle.waitForTimeout(1500);
   equal(await warning.count(), 0, 'three minutes before there is none');
@@ -328,12 +355,16 @@ await h.step('a fraction shows MOVE with the signs in words', async () => {
   await anna.getByRole('button', { name: 'Start treatment session' }).click();
   await scan(anna, /Start sweep|Scan again/);
   await anna.locator('.verdict.move').waitFor();
-  // The body was carried by 6.2 mm to the gantry, 12.4 mm to its left and raised by 4.1 mm (within the turn's share): the correction goes back.
+  // The body was carried by 6.2 mm to the gantry, 12.4 mm to its left and raised by 4.1 mm (within
+  // the turn's share): the correction goes back.
   const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name }) });
-  check((await card('Vertical').locator('.value').innerText()).startsWith('−'), 'vertical is negative');
+  check((await card('Vertical').locator('.value').innerText()).startsWith('−'),
+    'vertical is negative');
   equal(await card('Vertical').locator('.word').innerText(), 'down', 'vertical in words');
-  check((await card('Longitudinal').locator('.value').innerText()).startsWith('−'), 'longitudinal is negative');
-  equal(await card('Longitudinal').locator('.word').innerText(), 'away from gantry', 'longitudinal in words');
+  check((await card('Longitudinal').locator('.value').innerText()).startsWith('−'),
+    'longitudinal is negative');
+  equal(await card('Longitudinal').locator('.word').innerText(), 'away from gantry',
+    'longitudinal in words');
   equal(await card('Lateral').locator('.word').innerText(), 'to patient right', 'lateral in words');
   check((await card('Yaw').locator('.value').innerText()).startsWith('+'), 'yaw is positive');
   check(await anna.locator('.number.outside').count() >= 3, 'values outside tolerance are marked');
@@ -347,18 +378,22 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
   const read = async () => {
     const words = await anna.locator('.reading').innerText();
     const [, value, x, y] = /^(.+)\s+at x (\S+), y (\S+) m$/.exec(words) ?? [];
-    return { value, mm: Number(/^([+−]?[\d.]+) mm$/.exec(value)?.[1].replace('−', '-') ?? NaN), x: Number(x), y: Number(y) };
+    return { value, mm: Number(/^([+−]?[\d.]+) mm$/.exec(value)?.[1].replace('−', '-') ?? NaN),
+      x: Number(x), y: Number(y) };
   };
-  const near = (found, expected, what) => check(Math.abs(found - expected) < 0.0015, `${what}: ${expected.toFixed(3)}, found ${found}`);
+  const near = (found, expected, what) =>
+    check(Math.abs(found - expected) < 0.0015, `${what}: ${expected.toFixed(3)}, found ${found}`);
   await map.focus();
-  for (let i = 0; i < 60 && !(Math.abs((await read()).mm) > 4); ++i) await map.press('ArrowUp');  // to where the moved body lies off
+  // To where the moved body lies off.
+  for (let i = 0; i < 60 && !(Math.abs((await read()).mm) > 4); ++i) await map.press('ArrowUp');
   const start = await read();
   check(Math.abs(start.mm) > 4, `the body lies off: ${start.value}`);
   await anna.getByLabel('After the correction').check();
   await anna.locator('canvas.map[data-map=after]').waitFor();  // it comes only now
   const after = await read();
   near(after.x, start.x, 'the same place');
-  check(Math.abs(after.mm) < 0.5 * Math.abs(start.mm), `the correction puts it right: ${start.value}, then ${after.value}`);
+  check(Math.abs(after.mm) < 0.5 * Math.abs(start.mm),
+    `the correction puts it right: ${start.value}, then ${after.value}`);
   await anna.getByLabel('Before', { exact: true }).check();
   await anna.locator('canvas.map[data-map=before]').waitFor();
   equal((await read()).value, start.value, 'and back');
@@ -369,7 +404,8 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
   near(beside.y, start.y - 0.05, 'a long step down');
   await map.hover({ position: { x: 10, y: 10 } });
   const corner = await read();
-  check(corner.x < start.x - 0.05 && corner.y > start.y + 0.05, `the pointer reads at the upper left: ${corner.x}, ${corner.y}`);
+  check(corner.x < start.x - 0.05 && corner.y > start.y + 0.05,
+    `the pointer reads at the upper left: ${corner.x}, ${corner.y}`);
 });
 
 await h.step('the surface opens in 3-D', async () => {
@@ -384,7 +420,8 @@ await h.step('the surface opens in 3-D', async () => {
   go();
   await anna.locator('.mesh-place').getByText('The appliance is not responding.').waitFor();
   await anna.unroute(surface);
-  await anna.route(surface, (route) => route.fulfill({ contentType: 'application/octet-stream', body: 'PLM2 and no more' }));
+  await anna.route(surface, (route) =>
+    route.fulfill({ contentType: 'application/octet-stream', body: 'PLM2 and no more' }));
   await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
   await anna.locator('.mesh-place').getByText('The surface arrived damaged.').waitFor();
   await anna.unroute(surface);
@@ -404,7 +441,8 @@ await h.step('the surface opens in 3-D', async () => {
     }
     return { bytes: canvas.toDataURL('image/png'), bright, corner: corner / (0.04 * height ** 2) };
   });
-  const keep = (name, bytes) => writeFileSync(h.file(`${name}.png`), Buffer.from(bytes.split(',')[1], 'base64'));
+  const keep = (name, bytes) =>
+    writeFileSync(h.file(`${name}.png`), Buffer.from(bytes.split(',')[1], 'base64'));
   const seen = new Map();
   for (const name of ['Anterior', 'Left', 'Right', 'Head', 'Feet', 'Reset']) {
     const button = anna.locator('.mesh-place').getByRole('button', { name, exact: true });
@@ -423,7 +461,8 @@ await h.step('the surface opens in 3-D', async () => {
   const half = await drawn();
   check(half.bright < 0.9 * whole.bright, `the cut leaves ${half.bright} of ${whole.bright}`);
   keep('mesh-cut', half.bytes);
-  // Every step is drawn again, which takes the emulated graphics card a second: few of them by keys.
+  // Every step is drawn again, which takes the emulated graphics card a second: few of them by
+  // keys.
   await where.press('ArrowLeft');
   equal(await where.inputValue(), '0.48', 'a key moves the cut');
   await where.fill('0.26');
@@ -447,7 +486,8 @@ await h.step('the surface opens in 3-D', async () => {
   equal((await drawn()).bytes, current.bytes, 'drawn again, nothing flickers');
   await share.fill('0.5');
   keep('mesh', (await drawn()).bytes);
-  const [picture] = await Promise.all([anna.waitForEvent('download'), anna.getByRole('button', { name: 'Save picture' }).click()]);
+  const [picture] = await Promise.all(
+    [anna.waitForEvent('download'), anna.getByRole('button', { name: 'Save picture' }).click()]);
   check(/_3d\.png$/.test(picture.suggestedFilename()), picture.suggestedFilename());
   await h.look(anna, 'result-3d', { axe: false });
 });
@@ -480,12 +520,14 @@ await h.step('a second page follows the same scan', async () => {
   await anna.locator('.verdict.in_tolerance').waitFor();
 });
 
-await h.step('a result grows old over a sleep, and takes its age from the appliance again', async () => {
+await h.step('a result grows old over a sleep, and takes its age from the appliance again',
+  async () => {
   equal(await anna.locator('.is-old').count(), 0, 'fresh at first');
   await h.sleep(anna, 130);
   await anna.getByText('Do not act on it').waitFor();
   const offline = anna.getByRole('alert').getByText('No connection to the appliance');
-  // The browser does not cut the stream that is open: a beat that comes just now says that all is well, and it takes another silence.
+  // The browser does not cut the stream that is open: a beat that comes just now says that all is
+  // well, and it takes another silence.
   for (let i = 0; i < 8 && !(await offline.isVisible()); ++i) {
     await h.setClockOn(anna, 30);
     await offline.waitFor({ timeout: 2500 }).catch(() => {});
@@ -493,7 +535,8 @@ await h.step('a result grows old over a sleep, and takes its age from the applia
   await offline.waitFor();
   equal(await anna.locator('.is-old').count(), 1, 'the result is grey');
   await h.wake(anna);
-  await anna.locator('.is-old').waitFor({ state: 'detached' });  // for the appliance no 2 minutes have passed
+  // For the appliance no 2 minutes have passed.
+  await anna.locator('.is-old').waitFor({ state: 'detached' });
   await anna.getByRole('alert').getByText('No connection').waitFor({ state: 'detached' });
   h.tell('old');
   await anna.getByText('Do not act on it').waitFor();
@@ -503,7 +546,8 @@ await h.step('a result grows old over a sleep, and takes its age from the applia
 await h.step('NO ANSWER says why', async () => {
   await scan(anna, 'Scan again');
   await anna.locator('.verdict.no_answer').waitFor();
-  check(/marker/i.test(await anna.locator('.verdict .why').innerText()), 'the reason names the markers');
+  check(/marker/i.test(await anna.locator('.verdict .why').innerText()),
+    'the reason names the markers');
   await h.look(anna, 'result-no-answer', { axe: false });
 });
 
@@ -511,10 +555,12 @@ await h.step('the trend shows the fractions', async () => {
   await anna.locator('.trend').first().waitFor();
   equal(await anna.locator('.trend').count(), 6, 'six trends');
   await anna.locator('.identity').getByRole('link', { name: 'PX-0417' }).click();
-  // Each scan that answered says its numbers, with the digits that are known; one without an answer none.
+  // Each scan that answered says its numbers, with the digits that are known; one without an answer
+  // none.
   await anna.getByText('Vert., long., lat. (mm)').waitFor();
   const numbers = await anna.locator('td.digits').allInnerTexts();
-  check(numbers.filter((line) => /^[−+]?\d+(\.\d)?, .+ · .+, .+, [−+]?\d/.test(line)).length >= 2, `numbers: ${numbers.join(' | ')}`);
+  check(numbers.filter((line) => /^[−+]?\d+(\.\d)?, .+ · .+, .+, [−+]?\d/.test(line)).length >= 2,
+    `numbers: ${numbers.join(' | ')}`);
   check(numbers.includes('–'), 'and none where there is no answer');
   await h.look(anna, 'patient-scans');
 });
@@ -526,7 +572,8 @@ await h.step('unplugging during a sweep discards the scan and says so', async ()
   await anna.getByRole('button', { name: 'End sweep' }).waitFor();
   h.tell('unplug');
   await anna.locator('.headline', { hasText: 'Sensor missing' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), true, 'no start without a sensor');
+  equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), true,
+    'no start without a sensor');
   await anna.getByRole('alert').getByText('The sensor was unplugged').waitFor();
   equal(await anna.locator('.verdict').count(), 0, 'no older result is shown for it');
   await h.look(anna, 'scan-unplugged', { axe: false });
@@ -544,13 +591,16 @@ await h.step('a failed scan is acknowledged on the page', async () => {
   h.tell('fail');
   await anna.getByRole('button', { name: 'Acknowledge' }).waitFor();
   await anna.locator('.headline', { hasText: 'Fault' }).waitFor();
-  equal(await anna.locator('.guidance').innerText(), 'The recording cannot be written. Acknowledge it on the scan screen or with the button, then scan again.', 'what is wrong and what to do');
+  equal(await anna.locator('.guidance').innerText(),
+    'The recording cannot be written. Acknowledge it on the scan screen or with the button, then '
+      + 'scan again.', 'what is wrong and what to do');
   equal(await anna.getByRole('button', { name: 'Start sweep' }).count(), 0, 'no start before');
   await h.look(anna, 'scan-fault');
   await anna.waitForTimeout(1000);  // likewise
   await anna.getByRole('button', { name: 'Acknowledge' }).click();
   await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), false, 'the next scan can start');
+  equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), false,
+    'the next scan can start');
   h.tell('fast');
 });
 
@@ -559,7 +609,8 @@ await h.step('another open patient is pointed out on the result', async () => {
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await anna.getByRole('button', { name: 'Close PX-0417, open PX-0999' }).click();
   await anna.locator('.who-line', { hasText: 'PX-0999' }).waitFor();
-  const history = await anna.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
+  const history =
+    await anna.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
   const last = history.scans.find((one) => one.result);
   await anna.goto(`${h.url}#/result/${last.id}`);
   await anna.getByText('The session of another patient (PX-0999) is open').waitFor();
@@ -581,7 +632,8 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   };
   await takeCheck();
   await anna.locator('.verdict', { hasText: 'NO BASELINE' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Set as baseline' }).count(), 0, 'a technician sets no baseline');
+  equal(await anna.getByRole('button', { name: 'Set as baseline' }).count(), 0,
+    'a technician sets no baseline');
   await bob.goto(`${h.url}#/check`);
   await h.acknowledge(bob);
   await bob.getByRole('button', { name: 'Set as baseline' }).click();
@@ -595,14 +647,18 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   await takeCheck();
   await anna.locator('.verdict', { hasText: 'FAILED' }).waitFor();
   await anna.getByText('marker 7 moved 12 mm').first().waitFor();
-  check(await anna.locator('.trend circle.mark.within').count() > 0, 'a check that passed is a circle in the trend');
-  check(await anna.locator('.trend path.mark.outside').count() > 0, 'one that failed has another shape');
+  check(await anna.locator('.trend circle.mark.within').count() > 0,
+    'a check that passed is a circle in the trend');
+  check(await anna.locator('.trend path.mark.outside').count() > 0,
+    'one that failed has another shape');
   await h.look(anna, 'check-failed', { axe: false });
   await anna.goto(`${h.url}#/status`);
-  await anna.locator('.tile', { hasText: 'Daily check' }).getByText('failed', { exact: true }).waitFor();
+  await anna.locator('.tile', { hasText: 'Daily check' })
+    .getByText('failed', { exact: true }).waitFor();
   await anna.getByText('Find out why the check failed').waitFor();
   const { check_failed: failed, reference_block: block } = (await h.api(anna, 'status')).body;
-  check(failed && /daily check has failed/.test(block), 'after a pass of the same day it counts, too');
+  check(failed && /daily check has failed/.test(block),
+    'after a pass of the same day it counts, too');
   await h.look(anna, 'status-check-failed', { axe: false });
 });
 
@@ -616,13 +672,16 @@ await h.step('patients, log, settings and update look finished', async () => {
   await bob.getByLabel('Filter').fill('reference approved');
   await bob.getByText(/^1 of \d+ entries$/).waitFor();
   equal(await bob.locator('tbody tr').count(), 1, 'only what was looked for');
-  const [download] = await Promise.all([bob.waitForEvent('download'), bob.getByRole('button', { name: 'Download as CSV' }).click()]);
+  const [download] = await Promise.all(
+    [bob.waitForEvent('download'), bob.getByRole('button', { name: 'Download as CSV' }).click()]);
   const csv = readFileSync(await download.path(), 'utf8').trim().split('\r\n');
   equal(csv.length, 2, 'a head and one entry');
   check(csv[1].includes('"Reference approved"'), csv[1]);
   // Settings that cannot be read are replaced on the page; no default looks like one of them.
   const settingsUrl = '**/api/v1/settings';
-  const why = 'what is stored cannot be read: the stored settings cannot be read: expected a JSON object, found none; it was changed from outside, or its disk failed. Put a backup of the database in its place, or save it again';
+  const why = 'what is stored cannot be read: the stored settings cannot be read: expected a JSON '
+    + 'object, found none; it was changed from outside, or its disk failed. Put a backup of the '
+    + 'database in its place, or save it again';
   await engineer.route(settingsUrl, (route) => (route.request().method() === 'GET'
     ? route.fulfill({ status: 500, json: { error: why } }) : route.continue()));
   await engineer.goto(`${h.url}#/settings`);
@@ -632,14 +691,17 @@ await h.step('patients, log, settings and update look finished', async () => {
   const form = engineer.locator('form.columns');
   const numbers = form.locator('input[type=number]');
   const choices = form.locator('select');
-  const all = await form.locator('input, select').evaluateAll((fields) => fields.map((one) => one.value));
+  const all =
+    await form.locator('input, select').evaluateAll((fields) => fields.map((one) => one.value));
   equal(all.join(), ',,,,,,,,', 'nothing is filled in');
   const sent = [];
   const note = (request) => { if (request.method() === 'PUT') sent.push(request.postDataJSON()); };
   engineer.on('request', note);
   const save = engineer.getByRole('button', { name: 'Save' });
   await save.click();
-  for (const [k, value] of ['5', '1', '10', '60', '0', '15'].entries()) await numbers.nth(k).fill(value);
+  for (const [k, value] of ['5', '1', '10', '60', '0', '15'].entries()) {
+    await numbers.nth(k).fill(value);
+  }
   for (const [k, value] of ['HFS', 'true'].entries()) await choices.nth(k).selectOption(value);
   await save.click();
   equal(await form.evaluate((one) => one.checkValidity()), false, 'one choice is missing');
@@ -647,7 +709,8 @@ await h.step('patients, log, settings and update look finished', async () => {
   await save.click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
   equal(sent.length, 1, 'nothing was sent before all was entered');
-  equal(JSON.stringify([sent[0].posture, sent[0].idle_logout_min, sent[0].couch_markers, sent[0].keep_recordings]),
+  equal(JSON.stringify(
+    [sent[0].posture, sent[0].idle_logout_min, sent[0].couch_markers, sent[0].keep_recordings]),
     '["HFS",15,true,false]', 'what was entered');
   equal(await unreadable.count(), 0, 'the fault is no longer shown');
   engineer.off('request', note);
@@ -655,11 +718,13 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.reload();
   await engineer.getByLabel('Log out after … min of inactivity').fill('20');
   const elsewhere = { retention_days: 365, keep_recordings: true };
-  equal((await h.api(engineer, 'settings', 'PUT', elsewhere)).status, 200, 'another page changes other settings');
+  equal((await h.api(engineer, 'settings', 'PUT', elsewhere)).status, 200,
+    'another page changes other settings');
   await engineer.getByRole('button', { name: 'Save' }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
   const both = (await h.api(engineer, 'settings')).body;
-  equal([both.retention_days, both.keep_recordings, both.idle_logout_min].join(), '365,true,20', 'nobody undoes what another has changed');
+  equal([both.retention_days, both.keep_recordings, both.idle_logout_min].join(), '365,true,20',
+    'nobody undoes what another has changed');
   equal(await numbers.nth(4).inputValue(), '365', 'what is stored is shown');
   await engineer.getByText('No backup has been made yet.').waitFor();
   await engineer.getByRole('button', { name: 'Back up now' }).click();
@@ -672,7 +737,8 @@ await h.step('patients, log, settings and update look finished', async () => {
   const rows = profile.locator('tbody tr');
   equal(await rows.count(), 3, 'versions of the profile');
   check((await rows.first().innerText()).includes('−1.90 %'), await rows.first().innerText());
-  const [file] = await Promise.all([engineer.waitForEvent('download'), rows.nth(1).getByRole('link', { name: 'Download' }).click()]);
+  const [file] = await Promise.all([engineer.waitForEvent('download'),
+    rows.nth(1).getByRole('link', { name: 'Download' }).click()]);
   equal(file.suggestedFilename(), 'plumb_sensor_profile_3.json', 'the file of that version');
   const change = async (choice, password) => {
     await profile.getByLabel('What to do').selectOption({ label: choice });
@@ -683,10 +749,13 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByRole('alert').getByText('the password is wrong').waitFor();
   equal(await rows.count(), 3, 'a wrong password changes nothing');
   await change('Restore version 3', h.password);
-  await engineer.getByRole('status').getByText('The earlier version is in use.').waitFor({ state: 'attached' });
-  await rows.first().locator('> :first-child', { hasText: /^5(\D|$)/ }).waitFor();  // the newest version
+  await engineer.getByRole('status')
+    .getByText('The earlier version is in use.').waitFor({ state: 'attached' });
+  // The newest version.
+  await rows.first().locator('> :first-child', { hasText: /^5(\D|$)/ }).waitFor();
   await change('Start again without a profile', h.password);
-  await engineer.getByRole('status').getByText('The next scan starts without a profile.').waitFor({ state: 'attached' });
+  await engineer.getByRole('status')
+    .getByText('The next scan starts without a profile.').waitFor({ state: 'attached' });
   await rows.first().getByText('reset').waitFor();
   await h.look(engineer, 'settings-profile');
   await bob.goto(`${h.url}#/settings`);
@@ -701,7 +770,8 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByText('plumb-0.5.0.raucb').waitFor();
   equal(await focused(), 'Install plumb-0.2.0.raucb', 'the list is drawn again below the keyboard');
   const send = async (name, text) => {
-    await engineer.getByLabel('Update file', { exact: true }).setInputFiles({ name, mimeType: 'application/octet-stream', buffer: Buffer.from(text.padEnd(100000, 'x')) });
+    await engineer.getByLabel('Update file', { exact: true }).setInputFiles({ name,
+      mimeType: 'application/octet-stream', buffer: Buffer.from(text.padEnd(100000, 'x')) });
     await engineer.getByRole('button', { name: 'Upload' }).click();
   };
   await send('photo.raucb', 'GIF89a');
@@ -711,17 +781,21 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByText('Copying image to rootfs.1').waitFor();
   equal(await engineer.locator('progress[value="0.4"]').count(), 1, 'the progress');
   equal(await focused(), 'Install plumb-0.3.0.raucb', 'a button that is off keeps the focus');
-  equal(await engineer.getByRole('button', { name: 'Install plumb-0.2.0.raucb' }).isDisabled(), true, 'one installation at a time');
-  equal(await engineer.getByRole('button', { name: 'Install plumb-0.4.0.raucb from the USB stick' }).isDisabled(), true, 'nor the one on the stick beside it');
+  equal(await engineer.getByRole('button', { name: 'Install plumb-0.2.0.raucb' }).isDisabled(),
+    true, 'one installation at a time');
+  equal(await engineer.getByRole('button', { name: 'Install plumb-0.4.0.raucb from the USB stick' })
+    .isDisabled(), true, 'nor the one on the stick beside it');
   await h.look(engineer, 'update-installing');
   h.tell('installed');
   await engineer.getByText('restart the appliance to use it').waitFor();
   await bob.goto(`${h.url}#/update`);
   await bob.getByText('plumb-0.3.0.raucb').first().waitFor();
-  equal(await bob.getByRole('button', { name: /Install|Upload|Remove|Restart/ }).count(), 0, 'a physicist updates nothing');
+  equal(await bob.getByRole('button', { name: /Install|Upload|Remove|Restart/ }).count(), 0,
+    'a physicist updates nothing');
 });
 
-await h.step('the restart into an update: with the password, never during a session; a roll-back is reported until it is seen', async () => {
+await h.step('the restart into an update: with the password, never during a session; a roll-back '
+  + 'is reported until it is seen', async () => {
   const restart = async (password) => {
     await engineer.locator('.restart').getByLabel('Your password').fill(password);
     await engineer.getByRole('button', { name: 'Restart now' }).click();
@@ -734,14 +808,18 @@ await h.step('the restart into an update: with the password, never during a sess
   const session = async () => (await h.api(anna, 'status')).body.session;
   check(await session() !== null, 'a session is open');
   await restart(h.password);
-  await alert.getByText('The session of a patient is open').or(alert.getByText('the session of a patient is open')).waitFor();
-  equal((await h.api(anna, 'treatment/close', 'POST', { session_id: (await session()).id })).status, 200, 'closed');
+  await alert.getByText('The session of a patient is open')
+    .or(alert.getByText('the session of a patient is open')).waitFor();
+  equal((await h.api(anna, 'treatment/close', 'POST', { session_id: (await session()).id })).status,
+    200, 'closed');
   await h.acknowledge(anna, bob, engineer);
   await restart(h.password);
-  await engineer.getByRole('status').getByText('The appliance restarts').waitFor({ state: 'attached' });
+  await engineer.getByRole('status')
+    .getByText('The appliance restarts').waitFor({ state: 'attached' });
   h.tell('rolledback');
   await engineer.getByText('gone back to the previous system').waitFor();
-  equal(await engineer.getByRole('button', { name: 'Restart now' }).count(), 0, 'nothing waits for a restart');
+  equal(await engineer.getByRole('button', { name: 'Restart now' }).count(), 0,
+    'nothing waits for a restart');
   await h.look(engineer, 'update-rolled-back', { axe: false });
   await bob.goto(`${h.url}#/status`);
   await bob.getByText('gone back to the previous system').waitFor();
@@ -749,7 +827,8 @@ await h.step('the restart into an update: with the password, never during a sess
   await engineer.getByText('gone back to the previous system').waitFor({ state: 'detached' });
 });
 
-await h.step('a factory reset: its kind chosen, wiping with its word typed, the password again', async () => {
+await h.step('a factory reset: its kind chosen, wiping with its word typed, the password again',
+  async () => {
   await engineer.goto(`${h.url}#/update`);
   const submit = engineer.getByRole('button', { name: 'Reset the appliance' });
   const word = engineer.getByLabel('Type WIPE to confirm');
@@ -800,15 +879,19 @@ await h.step('a patient is deleted with the code and the password', async () => 
   equal((await h.api(bob, `patients/${id}`)).status, 404, 'gone');
 });
 
-await h.step('a scan is deleted with a reason and its number; one that a reference is made of is not', async () => {
+await h.step(
+  'a scan is deleted with a reason and its number; one that a reference is made of is not',
+  async () => {
   const { scans } = (await h.api(bob, 'scans')).body;
   const reference = scans.find((one) => one.purpose === 'reference' && one.outcome === 'done');
   await bob.goto(`${h.url}#/result/${reference.id}`);
   await bob.locator('.verdict').waitFor();
   await bob.getByText('Delete this scan…').click();
   await bob.getByText(/This scan is the source of reference version \d+/).waitFor();
-  equal(await bob.getByRole('button', { name: 'Delete permanently' }).count(), 0, 'nothing to press');
-  equal((await h.api(bob, `scans/${reference.id}`, 'DELETE', { reason: 'a test' })).status, 409, 'nor through the interface');
+  equal(await bob.getByRole('button', { name: 'Delete permanently' }).count(), 0,
+    'nothing to press');
+  equal((await h.api(bob, `scans/${reference.id}`, 'DELETE', { reason: 'a test' })).status, 409,
+    'nor through the interface');
   const { id } = scans.find((one) => one.outcome === 'failed');
   await anna.goto(`${h.url}#/result/${id}`);
   await anna.locator('.verdict').waitFor();
@@ -828,7 +911,8 @@ await h.step('a scan is deleted with a reason and its number; one that a referen
   await bob.waitForURL(/#\/patient\//);
   equal((await h.api(bob, `scans/${id}`)).status, 404, 'it is gone');
   const { entries } = (await h.api(bob, 'audit')).body;
-  equal(entries.find((one) => one.action === 'scan.remove').subject, id, 'the log keeps its number');
+  equal(entries.find((one) => one.action === 'scan.remove').subject, id,
+    'the log keeps its number');
 });
 
 await h.step('the last log-in and failed attempts are shown', async () => {
@@ -841,7 +925,8 @@ await h.step('the last log-in and failed attempts are shown', async () => {
     await again.getByRole('alert').getByText('name or password is wrong').waitFor();
   }
   await h.logIn(again, 'clara');
-  await again.locator('.last-login', { hasText: /Last log-in: .*, from 127\.0\.0\.1\. 2 failed attempts since/ }).waitFor();
+  await again.locator('.last-login',
+    { hasText: /Last log-in: .*, from 127\.0\.0\.1\. 2 failed attempts since/ }).waitFor();
   await h.look(again, 'last-login');
   await again.context().close();
 });
@@ -866,14 +951,19 @@ await h.step('a keyboard alone logs in, starts a sweep and ends it', async () =>
   h.tell('plug');
   await keys.locator('.tile.good', { hasText: 'attached' }).waitFor();
   const { body: { patients } } = await h.api(anna, 'patients');
-  equal((await h.api(anna, `patients/${patients.find((one) => one.code === 'PX-0417').id}/open`, 'POST', { purpose: 'fraction', reason: '', replaces: (await h.api(anna, 'status')).body.session?.id ?? '' })).status, 200, 'a patient to compare');
+  equal((await h.api(anna, `patients/${patients.find((one) => one.code === 'PX-0417').id}/open`,
+    'POST', { purpose: 'fraction', reason: '',
+      replaces: (await h.api(anna, 'status')).body.session?.id ?? '' })).status, 200,
+    'a patient to compare');
   await h.acknowledge(keys, anna);
   await keys.locator('.brand').focus();
   for (let i = 0; i < 40 && (await focused()) !== 'Scan'; ++i) await keys.keyboard.press('Tab');
   await h.look(keys, 'focus', { axe: false });
   await keys.keyboard.press('Enter');
   await keys.getByRole('button', { name: 'Start sweep' }).waitFor();
-  for (let i = 0; i < 8 && (await focused()) !== 'Start sweep'; ++i) await keys.keyboard.press('Tab');
+  for (let i = 0; i < 8 && (await focused()) !== 'Start sweep'; ++i) {
+    await keys.keyboard.press('Tab');
+  }
   equal(await focused(), 'Start sweep', 'the start button is reached from the main part');
   h.tell('slow');
   await keys.keyboard.press('Enter');
@@ -891,7 +981,9 @@ await h.step('two taps start a sweep and do not end it', async () => {
   await anna.evaluate(async () => {
     const button = document.querySelector('.giant');
     button.click();
-    while (button.textContent !== 'End sweep') await new Promise((ready) => { setTimeout(ready, 10); });
+    while (button.textContent !== 'End sweep') {
+      await new Promise((ready) => { setTimeout(ready, 10); });
+    }
     button.click();
   });
   await anna.waitForTimeout(1200);
@@ -909,10 +1001,15 @@ await h.step('without script the last result is shown, without WebGL the picture
   await plain.getByLabel('Password').fill(h.password);
   await plain.getByRole('button', { name: 'Log in' }).click();
   await plain.getByText('NO ANSWER').waitFor();
-  check((await plain.getByRole('complementary').innerText()).includes('Not a medical device'), 'the notice is there');
+  check((await plain.getByRole('complementary').innerText()).includes('Not a medical device'),
+    'the notice is there');
   await h.picture(plain, 'plain-result.png');
   const flat = await h.person('flat');
-  await flat.addInitScript(() => { HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, { apply: (target, self, args) => (args[0].startsWith('webgl') ? null : Reflect.apply(target, self, args)) }); });
+  await flat.addInitScript(() => {
+    HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext,
+      { apply: (target, self, args) =>
+        (args[0].startsWith('webgl') ? null : Reflect.apply(target, self, args)) });
+  });
   await h.logIn(flat, 'anna');
   await flat.goto(`${h.url}#/result`);
   await flat.getByRole('button', { name: 'Open the 3-D view' }).click();
@@ -931,9 +1028,11 @@ await h.step('the first page is small and asks no other server', async () => {
   const begun = Date.now();
   await page.goto(h.url);
   await page.getByRole('button', { name: 'Log in' }).waitFor();
-  const paint = await page.evaluate(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? -1);
+  const paint = await page.evaluate(
+    () => performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? -1);
   const total = sizes.reduce((sum, size) => sum + size, 0);
-  console.log(`    first page ${total} bytes, first paint ${Math.round(paint)} ms, login shown after ${Date.now() - begun} ms`);
+  console.log(`    first page ${total} bytes, first paint ${Math.round(paint)} ms, login shown `
+    + `after ${Date.now() - begun} ms`);
   check(total < 150000, `first page is ${total} bytes`);
   equal(hosts.size, 1, 'one host');
 });
@@ -942,7 +1041,8 @@ await h.step('the session ends with log out', async () => {
   await anna.goto(`${h.url}#/status`);
   await anna.getByRole('button', { name: 'Log out' }).click();
   await anna.getByRole('heading', { name: 'Log in' }).waitFor();
-  equal(await anna.evaluate(() => fetch('/api/v1/status').then((response) => response.status)), 401, 'nothing without login');
+  equal(await anna.evaluate(() => fetch('/api/v1/status').then((response) => response.status)), 401,
+    'nothing without login');
 });
 
 await h.finish();

@@ -1,4 +1,5 @@
-// The room's calibration on the page: room_calibration_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
+// The room's calibration on the page: room_calibration_test.mjs NODE_MODULES SERVER OUT_FOLDER
+// CHROMIUM
 import { Harness } from './harness.mjs';
 
 const [modules, server, folder, chromium] = process.argv.slice(2);
@@ -26,9 +27,11 @@ async function scanBoard() {
   await bob.waitForURL(/#\/check/, { timeout: 60000 });
 }
 
-await h.step('without a calibration directions are the patient’s, and a technician only reads', async () => {
+await h.step('without a calibration directions are the patient’s, and a technician only reads',
+  async () => {
   await anna.goto(`${h.url}#/check`);
-  await card(anna).getByText('The room has not been calibrated: directions are those of the patient or of the reference marker, never of the couch. Calibrate the room').waitFor();
+  await card(anna).getByText('The room has not been calibrated: directions are those of the '
+    + 'patient or of the reference marker, never of the couch. Calibrate the room').waitFor();
   equal(await card(anna).getByRole('button').count(), 0, 'nothing to start or to sign');
   await bob.goto(`${h.url}#/check`);
   const [board] = await Promise.all([bob.waitForEvent('download'),
@@ -41,11 +44,14 @@ await h.step('three scans, their spread, and a signature with the password', asy
   h.tell('board');
   await scanBoard();
   await card(bob).getByText('1 of 3 scans of the board have been made').waitFor();
-  equal(await card(bob).getByRole('button', { name: 'Sign the calibration' }).count(), 0, 'too early to sign');
+  equal(await card(bob).getByRole('button', { name: 'Sign the calibration' }).count(), 0,
+    'too early to sign');
   await scanBoard();
   await card(bob).getByText('2 of 3 scans of the board have been made').waitFor();
   await scanBoard();
-  await card(bob).getByText('The newest 3 scans differ by 0.37 mm and 0.06°; at most 1.0 mm and 0.2° are allowed.').waitFor();
+  await card(bob).getByText(
+    'The newest 3 scans differ by 0.37 mm and 0.06°; at most 1.0 mm and 0.2° are allowed.')
+    .waitFor();
   equal(await card(bob).locator('tbody tr').count(), 3, 'one line a scan');
   await h.look(bob, 'room-calibration-three', { axe: false });
   // By the keyboard alone.
@@ -63,7 +69,9 @@ await h.step('three scans, their spread, and a signature with the password', asy
   await card(bob).getByLabel('Your password').focus();
   await bob.keyboard.type(h.password);
   await bob.keyboard.press('Enter');
-  await card(bob).getByText(/Version 1, signed by bob, .*\b(UTC|GMT)\b.*, gives every comparison the axes of the room/).waitFor();
+  await card(bob).getByText(
+    /Version 1, signed by bob, .*\b(UTC|GMT)\b.*, gives every comparison the axes of the room/)
+    .waitFor();
   await anna.unroute(events);
   // The stream is retried every 15 s; on a busy machine that can take longer than other steps may.
   await card(anna).getByText(/signed by bob/).waitFor({ timeout: 60000 });

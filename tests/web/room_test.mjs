@@ -25,13 +25,15 @@ const until = async (what, holds) => {
   }
 };
 const inState = (name) => until(`state ${name}`, (status) => status.state === name);
-const styleOf = (page, part, name) => page.locator(part).first().evaluate((element, what) => getComputedStyle(element)[what], name);
+const styleOf = (page, part, name) =>
+  page.locator(part).first().evaluate((element, what) => getComputedStyle(element)[what], name);
 const sizeOf = async (page, part) => parseFloat(await styleOf(page, part, 'fontSize'));
 /// A sweep with the button, to its result.
 async function press() {
   const before = (await state()).last_result?.id;
   h.tell('press');
-  await until('a result', (status) => status.state === 'result' && status.last_result?.id !== before);
+  await until('a result',
+    (status) => status.state === 'result' && status.last_result?.id !== before);
 }
 async function addPatient(code) {
   return (await ok(anna, 'patients', 'POST', { code, site: 'thorax' })).id;
@@ -39,7 +41,8 @@ async function addPatient(code) {
 async function approvedPatient(code) {
   const id = await addPatient(code);
   const open = (await state()).session?.id ?? '';
-  await ok(anna, `patients/${id}/open`, 'POST', { purpose: 'reference', reason: '', replaces: open });
+  await ok(anna, `patients/${id}/open`, 'POST',
+    { purpose: 'reference', reason: '', replaces: open });
   await press();
   // A code that does not fit on the line wraps as a whole and is not broken at its hyphen.
   const link = bob.locator('.tile .whole', { hasText: code });
@@ -47,16 +50,19 @@ async function approvedPatient(code) {
     const before = document.createRange();
     before.setStart(element.parentElement, 0);
     before.setEndBefore(element);
-    element.parentElement.style.width = `${before.getBoundingClientRect().width + 0.6 * element.offsetWidth}px`;
+    element.parentElement.style.width =
+      `${before.getBoundingClientRect().width + 0.6 * element.offsetWidth}px`;
     return element.getClientRects().length;
   }), 1, 'a code is not broken at its hyphen');
   const { draft_reference_id: draft } = await ok(anna, `patients/${id}`, 'GET');
   const { plan, ...read } = await ok(bob, `references/${draft}`, 'GET');
-  await ok(bob, `references/${draft}/plan`, 'PUT', { region_m: plan.region_m, isocentre_m: plan.isocentre_m, posture: plan.posture,
-    couch_markers: plan.couch_markers, shift_tolerance_mm: plan.tolerance.shift_mm, rotation_tolerance_deg: plan.tolerance.rotation_deg,
-    revision: read.revision });
+  await ok(bob, `references/${draft}/plan`, 'PUT',
+    { region_m: plan.region_m, isocentre_m: plan.isocentre_m, posture: plan.posture,
+      couch_markers: plan.couch_markers, shift_tolerance_mm: plan.tolerance.shift_mm,
+      rotation_tolerance_deg: plan.tolerance.rotation_deg, revision: read.revision });
   const { digest, revision } = await ok(clara, `references/${draft}`, 'GET');
-  await ok(clara, `references/${draft}/approve`, 'POST', { revision, digest, password: h.password });
+  await ok(clara, `references/${draft}/approve`, 'POST',
+    { revision, digest, password: h.password });
   await h.acknowledge(anna, bob, clara);
   return id;
 }
@@ -69,15 +75,18 @@ const openOnPage = async (page, code) => {
 let patient;
 await h.step('accounts, and a patient with an approved reference', async () => {
   await h.firstStart(engineer);
-  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) {
+  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'],
+    ['clara', 'physicist']]) {
     await h.addAccountByApi(engineer, name, role);
   }
-  await Promise.all([[anna, 'anna'], [bob, 'bob'], [clara, 'clara']].map(([page, name]) => h.logIn(page, name)));
+  await Promise.all(
+    [[anna, 'anna'], [bob, 'bob'], [clara, 'clara']].map(([page, name]) => h.logIn(page, name)));
   patient = await approvedPatient('P-0042');
 });
 
 const room = await h.person('room', { width: 1920, height: 1080 });
-await h.step('the room display is paired by the code that it shows, and changes nothing', async () => {
+await h.step('the room display is paired by the code that it shows, and changes nothing',
+  async () => {
   await room.goto(`${h.url}room`);
   const code = await room.locator('.pair-code').innerText();
   check(/^[0-9A-Z]{3}-[0-9A-Z]{3}$/.test(code), `a code to type: ${code}`);
@@ -92,14 +101,16 @@ await h.step('the room display is paired by the code that it shows, and changes 
   await engineer.getByRole('cell', { name: 'couch side', exact: true }).waitFor();
   await h.look(engineer, 'displays');
   await room.locator('.room-code').waitFor();
-  for (const [method, path, body] of [['POST', 'press'], ['POST', 'scan/start'], ['GET', 'patients'],
-    ['GET', 'users'], ['POST', `patients/${patient}/open`, { purpose: 'fraction', reason: '' }],
+  for (const [method, path, body] of [['POST', 'press'], ['POST', 'scan/start'],
+    ['GET', 'patients'], ['GET', 'users'],
+    ['POST', `patients/${patient}/open`, { purpose: 'fraction', reason: '' }],
     ['POST', 'treatment/close', { session_id: '' }]]) {
     equal((await h.api(room, path, method, body)).status, 403, `${method} ${path} by the display`);
   }
 });
 
-await h.step('a link with the key pairs a display without a code, and does not keep the key', async () => {
+await h.step('a link with the key pairs a display without a code, and does not keep the key',
+  async () => {
   // Another pairing's secret is as good a key as that of a provisioning file.
   const { code, secret } = await ok(engineer, 'displays/pair', 'POST');
   const wall = await h.person('wall', { width: 1280, height: 800 });
@@ -109,7 +120,8 @@ await h.step('a link with the key pairs a display without a code, and does not k
   await ok(engineer, 'displays', 'POST', { code, name: 'wall' });
   await wall.goto(`${h.url}room?theme=light#key=${secret}`);
   await wall.locator('.room-code').waitFor();
-  equal(new URL(wall.url()).search + new URL(wall.url()).hash, '?theme=light', 'the address has no key');
+  equal(new URL(wall.url()).search + new URL(wall.url()).hash, '?theme=light',
+    'the address has no key');
   equal((await h.api(wall, 'press', 'POST')).status, 403, 'it changes nothing');
   await engineer.goto(`${h.url}#/users`);
   await engineer.reload();
@@ -130,7 +142,8 @@ await h.step('a person may log in on the screen in the room instead of pairing i
   await tablet.context().close();
 });
 
-await h.step('one tap opens, confirms and leads to the sweep; the room says whose session', async () => {
+await h.step('one tap opens, confirms and leads to the sweep; the room says whose session',
+  async () => {
   await openOnPage(anna, 'P-0042');
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).waitFor();
   await room.locator('.room-code', { hasText: 'P-0042' }).waitFor();
@@ -142,19 +155,22 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
   h.tell('moved z 8 HFS');
   h.tell('press');
   const kAdvice = ['slower', 'closer', 'farther', 'lost', 'too_slow', 'good'];
-  for (const [language, words] of [['es', ['MÁS DESPACIO', 'MÁS CERCA', 'MÁS LEJOS', 'PERDIDO', 'EQUIPO LENTO', 'BIEN']],
+  for (const [language, words] of [
+    ['es', ['MÁS DESPACIO', 'MÁS CERCA', 'MÁS LEJOS', 'PERDIDO', 'EQUIPO LENTO', 'BIEN']],
     ['en', ['SLOWER', 'CLOSER', 'FARTHER', 'LOST', 'COMPUTER TOO SLOW', 'GOOD']]]) {
     await room.goto(`${h.url}room?language=${language}`);
     for (const [i, word] of words.entries()) {
       h.tell(`guide ${kAdvice[i]}`);
       const shown = room.locator('.room-word', { hasText: word });
       await shown.waitFor(kSlow);
-      // On a screen of 40 inches (88 cm wide): the height of capital letters. The width leaves 10 cm to words
-      // of up to 7 letters, 7 cm to those of up to 9, and 5 cm to longer ones: MÁS DESPACIO, EQUIPO LENTO and
-      // COMPUTER TOO SLOW are among these.
-      const size = await shown.evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
+      // On a screen of 40 inches (88 cm wide): the height of capital letters. The width leaves 10
+      // cm to words of up to 7 letters, 7 cm to those of up to 9, and 5 cm to longer ones: MÁS
+      // DESPACIO, EQUIPO LENTO and COMPUTER TOO SLOW are among these.
+      const size =
+        await shown.evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
       const cm = size * 0.73 * 88.5 / 1920;
-      check(cm >= (word.length > 9 ? 5 : word.length > 7 ? 7 : 10), `${word} is ${cm.toFixed(1)} cm high`);
+      check(cm >= (word.length > 9 ? 5 : word.length > 7 ? 7 : 10),
+        `${word} is ${cm.toFixed(1)} cm high`);
       const box = await shown.boundingBox();
       check(box.x >= 0 && box.x + box.width <= 1920, `${word} fits`);
       await h.look(room, `room-${kAdvice[i]}-${language}`, { axe: false, fullPage: false });
@@ -166,11 +182,15 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
   for (const [width, height] of [[1280, 800], [1920, 1080]]) {
     await room.setViewportSize({ width, height });
     // All at once: the map is drawn again twice a second.
-    const [map, sweep, ...words] = await room.evaluate(() => ['.live-surface .map-box', '.room-sweep', '.marks-note', '.live-surface .keys']
-      .map((place) => document.querySelector(place).getBoundingClientRect().toJSON()));
+    const [map, sweep, ...words] = await room.evaluate(() =>
+      ['.live-surface .map-box', '.room-sweep', '.marks-note', '.live-surface .keys']
+        .map((place) => document.querySelector(place).getBoundingClientRect().toJSON()));
     check(map.height > 0.95 * sweep.height || map.width > 0.45 * sweep.width,
-      `the map has its space at ${width}x${height}: ${map.width} x ${map.height} of ${sweep.width} x ${sweep.height}`);
-    for (const { bottom } of words) check(bottom <= height, `note and keys in view at ${width}x${height}: down to ${bottom}`);
+      `the map has its space at ${width}x${height}: ${map.width} x ${map.height} of ${sweep.width} `
+        + `x ${sweep.height}`);
+    for (const { bottom } of words) {
+      check(bottom <= height, `note and keys in view at ${width}x${height}: down to ${bottom}`);
+    }
   }
   h.tell('guide');
   h.tell('fast');
@@ -182,7 +202,8 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
   // Patient and uncertainty are read from 3 m: digits of 1 cm at least, and nothing below the edge.
   for (const [place, least] of [['.room-code', 2], ['.number .value', 2], ['.number .half', 1],
     ['.number .limit', 0.9]]) {
-    const size = await room.locator(place).first().evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
+    const size = await room.locator(place)
+      .first().evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
     const cm = size * 0.73 * 88.5 / 1920;
     check(cm >= least, `${place} is ${cm.toFixed(1)} cm high`);
   }
@@ -190,16 +211,20 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
     await room.setViewportSize({ width, height });
     // With the longest words that there are in either language.
     const lowest = await room.evaluate(() => {
-      const words = { '.number .word': 'hacia la izquierda del paciente', '.number .judged': '▲ fuera de tolerancia' };
+      const words = { '.number .word': 'hacia la izquierda del paciente',
+        '.number .judged': '▲ fuera de tolerancia' };
       const texts = Object.entries(words).flatMap(([where, text]) =>
-        [...document.querySelectorAll(where)].map((element) => [element, element.textContent, text]));
+        [...document.querySelectorAll(where)]
+          .map((element) => [element, element.textContent, text]));
       for (const [element, , text] of texts) element.textContent = text;
-      const bottom = Math.max(...[...document.querySelectorAll('.number')].map((card) => card.getBoundingClientRect().bottom));
+      const bottom = Math.max(...[...document.querySelectorAll('.number')]
+        .map((card) => card.getBoundingClientRect().bottom));
       for (const [element, text] of texts) element.textContent = text;
       return bottom;
     });
     check(lowest <= height, `all six in view at ${width}x${height}: down to ${lowest}`);
-    const crowded = await room.evaluate(() => [...document.querySelectorAll('.number')].filter((card) => {
+    const crowded =
+      await room.evaluate(() => [...document.querySelectorAll('.number')].filter((card) => {
       const text = document.createRange();
       text.selectNodeContents(card.querySelector('.value'));
       const arrow = card.querySelector('.arrow');
@@ -208,7 +233,8 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
     equal(crowded.join(), '', `no arrow lies on its number at ${width}x${height}`);
     for (const part of ['.room-map .legend', '.room-posture', '.room-age']) {
       const box = await room.locator(part).boundingBox();
-      check(box.y + box.height <= height, `${part} in view at ${width}x${height}: down to ${box.y + box.height}`);
+      check(box.y + box.height <= height,
+        `${part} in view at ${width}x${height}: down to ${box.y + box.height}`);
     }
   }
   await h.look(room, 'room-move', { axe: false, fullPage: false });
@@ -252,7 +278,8 @@ await h.step('while a sweep runs or is computed no older result looks valid', as
 await h.step('accepting outside tolerance takes a reason and the password', async () => {
   const last = (await state()).last_result.id;
   equal((await h.api(anna, `scans/${last}/accept`, 'POST')).status, 409, 'not in one tap');
-  equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'no such button');
+  equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0,
+    'no such button');
   await anna.getByText('Accept outside tolerance…').click();
   await anna.getByLabel('Reason', { exact: true }).fill('swelling, known to the physician');
   await anna.getByLabel('Your password').fill('not this one, no');
@@ -278,17 +305,21 @@ await h.step('in tolerance: one tap accepts, and nothing commands a move', async
   }
   await anna.getByRole('button', { name: 'Accept', exact: true }).click();
   await anna.getByText('Accepted by anna').waitFor();
-  // An old result: the note is read from 3 m; nothing is green or ticked, and nothing says what to do.
+  // An old result: the note is read from 3 m; nothing is green or ticked, and nothing says what to
+  // do.
   await room.locator('.room-result:not(.is-old) .verdict.in_tolerance').waitFor();
   h.tell('old');
   await room.locator('.room-result.is-old .verdict', { hasText: 'WAS IN TOLERANCE' }).waitFor();
-  for (const [part, name, expected] of [['.verdict', 'filter', 'grayscale(1)'], ['.room-answer', 'filter', 'grayscale(1)'],
-    ['.verdict .word', 'color', 'rgb(167, 182, 194)'], ['.verdict', 'borderTopStyle', 'dashed'], ['.verdict .icon', 'display', 'none'],
-    ['.number .word', 'display', 'none'], ['.number .judged', 'display', 'none'], ['.room-posture', 'display', 'none']]) {
+  for (const [part, name, expected] of [
+    ['.verdict', 'filter', 'grayscale(1)'], ['.room-answer', 'filter', 'grayscale(1)'],
+    ['.verdict .word', 'color', 'rgb(167, 182, 194)'], ['.verdict', 'borderTopStyle', 'dashed'],
+    ['.verdict .icon', 'display', 'none'], ['.number .word', 'display', 'none'],
+    ['.number .judged', 'display', 'none'], ['.room-posture', 'display', 'none']]) {
     equal(await styleOf(room, part, name), expected, `${name} of ${part}`);
   }
   check(await sizeOf(room, '.old-note') > 45, 'the note is large');
-  check(await sizeOf(room, '.old-note') < await sizeOf(room, '.verdict .word') * 1.5, 'and the verdict is not much larger');
+  check(await sizeOf(room, '.old-note') < await sizeOf(room, '.verdict .word') * 1.5,
+    'and the verdict is not much larger');
   await h.look(room, 'room-old', { axe: false, fullPage: false });
 });
 
@@ -298,13 +329,16 @@ await h.step('no answer: the room display shows three reasons, and no list to op
   await room.locator('.verdict.no_answer').waitFor();
   equal(await room.locator('.room-reasons li').count(), 2, 'below the first');
   equal(await room.locator('details').count(), 0, 'nobody can open them there');
-  for (const part of ['.room-reasons li', '.verdict .why']) check(await sizeOf(room, part) > 40, `${part} is read from 3 m`);
+  for (const part of ['.room-reasons li', '.verdict .why']) {
+    check(await sizeOf(room, part) > 40, `${part} is read from 3 m`);
+  }
   const age = await room.locator('.room-age').boundingBox();
   check(age.y + age.height <= 1080, 'all in view');
   await h.look(room, 'room-no-answer', { axe: false, fullPage: false });
 });
 
-await h.step('three words: within, not surely within, outside; no digits below the uncertainty', async () => {
+await h.step('three words: within, not surely within, outside; no digits below the uncertainty',
+  async () => {
   h.tell('unsure');
   await press();
   await anna.locator('.verdict.unsure').waitFor();
@@ -318,8 +352,10 @@ await h.step('three words: within, not surely within, outside; no digits below t
   equal(await pitch.locator('.value').innerText(), '0.0°', '0.01 ±0.14');
   check(/±0\.14°$/.test(await pitch.locator('.half').innerText()), 'a second digit after a 1');
   for (const page of [anna, room]) {
-    equal(await sizeOf(page, '.number:last-child .unit'), await sizeOf(page, '.number:last-child .value'), 'no small ° at the foot');
-    check(await sizeOf(page, '.number .unit') < 0.6 * await sizeOf(page, '.number .value'), 'mm is small');
+    equal(await sizeOf(page, '.number:last-child .unit'),
+      await sizeOf(page, '.number:last-child .value'), 'no small ° at the foot');
+    check(await sizeOf(page, '.number .unit') < 0.6 * await sizeOf(page, '.number .value'),
+      'mm is small');
   }
   const lowest = await anna.locator('.number').last().evaluate((element) => {
     window.scrollTo(0, 0);
@@ -331,13 +367,15 @@ await h.step('three words: within, not surely within, outside; no digits below t
   });
   check(lowest <= 800, `six numbers in view, down to ${lowest}`);
   await h.look(anna, 'result-unsure', { axe: false });
-  equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'not in one tap');
+  equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0,
+    'not in one tap');
   equal(await anna.getByText('Accept outside tolerance').count(), 0, 'no value is outside');
   await anna.getByText('Accept although not surely within tolerance…').click();
   await anna.getByLabel('Reason', { exact: true }).fill('breathing');
   await anna.getByLabel('Your password').fill(h.password);
   await anna.getByRole('button', { name: 'Accept although not surely within tolerance' }).click();
-  await anna.getByText(/^≈ Accepted although not surely within tolerance by anna, .*: breathing$/).waitFor();
+  await anna.getByText(/^≈ Accepted although not surely within tolerance by anna, .*: breathing$/)
+    .waitFor();
 });
 
 await h.step('the room display says in large letters that the room is not calibrated', async () => {
@@ -345,7 +383,8 @@ await h.step('the room display says in large letters that the room is not calibr
   await press();
   await room.locator('.room-answer section > .caution').waitFor();
   check(await sizeOf(room, '.room-answer section > .caution') > 36, 'read from 3 m');
-  const lowest = await room.locator('.number').last().evaluate((element) => element.getBoundingClientRect().bottom);
+  const lowest = await room.locator('.number')
+    .last().evaluate((element) => element.getBoundingClientRect().bottom);
   check(lowest <= 1080, `six numbers in view, down to ${lowest}`);
 });
 
@@ -371,21 +410,26 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   // The next thing to press is the scan, not another session.
   await anna.goto(`${h.url}#/patient/${patient}`);
   await anna.locator('a.primary', { hasText: 'Go to scan' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Start treatment session' }).count(), 0, 'what is open is not offered again');
+  equal(await anna.getByRole('button', { name: 'Start treatment session' }).count(), 0,
+    'what is open is not offered again');
   equal(await anna.getByText('Confirm: P-0042 is on the couch').isVisible(), false, 'nor asked');
-  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).count(), 1, 'another purpose is');
+  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).count(), 1,
+    'another purpose is');
   await anna.goto(`${h.url}#/scan`);
 });
 
 await h.step('a change from elsewhere is an alert to acknowledge', async () => {
-  // Where nothing is done with who is open, the screen stays usable beside it. A reload is no acknowledgement.
+  // Where nothing is done with who is open, the screen stays usable beside it. A reload is no
+  // acknowledgement.
   await anna.goto(`${h.url}#/status`);
   const second = await addPatient('P-0050');
-  await ok(bob, `patients/${second}/open`, 'POST', { purpose: 'reference', reason: '', replaces: (await state()).session.id });
+  await ok(bob, `patients/${second}/open`, 'POST',
+    { purpose: 'reference', reason: '', replaces: (await state()).session.id });
   // The screen in the room says it for some seconds; nothing moves where that is not wanted.
   const swapped = room.locator('.room-code.swapped', { hasText: 'Another patient: P-0050' });
   await swapped.waitFor();
-  equal(await swapped.evaluate((element) => getComputedStyle(element).animationName), 'none', 'no animation');
+  equal(await swapped.evaluate((element) => getComputedStyle(element).animationName), 'none',
+    'no animation');
   await h.look(room, 'room-swapped', { axe: false, fullPage: false });
   await h.setClockOn(room, 10);
   await swapped.waitFor({ state: 'detached' });
@@ -429,7 +473,8 @@ await h.step('codes are unique without regard to case, and a wristband opens', a
   await anna.keyboard.type('P-005');
   await anna.keyboard.press('Enter');
   await anna.locator('.caution', { hasText: 'No patient with this code: P-005.' }).waitFor();
-  await anna.getByRole('status').getByText('No patient with this code: P-005.').waitFor({ state: 'attached' });
+  await anna.getByRole('status')
+    .getByText('No patient with this code: P-005.').waitFor({ state: 'attached' });
   check(/#\/patients$/.test(anna.url()), 'a part of a code opens nobody');
   await anna.keyboard.type('P-77');  // in place of what was typed before
   await anna.locator('.hint', { hasText: 'No patient with this code: P-77.' }).waitFor();
@@ -452,7 +497,8 @@ await h.step('without a session the button makes an unassigned scan that says so
   await h.look(anna, 'result-unassigned');
 });
 
-await h.step('eight tabs of one browser and three browsers: every one live, one stream a browser', async () => {
+await h.step('eight tabs of one browser and three browsers: every one live, one stream a browser',
+  async () => {
   const { session } = await state();
   check(session === null, 'none is open');
   const context = clara.context();
@@ -505,19 +551,25 @@ await h.step('disconnected: states and buttons are off, and say how old they are
       }
     }));
     equal(await open.getAttribute('aria-disabled'), 'true', 'nor is a session opened');
-    equal(await clara.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'), 'true', 'nor one for a reference');
+    equal(await clara.getByRole('button', { name: 'Scan a new reference' })
+      .getAttribute('aria-disabled'), 'true', 'nor one for a reference');
     await bob.locator('.hero').getByText(/^Last known: Ready, \d+ s ago$/).waitFor();
-    equal(await bob.locator('.tile').first().evaluate((tile) => getComputedStyle(tile).borderTopStyle), 'dashed', 'no tile looks current');
+    equal(
+      await bob.locator('.tile').first().evaluate((tile) => getComputedStyle(tile).borderTopStyle),
+      'dashed', 'no tile looks current');
     await h.look(bob, 'status-disconnected');
     await anna.locator('main').getByText(/^Last known: Ready, \d+ s ago$/).waitFor();
-    equal(await anna.locator('main [role=status]', { hasText: 'Last known' }).innerText(), 'Last known: Ready', 'what is announced does not tick');
+    equal(await anna.locator('main [role=status]', { hasText: 'Last known' }).innerText(),
+      'Last known: Ready', 'what is announced does not tick');
     const start = anna.getByRole('button', { name: 'Start sweep' });
     equal(await start.getAttribute('aria-disabled'), 'true', 'the button is off');
     await h.look(anna, 'scan-disconnected', { axe: false });
   } finally {
     h.server.kill('SIGCONT');
   }
-  for (const page of [anna, bob, clara]) await page.locator('.disconnected').waitFor({ state: 'detached', ...kSlow });
+  for (const page of [anna, bob, clara]) {
+    await page.locator('.disconnected').waitFor({ state: 'detached', ...kSlow });
+  }
   equal(await open.getAttribute('aria-disabled'), null, 'a session can be opened again');
 });
 
@@ -531,7 +583,8 @@ await h.step('Spanish and light: complete, and kept for the account and for the 
   const elsewhere = await h.person('bob in another browser');
   await h.logIn(elsewhere, 'bob');
   await elsewhere.getByRole('link', { name: 'Estado', exact: true }).waitFor();
-  equal(await elsewhere.evaluate(() => document.documentElement.dataset.theme), 'light', 'his theme in another browser');
+  equal(await elsewhere.evaluate(() => document.documentElement.dataset.theme), 'light',
+    'his theme in another browser');
   await elsewhere.context().close();
   await bob.goto(`${h.url}#/result`);
   await bob.locator('.verdict').waitFor();
@@ -567,7 +620,8 @@ await h.step('Spanish and light: complete, and kept for the account and for the 
   await engineer.goto(`${h.url}#/users`);
   await engineer.getByLabel('Language').selectOption('es');
   await engineer.goto(`${h.url}#/settings`);
-  await engineer.locator('.last-backup').getByText('La última copia de seguridad falló: no hay carpeta de copias configurada').waitFor();
+  await engineer.locator('.last-backup').getByText(
+    'La última copia de seguridad falló: no hay carpeta de copias configurada').waitFor();
   await engineer.goto(`${h.url}#/users`);
   await engineer.getByLabel('Idioma').selectOption('en');
 });

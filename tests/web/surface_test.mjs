@@ -1,6 +1,8 @@
-// The parts of the 3-D view that need no browser: reading packed surfaces, whole and damaged, and the motion that a correction is shown as:
-// surface_test.mjs NODE_MODULES SOURCE_FOLDER
-import { copyFileSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
+// The parts of the 3-D view that need no browser: reading packed surfaces, whole and damaged, and
+// the motion that a correction is shown as: surface_test.mjs NODE_MODULES SOURCE_FOLDER
+import {
+  copyFileSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync,
+} from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -35,7 +37,8 @@ function packed(content, { vertices, triangles, magic = 'PLM2' }) {
   const bytes = Buffer.concat([head, deflateSync(Buffer.from(content))]);
   return bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
 }
-const kSteps = [[0, 0, 65535], [300, 2, 0], [7, 65535, 9], [0, 1, 12]];  // x, y and z of each vertex
+// X, y and z of each vertex.
+const kSteps = [[0, 0, 65535], [300, 2, 0], [7, 65535, 9], [0, 1, 12]];
 const kTriangles = [[0, 1, 2], [3, 0, 2]];
 const bytesOfVertices = () => [0, 1, 2].flatMap((axis) => kSteps.flatMap((steps, i) => {
   const difference = (steps[axis] - (i ? kSteps[i - 1][axis] : 0)) & 0xffff;
@@ -55,12 +58,14 @@ const whole = packed(kWhole, kSize);
 const { positions, corners } = await readMesh(whole);
 check([...corners].join() === kTriangles.flat().join(), `the corners: ${corners}`);
 kSteps.flat().forEach((steps, i) => {
-  check(Math.abs(positions[i] - kLeast[i % 3] - steps * kStep) < 1e-5, `coordinate ${i}: ${positions[i]}`);
+  check(Math.abs(positions[i] - kLeast[i % 3] - steps * kStep) < 1e-5,
+    `coordinate ${i}: ${positions[i]}`);
 });
 const empty = await readMesh(packed([], { vertices: 0, triangles: 0 }));
 check(empty.positions.length === 0 && empty.corners.length === 0, 'an empty surface');
 
-const withCorners = (bytes, triangles = 2) => packed([...bytesOfVertices(), ...bytes], { vertices: 4, triangles });
+const withCorners = (bytes, triangles = 2) =>
+  packed([...bytesOfVertices(), ...bytes], { vertices: 4, triangles });
 const kMost = 2 ** 25;
 for (const [what, bytes, expected] of [
   ['nothing', new ArrayBuffer(0), 'no surface'],
@@ -68,14 +73,17 @@ for (const [what, bytes, expected] of [
   ['something else', packed(kWhole, { ...kSize, magic: 'PLM1' }), 'no surface'],
   ['too many vertices', packed(kWhole, { vertices: kMost + 1, triangles: 2 }), 'no surface'],
   ['too many triangles', packed(kWhole, { vertices: 4, triangles: kMost + 1 }), 'no surface'],
-  ['as many as there may be, which are not there', packed(kWhole, { vertices: kMost, triangles: kMost }), 'ends early'],
+  ['as many as there may be, which are not there',
+    packed(kWhole, { vertices: kMost, triangles: kMost }), 'ends early'],
   ['a head alone', whole.slice(0, 28), ''],
   ['half a stream', whole.slice(0, 28 + Math.floor((whole.byteLength - 28) / 2)), ''],
   ['vertices that end early', packed(kWhole.slice(0, 20), kSize), 'ends early'],
   ['corners that end early', packed(kWhole.slice(0, -1), kSize), 'ends early'],
-  ['a last corner that ends early', withCorners([...bytesOfCorners([0, 1, 2, 3, 0]), 0x80]), 'a triangle'],
+  ['a last corner that ends early', withCorners([...bytesOfCorners([0, 1, 2, 3, 0]), 0x80]),
+    'a triangle'],
   ['a corner past the last vertex', withCorners(bytesOfCorners([0, 1, 2, 3, 0, 4])), 'a triangle'],
-  ['a corner before the first vertex', withCorners(bytesOfCorners([0, 1, 2, 3, -1, 2])), 'a triangle'],
+  ['a corner before the first vertex', withCorners(bytesOfCorners([0, 1, 2, 3, -1, 2])),
+    'a triangle'],
   ['a corner that is far off', withCorners(bytesOfCorners([0, 1, 2, 3, 2 ** 40, 2])), 'a triangle'],
   ['a number without end', withCorners(Array(5000).fill(0x80)), 'a triangle'],
   ['a number of ever more bits', withCorners(Array(5000).fill(0xff)), 'a triangle'],
@@ -84,9 +92,12 @@ for (const [what, bytes, expected] of [
   check(refusal instanceof Error && refusal.message.includes(expected), `${what}: ${refusal}`);
 }
 // What the appliance packs, a browser reads.
-const bound = (file, pattern) => Number(pattern.exec(readFileSync(join(source, file), 'utf8'))?.[1]);
-check(bound('web/assets/packed_mesh.js', /kMost = 2 \*\* (\d+);/) === 25, 'the most parts that are read');
-check(bound('daemon/files/compact_map.cpp', /kMostParts = std::size_t\{1\} << (\d+);/) === 25, 'the most parts that are packed');
+const bound = (file, pattern) =>
+  Number(pattern.exec(readFileSync(join(source, file), 'utf8'))?.[1]);
+check(bound('web/assets/packed_mesh.js', /kMost = 2 \*\* (\d+);/) === 25,
+  'the most parts that are read');
+check(bound('daemon/files/compact_map.cpp', /kMostParts = std::size_t\{1\} << (\d+);/) === 25,
+  'the most parts that are packed');
 
 // --- The correction, on matrices of plain numbers: rows of a rotation about an axis, and a shift.
 function rigid(axis, degrees, shift) {
@@ -100,7 +111,8 @@ function rigid(axis, degrees, shift) {
     [z * x * d - y * s, z * y * d + x * s, c + z * z * d, shift[2]],
     [0, 0, 0, 1]];
 }
-const moved = (M, p) => [0, 1, 2].map((row) => M[row][0] * p[0] + M[row][1] * p[1] + M[row][2] * p[2] + M[row][3]);
+const moved = (M, p) =>
+  [0, 1, 2].map((row) => M[row][0] * p[0] + M[row][1] * p[1] + M[row][2] * p[2] + M[row][3]);
 const movedBack = (M, p) => {
   const q = p.map((value, i) => value - M[i][3]);
   return [0, 1, 2].map((row) => M[0][row] * q[0] + M[1][row] * q[1] + M[2][row] * q[2]);
@@ -113,9 +125,11 @@ const M = rigid([2, 1, -1], 12, [0.03, -0.05, 0.02]);  // of the body, in the ma
 const kPoints = [[0, 0, 0], [0.3, -0.2, 0.1], [-0.4, 0.5, 0.25]];
 const correction = correctionOf(T, M);
 for (const p of kPoints) {
-  check(apart(moved(T, by(correction, p)), movedBack(M, moved(T, p))) < 1e-9, `the correction of ${p}: in the map's frame, the motion undone`);
+  check(apart(moved(T, by(correction, p)), movedBack(M, moved(T, p))) < 1e-9,
+    `the correction of ${p}: in the map's frame, the motion undone`);
   const swapped = moved(T, movedBack(M, movedBack(T, p)));
-  check(apart(by(correction, p), swapped) > 0.01, `${p}: this T and M tell the order of the product`);
+  check(apart(by(correction, p), swapped) > 0.01,
+    `${p}: this T and M tell the order of the product`);
   check(apart(by(correctionOf(null, M), p), movedBack(M, p)) < 1e-9, `${p}: one frame`);
 }
 
@@ -124,13 +138,15 @@ const motionAt = (fraction) => fractionOf(correction, fraction, new Vector3(...c
 const turnOf = ({ elements: e }) => Math.acos((e[0] + e[5] + e[10] - 1) / 2) * 180 / Math.PI;
 for (const p of kPoints) {
   check(apart(by(motionAt(0), p), p) < 1e-9, `${p}: nothing has moved at first`);
-  check(apart(by(motionAt(1), p), by(correction, p)) < 1e-9, `${p}: all of the correction at the end`);
+  check(apart(by(motionAt(1), p), by(correction, p)) < 1e-9,
+    `${p}: all of the correction at the end`);
 }
 for (const fraction of [0.25, 0.5, 0.8]) {
   check(Math.abs(turnOf(motionAt(fraction)) - 12 * fraction) < 1e-6, `${fraction} of the turn`);
   const end = by(correction, centre);
   const expected = centre.map((value, i) => value + fraction * (end[i] - value));
-  check(apart(by(motionAt(fraction), centre), expected) < 1e-9, `${fraction} of the way of the centre`);
+  check(apart(by(motionAt(fraction), centre), expected) < 1e-9,
+    `${fraction} of the way of the centre`);
 }
 
 for (const failure of failures) console.log(`  - ${failure}`);

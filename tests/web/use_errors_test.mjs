@@ -1,5 +1,7 @@
-// What a person could get wrong at the screen, each as a test: use_errors_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
-// The truths are written here by hand, from what a motion of the body means to who stands beside it; none comes from the program.
+// What a person could get wrong at the screen, each as a test: use_errors_test.mjs NODE_MODULES
+// SERVER OUT_FOLDER CHROMIUM
+// The truths are written here by hand, from what a motion of the body means to who stands beside
+// it; none comes from the program.
 import { Harness } from './harness.mjs';
 
 const [modules, server, folder, chromium] = process.argv.slice(2);
@@ -10,15 +12,18 @@ const engineer = await h.person('engineer');
 const anna = await h.person('anna');
 const bob = await h.person('bob');
 const clara = await h.person('clara');
-const kPeople = [[anna, 'anna', 'technician'], [bob, 'bob', 'physicist'], [clara, 'clara', 'physicist']];
+const kPeople = [[anna, 'anna', 'technician'], [bob, 'bob', 'physicist'],
+  [clara, 'clara', 'physicist']];
 
 async function addPatient(code) {
   await h.addPatient(anna, code);
   await anna.getByRole('heading', { name: code }).waitFor();
 }
 
-// Which side is the patient's is decided once, with the words; no picture may claim more than they do.
-const marksIn = async (page, where) => [...new Set(await page.locator(`${where} [data-mark]`).evaluateAll((marks) => marks.map((mark) => mark.dataset.mark)))].sort();
+// Which side is the patient's is decided once, with the words; no picture may claim more than they
+// do.
+const marksIn = async (page, where) => [...new Set(await page.locator(`${where} [data-mark]`)
+  .evaluateAll((marks) => marks.map((mark) => mark.dataset.mark)))].sort();
 
 /// A sweep from the scan screen to its result.
 async function scan() {
@@ -55,41 +60,54 @@ await h.step('accounts of three roles, a patient, an approved reference', async 
   await anna.getByRole('button', { name: 'Start treatment session' }).click();
 });
 
-// What the body did -> the words that put it back. Head first, supine: the head is at the gantry, the patient's left is on the right of
-// who faces the gantry. `toward` is where the arrow's tip lies from its tail on the screen (x right, y down); a turn seen from above
-// goes the way of the clock or against it.
+// What the body did -> the words that put it back. Head first, supine: the head is at the gantry,
+// the patient's left is on the right of who faces the gantry. `toward` is where the arrow's tip
+// lies from its tail on the screen (x right, y down); a turn seen from above goes the way of the
+// clock or against it.
 const kSigns = [
   ['z', 8, 'HFS', 'Vertical', '−8.0', 'down', { y: 1 }, 'the body lies 8 mm too high'],
   ['z', -8, 'HFS', 'Vertical', '+8.0', 'up', { y: -1 }, 'too low'],
-  ['y', 8, 'HFS', 'Longitudinal', '−8.0', 'away from gantry', { y: 1 }, 'too near the gantry, which is drawn on top'],
+  ['y', 8, 'HFS', 'Longitudinal', '−8.0', 'away from gantry', { y: 1 },
+    'too near the gantry, which is drawn on top'],
   ['y', -8, 'HFS', 'Longitudinal', '+8.0', 'toward gantry', { y: -1 }, 'too far from the gantry'],
   ['x', 8, 'HFS', 'Lateral', '−8.0', 'to patient right', { x: -1 }, 'too far to its own left'],
   ['x', -8, 'HFS', 'Lateral', '+8.0', 'to patient left', { x: 1 }, 'too far to its own right'],
   ['pitch', 2, 'HFS', 'Pitch', '−2.0', 'head down', { y: 1 }, 'the head end is lifted'],
   ['pitch', -2, 'HFS', 'Pitch', '+2.0', 'head up', { y: -1 }, 'the head end hangs'],
-  ['roll', 2, 'HFS', 'Roll', '−2.0', 'patient right side down', { y: 1, end: 'left' }, 'its left side hangs'],
-  ['roll', -2, 'HFS', 'Roll', '+2.0', 'patient left side down', { y: 1, end: 'right' }, 'its right side hangs'],
-  ['yaw', 2, 'HFS', 'Yaw', '−2.0', 'head to patient left', { clockwise: true }, 'turned against the clock: the head went to its right'],
-  ['yaw', -2, 'HFS', 'Yaw', '+2.0', 'head to patient right', { clockwise: false }, 'turned with the clock: the head went to its left'],
+  ['roll', 2, 'HFS', 'Roll', '−2.0', 'patient right side down', { y: 1, end: 'left' },
+    'its left side hangs'],
+  ['roll', -2, 'HFS', 'Roll', '+2.0', 'patient left side down', { y: 1, end: 'right' },
+    'its right side hangs'],
+  ['yaw', 2, 'HFS', 'Yaw', '−2.0', 'head to patient left', { clockwise: true },
+    'turned against the clock: the head went to its right'],
+  ['yaw', -2, 'HFS', 'Yaw', '+2.0', 'head to patient right', { clockwise: false },
+    'turned with the clock: the head went to its left'],
   // The other postures turn the words over, never the sign or the arrow, which are the room's.
   ['x', 8, 'HFP', 'Lateral', '−8.0', 'to patient left', { x: -1 }, 'prone'],
   ['x', 8, 'FFS', 'Lateral', '−8.0', 'to patient left', { x: -1 }, 'feet first'],
   ['x', 8, 'FFP', 'Lateral', '−8.0', 'to patient right', { x: -1 }, 'feet first, prone'],
-  ['pitch', 2, 'FFS', 'Pitch', '−2.0', 'head up', { y: 1 }, 'feet first: what hangs now is the head'],
+  ['pitch', 2, 'FFS', 'Pitch', '−2.0', 'head up', { y: 1 },
+    'feet first: what hangs now is the head'],
   ['roll', 2, 'HFP', 'Roll', '−2.0', 'patient left side down', { y: 1, end: 'left' }, 'prone'],
-  ['yaw', 2, 'FFS', 'Yaw', '−2.0', 'head to patient left', { clockwise: true }, 'feet first: the feet went left of who faces the gantry, the head right'],
+  ['yaw', 2, 'FFS', 'Yaw', '−2.0', 'head to patient left', { clockwise: true },
+    'feet first: the feet went left of who faces the gantry, the head right'],
 ];
 
 /// Tail and tip of the card's arrow on the screen, and the middle of its drawing.
 const arrowOf = (card) => card.locator('svg.arrow').evaluate((drawing) => {
   const stroke = drawing.querySelector('path.stroke');
   const matrix = stroke.getScreenCTM();
-  const [first] = stroke.getAttribute('d').split(/(?<=.)M/);  // the shaft comes first, the head after it
+  // The shaft comes first, the head after it.
+  const [first] = stroke.getAttribute('d').split(/(?<=.)M/);
   const shaft = document.createElementNS('http://www.w3.org/2000/svg', 'path');
   shaft.setAttribute('d', first);
-  const at = (share) => { const point = shaft.getPointAtLength(share * shaft.getTotalLength()).matrixTransform(matrix); return { x: point.x, y: point.y }; };
+  const at = (share) => {
+    const point = shaft.getPointAtLength(share * shaft.getTotalLength()).matrixTransform(matrix);
+    return { x: point.x, y: point.y };
+  };
   const box = drawing.getBoundingClientRect();
-  return { tail: at(0), before: at(0.9), tip: at(1), middle: { x: box.x + box.width / 2, y: box.y + box.height / 2 } };
+  return { tail: at(0), before: at(0.9), tip: at(1),
+    middle: { x: box.x + box.width / 2, y: box.y + box.height / 2 } };
 });
 
 h.tell('swift');
@@ -99,27 +117,39 @@ for (const [axis, amount, posture, name, value, words, toward, why] of kSigns) {
     await scan();
     const card = anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
     await card.waitFor();
-    check((await card.locator('.value').innerText()).startsWith(value), `${name} reads ${value}, found ${await card.locator('.value').innerText()}`);
+    check((await card.locator('.value').innerText()).startsWith(value),
+      `${name} reads ${value}, found ${await card.locator('.value').innerText()}`);
     equal(await card.locator('.word').innerText(), words, 'the words');
     const { tail, before, tip, middle } = await arrowOf(card);
-    if (toward.x) check(Math.sign(tip.x - tail.x) === toward.x && Math.abs(tip.x - tail.x) > 5, 'the arrow points to its side');
-    if (toward.y) check(Math.sign(tip.y - tail.y) === toward.y && Math.abs(tip.y - tail.y) > 5, 'the arrow points up or down as it should');
-    if (toward.end) equal(tip.x < middle.x ? 'left' : 'right', toward.end, 'the end that the arrow is at');
+    if (toward.x) {
+      check(Math.sign(tip.x - tail.x) === toward.x && Math.abs(tip.x - tail.x) > 5,
+        'the arrow points to its side');
+    }
+    if (toward.y) {
+      check(Math.sign(tip.y - tail.y) === toward.y && Math.abs(tip.y - tail.y) > 5,
+        'the arrow points up or down as it should');
+    }
+    if (toward.end) {
+      equal(tip.x < middle.x ? 'left' : 'right', toward.end, 'the end that the arrow is at');
+    }
     if (toward.clockwise !== undefined) {
       // On a screen (y down) a positive cross product of radius and motion turns with the clock.
-      const cross = (before.x - middle.x) * (tip.y - before.y) - (before.y - middle.y) * (tip.x - before.x);
+      const cross = (before.x - middle.x) * (tip.y - before.y)
+        - (before.y - middle.y) * (tip.x - before.x);
       equal(cross > 0, toward.clockwise, 'the arrow turns with the clock');
     }
     // All others stay: neither a sign nor a direction that somebody could apply.
     for (const other of await anna.locator('.number').all()) {
       if (await other.getByRole('heading').innerText() === name) continue;
-      check(/^0\.0/.test(await other.locator('.value').innerText()), `only ${name} moves: ${await other.innerText()}`);
+      check(/^0\.0/.test(await other.locator('.value').innerText()),
+        `only ${name} moves: ${await other.innerText()}`);
       equal(await other.locator('.word').innerText(), 'no change', 'no direction');
     }
   });
 }
 
-await h.step('couch readings: the sum is done, only for a move, only where the room is known', async () => {
+await h.step('couch readings: the sum is done, only for a move, only where the room is known',
+  async () => {
   h.tell('moved y -8 HFS');  // put right by +8 mm toward the gantry, which counts up
   await scan();
   await anna.getByText('Couch readings: what to set').click();
@@ -139,20 +169,28 @@ await h.step('couch readings: the sum is done, only for a move, only where the r
   h.tell('room known');
 });
 
-await h.step('where the room was never said: the words are the patient’s, no arrow, mark or reading is the couch’s', async () => {
+await h.step('where the room was never said: the words are the patient’s, no arrow, mark or '
+  + 'reading is the couch’s', async () => {
   h.tell('room unknown');
   await anna.goto(`${h.url}#/status`);
   await anna.reload();
   h.tell('moved y -8 HFS bare');  // to the feet: along the marker's x axis, where the head lies
   await scan();
-  const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
-  // The head lies along the marker's x axis: that card is named head/feet, like its direction, and no card is named after a couch axis.
+  const card = (name) =>
+    anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
+  // The head lies along the marker's x axis: that card is named head/feet, like its direction, and
+  // no card is named after a couch axis.
   await card('Patient head/feet').waitFor();
-  equal(await card('Patient head/feet').locator('.value').innerText(), '+8.0 mm', 'along the marker’s axis');
-  equal(await card('Patient head/feet').locator('.word').innerText(), 'toward the head', 'the words');
+  equal(await card('Patient head/feet').locator('.value').innerText(), '+8.0 mm',
+    'along the marker’s axis');
+  equal(await card('Patient head/feet').locator('.word').innerText(), 'toward the head',
+    'the words');
   equal(await card('Patient head/feet').locator('.arrow').count(), 0, 'no arrow of the couch');
-  equal((await anna.locator('.number h3').allInnerTexts()).join(), 'Vertical,Patient left/right,Patient head/feet,Tilt left/right,Tilt head/feet,Yaw', 'the cards');
-  await anna.getByText('The room has not been calibrated: directions are those of the patient or of the reference marker, never of the couch.').waitFor();
+  equal((await anna.locator('.number h3').allInnerTexts()).join(),
+    'Vertical,Patient left/right,Patient head/feet,Tilt left/right,Tilt head/feet,Yaw',
+    'the cards');
+  await anna.getByText('The room has not been calibrated: directions are those of the patient or '
+    + 'of the reference marker, never of the couch.').waitFor();
   equal(await anna.locator('.couch').count(), 0, 'no couch readings');
   await anna.locator('.map-row .map-box .ways').waitFor();
   equal((await marksIn(anna, '.map-row .map-box .ways')).join(), 'feet,head,left,right', 'the map');
@@ -165,12 +203,14 @@ await h.step('where the room was never said: the words are the patient’s, no a
   h.tell('room known');
   h.tell('moved y -8 HFS');  // set, as it was: the room's words and arrows
   await scan();
-  equal(await card('Longitudinal').locator('.word').innerText(), 'toward gantry', 'in a known room');
+  equal(await card('Longitudinal').locator('.word').innerText(), 'toward gantry',
+    'in a known room');
   equal(await card('Longitudinal').locator('.arrow').count(), 1, 'with its arrow');
   equal(await anna.getByText('The room has not been calibrated').count(), 0, 'nothing to warn of');
 });
 
-await h.step('a result that can no longer be acted on says what was found, and commands nothing', async () => {
+await h.step('a result that can no longer be acted on says what was found, and commands nothing',
+  async () => {
   h.tell('moved y -8 HFS');
   const shown = await scan();
   await anna.getByRole('heading', { name: /^Correction to apply/ }).waitFor();
@@ -190,9 +230,12 @@ await h.step('a result that can no longer be acted on says what was found, and c
     await anna.getByRole('heading', { name: /^Correction found then/ }).waitFor();
     equal(await anna.locator('.number .arrow').count(), 0, 'no arrow');
     equal(await anna.locator('.couch').count(), 0, 'nothing to set');
-    equal(await anna.locator('.verdict .word').innerText(), '↔WAS OUTSIDE TOLERANCE', 'the verdict');
-    check(!/Correction to apply|Apply the correction/.test(await anna.locator('main').innerText()), 'nothing to apply');
-    await anna.getByRole('heading', { name: 'Posture difference at this scan', exact: true }).waitFor();
+    equal(await anna.locator('.verdict .word').innerText(), '↔WAS OUTSIDE TOLERANCE',
+      'the verdict');
+    check(!/Correction to apply|Apply the correction/.test(await anna.locator('main').innerText()),
+      'nothing to apply');
+    await anna.getByRole('heading', { name: 'Posture difference at this scan', exact: true })
+      .waitFor();
     equal(await anna.getByText('Correct the posture first').count(), 0, 'no order');
   }
   await h.look(anna, 'result-review', { axe: false });
@@ -208,9 +251,12 @@ await h.step('a lifted shoulder is said in words, on the page and in print', asy
   await posture.waitFor();
   await h.look(anna, 'result-posture', { axe: false });
   const said = await posture.locator('li').allInnerTexts();
-  check(said.some((words) => /^left side at the head end \d+ mm high$/.test(words)), `the left shoulder: ${said.join('; ')}`);
-  check(!said.some((words) => /^right side at the head end \d+ mm high$/.test(words)), `not the right one: ${said.join('; ')}`);
-  equal(await anna.locator('.verdict .flags li').first().innerText(), `Posture differs: ${said[0]}.`, 'beside the verdict');
+  check(said.some((words) => /^left side at the head end \d+ mm high$/.test(words)),
+    `the left shoulder: ${said.join('; ')}`);
+  check(!said.some((words) => /^right side at the head end \d+ mm high$/.test(words)),
+    `not the right one: ${said.join('; ')}`);
+  equal(await anna.locator('.verdict .flags li').first().innerText(),
+    `Posture differs: ${said[0]}.`, 'beside the verdict');
   await anna.getByText('Correct the posture first').waitFor();
   const { body } = await h.api(anna, `results/${shown.id}`);
   equal(body.body.named_by, 'posture', 'what names the parts');
@@ -240,12 +286,15 @@ await h.step('as planned: the pictures name the sides of the patient', async () 
   equal(found[kPictures[0]].join(), 'feet,gantry,head,left,right', 'the map');
   equal(found[kPictures[2]].join(), 'feet,gantry,head,left,right', 'the overlay');
   equal(found[kPictures[1]].length, 2, 'both ends of the profile');
-  check(found[kPictures[1]].every((name) => kPatients.includes(name)), `the profile: ${found[kPictures[1]]}`);
+  check(found[kPictures[1]].every((name) => kPatients.includes(name)),
+    `the profile: ${found[kPictures[1]]}`);
   check(views.includes('Left') && views.includes('Feet'), `3-D views: ${views}`);
   equal(await anna.locator('.marks-note').count(), 0, 'nothing to warn of');
 });
 
-await h.step('compared before the room was known: its pictures have no gantry, whatever is known now', async () => {
+await h.step(
+  'compared before the room was known: its pictures have no gantry, whatever is known now',
+  async () => {
   h.tell('moved z 8 HFS bare');
   const { id } = await scan();
   equal((await h.api(anna, `results/${id}`)).body.body.room_known, false, 'as it was compared');
@@ -254,9 +303,12 @@ await h.step('compared before the room was known: its pictures have no gantry, w
   equal(found[kPictures[2]].join(), 'feet,head,left,right', 'the overlay');
 });
 
-await h.step('the slider of the 3-D view moves the surface as the correction will, beside the reference', async () => {
-  // Where the region lies in the picture from the left, in pixels from the top: all around it is dimmed. Without the cube in the corner and
-  // the yellow names of the sides, which stay where they are.
+await h.step(
+  'the slider of the 3-D view moves the surface as the correction will, beside the reference',
+  async () => {
+  // Where the region lies in the picture from the left, in pixels from the top: all around it is
+  // dimmed. Without the cube in the corner and the yellow names of the sides, which stay where they
+  // are.
   const middle = () => anna.locator('canvas.mesh').evaluate(async (canvas) => {
     const { data, width, height } = await window.pixelsOf(canvas);
     let [sum, count] = [0, 0];
@@ -295,16 +347,20 @@ await h.step('the slider of the 3-D view moves the surface as the correction wil
   check(Math.abs(quarter / half - 0.5) < 0.2, `a quarter of it by ${quarter.toFixed(1)} px`);
 });
 
-await h.step('not as planned: no picture names a side of the patient, in a known room and in an unknown one', async () => {
+await h.step(
+  'not as planned: no picture names a side of the patient, in a known room and in an unknown one',
+  async () => {
   const sides = (list) => list.filter((name) => kPatients.includes(name.toLowerCase()));
   h.tell('across');
   const { id } = await scan();
-  equal((await h.api(anna, `results/${id}`)).body.body.named_by, 'room', 'the words are the room’s');
+  equal((await h.api(anna, `results/${id}`)).body.body.named_by, 'room',
+    'the words are the room’s');
   const { found, views } = await marksOfResult('marks-room');
   equal(found[kPictures[0]].join(), 'gantry,roomMinusX,roomPlusX', 'the map');
   equal(found[kPictures[2]].join(), 'gantry,roomMinusX,roomPlusX', 'the overlay');
   // The ticks are the marker's x and y, so the marks of the room's axes say whose they are.
-  equal(await anna.locator('.map-row .way[data-mark=roomPlusX]').textContent(), 'ROOM +X', 'whose axis');
+  equal(await anna.locator('.map-row .way[data-mark=roomPlusX]').textContent(), 'ROOM +X',
+    'whose axis');
   for (const where of kPictures) equal(sides(found[where]).join(), '', where);
   equal(sides(views).join(), '', '3-D views');
   await anna.getByText('axes of the room (IEC 61217), not the patient’s sides').first().waitFor();
@@ -317,34 +373,42 @@ await h.step('not as planned: no picture names a side of the patient, in a known
   for (const where of kPictures) equal(sides(unknown.found[where]).join(), '', where);
   equal(sides(unknown.views).join(), '', '3-D views');
   await anna.getByText('axes of the reference marker, not the patient’s sides').first().waitFor();
-  check(!/gantry/i.test((await anna.locator('.map-row .ways').allInnerTexts()).join()), 'no gantry');
+  check(!/gantry/i.test((await anna.locator('.map-row .ways').allInnerTexts()).join()),
+    'no gantry');
   h.tell('room known');
 });
 
-await h.step('unknown, without an answer: no picture of the result names a side of the patient', async () => {
+await h.step('unknown, without an answer: no picture of the result names a side of the patient',
+  async () => {
   h.tell('stranger');
   await scan();
   const { found, views } = await marksOfResult('marks-no-answer');
   equal(found[kPictures[0]].join(), 'gantry,roomMinusX,roomPlusX', 'the map');
   equal(await anna.getByLabel('After the correction').count(), 0, 'no map of a correction either');
   check(!views.some((name) => kPatients.includes(name.toLowerCase())), `3-D views: ${views}`);
-  equal(await anna.getByLabel('Share of the correction that is shown').count(), 0, 'no answer, no correction to show');
+  equal(await anna.getByLabel('Share of the correction that is shown').count(), 0,
+    'no answer, no correction to show');
 });
 
-await h.step('the map of a plan names the sides that its posture has in a known room, and says so', async () => {
+await h.step('the map of a plan names the sides that its posture has in a known room, and says so',
+  async () => {
   const { body } = await h.api(bob, 'scans?limit=1');
   await bob.goto(`${h.url}#/plan/${body.scans[0].reference_id}`);
   const way = (name) => bob.locator(`.plan-grid [data-mark=${name}]`);
   await way('head').waitFor();
   equal((await marksIn(bob, '.plan-grid')).join(), 'feet,gantry,head,left,right', 'the plan');
   await bob.locator('.plan-grid').getByText('check that the patient is lying that way').waitFor();
-  // On this map the gantry is on the right, so that what is to the right of who faces it is at the bottom.
+  // On this map the gantry is on the right, so that what is to the right of who faces it is at the
+  // bottom.
   const posture = bob.locator('.plan-grid').getByLabel('Posture');
   equal(await posture.inputValue(), 'HFS', 'as approved');
-  for (const [name, head, left] of [['HFP', 'right', 'top'], ['FFS', 'left', 'top'], ['FFP', 'left', 'bottom'], ['HFS', 'right', 'bottom']]) {
+  for (const [name, head, left] of [['HFP', 'right', 'top'], ['FFS', 'left', 'top'],
+    ['FFP', 'left', 'bottom'], ['HFS', 'right', 'bottom']]) {
     await posture.selectOption(name);
     const at = {};
-    for (const mark of ['head', 'feet', 'left', 'right', 'gantry']) at[mark] = await way(mark).boundingBox();
+    for (const mark of ['head', 'feet', 'left', 'right', 'gantry']) {
+      at[mark] = await way(mark).boundingBox();
+    }
     check(at.gantry.x > Math.max(at.left.x, at.right.x), `${name}: the gantry is on the right`);
     equal(at.head.x > at.feet.x ? 'right' : 'left', head, `${name}: the head`);
     equal(at.left.y > at.right.y ? 'bottom' : 'top', left, `${name}: the left side`);
@@ -355,23 +419,30 @@ await h.step('the map of a plan names the sides that its posture has in a known 
   await bob.reload();
   await way('head').waitFor();
   const turned = {};
-  for (const mark of ['head', 'feet', 'left', 'right', 'gantry']) turned[mark] = await way(mark).boundingBox();
-  check(turned.gantry.y < turned.head.y && turned.head.y < turned.feet.y, 'the gantry and the head are at the top of the map');
+  for (const mark of ['head', 'feet', 'left', 'right', 'gantry']) {
+    turned[mark] = await way(mark).boundingBox();
+  }
+  check(turned.gantry.y < turned.head.y && turned.head.y < turned.feet.y,
+    'the gantry and the head are at the top of the map');
   check(turned.left.x > turned.right.x, 'the left side is on the right of the map');
   h.tell('room unknown');
   await bob.reload();  // or the status might be an older one
   await way('plusY').waitFor();
-  equal((await marksIn(bob, '.plan-grid')).join(), 'minusX,minusY,plusX,plusY', 'nobody knows the room');
+  equal((await marksIn(bob, '.plan-grid')).join(), 'minusX,minusY,plusX,plusY',
+    'nobody knows the room');
   h.tell('room known');
 });
 
-await h.step('during a sweep for a fraction the growing map names the sides of the planned posture', async () => {
+await h.step('during a sweep for a fraction the growing map names the sides of the planned posture',
+  async () => {
   h.tell('slow');
   await anna.goto(`${h.url}#/scan`);
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).click();
   await anna.locator('.live-surface [data-mark=head]').waitFor();
-  equal((await marksIn(anna, '.live-surface')).join(), 'feet,gantry,head,left,right', 'the map that grows');
-  await anna.locator('.live-surface').getByText('check that the patient is lying that way').waitFor();
+  equal((await marksIn(anna, '.live-surface')).join(), 'feet,gantry,head,left,right',
+    'the map that grows');
+  await anna.locator('.live-surface')
+    .getByText('check that the patient is lying that way').waitFor();
   await h.look(anna, 'marks-live', { axe: false });
   h.tell('fast');
   await anna.waitForURL(/#\/result/, { timeout: 60000 });
@@ -382,7 +453,8 @@ await h.step('a wrong reference is NO ANSWER with its reason, and nothing to app
   const shown = await scan();
   await anna.locator('.verdict.no_answer').waitFor();
   check((await anna.locator('.verdict').innerText()).includes('NO ANSWER'), 'the verdict');
-  check(/does not look like this reference/.test(await anna.locator('.verdict .why').innerText()), await anna.locator('.verdict .why').innerText());
+  check(/does not look like this reference/.test(await anna.locator('.verdict .why').innerText()),
+    await anna.locator('.verdict .why').innerText());
   equal(await anna.locator('.number').count(), 0, 'no numbers');
   equal(await anna.locator('.correction').count(), 0, 'no correction');
   equal(await anna.locator('.body-words').count(), 0, 'no posture');
@@ -400,7 +472,8 @@ await h.step('a marker that was moved is named, and not used', async () => {
   await anna.locator('.number').first().waitFor();
   const ignored = anna.locator('.trust > div', { hasText: 'Markers ignored' });
   equal(await ignored.locator('dd').innerText(), 'marker 3 moved 12 mm', 'which, and how far');
-  await anna.locator('.trust', { hasText: 'Marker 3 moved 12 mm since the reference; ignored.' }).waitFor();
+  await anna.locator('.trust', { hasText: 'Marker 3 moved 12 mm since the reference; ignored.' })
+    .waitFor();
   await h.look(anna, 'result-marker-moved', { axe: false });
   h.tell('moved z 8 HFS');
   await scan();
@@ -408,7 +481,8 @@ await h.step('a marker that was moved is named, and not used', async () => {
   equal(await ignored.count(), 0, 'where none was moved none is named');
 });
 
-await h.step('a hole in the region is NO ANSWER that says where, and the map is there and marks it', async () => {
+await h.step('a hole in the region is NO ANSWER that says where, and the map is there and marks it',
+  async () => {
   h.tell('hole');
   await scan();
   await anna.locator('.verdict.no_answer').waitFor();
@@ -423,12 +497,16 @@ await h.step('a hole in the region is NO ANSWER that says where, and the map is 
 await h.step('a direction that the surface hardly determines says so on its card', async () => {
   h.tell('weak');
   await scan();
-  const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
+  const card = (name) =>
+    anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
   await card('Roll').getByText('uncertain direction').waitFor();
-  equal(await anna.locator('.number', { hasText: 'uncertain direction' }).count(), 1, 'only that one');
+  equal(await anna.locator('.number', { hasText: 'uncertain direction' }).count(), 1,
+    'only that one');
 });
 
-await h.step('a cold sensor and lost frames are said beside the verdict; a cold sensor takes no reference', async () => {
+await h.step(
+  'a cold sensor and lost frames are said beside the verdict; a cold sensor takes no reference',
+  async () => {
   const flags = anna.locator('.verdict .flags li');
   h.tell('checked');
   h.tell('hurried');
@@ -440,9 +518,12 @@ await h.step('a cold sensor and lost frames are said beside the verdict; a cold 
   const { body: { session } } = await h.api(anna, 'status');
   await anna.goto(`${h.url}#/patient/${session.patient_id}`);
   await anna.getByText('The sensor is still warming up').waitFor();
-  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'), 'true', 'blocked');
+  equal(
+    await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'),
+    'true', 'blocked');
   equal(await anna.locator('.reference-block a').count(), 0, 'a daily check would not help');
-  equal((await h.api(anna, `patients/${session.patient_id}/open`, 'POST', { purpose: 'reference', reason: 'colder', replaces: session.id })).status, 409,
+  equal((await h.api(anna, `patients/${session.patient_id}/open`, 'POST',
+    { purpose: 'reference', reason: 'colder', replaces: session.id })).status, 409,
     'the interface refuses too');
   await h.look(anna, 'patient-cold', { axe: false });
   // The time is the one that is configured: here 20 min.
@@ -459,12 +540,14 @@ await h.step('a cold sensor and lost frames are said beside the verdict; a cold 
   equal(await flags.count(), 0, 'warm, and no frames lost');
 });
 
-await h.step('a full disk is a fault that says what to do; the approved reference is still there', async () => {
+await h.step('a full disk is a fault that says what to do; the approved reference is still there',
+  async () => {
   h.tell('full');
   await anna.goto(`${h.url}#/scan`);
   await anna.locator('.headline', { hasText: 'Fault' }).waitFor();
-  equal(await anna.locator('.guidance').innerText(), 'The disk is full: 90 MB are free, a scan may need 700; remove scans that are no longer needed. '
-    + 'Nothing can be scanned until this is fixed.', 'what is wrong and what to do');
+  equal(await anna.locator('.guidance').innerText(),
+    'The disk is full: 90 MB are free, a scan may need 700; remove scans that are no longer '
+      + 'needed. Nothing can be scanned until this is fixed.', 'what is wrong and what to do');
   equal(await anna.locator('.giant').getAttribute('aria-disabled'), 'true', 'nothing to start');
   const { body: { session } } = await h.api(anna, 'status');
   await anna.goto(`${h.url}#/patient/${session.patient_id}`);
@@ -491,7 +574,8 @@ await h.step('during a sweep no update is installed', async () => {
 await h.step('a result that grows old on the screen turns grey and says so', async () => {
   h.tell('moved z 8 HFS');
   await scan();
-  const colour = () => anna.locator('.fresh').evaluate((element) => getComputedStyle(element).filter);
+  const colour = () =>
+    anna.locator('.fresh').evaluate((element) => getComputedStyle(element).filter);
   equal(await anna.locator('.is-old').count(), 0, 'fresh for 2 minutes');
   equal(await colour(), 'none', 'in colour');
   await h.sleep(anna, 100);
@@ -505,24 +589,32 @@ await h.step('a result that grows old on the screen turns grey and says so', asy
   await h.look(anna, 'result-grown-old', { axe: false });
   await h.setClockOn(anna, -3600);
   await anna.waitForTimeout(1500);
-  check(!/-\d+ (s|min)/.test(await anna.locator('.identity').innerText()), 'a clock that is set back makes no age negative');
+  check(!/-\d+ (s|min)/.test(await anna.locator('.identity').innerText()),
+    'a clock that is set back makes no age negative');
 });
 
-await h.step('a result that was missed without a connection is shown as soon as there is one', async () => {
-  const vertical = anna.locator('.number', { has: anna.getByRole('heading', { name: 'Vertical', exact: true }) }).locator('.value');
-  check((await vertical.innerText()).startsWith('−8.0'), 'the older result, while there is no connection');
+await h.step('a result that was missed without a connection is shown as soon as there is one',
+  async () => {
+  const vertical = anna.locator('.number',
+    { has: anna.getByRole('heading', { name: 'Vertical', exact: true }) }).locator('.value');
+  check((await vertical.innerText()).startsWith('−8.0'),
+    'the older result, while there is no connection');
   h.tell('moved z -8 HFS');
   const { body: { last_result: before } } = await h.api(bob, 'status');
   equal((await h.api(bob, 'scan/start', 'POST')).status, 200, 'another screen starts');
-  await bob.waitForFunction((id) => fetch('/api/v1/status').then((response) => response.json()).then((status) => status.last_result.id !== id), before.id, { timeout: 30000, polling: 500 });
+  await bob.waitForFunction((id) => fetch('/api/v1/status')
+    .then((response) => response.json()).then((status) => status.last_result.id !== id), before.id,
+    { timeout: 30000, polling: 500 });
   check((await vertical.innerText()).startsWith('−8.0'), 'nothing has come');
   await h.wake(anna);
   await vertical.getByText('+8.0').waitFor();
   equal(await anna.locator('.is-old').count(), 0, 'and it is fresh');
 });
 
-await h.step('a stream that says nothing any more is no connection, and a result that nobody can know to be valid commands nothing', async () => {
-  const commands = async () => [await anna.locator('.number .arrow').count(), await anna.getByText('Accept outside tolerance…').count()].join();
+await h.step('a stream that says nothing any more is no connection, and a result that nobody can '
+  + 'know to be valid commands nothing', async () => {
+  const commands = async () => [await anna.locator('.number .arrow').count(),
+    await anna.getByText('Accept outside tolerance…').count()].join();
   equal(await commands(), '1,1', 'an arrow, and the way to accept it');
   h.server.kill('SIGSTOP');
   try {
@@ -531,7 +623,8 @@ await h.step('a stream that says nothing any more is no connection, and a result
     equal(await anna.getByText('No connection to the appliance').count(), 0, 'beats may be late');
     await h.setClockOn(anna, 20);
     await anna.getByRole('alert').getByText('No connection to the appliance').waitFor();
-    check(/^Last known: Result, \d+ s ago$/.test(await anna.locator('.chip').innerText()), 'and above');
+    check(/^Last known: Result, \d+ s ago$/.test(await anna.locator('.chip').innerText()),
+      'and above');
     await anna.locator('.old-note', { hasText: 'NO CONNECTION' }).waitFor();
     equal(await anna.locator('.is-old').count(), 1, 'grey');
     equal(await commands(), '0,0', 'neither an arrow nor a way to accept it');
@@ -544,7 +637,9 @@ await h.step('a stream that says nothing any more is no connection, and a result
   await anna.locator('.chip', { hasText: 'Result' }).waitFor();
 });
 
-await h.step('who logs out without a connection sees no patient any more, and is logged out once there is one', async () => {
+await h.step(
+  'who logs out without a connection sees no patient any more, and is logged out once there is one',
+  async () => {
   await h.sleep(anna, 0);
   await anna.getByRole('button', { name: 'Log out' }).click();
   await anna.getByText('You will be logged out as soon as it answers.').waitFor();
@@ -552,11 +647,13 @@ await h.step('who logs out without a connection sees no patient any more, and is
   equal(await anna.getByRole('navigation').count(), 0, 'no way to one');
   await h.wake(anna);
   await anna.getByRole('heading', { name: 'Log in' }).waitFor();
-  equal(await anna.evaluate(() => fetch('/api/v1/status').then((response) => response.status)), 401, 'nothing without login');
+  equal(await anna.evaluate(() => fetch('/api/v1/status').then((response) => response.status)), 401,
+    'nothing without login');
   await h.logIn(anna, 'anna');
 });
 
-await h.step('scan again leads to the sweep only in the session of the same patient and purpose, else to where that is confirmed', async () => {
+await h.step('scan again leads to the sweep only in the session of the same patient and purpose, '
+  + 'else to where that is confirmed', async () => {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0001' }).click();
   // In place of an approved one it takes a reason.
@@ -585,7 +682,8 @@ await h.step('scan again leads to the sweep only in the session of the same pati
   equal((await scanAgain()).at, '#/scan', 'in its own session to the sweep');
   const { scans } = (await h.api(anna, `patients/${patient}/scans`)).body;
   found = await scanAgain(scans.find(({ purpose }) => purpose === 'reference').id);
-  equal(found.at, `#/patient/${patient}`, 'of a reference to the patient, where its reason is asked');
+  equal(found.at, `#/patient/${patient}`,
+    'of a reference to the patient, where its reason is asked');
   equal(found.session.purpose, 'fraction', 'no reference was opened');
   await anna.getByRole('button', { name: 'Close session' }).click();
   await anna.getByText('The session is closed.').waitFor();
@@ -596,7 +694,8 @@ await h.step('scan again leads to the sweep only in the session of the same pati
   await anna.locator('.who-line', { hasText: /PX-0001\s*Fraction/ }).waitFor();
 });
 
-await h.step('two at one plan: neither saves over or approves what they have not seen', async () => {
+await h.step('two at one plan: neither saves over or approves what they have not seen',
+  async () => {
   const shift = (page) => page.getByLabel('Shifts (mm)');
   /// Until the plan is drawn again: what is typed before would be lost.
   const save = async (page) => {
@@ -604,7 +703,8 @@ await h.step('two at one plan: neither saves over or approves what they have not
     await page.getByRole('button', { name: 'Save plan' }).click();
     await page.waitForFunction((one) => !one.isConnected, field);
   };
-  await bob.goto(`${h.url}#/plan/${(await h.api(anna, 'scans?limit=1')).body.scans[0].reference_id}`);
+  await bob.goto(
+    `${h.url}#/plan/${(await h.api(anna, 'scans?limit=1')).body.scans[0].reference_id}`);
   await shift(bob).fill('4');
   await save(bob);  // of an approved one: a new version
   await bob.getByRole('heading', { name: 'Reference 2' }).waitFor();
@@ -622,12 +722,17 @@ await h.step('two at one plan: neither saves over or approves what they have not
   await save(clara);
   await clara.getByRole('alert').getByText('Someone else has changed the plan').waitFor();
   equal(await shift(clara).inputValue(), '6', 'what is stored');
-  equal(await clara.getByLabel('Rotations (degrees)').inputValue(), '1', 'nothing of what was refused');
+  equal(await clara.getByLabel('Rotations (degrees)').inputValue(), '1',
+    'nothing of what was refused');
   // As an approval that was on its way while bob saved.
-  const { reference, plan } = await clara.evaluate(() => fetch(`/api/v1/references/${location.hash.split('/')[2]}`).then((response) => response.json())).then(({ plan: stored, ...rest }) => ({ reference: rest, plan: stored }));
+  const { reference, plan } = await clara.evaluate(() =>
+    fetch(`/api/v1/references/${location.hash.split('/')[2]}`).then((response) => response.json()))
+    .then(({ plan: stored, ...rest }) => ({ reference: rest, plan: stored }));
   await clara.route('**/approve', async (route) => {
     const { region_m, isocentre_m, posture, couch_markers } = plan;
-    equal((await h.api(bob, `references/${reference.id}/plan`, 'PUT', { region_m, isocentre_m, posture, couch_markers, shift_tolerance_mm: 7, rotation_tolerance_deg: 1, revision: reference.revision })).status, 200, 'bob saves');
+    equal((await h.api(bob, `references/${reference.id}/plan`, 'PUT',
+      { region_m, isocentre_m, posture, couch_markers, shift_tolerance_mm: 7,
+        rotation_tolerance_deg: 1, revision: reference.revision })).status, 200, 'bob saves');
     await route.continue();
   });
   await clara.getByRole('button', { name: 'Review and approve' }).click();
@@ -645,16 +750,19 @@ await h.step('two at one note: neither saves over what they have not seen', asyn
   await note.waitFor();
   // As if bob had just saved, and the page had not been notified yet.
   const requests = `**/api/v1/${path}`;
-  await anna.route(requests, (route) => (route.request().method() === 'GET' ? route.abort() : route.continue()));
+  await anna.route(requests,
+    (route) => (route.request().method() === 'GET' ? route.abort() : route.continue()));
   const { site } = (await h.api(bob, path)).body;
-  const [, saved] = await Promise.all([anna.waitForEvent('requestfailed', (one) => one.url().endsWith(path)),
-    h.api(bob, path, 'PUT', { site, note: 'arms up' })]);
+  const [, saved] =
+    await Promise.all([anna.waitForEvent('requestfailed', (one) => one.url().endsWith(path)),
+      h.api(bob, path, 'PUT', { site, note: 'arms up' })]);
   equal(saved.status, 200, 'bob saves');
   await anna.unroute(requests);
   await note.fill('knee rest');
   const save = anna.locator('section', { has: note }).getByRole('button', { name: 'Save' });
   await save.click();
-  await anna.getByRole('alert').getByText('This patient was changed by somebody else meanwhile').waitFor();
+  await anna.getByRole('alert')
+    .getByText('This patient was changed by somebody else meanwhile').waitFor();
   equal(await note.inputValue(), 'arms up', 'what is stored');
   await note.fill('arms up, knee rest');
   await save.click();
@@ -674,7 +782,8 @@ await h.step('half an isocentre is refused at its field', async () => {
   await clara.getByLabel('Isocentre z').pressSequentially('1e');
   await clara.getByRole('button', { name: 'Save plan' }).click();
   await clara.getByText('Three numbers in metres, or all three empty.').waitFor();
-  equal(await clara.getByLabel('Isocentre z').getAttribute('aria-invalid'), 'true', 'what is not a number');
+  equal(await clara.getByLabel('Isocentre z').getAttribute('aria-invalid'), 'true',
+    'what is not a number');
   for (const axis of ['x', 'y', 'z']) await clara.getByLabel(`Isocentre ${axis}`).fill('');
   await clara.getByRole('button', { name: 'Save plan' }).click();
   await clara.getByRole('status').getByText('Plan saved.').waitFor();
@@ -688,7 +797,8 @@ await h.step('an account: only what was changed is sent', async () => {
   await row.getByRole('button', { name: 'Save' }).click();
   await engineer.getByRole('alert').getByText('Nothing was changed.').waitFor();
   await row.getByLabel('Disabled').check();
-  const [request] = await Promise.all([engineer.waitForRequest((one) => one.method() === 'PUT'), row.getByRole('button', { name: 'Save' }).click()]);
+  const [request] = await Promise.all([engineer.waitForRequest((one) => one.method() === 'PUT'),
+    row.getByRole('button', { name: 'Save' }).click()]);
   equal(request.postData(), '{"disabled":true}', 'what is sent');
   await row.getByText('disabled', { exact: true }).waitFor();
 });
@@ -698,13 +808,16 @@ await h.step('the wrong patient: both codes are on the screen', async () => {
   const last = await scan();
   await addPatient('PX-0002');
   await anna.getByText('Confirm: PX-0002 is on the couch').waitFor();
-  equal(await anna.getByRole('button', { name: 'Start treatment session' }).isDisabled(), true, 'no fraction without a reference of its own');
+  equal(await anna.getByRole('button', { name: 'Start treatment session' }).isDisabled(), true,
+    'no fraction without a reference of its own');
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await anna.getByRole('button', { name: 'Close PX-0001, open PX-0002' }).click();
-  await anna.locator('.who-line', { hasText: 'PX-0002' }).waitFor();  // the scan screen names who is open
+  // The scan screen names who is open.
+  await anna.locator('.who-line', { hasText: 'PX-0002' }).waitFor();
   await anna.goto(`${h.url}#/result/${last.id}`);
   await anna.getByText('The session of another patient (PX-0002) is open').waitFor();
-  check((await anna.locator('.identity').innerText()).includes('PX-0001'), 'the result names whose it is');
+  check((await anna.locator('.identity').innerText()).includes('PX-0001'),
+    'the result names whose it is');
   // A minute old, but of somebody who is not on the couch any more: nothing of it is to be applied.
   await anna.goto(`${h.url}#/result`);
   await anna.getByText('SESSION NOT OPEN').waitFor();
@@ -717,30 +830,50 @@ await h.step('the wrong patient: both codes are on the screen', async () => {
 await h.step('three roles: what a screen hides the interface refuses', async () => {
   const scans = (await h.api(anna, 'scans?limit=1')).body.scans;
   const user = { name: 'mallory', role: 'engineer', password: 'correct horse battery' };
-  const plan = ['PUT', 'references/r0001/plan', { region_m: [], isocentre_m: null, shift_tolerance_mm: 3, rotation_tolerance_deg: 1, posture: 'HFS', couch_markers: false }];
+  const plan = ['PUT', 'references/r0001/plan', { region_m: [], isocentre_m: null,
+    shift_tolerance_mm: 3, rotation_tolerance_deg: 1, posture: 'HFS', couch_markers: false }];
   const kRefused = [
-    [anna, ['GET', 'users'], ['POST', 'users', user], ['GET', 'audit'], plan, ['POST', 'references/r0001/approve'], ['POST', 'references', { scan_id: scans[0].id, reason: '' }], ['DELETE', 'patients/p0001'], ['POST', 'update', { bundle: 'plumb-0.2.0.raucb' }], ['POST', 'diagnostics']],
-    [bob, ['GET', 'users'], ['POST', 'users', user], ['POST', 'update', { bundle: 'plumb-0.2.0.raucb' }], ['POST', 'diagnostics']],
-    [engineer, ['POST', 'patients', { code: 'PX-1', site: '' }], plan, ['POST', 'references/r0001/approve'], ['POST', `scans/${scans[0].id}/accept`], ['DELETE', 'patients/p0001']],
+    [anna, ['GET', 'users'], ['POST', 'users', user], ['GET', 'audit'], plan,
+      ['POST', 'references/r0001/approve'],
+      ['POST', 'references', { scan_id: scans[0].id, reason: '' }], ['DELETE', 'patients/p0001'],
+      ['POST', 'update', { bundle: 'plumb-0.2.0.raucb' }], ['POST', 'diagnostics']],
+    [bob, ['GET', 'users'], ['POST', 'users', user],
+      ['POST', 'update', { bundle: 'plumb-0.2.0.raucb' }], ['POST', 'diagnostics']],
+    [engineer, ['POST', 'patients', { code: 'PX-1', site: '' }], plan,
+      ['POST', 'references/r0001/approve'], ['POST', `scans/${scans[0].id}/accept`],
+      ['DELETE', 'patients/p0001']],
   ];
-  for (const [page, ...calls] of kRefused) for (const [method, path, body] of calls) equal((await h.api(page, path, method, body)).status, 403, `${method} ${path}`);
-  for (const [page, allowed] of [[anna, ['Status', 'Patients', 'Scan', 'Result']], [bob, ['Audit log']], [engineer, ['Audit log', 'Settings', 'Update']]]) {
-    for (const name of allowed) equal(await page.getByRole('navigation').getByRole('link', { name, exact: true }).count(), 1, `${name} is offered`);
+  for (const [page, ...calls] of kRefused) {
+    for (const [method, path, body] of calls) {
+      equal((await h.api(page, path, method, body)).status, 403, `${method} ${path}`);
+    }
   }
-  for (const [page, hidden] of [[anna, 'Install'], [bob, 'Install'], [anna, 'Download diagnostics']]) {
+  for (const [page, allowed] of [[anna, ['Status', 'Patients', 'Scan', 'Result']],
+    [bob, ['Audit log']], [engineer, ['Audit log', 'Settings', 'Update']]]) {
+    for (const name of allowed) {
+      equal(await page.getByRole('navigation').getByRole('link', { name, exact: true }).count(), 1,
+        `${name} is offered`);
+    }
+  }
+  for (const [page, hidden] of [[anna, 'Install'], [bob, 'Install'],
+    [anna, 'Download diagnostics']]) {
     await page.goto(`${h.url}#/update`);
     await page.getByText('Installed version').waitFor();
     equal(await page.getByRole('button', { name: hidden }).count(), 0, `${hidden} is not offered`);
   }
 });
 
-await h.step('no check today: no new reference, and a fraction is marked in the history', async () => {
-  const patient = (await h.api(anna, 'patients')).body.patients.find(({ code }) => code === 'PX-0001');
+await h.step('no check today: no new reference, and a fraction is marked in the history',
+  async () => {
+  const patient =
+    (await h.api(anna, 'patients')).body.patients.find(({ code }) => code === 'PX-0001');
   const marked = () => anna.locator('.badge.overdue').count();
   h.tell('checked');
   await anna.goto(`${h.url}#/patient/${patient.id}`);
   await anna.getByRole('button', { name: 'Scan a new reference' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'), null, 'after the check');
+  equal(
+    await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'),
+    null, 'after the check');
   const before = await marked();
   await anna.getByRole('button', { name: 'Start treatment session' }).click();
   await anna.getByRole('button', { name: /^Close PX-0002/ }).click();
@@ -751,27 +884,33 @@ await h.step('no check today: no new reference, and a fraction is marked in the 
   await anna.getByText('The daily check was overdue at this scan.').waitFor();
   await anna.goto(`${h.url}#/patient/${patient.id}`);
   await anna.getByText('The daily check is overdue').waitFor();
-  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'), 'true', 'blocked');
+  equal(
+    await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'),
+    'true', 'blocked');
   equal(await anna.locator('.reference-block a').getAttribute('href'), '#/check', 'the next step');
   equal(await marked(), before + 1, 'one of the two is marked');
-  const refused = await h.api(anna, `patients/${patient.id}/open`, 'POST', { purpose: 'reference', reason: '' });
+  const refused = await h.api(anna, `patients/${patient.id}/open`, 'POST',
+    { purpose: 'reference', reason: '' });
   equal(refused.status, 409, 'the interface refuses too');
   await h.look(anna, 'patient-overdue', { axe: false });
   h.tell('checked');
 });
 
-await h.step('site and note are corrected; an archived patient is out of the list, not gone', async () => {
+await h.step('site and note are corrected; an archived patient is out of the list, not gone',
+  async () => {
   const open = (await h.api(anna, 'patients')).body.patients.find(({ code }) => code === 'PX-0002');
   await bob.goto(`${h.url}#/patient/${open.id}`);
   await bob.getByLabel('Site').fill('pelvis');
   await bob.getByLabel('Note').fill('knee rest,\narms on the chest');
   await bob.getByRole('button', { name: 'Save', exact: true }).click();
   await bob.getByRole('heading', { name: 'PX-0002 pelvis' }).waitFor();
-  equal((await h.api(bob, `patients/${open.id}`)).body.note, 'knee rest, arms on the chest', 'one line');
+  equal((await h.api(bob, `patients/${open.id}`)).body.note, 'knee rest, arms on the chest',
+    'one line');
   await h.look(bob, 'patient-about', { axe: false });
   await bob.getByRole('button', { name: 'Archive', exact: true }).click();
   await bob.getByText('This patient is archived and cannot be opened').first().waitFor();
-  equal(await bob.getByRole('button', { name: 'Scan a new reference' }).count(), 0, 'not to be opened');
+  equal(await bob.getByRole('button', { name: 'Scan a new reference' }).count(), 0,
+    'not to be opened');
   await bob.goto(`${h.url}#/patients`);
   await bob.getByRole('link', { name: 'PX-0001' }).waitFor();
   equal(await bob.getByRole('link', { name: 'PX-0002' }).count(), 0, 'out of the list');
@@ -783,10 +922,12 @@ await h.step('site and note are corrected; an archived patient is out of the lis
   await bob.getByRole('link', { name: 'PX-0002' }).waitFor();
   await anna.goto(`${h.url}#/patient/${open.id}`);
   await anna.getByLabel('Note').waitFor();
-  equal(await anna.getByRole('button', { name: 'Archive', exact: true }).count(), 0, 'not offered to a technician');
+  equal(await anna.getByRole('button', { name: 'Archive', exact: true }).count(), 0,
+    'not offered to a technician');
 });
 
-await h.step('unplugged in the middle of a sweep: no result, and none of before in its place', async () => {
+await h.step('unplugged in the middle of a sweep: no result, and none of before in its place',
+  async () => {
   h.tell('slow');
   await anna.goto(`${h.url}#/scan`);
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).click();
@@ -797,9 +938,10 @@ await h.step('unplugged in the middle of a sweep: no result, and none of before 
   equal((await h.api(anna, 'scans?limit=1')).body.scans[0].outcome, 'failed', 'the scan');
 });
 
-await h.step('in safe mode everybody reads why nobody can log in, and it ends by itself', async () => {
-  const fault = 'the database /state/plumb.db is damaged (malformed): put a backup in its place, or '
-    + 'move it and the folder scans away to start over';
+await h.step('in safe mode everybody reads why nobody can log in, and it ends by itself',
+  async () => {
+  const fault = 'the database /state/plumb.db is damaged (malformed): put a backup in its place, '
+    + 'or move it and the folder scans away to start over';
   const body = { error: 'log in first', setup_required: false, fault, certificate: '' };
   await Promise.all([['', 'Password'], ['room', 'Log in']].map(async ([where, after]) => {
     const visitor = await h.person('visitor');

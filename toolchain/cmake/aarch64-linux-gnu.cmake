@@ -21,7 +21,8 @@ foreach(library blas lapack)
 endforeach()
 find_program(PLUMB_QEMU qemu-aarch64-static REQUIRED)
 set(CMAKE_CROSSCOMPILING_EMULATOR
-  "${PLUMB_QEMU};-L;${PLUMB_SYSROOT};-E;LD_LIBRARY_PATH=/usr/lib/aarch64-linux-gnu/blas:/usr/lib/aarch64-linux-gnu/lapack")
+  "${PLUMB_QEMU}" -L "${PLUMB_SYSROOT}" -E
+  "LD_LIBRARY_PATH=/usr/lib/aarch64-linux-gnu/blas:/usr/lib/aarch64-linux-gnu/lapack")
 set(ENV{PKG_CONFIG_DIR} "")
 set(ENV{PKG_CONFIG_SYSROOT_DIR} "${PLUMB_SYSROOT}")
 set(ENV{PKG_CONFIG_LIBDIR}

@@ -27,20 +27,24 @@ await esbuild.build({
   legalComments: 'inline',
 });
 
-const kTypes = { '.js': 'text/javascript; charset=utf-8', '.css': 'text/css; charset=utf-8', '.svg': 'image/svg+xml' };
+const kTypes = { '.js': 'text/javascript; charset=utf-8', '.css': 'text/css; charset=utf-8',
+  '.svg': 'image/svg+xml' };
 const icon = readFileSync(join(here, 'icon.svg'));
 const iconName = `icon.${createHash('sha256').update(icon).digest('hex').slice(0, 8)}.svg`;
 writeFileSync(join(work, iconName), icon);
 const names = readdirSync(work).sort();
-const find = (start, end) => `/assets/${names.find((name) => name.startsWith(start) && name.endsWith(end))}`;
+const find = (start, end) =>
+  `/assets/${names.find((name) => name.startsWith(start) && name.endsWith(end))}`;
 const html = readFileSync(join(here, 'index.html'), 'utf8')
   .replace('{app}', find('app.', '.js'))
   .replace('{style}', find('style.', '.css'))
   .replace('{icon}', `/assets/${iconName}`);
 
-const assets = [{ path: '/', type: 'text/html; charset=utf-8', data: Buffer.from(html), hashed: false }];
+const assets =
+  [{ path: '/', type: 'text/html; charset=utf-8', data: Buffer.from(html), hashed: false }];
 for (const name of names) {
-  assets.push({ path: `/assets/${name}`, type: kTypes[extname(name)], data: readFileSync(join(work, name)), hashed: true });
+  assets.push({ path: `/assets/${name}`, type: kTypes[extname(name)],
+    data: readFileSync(join(work, name)), hashed: true });
 }
 
 // A string literal; octal escapes have three digits at most, so what follows them cannot join in.
@@ -58,8 +62,10 @@ const view = (data) => `std::string_view(${literal(data)}, ${data.length})`;
 const rows = assets.map((asset) => {
   const packed = gzipSync(asset.data, { level: 9 });
   const name = asset.path.padEnd(36);
-  console.log(`  ${name} ${String(asset.data.length).padStart(8)} bytes, ${String(packed.length).padStart(7)} gzip`);
-  return `    {${literal(Buffer.from(asset.path))}, ${literal(Buffer.from(asset.type))}, ${view(asset.data)},\n     ${view(packed)}, ${asset.hashed}},`;
+  console.log(`  ${name} ${String(asset.data.length).padStart(8)} bytes, `
+    + `${String(packed.length).padStart(7)} gzip`);
+  return `    {${literal(Buffer.from(asset.path))}, ${literal(Buffer.from(asset.type))}, `
+    + `${view(asset.data)},\n     ${view(packed)}, ${asset.hashed}},`;
 });
 
 // The appliance's words, for the reports that the server makes.
