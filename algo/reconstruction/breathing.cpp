@@ -30,7 +30,7 @@ constexpr float kMinNormalAgreement = 0.8F;  // length of the mean of a patch's 
 constexpr float kMaxDistance_m = 0.02F;      // farther away is another surface
 constexpr float kMaxDepth_m = 1.8F;          // noise grows with the square of the depth
 constexpr float kMinDepth_m = 0.5F;
-constexpr float kMinPatchIncidence = 0.1F;
+constexpr float kMinPatchCosIncidence = 0.1F;
 
 // Estimate.
 constexpr std::size_t kMinSamples = 6;  // of a patch
@@ -373,7 +373,7 @@ std::vector<SurfacePatch> MeasurePatches(std::span<const ViewSurface> views,
       }
       if (2 * seen <= cells[p].size()) continue;
       const float cos_incidence = -patch.normal.dot(way) / way.norm();
-      if (!(cos_incidence >= kMinPatchIncidence)) continue;
+      if (!(cos_incidence >= kMinPatchCosIncidence)) continue;
       const float depth2 = std::max(depth_m, kMinDepth_m) * std::max(depth_m, kMinDepth_m);
       patch.samples.push_back({static_cast<std::uint32_t>(v), sum_m / static_cast<float>(seen),
                                cos_incidence / (depth2 * depth2)});

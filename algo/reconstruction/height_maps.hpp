@@ -14,6 +14,7 @@
 
 namespace plumb {
 
+/// A larger grid is refused.
 inline constexpr double kMaxHeightMapCells = 64e6;
 
 /// Parameters of PaperHeightMap(); the defaults are the paper's. Lengths in metres, reference

@@ -28,7 +28,7 @@ constexpr double kLabel_mm =
 constexpr double kLabelBegin = 0.45;  // fraction of the white margin of one cell, from the marker
 constexpr double kRuler_mm = 100.0;
 constexpr std::size_t kMaxIds = 1000;
-constexpr double kRulerGrey = 0.45;
+constexpr double kTextGrey = 0.45;
 
 struct SurfaceCloser {
   void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
@@ -183,7 +183,7 @@ void MarkerSheet::DrawMarker(const Canvas& canvas, const PlacedMarker& marker) c
   cairo_fill(canvas.cr);  // all cells at once, so that neighbours have no seams
 
   const double y = marker.top_mm + side_mm + kLabelBegin * cell_mm + 4.5, x = marker.left_mm;
-  canvas.Grey(kRulerGrey);
+  canvas.Grey(kTextGrey);
   cairo_move_to(canvas.cr, x + 1.5, y - 3.6);
   cairo_line_to(canvas.cr, x + 3.0, y - 1.0);
   cairo_line_to(canvas.cr, x, y - 1.0);
@@ -202,7 +202,7 @@ void MarkerSheet::DrawRuler(const Canvas& canvas, int page) const {
   }
   canvas.Line(x, y, x + kRuler_mm, y, 0.12);
   canvas.Text(x + kRuler_mm + 3.0, y, 3.2, "must measure 100 mm: print at 100 %, without fitting");
-  canvas.Grey(kRulerGrey);
+  canvas.Grey(kTextGrey);
   canvas.Text(
       x, y + 5.0, 3.0,
       options_.is_board

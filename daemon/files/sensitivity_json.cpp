@@ -17,7 +17,7 @@ constexpr int kSensitivityFormat = 1;
 constexpr std::size_t kMaxTerms = 256;
 constexpr std::size_t kMaxPatches = 4096;
 constexpr std::size_t kMaxSerialBytes = 256;
-constexpr std::size_t kMaxSensitiveMarkers = 4096;
+constexpr std::size_t kMaxMarkerDerivatives = 4096;
 constexpr double kLargest = 1e12;
 
 // Four digits are more than a sensitivity is known to.
@@ -67,7 +67,7 @@ class Reader {
   const std::string& name_;
 };
 
-Json IntrinsicsJson(const Intrinsics& k) {
+Json IntrinsicsRow(const Intrinsics& k) {
   return {k.width,
           k.height,
           k.fx,
@@ -91,7 +91,7 @@ Intrinsics ToIntrinsics(const Eigen::VectorXd& v) {
 std::string SensitivityJson(const SensorSensitivity& sensitivity) {
   Json json;
   json["format"] = kSensitivityFormat;
-  json["stated"] = IntrinsicsJson(sensitivity.stated);
+  json["stated"] = IntrinsicsRow(sensitivity.stated);
   json["stated_for_this_unit"] = sensitivity.stated_for_this_unit;
   json["serial"] = sensitivity.serial;
   json["estimate"] = Json::array();
@@ -155,8 +155,8 @@ SensorSensitivity ParseSensitivityJson(std::string_view text, const std::string&
     read.derivative = reader.Derivative(reader.At(patch, "derivative"), terms);
   }
   const Json& markers = reader.At(json, "markers");
-  if (!markers.is_object() || markers.size() > kMaxSensitiveMarkers)
-    reader.Fail(fmt::format("markers is no object of at most {}", kMaxSensitiveMarkers));
+  if (!markers.is_object() || markers.size() > kMaxMarkerDerivatives)
+    reader.Fail(fmt::format("markers is no object of at most {}", kMaxMarkerDerivatives));
   for (const auto& [id, derivative] : markers.items()) {
     if (id.empty() || id.size() > 5 || id.find_first_not_of("0123456789") != std::string::npos)
       reader.Fail("a marker has no id");

@@ -38,7 +38,7 @@ std::vector<double> Numbers(const Json& json, const char* key, std::size_t count
   return values;
 }
 
-Json StatedIntrinsicsJson(const Intrinsics& k) {
+Json IntrinsicsJson(const Intrinsics& k) {
   return {{"width", k.width},
           {"height", k.height},
           {"fx_px", k.fx},
@@ -116,7 +116,7 @@ std::string SensorProfileJson(const SensorProfile& profile) {
   json["format"] = kProfileFormat;
   json["version"] = kVersion;
   json["sweeps"] = profile.num_sweeps;
-  json["stated_intrinsics"] = StatedIntrinsicsJson(profile.stated);
+  json["stated_intrinsics"] = IntrinsicsJson(profile.stated);
   json["calibration"] = model.Named();  // for people; the vector below is what is read
   json["mean"] = Flat(profile.mean);
   json["covariance"] = Flat(profile.covariance);
