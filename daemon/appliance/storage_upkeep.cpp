@@ -318,10 +318,10 @@ std::vector<std::string> StorageUpkeep::Warnings(bool is_demo) const {
         "remove these scans. The log names them.",
         unusable_.scans));
   if (unusable_.set_aside > 0)
-    warnings.push_back(fmt::format(
-        "Some scan folders ({}) have no entry in the database and were set aside: restore a more "
-        "recent backup, or move the contents of the folder set-aside to another disk.",
-        unusable_.set_aside));
+    warnings.push_back(
+        fmt::format("Some scan folders ({}) have no entry in the database and were moved to the "
+                    "set-aside folder. Restore a more recent backup, or move them to another disk.",
+                    unusable_.set_aside));
   if (!record_fault_.empty()) warnings.push_back(record_fault_);
   if (config_.appliance.backup_folder.empty() && !is_demo)
     warnings.emplace_back(

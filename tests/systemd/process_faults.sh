@@ -35,7 +35,7 @@ check "the status says why" 'configuration cannot be used.*wrong.toml.*quotas' \
   "$("$plumb" --control control status --get reason)"
 check "so does its health" '"status":"[^"]*".*configuration cannot be used.*quotas' \
   "$(curl -sk "$(page)health")"
-check "the page is told why nobody can log in" \
+check "the page says why nobody can log in" \
   '"fault":"[^"]*configuration cannot be used.*quotas' "$(curl -sk "$(page)api/v1/session")"
 check "and offers no first account" '"setup_required":false' "$(curl -sk "$(page)api/v1/session")"
 check "the page without script says it" 'Out of order.*configuration cannot be used.*quotas' \

@@ -120,7 +120,7 @@ esac
 SCRIPT
 : >unitenv
 run
-check "a file that a power cut emptied is made anew" \
+check "a file that a power cut emptied is written again" \
   '^0 .*kept for the next ones created MACHINE_ID=2{32}$' \
   "$code $(cat out unitenv | tr '\n' ' ' | xargs)"
 printf '#!/bin/sh\n[ "$2" = list ]\n' >bin/grub-editenv
@@ -144,13 +144,13 @@ run
 check "a boot counter that can be read stays" '^0 A_OK=1$' "$code $(cat grubenv)"
 : >grubenv
 run
-check "one that a power cut emptied is made anew for the system that runs" \
-  '^0 .*made anew: system B .* created ORDER=B A B_OK=1 B_TRY=1 A_OK=0 A_TRY=0 $' \
+check "one that a power cut emptied is replaced for the running system" \
+  '^0 .*was replaced: only system B .* created ORDER=B A B_OK=1 B_TRY=1 A_OK=0 A_TRY=0 $' \
   "$code $(cat out grubenv | tr '\n' ' ')"
 echo "root=/dev/sda1" >cmdline
 : >grubenv
 run
-check "but not where that is not known" '^0 .*not be made anew.*0$' \
+check "but not where that is not known" '^0 .*neither be read nor replaced.*0$' \
   "$code $(cat out) $(wc -c <grubenv)"
 unset PLUMB_BOOT_COUNTER PLUMB_CMDLINE
 

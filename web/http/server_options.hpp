@@ -25,7 +25,7 @@ struct HttpServerOptions {
   /// one stays. Empty: the certificate cannot be replaced on the page.
   std::function<void(const TlsIdentity&)> keep_certificate;
   /// 32 random bytes that outlive a restart, for the cookies of browsers that logged in before.
-  /// Empty: created anew, so that a restart forgets those browsers.
+  /// Empty: new ones are created, so that a restart forgets those browsers.
   std::string device_key;
   /// Accepted in the Host header in addition to localhost and numeric addresses.
   std::vector<std::string> host_names;

@@ -221,7 +221,7 @@ TEST_F(ApplianceUpkeepTest, FoldersThatWereSetAsideAreAWarning) {
   fs::copy(state() / "scans" / "000003", state() / "scans" / "000007", fs::copy_options::recursive);
   Play([&] {
     EXPECT_TRUE(Comes([&] {
-      return Warns("Some scan folders (1) have no entry in the database and were set aside");
+      return Warns("Some scan folders (1) have no entry in the database and were moved to");
     }));
   });
 }

@@ -219,10 +219,10 @@ export const kFaultPatterns = [
     + 'or remove these scans\\. The log names them\\.?$',
   'Faltan o han cambiado archivos de algunos escaneos guardados ($1): recupérelos de una copia de '
     + 'seguridad o borre esos escaneos. El registro los nombra.'],
-  ['^Some scan folders \\((\\d+)\\) have no entry in the database and were set aside: restore a '
-    + 'more recent backup, or move the contents of the folder set-aside to another disk\\.?$',
-  'Algunas carpetas de escaneos ($1) no constan en la base de datos y se apartaron: restaure una '
-    + 'copia más reciente, o lleve el contenido de la carpeta set-aside a otro disco.'],
+  ['^Some scan folders \\((\\d+)\\) have no entry in the database and were moved to the '
+    + 'set-aside folder\\. Restore a more recent backup, or move them to another disk\\.?$',
+  'Algunas carpetas de escaneos ($1) no constan en la base de datos y se movieron a la carpeta '
+    + '«set-aside». Restaure una copia de seguridad más reciente, o muévalas a otro disco.'],
   ['^No backup is set up: if this disk fails, all scans are lost\\. Mount another disk for '
     + 'backups, and name it as backup_folder in \\[storage\\]\\.?$',
   'No hay copias de seguridad configuradas: si falla este disco, se pierden todos los escaneos. '
