@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The start button as an event source of the loop.
 #pragma once
 

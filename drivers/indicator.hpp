@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The light (and beeper) that shows the technician the appliance's state.
 #pragma once
 
@@ -20,7 +21,12 @@ enum class IndicatorPattern {
   kFault,
   kReadyRolledBack,      ///< Ready, but the system before the last update was restored.
   kReadyDiskNearlyFull,  ///< Ready, but there is little room for more scans.
-  kStopped,              ///< The service is not running, and no scan is possible.
+  kReadyGuessed,         ///< Ready, but somebody is guessing passwords of the page.
+  kMonitorStarting,      ///< Mounting, zeroing.
+  kMonitorIn,
+  kMonitorOut,
+  kMonitorUnknown,  ///< Counts as hold.
+  kStopped,         ///< The service is not running, and no scan is possible.
 };
 
 /// A light. Called on the event loop's thread only. No call blocks or throws: a broken light must

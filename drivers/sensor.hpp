@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The interface of a live RGB-D sensor of any make.
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # systemd-analyze verify complains of programs that are not installed yet and of files of other
 # units; what matters here are our own lines.
 execute_process(COMMAND ${ANALYZE} verify --man=no --recursive-errors=no ${UNIT} ${SOCKET}

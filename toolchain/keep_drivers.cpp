@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Linked into every program that is built with the address sanitizer: libraries stay loaded to the
 // end.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Linked into every program that is built with the thread sanitizer: TBB starts no threads of its
 // own.
 //

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Devices of the emulated machine for toolchain/test-image: a USB device and GPIO lines."""
 
 import socket

@@ -1,8 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/base/bounded_json.hpp"
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
+#include "words/file.hpp"
 
 namespace plumb {
 
@@ -11,14 +11,13 @@ Json ParseBoundedJson(std::string_view text, int max_depth) {
   using Event = typename Json::parse_event_t;
   const auto refuse_depth = [max_depth](int depth, Event event, Json&) {
     const bool opens = event == Event::array_start || event == Event::object_start;
-    if (opens && depth >= max_depth)
-      throw DataError(fmt::format("expected JSON nested at most {} deep, found more", max_depth));
+    if (opens && depth >= max_depth) throw DataError(say::file::JsonTooDeep(max_depth));
     return true;
   };
   try {
     return Json::parse(text, refuse_depth);
   } catch (const nlohmann::detail::exception& error) {
-    throw DataError(fmt::format("not valid JSON ({})", error.what()));
+    throw DataError(say::file::NotJson(error.what()));
   }
 }
 

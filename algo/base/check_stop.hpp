@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cancellation points for long work.
 #pragma once
 
@@ -7,9 +8,11 @@
 
 namespace plumb {
 
+[[noreturn]] void ThrowStopped();
+
 /// @throws Interrupted on a stop request.
 inline void CheckStop(const std::stop_token& stop) {
-  if (stop.stop_requested()) throw Interrupted("stopped on request");
+  if (stop.stop_requested()) ThrowStopped();
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tolerances that apply until somebody sets others.
 #pragma once
 

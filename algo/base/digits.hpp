@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How numbers and their uncertainties are written, in reports and on the page without scripts.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Enumerators and their names in files, in the interface, on the control socket and in the log.
 #pragma once
 

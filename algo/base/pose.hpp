@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rigid poses and the few operations on them that Eigen does not provide.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Patient orientation, and its names in files and in the interface.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Robust losses and their weights, defined once for all least-squares fits.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Medians and quantiles of measured values, defined once for all modules.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Named units. All quantities inside Plumb are SI (metres, seconds, radians).
 #pragma once
 

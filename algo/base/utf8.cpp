@@ -1,4 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/base/utf8.hpp"
+
+#include <algorithm>
 
 #include <array>
 
@@ -37,6 +40,12 @@ std::string ValidUtf8(std::string_view text) {
     text.remove_prefix(length == 0 ? 1 : length);
   }
   return valid;
+}
+
+std::size_t Utf8Characters(std::string_view text) {
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char byte) {
+    return (static_cast<unsigned char>(byte) & 0xC0U) != 0x80U;  // begins one
+  }));
 }
 
 }  // namespace plumb

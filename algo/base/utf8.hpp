@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Text from outside: paths, names of devices, messages of libraries.
 #pragma once
 
@@ -14,5 +15,8 @@ namespace plumb {
 
 /// The same text, with U+FFFD for each byte that is none of UTF-8.
 [[nodiscard]] std::string ValidUtf8(std::string_view text);
+
+/// Of text that is UTF-8.
+[[nodiscard]] std::size_t Utf8Characters(std::string_view text);
 
 }  // namespace plumb

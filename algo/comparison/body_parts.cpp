@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/body_parts.hpp"
 
 #include <algorithm>
@@ -9,11 +10,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
+#include "words/body.hpp"
 
 namespace plumb {
 namespace {
@@ -33,21 +34,24 @@ constexpr double kMaxHead_m = 0.45;  // length of head and neck
 constexpr double kTrunk_m = 0.6;
 // length of head and neck where they alone distinguish the ends
 constexpr double kMinHead_m = 0.15;
+// Mean width of head and neck; heads are 0.14 to 0.18 m wide, a mask or a rest adds some.
+constexpr double kMaxHeadWidth_m = 0.24;
 // fraction of the largest width of the whole body; knees behind feet are narrower
 constexpr double kShouldersOfAll = 0.85;
 
 // Ends of the bands below the shoulder line, in shoulder widths (about 0.45 m including the arms);
 // the lower legs follow.
 struct Band {
-  const char* name;
+  Message (*left)();
+  Message (*right)();
   double end;
 };
-constexpr std::array<Band, 6> kBands = {{{"shoulder", 0.3},
-                                         {"chest", 0.75},
-                                         {"side of the abdomen", 1.2},
-                                         {"side of the pelvis", 1.7},
-                                         {"thigh", 2.6},
-                                         {"lower leg", 9.0}}};
+constexpr std::array<Band, 6> kBands = {{{say::body::LeftShoulder, say::body::RightShoulder, 0.3},
+                                         {say::body::LeftChest, say::body::RightChest, 0.75},
+                                         {say::body::LeftAbdomen, say::body::RightAbdomen, 1.2},
+                                         {say::body::LeftPelvis, say::body::RightPelvis, 1.7},
+                                         {say::body::LeftThigh, say::body::RightThigh, 2.6},
+                                         {say::body::LeftLowerLeg, say::body::RightLowerLeg, 9.0}}};
 
 // Directions in the plane of the reference frame: `along` points away from the gantry (head) end,
 // `side` to +X (the left).
@@ -88,9 +92,14 @@ Outline OutlineOf(const GridShape& grid, const std::vector<std::uint8_t>& mask) 
   return {mean, solver.eigenvectors().col(1), spread[1] / spread[0]};
 }
 
+Axes AxesOfRoom(const Pose& T_iec_reference) {
+  const RoomWays ways = WaysOfRoom(T_iec_reference);
+  return {-ways.gantry, ways.right, false};
+}
+
 Axes AxesByRoom(const BodyView& view, const Outline& outline) {
   const RoomWays ways = WaysOfRoom(*view.T_iec_reference);
-  const Axes room = {-ways.gantry, ways.right, false};
+  const Axes room = AxesOfRoom(*view.T_iec_reference);
   if (!view.posture) return room;
   const PatientAxes patient = SidesOf(ways, *view.posture);
   Axes axes = {-patient.head, patient.left, true};
@@ -160,9 +169,23 @@ std::optional<Shoulders> FindShoulders(const Profile& profile) {
 bool ShowsHead(const Profile& profile) {
   const std::optional<Shoulders> shoulders = FindShoulders(profile);
   if (!shoulders || shoulders->line_m - profile.begin_m < kMinHead_m) return false;
+  // A trunk that narrows to a waist has the same outline, but larger.
+  double area_m2 = 0.0;
+  for (std::size_t i = 0; profile.begin_m + static_cast<double>(i) * kBin_m < shoulders->line_m;
+       ++i)
+    area_m2 += profile.width(i) * kBin_m;
+  if (area_m2 > kMaxHeadWidth_m * (shoulders->line_m - profile.begin_m)) return false;
   double widest = 0.0;
   for (std::size_t i = 0; i < profile.size(); ++i) widest = std::max(widest, profile.width(i));
   return shoulders->width_m >= kShouldersOfAll * widest;
+}
+
+// Whether the surface shows a head at that end only which is stated to be the feet's.
+bool HeadAtOtherEnd(const BodyView& view, const Axes& stated) {
+  const auto shows_head = [&](const Axes& axes) {
+    return ShowsHead(Profile(view.reference.grid, view.body_mask, axes));
+  };
+  return !shows_head(stated) && shows_head({-stated.along, stated.side, true});
 }
 
 // Neither the room nor the head end is known, so that only the shape of the body can decide.
@@ -226,21 +249,23 @@ class Naming {
     return 2 * static_cast<int>(band - kBands.begin()) + of_side;
   }
 
-  [[nodiscard]] std::string NameOf(int rank) const {
-    if (rank == kHeadRank) return "head and neck";
+  [[nodiscard]] Message NameOf(int rank) const {
+    using Part = Message (*)();
+    if (rank == kHeadRank) return say::body::HeadAndNeck();
     const auto place = static_cast<std::size_t>(rank / 2);
-    const bool is_plus = rank % 2 == 0;
-    if (shoulders_) return fmt::format("{} {}", is_plus ? "left" : "right", kBands[place].name);
-    static constexpr std::array<const char*, 3> kByPosture = {"at the head end", "in the middle",
-                                                              "at the feet end"};
-    static constexpr std::array<const char*, 3> kByRoom = {"at the gantry end", "in the middle",
-                                                           "at the end away from the gantry"};
-    static constexpr std::array<const char*, 3> kByMarker = {"at the +Y end", "in the middle",
-                                                             "at the -Y end"};
-    if (words_ == Words::kPatient)
-      return fmt::format("{} side {}", is_plus ? "left" : "right", kByPosture[place]);
-    return fmt::format("{} side {}", is_plus ? "+X" : "-X",
-                       words_ == Words::kRoom ? kByRoom[place] : kByMarker[place]);
+    const std::size_t side = rank % 2 == 0 ? 0 : 1;
+    if (shoulders_) return (side == 0 ? kBands[place].left : kBands[place].right)();
+    static constexpr std::array<std::array<Part, 3>, 2> kByPosture = {
+        {{say::body::LeftSideHead, say::body::LeftSideMiddle, say::body::LeftSideFeet},
+         {say::body::RightSideHead, say::body::RightSideMiddle, say::body::RightSideFeet}}};
+    static constexpr std::array<std::array<Part, 3>, 2> kByRoom = {
+        {{say::body::PlusXSideGantry, say::body::PlusXSideMiddle, say::body::PlusXSideAway},
+         {say::body::MinusXSideGantry, say::body::MinusXSideMiddle, say::body::MinusXSideAway}}};
+    static constexpr std::array<std::array<Part, 3>, 2> kByMarker = {
+        {{say::body::PlusXSidePlusY, say::body::PlusXSideMiddle, say::body::PlusXSideMinusY},
+         {say::body::MinusXSidePlusY, say::body::MinusXSideMiddle, say::body::MinusXSideMinusY}}};
+    if (words_ == Words::kPatient) return kByPosture[side][place]();
+    return (words_ == Words::kRoom ? kByRoom : kByMarker)[side][place]();
   }
 
  private:
@@ -277,6 +302,49 @@ std::optional<Eigen::Vector3d> LargestShift(std::vector<Eigen::Vector3d>& shifts
   return sum / static_cast<double>(end - shifts_m.begin());
 }
 
+// What the maps say of each part of the region, by its rank.
+std::map<int, Collected> CollectParts(const BodyView& view, const Axes& axes,
+                                      const Naming& naming) {
+  const GridShape& grid = view.reference.grid;
+  std::map<int, Collected> collected;
+  for (std::size_t i = 0; i < view.region_mask.size(); ++i) {
+    if (view.region_mask[i] == 0 || !std::isfinite(view.reference.z[i])) continue;
+    const Eigen::Vector2d p = CellCentre(grid, i);
+    Collected& part = collected[naming.RankOf(p.dot(axes.along), p.dot(axes.side))];
+    part.sum += Eigen::Vector3d(p.x(), p.y(), view.reference.z[i]);
+    ++part.cells;
+    if (std::isfinite(view.deviation_after.z[i])) part.after.push_back(view.deviation_after.z[i]);
+  }
+  if (view.deformation != nullptr) {
+    const Deformation& field = *view.deformation;
+    for (std::size_t i = 0; i < field.points.size(); ++i) {
+      const Eigen::Vector2d p = field.points[i].head<2>().cast<double>();
+      const auto cell = grid.cell(p.x(), p.y());
+      if (field.observed[i] == 0 || !cell || view.region_mask[*cell] == 0) continue;
+      collected[naming.RankOf(p.dot(axes.along), p.dot(axes.side))].shifts_m.push_back(
+          field.shifts_m[i].cast<double>());
+    }
+  }
+  return collected;
+}
+
+bool IsTooSmall(const Collected& part, const GridShape& grid) {
+  const auto cells = static_cast<double>(part.cells);
+  return cells * grid.step * grid.step < kMinPart_m2 ||
+         static_cast<double>(part.after.size()) < kMinMeasured * cells;
+}
+
+BodyPart PartOf(const BodyView& view, Message name, Collected& part) {
+  BodyPart made{.name = std::move(name),
+                .centre_m = part.sum / static_cast<double>(part.cells),
+                .now_m = std::nullopt,
+                .after_m = TakeMedian(part.after),
+                .largest_shift_m = LargestShift(part.shifts_m)};
+  if (view.marker_kind == MarkerKind::kRoom)
+    made.now_m = (view.T_motion * made.centre_m - made.centre_m).z() + made.after_m;
+  return made;
+}
+
 void CheckSizes(const BodyView& view) {
   const std::size_t cells = view.reference.grid.num_cells();
   if (!(view.deviation_after.grid == view.reference.grid) || view.region_mask.size() != cells ||
@@ -310,10 +378,13 @@ BodyParts DescribeBody(const BodyView& view) {
   const GridShape& grid = view.reference.grid;
   const Outline outline = OutlineOf(grid, view.body_mask);
   const bool is_room_known = view.T_iec_reference.has_value();
-  const Axes axes = is_room_known ? AxesByRoom(view, outline) : AxesByBody(view, outline);
+  Axes axes = is_room_known ? AxesByRoom(view, outline) : AxesByBody(view, outline);
+  const bool contradicted = is_room_known && axes.by_posture && HeadAtOtherEnd(view, axes);
+  if (contradicted) axes = AxesOfRoom(*view.T_iec_reference);
   const Profile profile(grid, view.body_mask, axes);
   BodyParts result{
       .by_posture = axes.by_posture,
+      .head_at_other_end = contradicted,
       .room = is_room_known ? std::optional(WaysOfRoom(*view.T_iec_reference)) : std::nullopt,
       .patient = std::nullopt,
       .parts = {},
@@ -329,57 +400,31 @@ BodyParts DescribeBody(const BodyView& view) {
         naming.RankOf(view.hole_centre_m->dot(axes.along), view.hole_centre_m->dot(axes.side)));
   }
 
-  std::map<int, Collected> collected;
-  for (std::size_t i = 0; i < view.region_mask.size(); ++i) {
-    if (view.region_mask[i] == 0 || !std::isfinite(view.reference.z[i])) continue;
-    const Eigen::Vector2d p = CellCentre(grid, i);
-    Collected& part = collected[naming.RankOf(p.dot(axes.along), p.dot(axes.side))];
-    part.sum += Eigen::Vector3d(p.x(), p.y(), view.reference.z[i]);
-    ++part.cells;
-    if (std::isfinite(view.deviation_after.z[i])) part.after.push_back(view.deviation_after.z[i]);
-  }
-  if (view.deformation != nullptr) {
-    const Deformation& field = *view.deformation;
-    for (std::size_t i = 0; i < field.points.size(); ++i) {
-      const Eigen::Vector2d p = field.points[i].head<2>().cast<double>();
-      const auto cell = grid.cell(p.x(), p.y());
-      if (field.observed[i] == 0 || !cell || view.region_mask[*cell] == 0) continue;
-      collected[naming.RankOf(p.dot(axes.along), p.dot(axes.side))].shifts_m.push_back(
-          field.shifts_m[i].cast<double>());
-    }
-  }
-  for (auto& [rank, part] : collected) {
-    const auto cells = static_cast<double>(part.cells);
-    if (cells * grid.step * grid.step < kMinPart_m2 ||
-        static_cast<double>(part.after.size()) < kMinMeasured * cells)
-      continue;
-    BodyPart made{.name = naming.NameOf(rank),
-                  .centre_m = part.sum / cells,
-                  .now_m = std::nullopt,
-                  .after_m = TakeMedian(part.after),
-                  .largest_shift_m = LargestShift(part.shifts_m)};
-    if (view.marker_kind == MarkerKind::kRoom)
-      made.now_m = (view.T_motion * made.centre_m - made.centre_m).z() + made.after_m;
-    result.parts.push_back(std::move(made));
+  for (auto& [rank, part] : CollectParts(view, axes, naming)) {
+    if (IsTooSmall(part, grid)) continue;
+    result.parts.push_back(PartOf(view, naming.NameOf(rank), part));
   }
   return result;
 }
 
-std::string ShiftWords(const BodyPart& part, const PatientAxes& patient, double limit_m) {
+Message ShiftWords(const BodyPart& part, const PatientAxes& patient, double limit_m) {
   if (!part.largest_shift_m) return {};
   const Eigen::Vector2d shift = part.largest_shift_m->head<2>();
   if (!(shift.norm() > limit_m)) return {};
   const double to_head = shift.dot(patient.head), to_left = shift.dot(patient.left);
-  const char* side = to_left > 0 ? "to the left" : "to the right";
-  const char* end = to_head > 0 ? "towards the head" : "towards the feet";
-  return fmt::format("{} up to {:.0f} mm {}", part.name, shift.norm() / kMillimetre,
-                     std::abs(to_left) > std::abs(to_head) ? side : end);
+  const double shift_mm = shift.norm() / kMillimetre;
+  if (std::abs(to_left) > std::abs(to_head))
+    return to_left > 0 ? say::body::ShiftedLeft(part.name, shift_mm)
+                       : say::body::ShiftedRight(part.name, shift_mm);
+  return to_head > 0 ? say::body::ShiftedToHead(part.name, shift_mm)
+                     : say::body::ShiftedToFeet(part.name, shift_mm);
 }
 
-std::string HeightWords(const BodyPart& part, double height_m, double limit_m) {
+Message HeightWords(const BodyPart& part, double height_m, double limit_m) {
   if (!(std::abs(height_m) > limit_m)) return {};
-  return fmt::format("{} {:.0f} mm {}", part.name, std::abs(height_m) / kMillimetre,
-                     height_m > 0 ? "high" : "low");
+  const double height_mm = std::abs(height_m) / kMillimetre;
+  return height_m > 0 ? say::body::High(part.name, height_mm)
+                      : say::body::Low(part.name, height_mm);
 }
 
 }  // namespace plumb

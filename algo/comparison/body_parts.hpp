@@ -1,16 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
 // Describes in words where on the body two scans differ, such as "left shoulder 9 mm high".
 #pragma once
 
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/comparison/correction.hpp"
-#include "algo/comparison/deformation.hpp"
+#include "algo/motion/deformation.hpp"
 #include "algo/types/height_map.hpp"
 
 namespace plumb {
@@ -20,7 +21,7 @@ namespace plumb {
 struct BodyPart {
   /// For example "left shoulder" or "left side at the head end"; named by the room "+X side at the
   /// gantry end", by the marker "+X side at the +Y end".
-  std::string name;
+  Message name;
   Eigen::Vector3d centre_m =
       Eigen::Vector3d::Zero();  ///< Mean of its reference surface in the reference frame.
   /// Height above the reference before any correction; absent with couch-fixed markers.
@@ -48,12 +49,15 @@ struct BodyParts {
   /// True if names follow the patient's posture. False if the posture is unknown or the body does
   /// not lie as it states; names then do not mention left or right.
   bool by_posture = false;
+  /// The surface shows the head at the end that posture and room state to be the feet's: one of
+  /// them is wrong, and names follow the room alone.
+  bool head_at_other_end = false;
   std::optional<RoomWays> room;  ///< Not set without T_iec_reference.
   /// Directions of head and left; exact where by_posture is set.
   std::optional<PatientAxes> patient;
   std::vector<BodyPart> parts;  ///< Ordered from head to feet (by the room: from the gantry away).
   /// Name of the part that BodyView::hole_centre_m lies on; empty without one.
-  std::string hole_place;
+  Message hole_place;
 };
 
 /// Input of DescribeBody(). All maps and masks share the reference scene's grid.
@@ -77,7 +81,8 @@ struct BodyView {
 ///
 /// A body whose neck is visible is named by shoulder, chest, abdomen, pelvis, thigh and lower leg,
 /// one without by its ends. Posture and T_iec_reference state which end is the head and which side
-/// is left; where the body's outline clearly lies across the axis that they state, neither is used.
+/// is left; where the body's outline clearly lies across the axis that they state, or shows head
+/// and shoulders at the other end only, neither is used.
 ///
 /// Without T_iec_reference the outline alone decides where the head is: exactly one end of a long
 /// outline must show head, neck and shoulders that are about as wide as the widest other part. The
@@ -91,10 +96,9 @@ struct BodyView {
 
 /// Direction along the couch in which the part has moved most, such as "right thigh up to 40 mm to
 /// the right". Empty where the patient's sides are unknown or the displacement is within limit_m.
-[[nodiscard]] std::string ShiftWords(const BodyPart& part, const PatientAxes& patient,
-                                     double limit_m);
+[[nodiscard]] Message ShiftWords(const BodyPart& part, const PatientAxes& patient, double limit_m);
 
 /// "left shoulder 9 mm high", "left shoulder 9 mm low"; empty within +-limit_m.
-[[nodiscard]] std::string HeightWords(const BodyPart& part, double height_m, double limit_m);
+[[nodiscard]] Message HeightWords(const BodyPart& part, double height_m, double limit_m);
 
 }  // namespace plumb

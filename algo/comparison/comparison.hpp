@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compares two scenes of one patient: correction, maps and verdict.
 #pragma once
 
@@ -11,15 +12,17 @@
 
 #include <Eigen/Core>
 
-#include "algo/acceptance/acceptance.hpp"
+#include "algo/acceptance/gates.hpp"
+#include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
 #include "algo/comparison/body_parts.hpp"
+#include "algo/comparison/calibrated_room.hpp"
 #include "algo/comparison/correction.hpp"
-#include "algo/comparison/deformation.hpp"
 #include "algo/comparison/motion_uncertainty.hpp"
-#include "algo/comparison/region.hpp"
 #include "algo/comparison/scene_alignment.hpp"
+#include "algo/motion/deformation.hpp"
+#include "algo/motion/region.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/scene.hpp"
 
@@ -36,6 +39,16 @@ struct CompareOptions {
   /// unknown. The numbers then refer to the reference marker's axes, and the direction words do not
   /// mention couch or gantry.
   std::optional<Pose> T_iec_reference;
+  /// Only for a reference from a planning CT, where "reference frame" is the current scan's:
+  /// half-widths of the 95 % interval of T_iec_reference at the isocentre. Not set: exact, with a
+  /// warning.
+  std::optional<double> iec_u95_m, iec_u95_rad;
+  /// The taught markers of the room, in the frame that T_iec_reference maps from. Empty: that frame
+  /// is found by the current scan's reference marker alone.
+  MarkerMap room_markers;
+  /// Set: the reference was scanned in another room than the current scan, and no marker is shared.
+  /// Each scan is placed in IEC axes by its own room, the current one by the fields above.
+  std::optional<CalibratedRoom> reference_room;
   /// With kCouch only the posture is reported, no shifts.
   MarkerKind marker_kind = MarkerKind::kRoom;
   PatientPosture posture = PatientPosture::kHeadFirstSupine;  ///< Decides the words left and right.
@@ -75,8 +88,10 @@ struct Comparison {
   Preset preset = Preset::kBest;  ///< How the numbers were made.
   /// Names of the sensor units' profiles from which the two scenes were made, if they were.
   std::optional<std::string> reference_profile, current_profile;
+  std::optional<PlanningSource> planning;  ///< What the reference was, unless a sweep.
   Verdict verdict = Verdict::kNoAnswer;
-  std::vector<std::string> reasons;         ///< Complete sentences; the first one decides.
+  std::vector<Message> reasons;             ///< Complete sentences; the first one decides.
+  NumberJudgements judgements{};            ///< Of the numbers of `correction`.
   AcceptanceLimits limits;                  ///< By which the verdict was reached.
   MarkerConsensusOptions marker_consensus;  ///< By which moved markers were found.
   std::optional<Alignment> alignment;
@@ -97,15 +112,24 @@ struct Comparison {
   std::vector<std::uint8_t>
       region_mask;  ///< 1 for the cells of the reference grid in the region; may be empty.
 
-  std::vector<std::string> warnings;
+  std::vector<Message> warnings;
   std::map<std::string, double> timings_s;
 };
 
 /// Compares a current scan with its reference.
 ///
-/// The current scene may be in any frame (it need not have seen the reference marker), because the
-/// shared markers align it. The reference scene must be in its reference marker's frame and have a
-/// height map; otherwise the verdict is no_answer.
+/// A reference from a planning CT (SceneFrame::kIec) is met through T_iec_reference, from the frame
+/// of the current scene's reference marker: without it, or with fewer good markers in the current
+/// scene than AcceptanceLimits::min_shared_markers, there is no answer. `motion` and `correction`
+/// are then in that frame, while alignment, maps, region and parts of the body are in that of the
+/// reference scene (IEC axes).
+///
+/// A reference from another room (CompareOptions::reference_room) is met in IEC axes, too; the
+/// result is in the frame of the reference scene, as that of two scans in one room.
+///
+/// Otherwise the current scene may be in any frame (it need not have seen the reference marker),
+/// because the shared markers align it. The reference scene must be in its reference marker's frame
+/// and have a height map; otherwise the verdict is no_answer.
 ///
 /// @throws DataError if the scenes used different marker dictionaries or marker lengths.
 /// @throws std::invalid_argument if an option is out of range (tolerances <= 0, a polygon of fewer

@@ -1,17 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/correction.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "algo/base/units.hpp"
+#include "algo/comparison/correction_words.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr double kNormal95 = 1.959964;  // half-width of a 95 % interval in standard deviations
+using namespace couch;  // NOLINT: the names of its components
 
-// Components of the couch vector.
-enum Couch : Eigen::Index { kLateral, kLongitudinal, kVertical, kPitch, kRoll, kYaw };
+constexpr double kNormal95 = 1.959964;  // half-width of a 95 % interval in standard deviations
 
 // Standard deviations of the couch vector, to first order by central differences. The covariance is
 // a left perturbation (w, t) about the moved centroid m: p -> m + R(w)(p - m) + t.
@@ -47,103 +48,6 @@ CouchNumbers NumbersOf(const Vector6d& couch, MarkerKind kind) {
   return numbers;
 }
 
-bool IsSupine(PatientPosture posture) {
-  return posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kFeetFirstSupine;
-}
-
-// The nearest of the patient's eight directions to a direction in the plane: -1 feet, 0, +1 head,
-// and -1 right, 0, +1 left.
-struct PatientWay {
-  int head = 0, left = 0;
-};
-
-PatientWay WayOf(const PatientAxes& patient, const Eigen::Vector2d& way) {
-  const double limit = std::sin(22.5 * kDegree);
-  const auto side = [&](double part) { return part > limit ? 1 : (part < -limit ? -1 : 0); };
-  return {side(way.dot(patient.head)), side(way.dot(patient.left))};
-}
-
-std::string ShiftWords(const PatientWay& way) {
-  const std::string end = way.head > 0 ? "toward the head" : "toward the feet";
-  const std::string side = way.left > 0 ? "patient left" : "patient right";
-  if (way.left == 0) return end;
-  return way.head == 0 ? "to " + side : end + " and " + side;
-}
-
-std::string TiltWords(const PatientWay& rising) {
-  if (rising.left == 0) return rising.head > 0 ? "head up" : "head down";
-  if (rising.head == 0)
-    return rising.left > 0 ? "patient right side down" : "patient left side down";
-  return std::string(rising.head > 0 ? "head" : "feet") + " and patient " +
-         (rising.left > 0 ? "left" : "right") + " side up";
-}
-
-// Direction words where the orientation of the room is unknown. They refer to the patient if the
-// directions of head and left are known, otherwise to the reference marker's axes, and never to
-// couch or gantry.
-std::array<std::string, 6> WordsWithoutRoom(const Vector6d& couch, MarkerKind kind,
-                                            const std::optional<PatientPosture>& posture,
-                                            const std::optional<PatientAxes>& patient) {
-  const auto sign = [&](Eigen::Index i) { return couch[i] >= 0 ? 1.0 : -1.0; };
-  const auto letter = [&](Eigen::Index i) { return couch[i] >= 0 ? "+" : "-"; };
-  std::array<std::string, 6> words;
-  if (patient && posture) {
-    if (kind == MarkerKind::kRoom) {
-      const bool is_anterior = (couch[kVertical] >= 0) == IsSupine(*posture);
-      words[0] = std::string(couch[kVertical] >= 0 ? "up" : "down") +
-                 (is_anterior ? " (anterior)" : " (posterior)");
-      words[1] = ShiftWords(WayOf(*patient, sign(kLongitudinal) * Eigen::Vector2d::UnitY()));
-      words[2] = ShiftWords(WayOf(*patient, sign(kLateral) * Eigen::Vector2d::UnitX()));
-    }
-    // A rotation about an axis lifts the side that lies along z cross that axis.
-    words[3] = TiltWords(WayOf(*patient, sign(kPitch) * Eigen::Vector2d::UnitY()));
-    words[4] = TiltWords(WayOf(*patient, -sign(kRoll) * Eigen::Vector2d::UnitX()));
-    const Eigen::Vector2d turned(-patient->head.y(), patient->head.x());
-    words[5] = std::string("head to patient ") +
-               (sign(kYaw) * turned.dot(patient->left) > 0 ? "left" : "right");
-    return words;
-  }
-  if (kind == MarkerKind::kRoom) {
-    words[0] = couch[kVertical] >= 0 ? "up" : "down";
-    words[1] = std::string("along ") + letter(kLongitudinal) + "Y of the reference marker";
-    words[2] = std::string("along ") + letter(kLateral) + "X of the reference marker";
-  }
-  words[3] = std::string(letter(kPitch)) + "Y side of the reference marker up";
-  words[4] = std::string(letter(kRoll)) + "X side of the reference marker down";
-  words[5] = couch[kYaw] >= 0 ? "counter-clockwise from above" : "clockwise from above";
-  return words;
-}
-
-// Words for the signs. With head first supine the patient's left is +X (the viewer's right); prone
-// and feet first each exchange the sides.
-std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind,
-                                   std::optional<PatientPosture> posture) {
-  std::array<std::string, 6> words;
-  if (kind == MarkerKind::kRoom) {
-    words[0] = couch[kVertical] >= 0 ? "up" : "down";
-    words[1] = couch[kLongitudinal] >= 0 ? "toward gantry" : "away from gantry";
-    words[2] =
-        couch[kLateral] >= 0 ? "to the right, facing the gantry" : "to the left, facing the gantry";
-  }
-  words[3] = couch[kPitch] >= 0 ? "gantry end up" : "gantry end down";
-  words[4] = couch[kRoll] >= 0 ? "right side down, facing the gantry"
-                               : "left side down, facing the gantry";
-  words[5] = couch[kYaw] >= 0 ? "counter-clockwise from above" : "clockwise from above";
-  if (!posture) return words;
-
-  const bool head_first =
-      *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kHeadFirstProne;
-  const bool left_is_plus_x = head_first == IsSupine(*posture);
-  const auto side = [&](bool plus_x) { return plus_x == left_is_plus_x ? "left" : "right"; };
-  if (kind == MarkerKind::kRoom) words[2] = std::string("to patient ") + side(couch[kLateral] >= 0);
-  words[3] = (couch[kPitch] >= 0) == head_first ? "head up" : "head down";
-  words[4] = std::string("patient ") + side(couch[kRoll] >= 0) + " side down";
-  // A counter-clockwise rotation (seen from above) moves the gantry end to -X and the other end to
-  // +X.
-  words[5] = std::string("head to patient ") + side((couch[kYaw] >= 0) != head_first);
-  return words;
-}
-
 }  // namespace
 
 Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference,
@@ -172,7 +76,7 @@ Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance,
   correction.u95 = NumbersOf(kNormal95 * CouchSigmas(T_motion, covariance, T_motion * centroid,
                                                      isocentre_reference, T_axes),
                              kind);
-  correction.words = T_iec_reference ? WordsOf(couch, kind, posture)
+  correction.words = T_iec_reference ? WordsInRoom(couch, kind, posture)
                                      : WordsWithoutRoom(couch, kind, posture, patient);
   return correction;
 }

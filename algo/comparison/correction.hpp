@@ -1,47 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts a body motion into the six couch numbers (IEC 61217).
 #pragma once
 
 #include <array>
 #include <optional>
-#include <string>
 
 #include <Eigen/Core>
 
-#include "algo/base/names.hpp"
+#include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/base/posture.hpp"
+#include "algo/comparison/couch_numbers.hpp"
 
 namespace plumb {
-
-/// Whether the markers are fixed to the room or to the couch; stored with the reference.
-enum class MarkerKind { kRoom, kCouch };
-template <>
-inline constexpr auto kNamesOf<MarkerKind> = NamesUpTo<MarkerKind::kCouch>({"room", "couch"});
-
-/// Directions of the patient's head and left side, unit vectors in the plane (x, y) of the
-/// reference marker.
-struct PatientAxes {
-  Eigen::Vector2d head = Eigen::Vector2d::UnitY();
-  Eigen::Vector2d left = Eigen::Vector2d::UnitX();
-};
-
-/// Six values or their uncertainties. Shifts are absent with couch-fixed markers.
-struct CouchNumbers {
-  std::optional<double> vertical_mm;      ///< +Z, up.
-  std::optional<double> longitudinal_mm;  ///< +Y, toward the gantry.
-  std::optional<double> lateral_mm;       ///< +X, to the right of a viewer who faces the gantry.
-  double pitch_deg = 0.0;                 ///< About X; positive lifts the gantry end.
-  double roll_deg = 0.0;                  ///< About Y; positive lowers the viewer's right side.
-  double yaw_deg = 0.0;                   ///< About Z; positive is counter-clockwise from above.
-};
 
 /// The motion to APPLY to the patient so that the body lies as in the reference.
 struct Correction {
   Eigen::Vector3d isocentre_m = Eigen::Vector3d::Zero();  ///< In the reference marker's frame.
   CouchNumbers value;
   CouchNumbers u95;  ///< Half-widths of the 95 % intervals.
-  /// Directions of vertical, longitudinal, lateral, pitch, roll, yaw; "" where not reported.
-  std::array<std::string, 6> words;
+  /// Directions of vertical, longitudinal, lateral, pitch, roll, yaw; empty where not reported.
+  std::array<Message, 6> words;
 };
 
 /// The six numbers as a vector, in the order lateral, longitudinal, vertical (metres), pitch, roll,

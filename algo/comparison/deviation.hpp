@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Height and distance differences of two surfaces on one grid.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/marker_check.hpp"
 
 #include <algorithm>
@@ -5,11 +6,9 @@
 #include <limits>
 #include <optional>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include "algo/comparison/scene_alignment.hpp"
 #include "algo/geometry/rigid_fit.hpp"
+#include "words/check.hpp"
 
 namespace plumb {
 namespace {
@@ -53,18 +52,16 @@ class Checker {
                     : baseline_ ? MarkerCheckStatus::kPassed
                                 : MarkerCheckStatus::kNoBaseline;
     if (check_.status == MarkerCheckStatus::kNoBaseline) {
-      check_.reasons.push_back(
-          "there is no baseline yet: if the markers are known to be in place, set this check "
-          "as the baseline");
+      check_.reasons.push_back(say::check::NoBaseline());
     }
     return std::move(check_);
   }
 
  private:
-  void Fail(std::string reason) { check_.reasons.push_back(std::move(reason)); }
+  void Fail(Message reason) { check_.reasons.push_back(std::move(reason)); }
 
-  void AtMost(const char* name, double value, double limit, const char* unit, std::string note,
-              const std::string& reason) {
+  void AtMost(const char* name, double value, double limit, const char* unit, Message note,
+              const Message& reason) {
     const bool passed = std::abs(value) <= limit;
     check_.items.push_back({name, value, limit, unit, passed, std::move(note)});
     if (!passed) Fail(reason);
@@ -80,28 +77,23 @@ class Checker {
     const auto wanted =
         baseline_ ? baseline_->markers.size() : static_cast<std::size_t>(limits_.min_markers);
     const auto found = baseline_ ? wanted - missing.size() : seen_.size();
-    const std::string names =
-        missing.empty() ? "" : fmt::format("missing: {}", fmt::join(missing, ", "));
+    const std::vector<std::int64_t> ids(missing.begin(), missing.end());
     check_.items.push_back({"markers_seen", static_cast<double>(found), static_cast<double>(wanted),
-                            "", found >= wanted, names});
+                            "", found >= wanted,
+                            ids.empty() ? Message() : say::check::Missing(ids)});
     if (found >= wanted) return;
-    Fail(missing.empty()
-             ? fmt::format("{} markers were seen, at least {} are needed; sweep over all of them",
-                           found, wanted)
-             : fmt::format("markers {} were not seen well: check that they are there, clean and "
-                           "uncovered, and sweep over all",
-                           fmt::join(missing, ", ")));
+    Fail(ids.empty() ? say::check::FewSeen(static_cast<std::int64_t>(found),
+                                           static_cast<std::int64_t>(wanted))
+                     : say::check::NotSeen(ids));
   }
 
   bool SameMarkers() {
-    if (baseline_->dictionary == scene_.marker_dictionary &&
-        std::abs(baseline_->marker_length_m - scene_.marker_length_m) < 1e-6)
+    if (baseline_->room_markers.dictionary == scene_.room_markers.dictionary &&
+        std::abs(baseline_->room_markers.length_m - scene_.room_markers.length_m) < 1e-6)
       return true;
-    Fail(
-        fmt::format("the baseline was taken with markers {} of {} m, this check with {} of {} m; "
-                    "take a new baseline",
-                    baseline_->dictionary, baseline_->marker_length_m, scene_.marker_dictionary,
-                    scene_.marker_length_m));
+    Fail(say::check::OtherMarkers(baseline_->room_markers.dictionary,
+                                  baseline_->room_markers.length_m, scene_.room_markers.dictionary,
+                                  scene_.room_markers.length_m));
     return false;
   }
 
@@ -124,7 +116,7 @@ class Checker {
     const AlignmentOutcome outcome =
         AlignScenes(baseline_->markers, seen_, Preset::kBest, {}, limits_.min_markers);
     if (!outcome.alignment) {
-      for (std::string& reason : RefusalsOfMarkers(outcome.markers, limits_.min_markers)) {
+      for (Message& reason : RefusalsOfMarkers(outcome.markers, limits_.min_markers)) {
         Fail(std::move(reason));
       }
       return;
@@ -143,47 +135,36 @@ class Checker {
     }
     const double misfit_mm = outcome.alignment->rms_m / kMillimetre,
                  moved_mm = moved_m / kMillimetre;
-    AtMost("misfit", misfit_mm, limits_.max_misfit_m / kMillimetre, "mm", "",
-           fmt::format(
-               "the markers lie {:.1f} mm (RMS) from where they were, at most {:g} mm are allowed",
-               misfit_mm, limits_.max_misfit_m / kMillimetre));
+    AtMost("misfit", misfit_mm, limits_.max_misfit_m / kMillimetre, "mm", {},
+           say::check::Misfit(misfit_mm, limits_.max_misfit_m / kMillimetre));
     AtMost("moved", moved_mm, limits_.max_moved_m / kMillimetre, "mm",
-           fmt::format("marker {}", worst.value()),
-           fmt::format("marker {} moved {:.0f} mm", worst.value(), moved_mm));
+           say::check::Marker(worst.value()), say::check::Moved(worst.value(), moved_mm));
     const double scale = 100 * (ScaleOf(good) - 1);
-    AtMost("scale", scale, 100 * limits_.max_scale_error, "%", "",
-           fmt::format("the markers lie {:.2f} % farther apart than they did: the sensor's "
-                       "calibration may have changed",
-                       scale));
+    AtMost("scale", scale, 100 * limits_.max_scale_error, "%", {}, say::check::Scale(scale));
   }
 
   void Sides() {
     double worst = kNotKnown;
     std::optional<int> id_of_worst;
     for (const auto& [id, marker] : seen_) {
-      const double off = 100 * (MeanSide(marker.corners) / scene_.marker_length_m - 1);
+      const double off = 100 * (MeanSide(marker.corners) / scene_.room_markers.length_m - 1);
       if (!id_of_worst || std::abs(off) > std::abs(worst)) worst = off, id_of_worst = id;
     }
     // Preset `best` assumes that every marker has its nominal size, so that its sides were not
     // measured and cannot be checked.
     if (std::abs(worst) < kAssumed_percent) return;
     AtMost("side", worst, 100 * limits_.max_side_error, "%",
-           id_of_worst ? fmt::format("marker {}", *id_of_worst) : "",
-           id_of_worst
-               ? fmt::format(
-                     "marker {} is {:+.1f} % off its stated length: check the size of its print",
-                     *id_of_worst, worst)
-               : "no marker was seen, so none could be measured");
+           id_of_worst ? say::check::Marker(*id_of_worst) : Message(),
+           id_of_worst ? say::check::Side(*id_of_worst, worst) : say::check::NoneSeen());
   }
 
   void Depth() {
+    // A scale that was not measured must not pass for a good one.
     const auto found = scene_.calibration.find("depth_scale");
-    if (found == scene_.calibration.end()) return;
-    const double off = 100 * (found->second - 1);
-    AtMost("depth_scale", off, 100 * limits_.max_depth_error, "%", "",
-           fmt::format("the sensor's depth is off by {:+.1f} %: let it warm up, check again, then "
-                       "have it calibrated",
-                       off));
+    const bool is_known = found != scene_.calibration.end() && std::isfinite(found->second);
+    const double off = is_known ? 100 * (found->second - 1) : kNotKnown;
+    AtMost("depth_scale", off, 100 * limits_.max_depth_error, "%", {},
+           is_known ? say::check::Depth(off) : say::check::DepthUnknown());
   }
 
   const Scene& scene_;
@@ -196,7 +177,7 @@ class Checker {
 }  // namespace
 
 MarkerBaseline BaselineOf(const Scene& scene, const MarkerCheckLimits& limits) {
-  MarkerBaseline baseline{{}, scene.marker_dictionary, scene.marker_length_m};
+  MarkerBaseline baseline{{}, scene.room_markers};
   for (const auto& [id, marker] : scene.markers) {
     const bool finite = std::all_of(marker.corners.begin(), marker.corners.end(),
                                     [](const Eigen::Vector3d& p) { return p.allFinite(); });
@@ -208,6 +189,36 @@ MarkerBaseline BaselineOf(const Scene& scene, const MarkerCheckLimits& limits) {
 MarkerCheck CheckMarkers(const Scene& scene, const std::optional<MarkerBaseline>& baseline,
                          const MarkerCheckLimits& limits) {
   return Checker(scene, baseline, limits).Run();
+}
+
+std::vector<Message> ChangesOfBaseline(const MarkerBaseline& baseline,
+                                       const MarkerBaseline& wanted) {
+  constexpr double kShown_m = 1 * kMillimetre;
+  std::vector<Message> changes;
+  std::vector<std::int64_t> gone, added;
+  for (const auto& [id, marker] : baseline.markers)
+    if (!wanted.markers.contains(id)) gone.push_back(id);
+  for (const auto& [id, marker] : wanted.markers)
+    if (!baseline.markers.contains(id)) added.push_back(id);
+  if (!gone.empty()) changes.push_back(say::check::BaselineGone(gone));
+  if (!added.empty()) changes.push_back(say::check::BaselineNew(added));
+  const AlignmentOutcome outcome = AlignScenes(baseline.markers, wanted.markers, Preset::kBest, {},
+                                               MarkerCheckLimits{}.min_markers);
+  if (!outcome.alignment) {
+    changes.push_back(say::check::BaselineNotComparable());
+    return changes;
+  }
+  for (const auto& [id, marker] : wanted.markers) {
+    const auto known = baseline.markers.find(id);
+    if (known == baseline.markers.end()) continue;
+    const double moved_m = (outcome.alignment->T_reference_current * CentreOf(marker.corners) -
+                            CentreOf(known->second.corners))
+                               .norm();
+    if (moved_m >= kShown_m)
+      changes.push_back(say::check::BaselineMoved(id, moved_m / kMillimetre));
+  }
+  if (changes.empty()) changes.push_back(say::check::BaselineSame());
+  return changes;
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The daily check: whether the markers are where they were when the baseline was accepted, and
 // whether the sensor still measures their true size.
 #pragma once
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "algo/acceptance/verdict.hpp"
+#include "algo/base/message.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/scene.hpp"
 
@@ -32,22 +34,26 @@ struct MarkerCheckItem {
   double limit = 0.0;  ///< Largest allowed `value`; for markers_seen the smallest.
   std::string unit;    ///< "", "mm" or "%"
   bool passed = false;
-  std::string note;  ///< For example "marker 7" or "missing: 3, 9"; may be empty.
+  Message note;  ///< For example "marker 7" or "missing: 3, 9"; may be empty.
 };
 
 struct MarkerCheck {
   MarkerCheckStatus status = MarkerCheckStatus::kFailed;
   std::vector<MarkerCheckItem> items;
-  std::vector<std::string> reasons;  ///< Complete sentences that state why the check did not pass.
+  std::vector<Message> reasons;  ///< Complete sentences that state why the check did not pass.
 };
 
 /// The markers that a check accepted, with their dictionary and length.
 struct MarkerBaseline {
   MarkerMap markers;
-  std::string dictionary;
-  double marker_length_m = 0.0;
+  RoomMarkers room_markers = RoomMarkers::Unknown();
 };
 [[nodiscard]] MarkerBaseline BaselineOf(const Scene& scene, const MarkerCheckLimits& limits = {});
+
+/// What becomes otherwise if `wanted` takes the place of `baseline`, for people: markers that are
+/// gone, new, or moved by at least 1 mm after the rigid fit. Never empty.
+[[nodiscard]] std::vector<Message> ChangesOfBaseline(const MarkerBaseline& baseline,
+                                                     const MarkerBaseline& wanted);
 
 /// Compares the markers of a sweep with a baseline. A rigid motion of all markers together (another
 /// reference marker or starting position) is not an error. Never throws because of what a sweep

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // Uncertainty of a body motion: one covariance for each cause, and their sum.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -26,12 +27,34 @@ struct MotionUncertainty {
   /// Calibrations of the two sensors: see SharedSensor.
   Matrix6d sensor = Matrix6d::Zero();
   Matrix6d breathing = Matrix6d::Zero();  ///< Breathing during the two sweeps.
+  /// Only for a reference from a planning CT: the room's calibration, the threshold by which the
+  /// skin was found in the CT, and the spacing of its slices.
+  Matrix6d room = Matrix6d::Zero(), skin = Matrix6d::Zero(), slices = Matrix6d::Zero();
 
   [[nodiscard]] Matrix6d Total() const {
-    return surface + markers + distortion + scale + frame + sensor + breathing;
+    return surface + markers + distortion + scale + frame + sensor + breathing + room + skin +
+           slices;
   }
-  /// The causes with their names, in a fixed order.
-  [[nodiscard]] std::array<std::pair<const char*, const Matrix6d*>, 7> Parts() const;
+  /// The causes with their names, in a fixed order; the last three only where they take part.
+  [[nodiscard]] std::vector<std::pair<const char*, const Matrix6d*>> Parts() const;
+};
+
+/// How uncertain the place of a scan in its room is.
+struct PlaceUncertainty {
+  double room_u95_m = 0.0, room_u95_rad = 0.0;  ///< Of T_iec_reference, at the isocentre.
+  /// Of the reference marker in the scan's map; zero where the room's markers place it.
+  double frame_sigma_m = 0.0, frame_sigma_rad = 0.0;
+  Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();  ///< That marker in the reference frame.
+};
+
+/// What is added where scans are joined by calibrations of rooms.
+struct PlannedUncertainty {
+  std::vector<PlaceUncertainty> scans;  ///< One for a planning CT, two for two rooms.
+  Eigen::Vector3d isocentre_m = Eigen::Vector3d::Zero();  ///< Of the rooms, reference frame.
+  /// The motion that a skin farther out by 1 m would feign: (rotation vector, translation) about
+  /// the moved centroid.
+  Vector6d per_skin = Vector6d::Zero();
+  double skin_u95_m = 0.0, slice_spacing_m = 0.0;
 };
 
 /// Input of Uncertainty(). Borrowed for the call.
@@ -43,7 +66,9 @@ struct UncertaintyInput {
   Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();
   /// SharedSensor::covariance; absent where a scene has no sensitivity.
   std::optional<Matrix6d> sensor;
+  double scale_doubt = 0.0;  ///< The larger of the scenes' Scene::scale_doubt.
   double breathing_m = 0.0;  ///< Rise of chest and belly, root of the squares of both sweeps.
+  std::optional<PlannedUncertainty> planned = {};  ///< Where rooms join the scans.
 };
 
 [[nodiscard]] MotionUncertainty Uncertainty(const UncertaintyInput& input);
@@ -51,5 +76,8 @@ struct UncertaintyInput {
 /// Moves a covariance (left perturbation) to another reference point.
 [[nodiscard]] Matrix6d CovarianceAbout(const Matrix6d& covariance, const Eigen::Vector3d& from_m,
                                        const Eigen::Vector3d& to_m);
+
+/// The same covariance in axes that are turned: what was e is R e.
+[[nodiscard]] Matrix6d CovarianceTurned(const Matrix6d& covariance, const Eigen::Matrix3d& R);
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/room_board.hpp"
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include "algo/base/statistics.hpp"
 #include "algo/comparison/scene_alignment.hpp"
 #include "algo/geometry/rigid_fit.hpp"
+#include "words/check.hpp"
 
 namespace plumb {
 namespace {
@@ -107,8 +109,8 @@ std::pair<MarkerMap, MarkerMap> SplitRoomBoard(const MarkerMap& seen, int dictio
   return parts;
 }
 
-std::variant<BoardFit, std::string> FitRoomBoard(const RoomBoard& board, const MarkerMap& seen,
-                                                 const RoomCalibrationLimits& limits) {
+std::variant<BoardFit, Message> FitRoomBoard(const RoomBoard& board, const MarkerMap& seen,
+                                             const RoomCalibrationLimits& limits) {
   std::vector<Eigen::Vector3d> on_board, in_scene, centres_board, centres_scene;
   double variance = 0.0;
   for (const auto& [id, centre_m] : board.centres_m) {
@@ -124,33 +126,25 @@ std::variant<BoardFit, std::string> FitRoomBoard(const RoomBoard& board, const M
   }
   const std::size_t num = centres_board.size();
   if (num < limits.min_markers) {
-    return fmt::format(
-        "{} of the board's {} markers were seen well, at least {} are needed: check that they are "
-        "clean and uncovered, and sweep slowly over the board",
-        num, board.centres_m.size(), limits.min_markers);
+    return say::check::BoardFew(static_cast<std::int64_t>(num),
+                                static_cast<std::int64_t>(board.centres_m.size()),
+                                static_cast<std::int64_t>(limits.min_markers));
   }
   BoardFit fit{.scale = SpreadOf(centres_scene) / SpreadOf(centres_board), .num_markers = num};
   if (!(std::abs(fit.scale - 1) <= limits.max_scale_error)) {
-    return fmt::format(
-        "the board measures {:.1f} % of its size, {:g} % off are allowed: print it at 100 %, "
-        "without fitting to the page, and check its ruler",
-        100 * fit.scale, 100 * limits.max_scale_error);
+    return say::check::BoardScale(100 * fit.scale, 100 * limits.max_scale_error);
   }
   const RigidFit rigid = FitRigid(in_scene, on_board);
   fit.T_scene_board = rigid.T_a_b;
   fit.rms_m = rigid.rms_m;
   if (!rigid.valid || !(fit.rms_m <= limits.max_rms_m)) {
-    return fmt::format(
-        "the board's markers lie {:.1f} mm (RMS) off their places on the sheet, at most {:g} mm "
-        "are "
-        "allowed: lay the sheet flat on a rigid plate and sweep slowly over it",
-        fit.rms_m / kMillimetre, limits.max_rms_m / kMillimetre);
+    return say::check::BoardMisfit(fit.rms_m / kMillimetre, limits.max_rms_m / kMillimetre);
   }
   AddUncertainty(fit, centres_board, std::sqrt(variance / static_cast<double>(num)));
   return fit;
 }
 
-std::variant<RoomFit, std::string> FitRoom(std::span<const RoomScan> scans) {
+std::variant<RoomFit, Message> FitRoom(std::span<const RoomScan> scans) {
   if (scans.empty()) throw std::invalid_argument("FitRoom() needs a scan");
   std::vector<Pose> boards;  // in the first scan's frame
   for (std::size_t i = 0; i < scans.size(); ++i) {
@@ -158,9 +152,7 @@ std::variant<RoomFit, std::string> FitRoom(std::span<const RoomScan> scans) {
     if (i > 0) {
       const AlignmentOutcome outcome = AlignScenes(scans[0].room, scans[i].room);
       if (!outcome.alignment) {
-        return std::string(
-            "fewer than 3 of the room's markers lie in the same place in all scans: sweep over the "
-            "room's markers too, and do not move them");
+        return say::check::RoomMoved();
       }
       T_first_scan = outcome.alignment->T_reference_current;
     }
@@ -194,19 +186,15 @@ std::variant<RoomFit, std::string> FitRoom(std::span<const RoomScan> scans) {
   return fit;
 }
 
-std::string WhyNotSign(const RoomFit& fit, std::size_t num_scans,
-                       const RoomCalibrationLimits& limits) {
+Message WhyNotSign(const RoomFit& fit, std::size_t num_scans, const RoomCalibrationLimits& limits) {
   if (num_scans < limits.num_scans) {
-    return fmt::format(
-        "{} of {} scans of the board have been made: scan again, without touching it", num_scans,
-        limits.num_scans);
+    return say::check::BoardMoreScans(static_cast<std::int64_t>(num_scans),
+                                      static_cast<std::int64_t>(limits.num_scans));
   }
   if (fit.shift_m <= limits.max_shift_m && fit.turn_rad <= limits.max_turn_rad) return {};
-  return fmt::format(
-      "the scans differ by {:.2f} mm and {:.2f} deg, at most {:g} mm and {:g} deg are allowed: let "
-      "the sensor warm up, do not touch the board, and scan again",
-      fit.shift_m / kMillimetre, fit.turn_rad / kDegree, limits.max_shift_m / kMillimetre,
-      limits.max_turn_rad / kDegree);
+  return say::check::BoardScansDiffer(fit.shift_m / kMillimetre, fit.turn_rad / kDegree,
+                                      limits.max_shift_m / kMillimetre,
+                                      limits.max_turn_rad / kDegree);
 }
 
 std::optional<Pose> RoomOf(const MarkerMap& markers_iec, const MarkerMap& scene) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Calibrates the axes of the room with a printed board of markers aligned with the room's lasers.
 #pragma once
 
@@ -11,6 +12,7 @@
 
 #include <Eigen/Core>
 
+#include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/marker.hpp"
@@ -67,7 +69,7 @@ struct BoardFit {
 /// The fit, or one sentence that states why there is none: too few markers, a sheet printed at
 /// another scale, or a sheet that is bent or is not this board.
 /// @param seen  Markers that do not belong to the board are ignored.
-[[nodiscard]] std::variant<BoardFit, std::string> FitRoomBoard(
+[[nodiscard]] std::variant<BoardFit, Message> FitRoomBoard(
     const RoomBoard& board, const MarkerMap& seen, const RoomCalibrationLimits& limits = {});
 
 /// Markers of one calibration scan, in the scan's own frame.
@@ -88,12 +90,12 @@ struct RoomFit {
 /// board, so that the noise of the reference marker alone does not rotate the room.
 /// @return one sentence that states why not: the room's markers of two scans do not agree.
 /// @throws std::invalid_argument without a scan.
-[[nodiscard]] std::variant<RoomFit, std::string> FitRoom(std::span<const RoomScan> scans);
+[[nodiscard]] std::variant<RoomFit, Message> FitRoom(std::span<const RoomScan> scans);
 
 /// Why the calibration may not be signed: too few scans, or scans that differ by more than the
 /// limits. Empty if it may.
-[[nodiscard]] std::string WhyNotSign(const RoomFit& fit, std::size_t num_scans,
-                                     const RoomCalibrationLimits& limits = {});
+[[nodiscard]] Message WhyNotSign(const RoomFit& fit, std::size_t num_scans,
+                                 const RoomCalibrationLimits& limits = {});
 
 /// Orientation of the room in a scene, from the markers of a calibration. Nothing if fewer than
 /// three of them agree with those of the scene.

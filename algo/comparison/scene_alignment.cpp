@@ -1,15 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/scene_alignment.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 
-#include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "algo/geometry/rigid_fit.hpp"
+#include "words/comparison.hpp"
 
 namespace plumb {
 namespace {
@@ -393,13 +394,10 @@ AlignmentOutcome AlignGood(std::span<const SharedMarker> shared, MarkerConsensus
     if (std::binary_search(consensus.good.begin(), consensus.good.end(), i)) continue;
     const double residual = MarkerResidual(shared[i], fit.T_a_b);
     outcome.alignment->markers_rejected[shared[i].id] = residual;
-    outcome.warnings.push_back(fmt::format("marker {} moved {:.0f} mm since the reference; ignored",
-                                           shared[i].id, residual / kMillimetre));
+    outcome.warnings.push_back(say::comparison::MarkerMoved(shared[i].id, residual / kMillimetre));
   }
   if (consensus.good.size() == 3) {
-    outcome.warnings.emplace_back(
-        "only 3 markers place the scans against each other: if one of them had moved by some "
-        "millimetres, the other two could not show it");
+    outcome.warnings.push_back(say::comparison::OnlyThreeMarkers());
   }
   return outcome;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Aligns the current scene to the reference scene by the markers that both contain.
 #pragma once
 
@@ -8,7 +9,8 @@
 
 #include <Eigen/Core>
 
-#include "algo/acceptance/acceptance.hpp"
+#include "algo/acceptance/gates.hpp"
+#include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/marker.hpp"
@@ -51,7 +53,7 @@ struct Alignment {
 struct AlignmentOutcome {
   std::optional<Alignment> alignment;  ///< Not set where the markers do not determine a pose.
   MarkerEvidence markers;              ///< For RefusalsOfMarkers().
-  std::vector<std::string> warnings;   ///< For example markers that moved.
+  std::vector<Message> warnings;       ///< For example markers that moved.
 };
 
 /// Rigid transform between the corners of the markers (ids) in both maps (paper, eq. of the scene

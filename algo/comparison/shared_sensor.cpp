@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/shared_sensor.hpp"
 
 #include <algorithm>
@@ -46,9 +47,9 @@ std::optional<Effect> RigidPart(const std::vector<Point>& points, std::size_t ne
   return solver.solve(g);
 }
 
-std::vector<Point> MarkersOf(const Scene& scene, const Alignment& alignment, const Pose& T) {
+std::vector<Point> MarkersOf(const Scene& scene, const std::vector<int>& ids, const Pose& T) {
   std::vector<Point> points;
-  for (const int id : alignment.markers_used) {
+  for (const int id : ids) {
     const auto moves = scene.sensitivity->markers.find(id);
     const auto marker = scene.markers.find(id);
     if (moves == scene.sensitivity->markers.end() || marker == scene.markers.end()) continue;
@@ -98,7 +99,61 @@ Eigen::VectorXd DriftVariance(const std::vector<Eigen::Index>& terms) {
   return sigma.cwiseAbs2()(terms);
 }
 
+// By how much the current body moves against its markers, about the moved centroid.
+std::optional<Effect> EffectOnCurrent(const SharedSensorInput& input) {
+  const Eigen::Vector3d moved = input.T_motion * input.centroid_m;
+  const Pose& T = input.alignment.T_reference_current;
+  const auto markers =
+      RigidPart(MarkersOf(input.current, input.alignment.markers_used, T), kMinMarkers, moved);
+  const auto body =
+      RigidPart(SurfaceOf(input.current, T, input.T_motion.inverse(), input), kMinPatches, moved);
+  if (!markers || !body) return std::nullopt;
+  return *body - *markers;
+}
+
+// By how much the motion changes with the reference's calibration: its markers' part less that of
+// its body, which moves with it.
+std::optional<Effect> EffectOfReference(const SharedSensorInput& input,
+                                        const std::vector<int>& marker_ids) {
+  const Pose& M = input.T_motion;
+  const auto markers = RigidPart(MarkersOf(input.reference, marker_ids, Pose::Identity()),
+                                 kMinMarkers, M * input.centroid_m);
+  const auto body = RigidPart(SurfaceOf(input.reference, Pose::Identity(), Pose::Identity(), input),
+                              kMinPatches, input.centroid_m);
+  if (!markers || !body) return std::nullopt;
+  Effect body_moved(6, kCalibrationSize);
+  body_moved.topRows<3>() = M.linear() * body->topRows<3>();
+  body_moved.bottomRows<3>() = M.linear() * body->bottomRows<3>();
+  return *markers - body_moved;
+}
+
+Matrix6d CovarianceOf(const Effect& effect, const SensorSensitivity& sensor) {
+  const std::vector<Eigen::Index> free = FreeTerms(sensor, sensor);
+  const Effect G = effect(Eigen::all, free);
+  return kSharedErrors * kSharedErrors * G * sensor.covariance(free, free) * G.transpose();
+}
+
 }  // namespace
+
+std::optional<Matrix6d> SensorAlone(const SharedSensorInput& input) {
+  if (!input.current.sensitivity) return std::nullopt;
+  const SensorSensitivity& c = *input.current.sensitivity;
+  if (c.estimate.size() != kCalibrationSize) return std::nullopt;
+  const std::optional<Effect> effect = EffectOnCurrent(input);
+  if (!effect) return std::nullopt;
+  return CovarianceOf(*effect, c);
+}
+
+std::optional<Matrix6d> SensorsApart(const SharedSensorInput& input,
+                                     const std::vector<int>& reference_markers) {
+  const std::optional<Matrix6d> current = SensorAlone(input);
+  if (!current || !input.reference.sensitivity) return std::nullopt;
+  const SensorSensitivity& r = *input.reference.sensitivity;
+  if (r.estimate.size() != kCalibrationSize) return std::nullopt;
+  const std::optional<Effect> effect = EffectOfReference(input, reference_markers);
+  if (!effect) return std::nullopt;
+  return Matrix6d(*current + CovarianceOf(*effect, r));
+}
 
 std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input) {
   if (!input.reference.sensitivity || !input.current.sensitivity) return std::nullopt;
@@ -106,28 +161,15 @@ std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input) {
   const SensorSensitivity& c = *input.current.sensitivity;
   if (r.estimate.size() != kCalibrationSize || c.estimate.size() != kCalibrationSize)
     return std::nullopt;
-  const Pose& T = input.alignment.T_reference_current;
-  const Pose& M = input.T_motion;
-  const Eigen::Vector3d moved = M * input.centroid_m;
-  const auto markers_r =
-      RigidPart(MarkersOf(input.reference, input.alignment, Pose::Identity()), kMinMarkers, moved);
-  const auto markers_c =
-      RigidPart(MarkersOf(input.current, input.alignment, T), kMinMarkers, moved);
-  const auto body_r =
-      RigidPart(SurfaceOf(input.reference, Pose::Identity(), Pose::Identity(), input), kMinPatches,
-                input.centroid_m);
-  const auto body_c =
-      RigidPart(SurfaceOf(input.current, T, M.inverse(), input), kMinPatches, moved);
-  if (!markers_r || !markers_c || !body_r || !body_c) return std::nullopt;
+  const std::optional<Effect> reference = EffectOfReference(input, input.alignment.markers_used);
+  const std::optional<Effect> current = EffectOnCurrent(input);
+  if (!reference || !current) return std::nullopt;
 
   // M' = exp(a_r) T exp(-a_c) exp(b_c) T^-1 M exp(-b_r), to first order and about the moved
   // centroid: a are the markers' twists, b the body's.
-  Effect body_moved(6, kCalibrationSize);
-  body_moved.topRows<3>() = M.linear() * body_r->topRows<3>();
-  body_moved.bottomRows<3>() = M.linear() * body_r->bottomRows<3>();
   const std::vector<Eigen::Index> free = FreeTerms(r, c);
-  const Effect G_r = (*markers_r - body_moved)(Eigen::all, free);
-  const Effect G_c = (*body_c - *markers_c)(Eigen::all, free);
+  const Effect G_r = (*reference)(Eigen::all, free);
+  const Effect G_c = (*current)(Eigen::all, free);
 
   const Eigen::MatrixXd P_r = kSharedErrors * kSharedErrors * r.covariance(free, free);
   const Eigen::MatrixXd P_c = kSharedErrors * kSharedErrors * c.covariance(free, free);

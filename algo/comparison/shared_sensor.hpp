@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two sweeps by one sensor unit share its calibration: what each sweep estimated of it is joined.
 #pragma once
 
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "algo/comparison/scene_alignment.hpp"
 #include "algo/types/scene.hpp"
@@ -35,5 +37,15 @@ struct SharedSensor {
 /// calibration, not a nominal one, and estimates that agree (chi-square test at 1 in 1,000). Absent
 /// where a scene has no sensitivity, or too little of the region or too few markers take part.
 [[nodiscard]] std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input);
+
+/// Covariance of the motion from the calibration of the current scan alone, where the reference has
+/// none: a planning CT shares no sensor, so nothing cancels out. Absent as above.
+[[nodiscard]] std::optional<Matrix6d> SensorAlone(const SharedSensorInput& input);
+
+/// The same from both calibrations, where the scans share no marker, so that nothing is joined.
+/// @param reference_markers  The markers that place the reference; those of `input.alignment` place
+///        the current scan.
+[[nodiscard]] std::optional<Matrix6d> SensorsApart(const SharedSensorInput& input,
+                                                   const std::vector<int>& reference_markers);
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/geometry/back_projection.hpp"
 
 #include <algorithm>
@@ -39,8 +40,7 @@ RayTable::RayTable(const Intrinsics& intrinsics) : intrinsics_(intrinsics) {
                                             intrinsics.fx, intrinsics.fy));
   const std::size_t width = static_cast<std::size_t>(intrinsics.width);
   ideal_.resize(width * static_cast<std::size_t>(intrinsics.height));
-  const bool has_lens = std::any_of(intrinsics.distortion.begin(), intrinsics.distortion.end(),
-                                    [](double k) { return k != 0.0; });
+  const bool has_lens = HasLens(intrinsics);
   tbb::parallel_for(0, intrinsics.height, [&](int row) {
     Eigen::Vector2d offset =
         Eigen::Vector2d::Zero();  // ideal minus distorted, for the pixel to the left

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts depth images to points with precomputed viewing rays of the camera.
 #pragma once
 

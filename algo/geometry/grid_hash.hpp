@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Integer cells of space and an open-addressing map from them, used by the searches in this folder.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds nearest points among several moving clouds with one shared spatial hash.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The rigid transform between two sets of paired points.
 #pragma once
 

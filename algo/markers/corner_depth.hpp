@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Computes the positions of a marker's corners from the depth image.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/markers/corner_refinement.hpp"
 
 #include <algorithm>
@@ -26,6 +27,34 @@ constexpr int kFirstSideSamples = 90;  // approximate number of pixels per side 
 constexpr int kSideSamples = 180;      // and in later rounds
 constexpr double kModelError_px =
     0.03;  // covers sharpening cameras and real paper; rendered images leave 0.01
+// Errors of neighbouring pixels are correlated (compression, interpolation in the camera), and the
+// model is not exact: on rendered images the errors are 1.0 to 1.3 times those of independent
+// noise.
+constexpr double kCorrelatedNoise = 1.25;
+constexpr std::size_t kMinSamples = 24;  // three for each unknown
+
+// Residuals above this fraction of the step from black to white count linearly: something lies on
+// the marker, or a pixel belongs to the next cell.
+constexpr double kHuberPart = 0.12;
+
+// Weak priors, each worth this many pixels: the logarithm of the blur does not change, and the
+// slopes are zero. The other two only keep the system regular.
+constexpr double kBlurPrior = 2.0;
+constexpr double kSlopePrior = 2.0;
+constexpr double kEndPrior = 1e-3;
+constexpr double kEdgeShiftPrior = 0.1;
+
+// Largest changes in one step, beyond which the linear model does not hold.
+constexpr double kMostMove = 0.3;  // of a cell, but at least a pixel
+constexpr double kMostLogBlur = 0.5;
+constexpr double kMostShift_px = 0.3;
+// Wider blur leaves no step between two cells.
+constexpr double kMaxBlur_px = 2.5;
+constexpr double kMaxBlur = 0.8;  // of a cell
+
+// A corner found farther from its start belongs to something else. The start is a polygon's vertex.
+constexpr double kMaxCorrection_px = 2.5;
+constexpr double kMaxCorrection = 0.6;  // of a cell
 
 const ToneTable& EncodedValues() {
   static const ToneTable table = PowerTone(1.0);
@@ -99,16 +128,33 @@ bool StartLevels(const Side& side, const std::vector<Sample>& samples, SideFit& 
 using Vector8 = Eigen::Matrix<double, 8, 1>;
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
 
-/// One robust Gauss-Newton step on a side's samples. False if the system is singular.
-bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_shift,
-          SideFit& fit) {
+/// Rows of the unknowns of a side.
+enum Unknown : Eigen::Index {
+  kEndA,  // the line's depth where the side begins
+  kEndB,  // and where it ends
+  kLogBlur,
+  kWhite,
+  kWhiteSlope,
+  kStep,
+  kStepSlope,
+  kEdgeShift
+};
+
+/// Sums over a side's samples, with their robust weights.
+struct SideSums {
+  Matrix8 normal;  ///< Only the lower half is filled and used.
+  Vector8 right;
+  double weighted_square = 0, weights = 0, levels_square = 0;
+};
+
+SideSums SumSamples(const Side& side, const std::vector<Sample>& samples, const SideFit& fit) {
   // In single precision and four numbers at a time, because this loop dominates the cost of a
   // frame. Column i holds row i of the lower half of J^T W J, which is symmetric.
   Eigen::Array<float, 8, 8> sums = Eigen::Array<float, 8, 8>::Zero();
   Eigen::Array<float, 8, 1> gradient = Eigen::Array<float, 8, 1>::Zero();
-  double weighted_square = 0, weights = 0, levels_square = 0;
+  SideSums result;
   const auto inverse_blur = static_cast<float>(1.0 / fit.blur_px);
-  const auto limit = static_cast<float>(0.12 * fit.step);
+  const auto limit = static_cast<float>(kHuberPart * fit.step);
   const auto shift = static_cast<float>(fit.edge_shift_px);
   for (const Sample& sample : samples) {
     const float along = sample.along;
@@ -130,44 +176,59 @@ bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_s
     for (int i = 0; i < 4; ++i) sums.col(i).head<4>() += weighted[i] * jacobian.head<4>();
     for (int i = 4; i < 8; ++i) sums.col(i) += weighted[i] * jacobian;
     gradient += weighted * residual;
-    weighted_square += static_cast<double>(weight) * residual * residual;
-    weights += weight;
+    result.weighted_square += static_cast<double>(weight) * residual * residual;
+    result.weights += weight;
     const float levels = residual * sample.levels_per_light;
-    levels_square += static_cast<double>(weight) * levels * levels;
+    result.levels_square += static_cast<double>(weight) * levels * levels;
   }
-  Matrix8 normal = sums.matrix().transpose().cast<double>();
-  Vector8 right = gradient.matrix().cast<double>();
-  // A weak prior on blur and slopes keeps the system regular for faint or tiny sides.
-  const double scale = fit.step * fit.step;
-  normal(2, 2) += 2 * scale;
-  normal(4, 4) += 2;
-  normal(6, 6) += 2;
-  right[4] -= 2 * fit.white_slope;
-  right[6] -= 2 * fit.step_slope;
-  normal(0, 0) += 1e-3 * scale;
-  normal(1, 1) += 1e-3 * scale;
-  if (!find_edge_shift) {
-    normal.row(7).setZero();
-    normal.col(7).setZero();
-    right[7] = 0;
-  }
-  normal(7, 7) += 1e-1 * scale;
-  const Eigen::LDLT<Matrix8> solver(normal);
-  if (solver.info() != Eigen::Success || !solver.isPositive()) return false;
-  const Vector8 change = solver.solve(right);
-  if (!change.allFinite()) return false;
+  result.normal = sums.matrix().transpose().cast<double>();
+  result.right = gradient.matrix().cast<double>();
+  return result;
+}
 
-  const double largest = std::max(1.0, 0.3 * side.cell_px);
-  fit.ends += change.head<2>().cwiseMax(-largest).cwiseMin(largest);
-  fit.blur_px = std::clamp(fit.blur_px * std::exp(std::clamp(change[2], -0.5, 0.5)), kMinBlur_px,
-                           std::max(2.5, 0.8 * side.cell_px));
-  fit.white += change[3];
-  fit.white_slope += change[4];
-  fit.step += change[5];
-  fit.step_slope += change[6];
-  fit.edge_shift_px += std::clamp(change[7], -0.3, 0.3);
-  fit.residual_levels = std::sqrt(levels_square / std::max(weights, 1.0));
-  const double variance = weighted_square / std::max(1.0, weights - 7);
+/// Keeps the system regular for faint or tiny sides.
+void AddPriors(const SideFit& fit, bool find_edge_shift, SideSums& sums) {
+  const double scale = fit.step * fit.step;
+  Matrix8& normal = sums.normal;
+  normal(kLogBlur, kLogBlur) += kBlurPrior * scale;
+  for (const Unknown slope : {kWhiteSlope, kStepSlope}) normal(slope, slope) += kSlopePrior;
+  sums.right[kWhiteSlope] -= kSlopePrior * fit.white_slope;
+  sums.right[kStepSlope] -= kSlopePrior * fit.step_slope;
+  for (const Unknown end : {kEndA, kEndB}) normal(end, end) += kEndPrior * scale;
+  if (!find_edge_shift) {
+    normal.row(kEdgeShift).setZero();
+    normal.col(kEdgeShift).setZero();
+    sums.right[kEdgeShift] = 0;
+  }
+  normal(kEdgeShift, kEdgeShift) += kEdgeShiftPrior * scale;
+}
+
+/// Moves the unknowns by a step, no farther than the model holds.
+void MoveBy(const Vector8& change, double cell_px, SideFit& fit) {
+  const double farthest_px = std::max(1.0, kMostMove * cell_px);
+  fit.ends += change.head<2>().cwiseMax(-farthest_px).cwiseMin(farthest_px);
+  const double log_blur = std::clamp(change[kLogBlur], -kMostLogBlur, kMostLogBlur);
+  fit.blur_px = std::clamp(fit.blur_px * std::exp(log_blur), kMinBlur_px,
+                           std::max(kMaxBlur_px, kMaxBlur * cell_px));
+  fit.white += change[kWhite];
+  fit.white_slope += change[kWhiteSlope];
+  fit.step += change[kStep];
+  fit.step_slope += change[kStepSlope];
+  fit.edge_shift_px += std::clamp(change[kEdgeShift], -kMostShift_px, kMostShift_px);
+}
+
+/// One robust Gauss-Newton step on a side's samples. False if the system is singular.
+bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_shift,
+          SideFit& fit) {
+  SideSums sums = SumSamples(side, samples, fit);
+  AddPriors(fit, find_edge_shift, sums);
+  const Eigen::LDLT<Matrix8> solver(sums.normal);
+  if (solver.info() != Eigen::Success || !solver.isPositive()) return false;
+  const Vector8 change = solver.solve(sums.right);
+  if (!change.allFinite()) return false;
+  MoveBy(change, side.cell_px, fit);
+  fit.residual_levels = std::sqrt(sums.levels_square / std::max(sums.weights, 1.0));
+  const double variance = sums.weighted_square / std::max(1.0, sums.weights - 7);
   fit.ends_covariance = variance * solver.solve(Matrix8::Identity()).topLeftCorner<2, 2>();
   return fit.step > kMinStep;
 }
@@ -180,7 +241,7 @@ void FitSide(const cv::Mat& gray, const Tone& tone, const Side& side, bool find_
   CollectSamples(gray, tone, side, first ? kFirstSideSamples : kSideSamples, samples);
   fit.ends.setZero();  // the side was moved to the line found before
   fit.valid = false;
-  if (samples.size() < 24 || (first && !StartLevels(side, samples, fit))) return;
+  if (samples.size() < kMinSamples || (first && !StartLevels(side, samples, fit))) return;
   for (int step = 0; step < (first ? kFirstSteps : 1); ++step)
     if (!Step(side, samples, find_edge_shift, fit)) return;
   fit.valid = true;
@@ -204,8 +265,8 @@ SideLine LineOf(const Side& side, const SideFit& fit) {
 std::optional<Eigen::Vector2d> Intersection(const SideLine& a, const SideLine& b) {
   Eigen::Matrix2d m;
   m << a.normal.transpose(), b.normal.transpose();
-  if (std::abs(m.determinant()) < 0.1)
-    return std::nullopt;  // the sides meet at less than 6 degrees
+  constexpr double kLeastSine = 0.1;  // Of the angle at which the sides meet: 6 degrees.
+  if (std::abs(m.determinant()) < kLeastSine) return std::nullopt;
   return m.inverse() * Eigen::Vector2d(a.offset, b.offset);
 }
 
@@ -220,10 +281,71 @@ double CornerSigma(const std::array<Side, 4>& sides, const std::array<SideFit, 4
   const Eigen::Vector2d variance(fits[before].ends_covariance(1, 1),
                                  fits[corner].ends_covariance(0, 0));
   const double random = (inverse * variance.asDiagonal() * inverse.transpose()).trace() / 2;
-  // Errors of neighbouring pixels are correlated (compression, interpolation in the camera), and
-  // the model is not exact: on rendered images the errors are 1.0 to 1.3 times those of independent
-  // noise.
-  return std::hypot(1.25 * std::sqrt(random), kModelError_px);
+  return std::hypot(kCorrelatedNoise * std::sqrt(random), kModelError_px);
+}
+
+/// The four sides of a marker, and the corners in which they meet.
+struct SquareFit {
+  ImageCorners corners;
+  std::array<Side, 4> sides;
+  std::array<SideFit, 4> fits;
+};
+
+/// True if no corner lies `margin_px` or more outside the image.
+bool AreInside(const ImageCorners& corners, const cv::Mat& gray, double margin_px) {
+  return std::all_of(corners.begin(), corners.end(), [&](const Eigen::Vector2d& p) {
+    return p.x() > -margin_px && p.y() > -margin_px && p.x() < gray.cols - 1 + margin_px &&
+           p.y() < gray.rows - 1 + margin_px;
+  });
+}
+
+bool FitSides(const cv::Mat& gray, const Tone& tone, const MarkerPattern& pattern,
+              const CornerRefinementOptions& options, std::vector<Sample>& samples,
+              SquareFit& square) {
+  std::array<SideFit, 4>& fits = square.fits;
+  for (std::size_t i = 0; i < 4; ++i) {
+    // The neighbours' blur acts along this side.
+    const double along_px = 0.5 * (fits[(i + 1) % 4].blur_px + fits[(i + 3) % 4].blur_px);
+    std::optional<Side> side = MakeSide(square.corners, static_cast<int>(i), pattern, along_px,
+                                        fits[i].edge_shift_px, options.intrinsics);
+    if (!side) return false;
+    square.sides[i] = *std::move(side);
+    FitSide(gray, tone, square.sides[i], options.find_edge_shift, samples, fits[i]);
+    if (!fits[i].valid) return false;
+  }
+  return true;
+}
+
+std::optional<ImageCorners> CornersOf(const SquareFit& square) {
+  ImageCorners corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::size_t before = (i + 3) % 4;
+    const std::optional<Eigen::Vector2d> corner = Intersection(
+        LineOf(square.sides[before], square.fits[before]), LineOf(square.sides[i], square.fits[i]));
+    if (!corner) return std::nullopt;
+    corners[i] = *corner;
+  }
+  return corners;
+}
+
+/// Nothing if a corner is farther from its start than the error of a start can explain.
+std::optional<CornerRefinement> ResultOf(const SquareFit& square, const ImageCorners& initial) {
+  CornerRefinement result;
+  result.corners = square.corners;
+  double cell_px = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const SideFit& fit = square.fits[i];
+    cell_px += square.sides[i].cell_px / 4;
+    result.sigma_px[i] = CornerSigma(square.sides, square.fits, i);
+    result.blur_px += fit.blur_px / 4;
+    result.contrast += fit.step / 4;
+    result.edge_shift_px += fit.edge_shift_px / 4;
+    result.residual_levels += fit.residual_levels / 4;
+  }
+  const double allowed_px = std::max(kMaxCorrection_px, kMaxCorrection * cell_px);
+  for (std::size_t i = 0; i < 4; ++i)
+    if (!((result.corners[i] - initial[i]).norm() < allowed_px)) return std::nullopt;
+  return result;
 }
 
 }  // namespace
@@ -255,62 +377,26 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
         fmt::format("corner refinement needs an 8-bit grey image, got {} x {} of type {}",
                     gray.cols, gray.rows, gray.type()));
   }
-  for (const Eigen::Vector2d& p : initial) {
-    if (!(p.x() > -1 && p.y() > -1 && p.x() < gray.cols && p.y() < gray.rows)) return std::nullopt;
-  }
+  if (!AreInside(initial, gray, 1)) return std::nullopt;
   const Tone tone(options.tone != nullptr ? *options.tone
                   : options.linear_light  ? SrgbTone()
                                           : EncodedValues());
-  CornerRefinement result;
-  result.corners = initial;
-  std::array<Side, 4> sides;
-  std::array<SideFit, 4> fits;
-  for (SideFit& fit : fits) fit.edge_shift_px = options.edge_shift_px;
+  SquareFit square;
+  square.corners = initial;
+  for (SideFit& fit : square.fits) fit.edge_shift_px = options.edge_shift_px;
   std::vector<Sample> samples;
   for (int round = 0; round < kOuterRounds; ++round) {
-    for (int k = 0; k < 4; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      const double along =
-          0.5 * (fits[(i + 1) % 4].blur_px +
-                 fits[(i + 3) % 4].blur_px);  // the neighbours' blur acts along this side
-      std::optional<Side> side =
-          MakeSide(result.corners, k, pattern, along, fits[i].edge_shift_px, options.intrinsics);
-      if (!side) return std::nullopt;
-      sides[i] = *std::move(side);
-      FitSide(gray, tone, sides[i], options.find_edge_shift, samples, fits[i]);
-      if (!fits[i].valid) return std::nullopt;
-    }
-    double moved = 0;
-    ImageCorners next;
-    for (std::size_t i = 0; i < 4; ++i) {
-      const std::size_t before = (i + 3) % 4;
-      const std::optional<Eigen::Vector2d> corner =
-          Intersection(LineOf(sides[before], fits[before]), LineOf(sides[i], fits[i]));
-      if (!corner) return std::nullopt;
-      next[i] = *corner;
-      moved = std::max(moved, (next[i] - result.corners[i]).norm());
-    }
-    result.corners = next;
-    for (const Eigen::Vector2d& p : next) {
-      if (!(p.x() > -2 && p.y() > -2 && p.x() < gray.cols + 1 && p.y() < gray.rows + 1))
-        return std::nullopt;
-    }
-    if (round > 0 && moved < kConverged_px) break;
+    if (!FitSides(gray, tone, pattern, options, samples, square)) return std::nullopt;
+    const std::optional<ImageCorners> next = CornersOf(square);
+    if (!next) return std::nullopt;
+    double moved_px = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      moved_px = std::max(moved_px, ((*next)[i] - square.corners[i]).norm());
+    square.corners = *next;
+    if (!AreInside(square.corners, gray, 2)) return std::nullopt;
+    if (round > 0 && moved_px < kConverged_px) break;
   }
-
-  double cell_px = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    cell_px += sides[i].cell_px / 4;
-    result.sigma_px[i] = CornerSigma(sides, fits, i);
-    result.blur_px += fits[i].blur_px / 4;
-    result.contrast += fits[i].step / 4;
-    result.edge_shift_px += fits[i].edge_shift_px / 4;
-    result.residual_levels += fits[i].residual_levels / 4;
-  }
-  const double allowed_px = std::max(2.5, 0.6 * cell_px);
-  for (std::size_t i = 0; i < 4; ++i)
-    if (!((result.corners[i] - initial[i]).norm() < allowed_px)) return std::nullopt;
-  return result;
+  return ResultOf(square, initial);
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds square fiducial markers in an image, with sub-pixel corners.
 #pragma once
 

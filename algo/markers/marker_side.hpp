@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One side of a marker's square in an image: its geometry, the pixels around it and the blurred
 // pattern beside it. Used by the corner refinement.
 #pragma once
@@ -14,7 +15,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/base/intrinsics.hpp"
-#include "algo/markers/corner_refinement.hpp"
+#include "algo/markers/marker_pattern.hpp"
 #include "algo/types/marker.hpp"
 
 namespace plumb::marker_side {

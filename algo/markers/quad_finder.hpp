@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds candidates for markers: dark convex quadrilaterals on a lighter background.
 #pragma once
 

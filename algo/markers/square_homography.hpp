@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The projective map from a square to a quadrilateral in closed form.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Estimates the camera's tone curve from the blurred edges of a sweep's markers.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/reconstruction/breathing.hpp"
 
 #include <algorithm>
@@ -14,7 +15,7 @@
 #include "algo/base/robust_weights.hpp"
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
-#include "algo/reconstruction/view_fusion.hpp"
+#include "algo/surface/view_fusion.hpp"
 
 namespace plumb {
 namespace {
@@ -150,7 +151,7 @@ class SurfaceFit {
     SetRhythm(angular_per_s);
     std::size_t count = 0;
     for (std::size_t p = 0; p < patches_.size(); ++p) {
-      surfaces_[p].moves = slopes[p] > above;  // not where it is NaN
+      surfaces_[p].moves = patches_[p].may_move && slopes[p] > above;  // not where it is NaN
       if (surfaces_[p].moves) ++count;
     }
     return count;
@@ -407,7 +408,9 @@ std::optional<Breathing> FindBreathing(std::span<const SurfacePatch> patches,
     const double noise_m = kMadToSigma * TakeMedian(sizes);
     const double above_m = std::max(kSignificant * noise_m, -TakeQuantile(known, kLowestFraction));
     const std::size_t num_moving = fit.LetMove(rhythm.angular_per_s, slopes, above_m);
-    std::erase_if(known, [&](double slope) { return slope <= above_m; });
+    std::vector<double> moving;
+    for (std::size_t i = 0; i < slopes.size(); ++i)
+      if (patches[i].may_move && slopes[i] > above_m) moving.push_back(slopes[i]);
     if (round < kMovementRounds && num_moving > 0) {
       fit.Solve(kSweeps);
       continue;
@@ -415,7 +418,7 @@ std::optional<Breathing> FindBreathing(std::span<const SurfacePatch> patches,
     Breathing result;
     result.limit_m = kFoundAbove * above_m;
     if (num_moving < kMinMoving || rhythm.contrast < kMinContrast) return result;
-    result.amplitude_m = 2.0 * TakeQuantile(known, kMostAffected);
+    result.amplitude_m = 2.0 * TakeQuantile(moving, kMostAffected);
     result.sigma_m = std::hypot(2.0 * noise_m, kAmplitudeError * result.amplitude_m);
     result.period_s = kTwoPi / rhythm.angular_per_s;
     return result;

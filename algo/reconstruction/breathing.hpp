@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds a body's breathing in the depth images of one sweep.
 #pragma once
 
@@ -9,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "algo/reconstruction/view_surface.hpp"
+#include "algo/surface/view_surface.hpp"
 #include "algo/types/point_cloud.hpp"
 #include "algo/types/scene.hpp"
 
@@ -27,6 +28,7 @@ struct SurfacePatch {
   Eigen::Vector3f centre_m = Eigen::Vector3f::Zero();
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< Unit length.
   std::vector<PatchSample> samples;                   ///< By view, ascending.
+  bool may_move = true;                               ///< False: cannot breathe.
 };
 
 /// Divides the merged surface into patches and measures each in every view that sees it. Runs in

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/reconstruction/reconstructor.hpp"
 
 #include <algorithm>
@@ -12,21 +13,28 @@
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/statistics.hpp"
+#include "algo/diagnosis/marker_depth.hpp"
+#include "algo/diagnosis/sweep_watch.hpp"
 #include "algo/markers/sweep_tone.hpp"
+#include "algo/motion/region.hpp"
+#include "algo/published/paper_reconstruction.hpp"
 #include "algo/reconstruction/breathing.hpp"
-#include "algo/reconstruction/corrected_views.hpp"
-#include "algo/reconstruction/height_maps.hpp"
-#include "algo/reconstruction/joint_registration.hpp"
-#include "algo/reconstruction/paper_reconstruction.hpp"
+#include "algo/reconstruction/breathing_check.hpp"
 #include "algo/reconstruction/scene_assembly.hpp"
-#include "algo/reconstruction/sensor_sensitivity.hpp"
-#include "algo/reconstruction/surface_cloud.hpp"
-#include "algo/reconstruction/surface_mesh.hpp"
 #include "algo/reconstruction/trajectory.hpp"
-#include "algo/reconstruction/view_surface.hpp"
+#include "algo/registration/corrected_views.hpp"
+#include "algo/registration/joint_registration.hpp"
+#include "algo/registration/sensor_sensitivity.hpp"
+#include "algo/surface/height_maps.hpp"
+#include "algo/surface/surface_cloud.hpp"
+#include "algo/surface/surface_mesh.hpp"
+#include "algo/surface/view_surface.hpp"
 #include "algo/tracking/map_budget.hpp"
 #include "algo/tracking/tracker.hpp"
+#include "algo/types/image_error_sigmas.hpp"
 #include "algo/types/marker_dictionary.hpp"
+#include "words/progress.hpp"
+#include "words/reconstruction.hpp"
 
 namespace plumb {
 namespace {
@@ -53,26 +61,17 @@ TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOption
 }
 
 // States why the scene contains no points. The depth is the median over the frames' medians.
-std::string WhyNoSurface(std::span<const ViewSurface> surfaces,
-                         std::vector<double> median_depths_m) {
+Message WhyNoSurface(std::span<const ViewSurface> surfaces, std::vector<double> median_depths_m,
+                     const UsableDepth& range) {
   const double median_depth_m = TakeMedian(median_depths_m);
-  const ViewSurfaceOptions range;
   const bool measured =
       std::any_of(surfaces.begin(), surfaces.end(), [](const ViewSurface& surface) {
         return std::any_of(surface.pixels.begin(), surface.pixels.end(),
                            [](const ViewSurface::Pixel& pixel) { return pixel.weight > 0; });
       });
-  if (measured)
-    return fmt::format(
-        "no surface was seen alike by two of {} keyframes (depth {:.2f} m in the median): sweep "
-        "slowly over a scene that stands still",
-        surfaces.size(), median_depth_m);
-  return fmt::format(
-      "no usable surface in {} keyframes: depth is {:.2f} m in the median, expected from {:.1f} to "
-      "{:.1f} m; check depth_scale in "
-      "camera.yaml and "
-      "the distance to the scene",
-      surfaces.size(), median_depth_m, range.min_depth_m, range.max_depth_m);
+  if (measured) return say::reconstruction::NoCommonSurface(surfaces.size(), median_depth_m);
+  return say::reconstruction::NoSurface(surfaces.size(), median_depth_m, range.nearest_m,
+                                        range.farthest_m);
 }
 
 // Standard deviation of the markers' edges after the sweep's tone curve has been taken into
@@ -96,6 +95,29 @@ void StateSigmas(const CalibrationMatrix& information, const CalibrationMatrix& 
   }
 }
 
+// What is known of the class's depth images beside the calibration.
+void ApplyClass(DepthSensor sensor, JointRegistrationOptions& options) {
+  options.correlation_px = ClassOf(sensor).correlation_px;
+  const ImageErrorSigmas& image = ImageErrorSigmasOf(sensor);
+  options.image_offset_sigma_m = image.offset_m;
+  options.image_tilt_sigma = image.tilt;
+}
+
+// How far the solved calibration is from its prior.
+CalibrationFit FitOf(const CalibrationVector& solved, const CalibrationPrior& prior) {
+  const std::optional<CalibrationVector> sigmas = SigmasOf(prior.information);
+  if (!sigmas) return {};
+  CalibrationFit fit;
+  fit.chi2 = 2 * prior.Cost(solved);
+  fit.num_terms = prior.num_terms;
+  int worst = 0;
+  (solved - prior.mean).cwiseQuotient(*sigmas).cwiseAbs().maxCoeff(&worst);
+  fit.worst_term = CalibrationNames()[static_cast<std::size_t>(worst)];
+  fit.worst_value = solved[worst] - prior.mean[worst];
+  fit.worst_sigma = (*sigmas)[worst];
+  return fit;
+}
+
 }  // namespace
 
 struct Reconstructor::Impl {
@@ -105,27 +127,29 @@ struct Reconstructor::Impl {
   std::int64_t dropped = 0;
   std::vector<double> median_depths_m;  // One per frame that has valid depth.
   std::vector<double> tracking_times_s;
+  SweepWatch watch;
 
   Impl(const StreamInfo& stream, const ReconstructorOptions& reconstructor_options)
       : info(stream),
         options(reconstructor_options),
-        tracker(stream, TrackingOptions(stream, reconstructor_options)) {}
+        tracker(stream, TrackingOptions(stream, reconstructor_options)),
+        watch(stream.usable_depth) {}
 
   [[nodiscard]] double Now() const { return options.now_s ? options.now_s() : 0.0; }
 
-  TrackingReport AddFrame(const Frame& frame, bool fewer_keypoints) {
+  TrackingReport AddFrame(const Frame& frame) {
     if (frame.color_rgb.cols != info.intrinsics.width ||
         frame.color_rgb.rows != info.intrinsics.height ||
         frame.depth_m.size() != frame.color_rgb.size())
-      throw DataError(fmt::format(
-          "frame {}: images are {}x{} (colour) and {}x{} (depth), the calibration is for {}x{}",
+      throw DataError(say::reconstruction::ImageSize(
           frame.index, frame.color_rgb.cols, frame.color_rgb.rows, frame.depth_m.cols,
           frame.depth_m.rows, info.intrinsics.width, info.intrinsics.height));
     TrackingReport report;
     DepthStatistics(frame.depth_m, report);
     const double start = Now();
-    const TrackedFrame tracked = tracker.Track(frame, fewer_keypoints);
+    const TrackedFrame tracked = tracker.Track(frame);
     tracking_times_s.push_back(Now() - start);
+    watch.Add(frame, tracked.num_markers > 0);
     report.tracked = tracked.tracked;
     report.is_keyframe = tracked.keyframe.has_value();
     report.num_keypoints = tracked.num_keypoints;
@@ -156,43 +180,28 @@ struct Reconstructor::Impl {
   }
 
   void CheckInput(const std::vector<TrackedFrame>& frames) const {
-    if (frames.size() < 2)
-      throw DataError(fmt::format(
-          "the recording has {} usable frame(s), a scene needs at least 2: record a sweep",
-          frames.size()));
-    if (median_depths_m.empty())
-      throw DataError(
-          fmt::format("all {} depth images are empty (0 everywhere): check the sensor's depth "
-                      "stream and depth_scale",
-                      frames.size()));
+    if (frames.size() < 2) throw DataError(say::reconstruction::FewFrames(frames.size()));
+    if (median_depths_m.empty()) throw DataError(say::reconstruction::NoDepth(frames.size()));
   }
 
   Scene Finish(const std::stop_token& stop,
-               const std::function<void(double, std::string_view)>& progress) {
+               const std::function<void(double, const Message&)>& progress) {
     const double start = Now();
-    const auto report = [&](double fraction, std::string_view what) {
+    const auto report = [&](double fraction, const Message& what) {
       CheckStop(stop);
       if (progress) progress(fraction, what);
     };
     std::vector<TrackedFrame> frames = tracker.frames();
     CheckInput(frames);
     TrackingMap map = tracker.TakeMap();
-    if (map.keyframes.empty())
-      throw DataError(
-          fmt::format("none of {} frames shows a marker or a surface: check that the sensor looks "
-                      "at the scene from 0.5 to 1.5 m",
-                      frames.size()));
+    if (map.keyframes.empty()) throw DataError(say::reconstruction::NothingSeen(frames.size()));
     BoundKeyframes(options.max_keyframes, ColorPoses(frames, map), frames, map);
     RefreshVelocities(frames, map);
 
-    Scene scene;
-    if (options.preset == Preset::kPaper) {
-      ReconstructPaper(frames, map, scene, stop, report);
-    } else {
-      ReconstructBest(frames, map, scene, stop, report);
-    }
-    report(0.9, "mesh");
-    double stage = Now();
+    Scene scene = options.preset == Preset::kPaper ? ReconstructPaper(frames, map, stop, report)
+                                                   : ReconstructBest(frames, map, stop, report);
+    report(0.9, say::progress::Mesh());
+    const double stage = Now();
     constexpr int kDecimation = 2;
     if (scene.height_map)
       scene.mesh = MeshOfHeightMap(*scene.height_map,
@@ -202,18 +211,18 @@ struct Reconstructor::Impl {
     if (!tracking_times_s.empty())
       scene.timings_s["tracking_per_frame_median"] = TakeMedian(tracking_times_s);
     scene.timings_s["after_last_frame"] = Now() - start;
-    report(1.0, "done");
+    report(1.0, say::progress::Done());
     return scene;
   }
 
-  using Report = std::function<void(double, std::string_view)>;
+  using Report = std::function<void(double, const Message&)>;
 
   // Estimates the camera's tone curve and measures the keyframes' markers again with it; tracking
   // assumed the sRGB curve.
   [[nodiscard]] std::optional<SweepTone> RefineMarkers(TrackingMap& map,
                                                        const std::stop_token& stop) const {
     if (!options.use_markers) return std::nullopt;
-    const MarkerDictionary dictionary = MarkerDictionary::ByName(info.marker_dictionary);
+    const MarkerDictionary dictionary = MarkerDictionary::ByName(info.room_markers.dictionary);
     std::vector<MarkerSighting> sightings;
     std::vector<MarkerObservation*> observations;
     for (MapKeyframe& keyframe : map.keyframes) {
@@ -240,24 +249,77 @@ struct Reconstructor::Impl {
     return tone;
   }
 
-  void ReconstructBest(std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene,
-                       const std::stop_token& stop, const Report& report) const {
-    report(0.0, "markers");
+  [[nodiscard]] Scene ReconstructBest(std::vector<TrackedFrame>& frames, TrackingMap& map,
+                                      const std::stop_token& stop, const Report& report) const {
+    report(0.0, say::progress::Markers());
     double stage = Now();
     const std::optional<SweepTone> tone =
         options.use_tone_curve ? RefineMarkers(map, stop) : std::nullopt;
     const double tone_s = Now() - stage;
-    // The joint solve needs as much memory as the images, so what it does not use is released
-    // first.
+    ReleaseImages(map);
+    report(0.05, say::progress::Registration());
+    stage = Now();
+    const JointRegistrationOptions joint_options = JointOptions(tone, frames);
+    Symptoms symptoms = SymptomsBefore(joint_options.prior, map);
+    const JointRegistrationResult joint =
+        RegisterJointly(info.intrinsics, joint_options, map, stop);
+    const double joint_s = Now() - stage;
+    stage = Now();
+    if (options.on_learned && joint.accepted)
+      options.on_learned(
+          Learn(options.profile.value_or(ProfileOfAnyUnit(info.intrinsics, Unit(frames))),
+                joint_options.prior, joint.evidence));
+    Scene scene = MakeScene({.info = info,
+                             .preset = options.preset,
+                             .num_dropped = dropped,
+                             .frames = frames,
+                             .map = map,
+                             .calibration = joint.calibration,
+                             .marker_sigmas_m = joint.marker_sigmas_m,
+                             .T_scene_world = SceneFromWorld(info, map)});
+    WarnOfFrame(info, map, scene);
+    StateSensor(joint, map, scene);
+    StateCalibration(joint, joint_options.prior, tone, scene);
+    symptoms.calibration = FitOf(ToVector(joint.calibration), joint_options.prior);
+    AddFindings(symptoms, scene);
+    scene.timings_s["tone_curve"] = tone_s;
+    scene.timings_s["global_registration"] = joint_s;
+    // The joint solve has used the markers; they now place the keyframes in the scene's frame.
+    scene.timings_s["markers"] = Now() - stage;
+    MakeSurfaces(joint, map, stop, report, scene);
+    return scene;
+  }
+
+  // What the sweep shows before anything is solved.
+  [[nodiscard]] Symptoms SymptomsBefore(const CalibrationPrior& prior,
+                                        const TrackingMap& map) const {
+    Symptoms symptoms =
+        watch.Finish(info, std::ranges::any_of(map.keyframes, [](const MapKeyframe& keyframe) {
+                       return !keyframe.data.markers.empty();
+                     }));
+    if (!options.use_markers) return symptoms;
+    CalibrationModel known;
+    MoveCalibration(prior.mean, known);
+    symptoms.marker_depths =
+        MeasureMarkerDepths(map, info.intrinsics, known, info.room_markers.length_m);
+    return symptoms;
+  }
+
+  // The joint solve needs as much memory as the images, so what it does not use is released first.
+  static void ReleaseImages(TrackingMap& map) {
     for (MapKeyframe& keyframe : map.keyframes) {
       keyframe.gray.release();
       keyframe.descriptors.release();
     }
-    report(0.05, "registration");
-    stage = Now();
+  }
+
+  // @param frames  Must outlive the options.
+  [[nodiscard]] JointRegistrationOptions JointOptions(const std::optional<SweepTone>& tone,
+                                                      std::vector<TrackedFrame>& frames) const {
     JointRegistrationOptions joint_options;
-    joint_options.marker_length_m = info.marker_length_m;
+    joint_options.marker_length_m = info.room_markers.length_m;
     joint_options.depth_noise = info.depth_noise;
+    ApplyClass(info.depth_sensor, joint_options);
     joint_options.use_depth_field = options.use_depth_field;
     joint_options.use_dense = options.use_dense_depth;
     joint_options.use_row_motion = options.use_row_motion;
@@ -267,19 +329,24 @@ struct Reconstructor::Impl {
     const double edge_sigma_px = EdgeSigma(tone);
     joint_options.prior = options.profile
                               ? PriorOfNextSweep(*options.profile, info.intrinsics, edge_sigma_px)
-                              : PriorOfAnyUnit(edge_sigma_px);
-    const JointRegistrationResult joint =
-        RegisterJointly(info.intrinsics, joint_options, map, stop);
-    const double solved = Now();
-    if (options.on_learned && joint.accepted)
-      options.on_learned(Learn(options.profile.value_or(ProfileOfAnyUnit(info.intrinsics)),
-                               joint_options.prior, joint.evidence));
-    scene = MakeScene(info, options.preset, dropped, frames, map, joint.calibration,
-                      joint.marker_sigmas_m, SceneFromWorld(info, map));
-    WarnOfFrame(info, map, scene);
+                              : PriorOfAnyUnit(edge_sigma_px, Unit(frames));
+    return joint_options;
+  }
+
+  [[nodiscard]] UnitKnowledge Unit(const std::vector<TrackedFrame>& frames) const {
+    return {.sensor = info.depth_sensor,
+            .lens_stated_straight = !HasLens(info.intrinsics),
+            .one_stamp = std::ranges::all_of(frames, [](const TrackedFrame& frame) {
+              return frame.color_time_s == frame.depth_time_s;
+            })};
+  }
+
+  // States the profile from which the sweep started, and how the scene depends on the sensor.
+  void StateSensor(const JointRegistrationResult& joint, const TrackingMap& map,
+                   Scene& scene) const {
     if (scene.frame == SceneFrame::kReferenceMarker && !joint.posterior.empty()) {
       scene.sensitivity = SensitivityOf(info.intrinsics, joint.calibration, joint.posterior, map,
-                                        *info.reference_marker);
+                                        *info.room_markers.reference);
       scene.sensitivity->stated_for_this_unit = !info.intrinsics_assumed;
       scene.sensitivity->serial = options.sensor_serial;
     }
@@ -287,16 +354,19 @@ struct Reconstructor::Impl {
       scene.sensor_profile =
           fmt::format("{}, {} sweep{}", options.profile->name, options.profile->num_sweeps,
                       options.profile->num_sweeps == 1 ? "" : "s");
+  }
+
+  // States what the sweep found out about the sensor, and the evidence for it.
+  static void StateCalibration(const JointRegistrationResult& joint, const CalibrationPrior& prior,
+                               const std::optional<SweepTone>& tone, Scene& scene) {
     for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
-    StateSigmas(joint.evidence.information, joint_options.prior.information, scene);
-    WarnOfScale(scene.calibration.at("depth_scale"), scene);
+    StateSigmas(joint.evidence.information, prior.information, scene);
     if (tone) {
       scene.calibration["tone_gamma"] = tone->gamma;
       scene.calibration["marker_edge_shift_px"] = tone->edge_shift_px;
       scene.calibration["marker_edge_shift_sigma_px"] = tone->sigma_edge_shift_px;
       scene.calibration["tone_gamma_sigma"] = tone->sigma_gamma;
     }
-    scene.timings_s["tone_curve"] = tone_s;
     scene.calibration["consistency_before_m"] = joint.consistency_before_m;
     scene.calibration["consistency_after_m"] = joint.consistency_after_m;
     scene.calibration["witness_keypoints_before_px"] = joint.witnesses_before.keypoints_px;
@@ -304,31 +374,63 @@ struct Reconstructor::Impl {
     scene.calibration["witness_corners_before_px"] = joint.witnesses_before.corners_px;
     scene.calibration["witness_corners_after_px"] = joint.witnesses_after.corners_px;
     if (!joint.accepted && joint.num_pairs > 0)
-      scene.warnings.push_back(
-          "the dense registration did not make the views agree better and was left out");
-    scene.timings_s["global_registration"] = solved - stage;
-    // The joint solve has used the markers; they now place the keyframes in the scene's frame.
-    scene.timings_s["markers"] = Now() - solved;
+      scene.warnings.push_back(say::reconstruction::RegistrationLeftOut());
+  }
 
-    report(0.5, "surface");
-    stage = Now();
-    ViewSurfaceOptions view_options;
-    view_options.depth_noise = info.depth_noise;
-    view_options.stop = stop;
+  [[nodiscard]] ViewSurfaceOptions ViewOptions(const std::stop_token& stop) const {
+    return {.min_depth_m = static_cast<float>(info.usable_depth.nearest_m),
+            .max_depth_m = static_cast<float>(info.usable_depth.farthest_m),
+            .depth_noise = info.depth_noise,
+            .edge_px = ClassOf(info.depth_sensor).edge_px,
+            .stop = stop};
+  }
+
+  // Of a body only, see CheckedBreathing().
+  [[nodiscard]] std::optional<Breathing> BreathingOf(const std::vector<ViewSurface>& surfaces,
+                                                     const JointRegistrationResult& joint,
+                                                     const TrackingMap& map, const Scene& scene,
+                                                     const std::stop_token& stop) const {
+    std::vector<double> times_s;
+    for (const ViewSurface& surface : surfaces) times_s.push_back(surface.time_s);
+    std::vector<SurfacePatch> patches = MeasurePatches(surfaces, scene.cloud, stop);
+    const std::optional<Breathing> found = FindBreathing(patches, times_s);
+    if (!found || !(found->amplitude_m > 0)) return found;
+    Body body;  // Up is known in the reference marker's frame only.
+    if (scene.frame == SceneFrame::kReferenceMarker) body = FindBody(scene.cloud);
+    for (SurfacePatch& patch : patches)
+      patch.may_move = body.support && body.Contains(patch.centre_m.cast<double>());
+    const Breathing on_body = FindBreathing(patches, times_s).value_or(Breathing());
+    if (!joint.accepted) return CheckedBreathing(*found, on_body, on_body);
+    SweepSolution dense{.calibration = joint.calibration};
+    SweepSolution sparse{.calibration = joint.sparse_calibration};
+    const Pose T_scene_world = SceneFromWorld(info, map);
+    for (const ViewSurface& surface : surfaces)
+      dense.T_scene_depth.push_back(surface.T_world_camera);
+    for (std::size_t k = 0; k < map.keyframes.size(); ++k)
+      if (!map.keyframes[k].is_bare)
+        sparse.T_scene_depth.push_back(T_scene_world * joint.T_world_depth_sparse[k]);
+    MovePatches(info.intrinsics, dense, sparse, patches);
+    return CheckedBreathing(*found, on_body, FindBreathing(patches, times_s).value_or(Breathing()));
+  }
+
+  // The scene's surface, breathing and height map.
+  void MakeSurfaces(const JointRegistrationResult& joint, TrackingMap& map,
+                    const std::stop_token& stop, const Report& report, Scene& scene) const {
+    report(0.5, say::progress::Surface());
+    double stage = Now();
     const std::vector<ViewSurface> surfaces = PrepareCorrectedViews(
-        map, info.intrinsics, joint.calibration, SceneFromWorld(info, map), view_options);
+        map, info.intrinsics, joint, SceneFromWorld(info, map), ViewOptions(stop));
     scene.cloud = MergeSurface(surfaces, {.with_colors = options.keep_color, .stop = stop});
-    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, median_depths_m));
+    if (scene.cloud.empty())
+      throw DataError(WhyNoSurface(surfaces, median_depths_m, info.usable_depth));
     scene.timings_s["clouds"] = Now() - stage;
 
     stage = Now();
-    std::vector<double> times_s;
-    for (const ViewSurface& surface : surfaces) times_s.push_back(surface.time_s);
-    scene.breathing = FindBreathing(MeasurePatches(surfaces, scene.cloud, stop), times_s);
+    scene.breathing = BreathingOf(surfaces, joint, map, scene, stop);
     WarnOfBreathing(scene);
     scene.timings_s["breathing"] = Now() - stage;
 
-    report(0.8, "height map");
+    report(0.8, say::progress::HeightMap());
     stage = Now();
     if (scene.frame == SceneFrame::kReferenceMarker)
       KeepHeightMap(RobustHeightMap(surfaces, {.stop = stop}), scene);
@@ -338,40 +440,43 @@ struct Reconstructor::Impl {
   // The published chain: tracking with its own bundle adjustment, then Algorithm 1 on a few
   // keyframes, single-pixel corners, means of means. The stated calibration of the sensor is used
   // unchanged.
-  void ReconstructPaper(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene,
-                        const std::stop_token& stop, const Report& report) const {
-    report(0.0, "registration");
+  [[nodiscard]] Scene ReconstructPaper(const std::vector<TrackedFrame>& frames, TrackingMap& map,
+                                       const std::stop_token& stop, const Report& report) const {
+    report(0.0, say::progress::Registration());
     const double start = Now();
     JointRegistrationOptions joint_options;
-    joint_options.marker_length_m = info.marker_length_m;
+    joint_options.marker_length_m = info.room_markers.length_m;
     joint_options.depth_noise = info.depth_noise;
     joint_options.calibrate = false;
     joint_options.use_dense = false;
     const CalibrationModel stated =
         RegisterJointly(info.intrinsics, joint_options, map, stop).calibration;
-    scene.timings_s["bundle_adjustment"] = Now() - start;
+    std::map<std::string, double> timings_s = {{"bundle_adjustment", Now() - start}};
     const std::vector<Keyframe> keyframes = PaperKeyframes(map, stated);
     PaperOptions paper_options;
     paper_options.icp.num_iterations = options.num_icp_iterations;
     paper_options.icp.seed = options.seed;
-    paper_options.marker_length_m = info.marker_length_m;
-    paper_options.reference_marker = info.reference_marker;
+    paper_options.room_markers = info.room_markers;
     std::string running;
     double stage = Now();
-    std::map<std::string, double> timings;
     const PaperReconstruction paper = ReconstructAsPublished(
         keyframes, paper_options, stop,
         [&](std::string_view next) {
-          if (!running.empty()) timings[running] = Now() - stage;
+          if (!running.empty()) timings_s[running] = Now() - stage;
           running = next;
           stage = Now();
         },
-        [&](double fraction) { report(0.1 + 0.6 * fraction, "global ICP"); });
+        [&](double fraction) { report(0.1 + 0.6 * fraction, say::progress::GlobalIcp()); });
     const Pose T_scene_world =
         paper.T_marker_world.value_or(map.keyframes.front().T_world_color.inverse());
-    timings.merge(scene.timings_s);
-    scene = MakeScene(info, options.preset, dropped, frames, map, stated, {}, T_scene_world);
-    scene.timings_s = timings;
+    Scene scene = MakeScene({.info = info,
+                             .preset = options.preset,
+                             .num_dropped = dropped,
+                             .frames = frames,
+                             .map = map,
+                             .calibration = stated,
+                             .T_scene_world = T_scene_world});
+    scene.timings_s = std::move(timings_s);
     scene.frame = paper.T_marker_world ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
     scene.markers = paper.markers_in_world;
     for (auto& [id, marker] : scene.markers)
@@ -386,11 +491,12 @@ struct Reconstructor::Impl {
       scene.keyframes.push_back({keyframes[j].depth_time_s, view.T_world_camera});
       views.push_back(std::move(view));
     }
-    const std::vector<ViewSurface> surfaces =
-        PrepareViews(views, {.depth_noise = info.depth_noise, .stop = stop});
+    const std::vector<ViewSurface> surfaces = PrepareViews(views, ViewOptions(stop));
     scene.cloud = MergeSurface(surfaces, {.with_colors = options.keep_color, .stop = stop});
-    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, median_depths_m));
+    if (scene.cloud.empty())
+      throw DataError(WhyNoSurface(surfaces, median_depths_m, info.usable_depth));
     if (paper.height_map) KeepHeightMap(*paper.height_map, scene);
+    return scene;
   }
 
   // Spread evenly over the sweep. Each section contributes the keyframe that sees the most markers,
@@ -418,12 +524,10 @@ struct Reconstructor::Impl {
 Reconstructor::Reconstructor(const StreamInfo& info, const ReconstructorOptions& options)
     : impl_(std::make_unique<Impl>(info, options)) {}
 Reconstructor::~Reconstructor() = default;
-TrackingReport Reconstructor::AddFrame(const Frame& frame, bool fewer_keypoints) {
-  return impl_->AddFrame(frame, fewer_keypoints);
-}
+TrackingReport Reconstructor::AddFrame(const Frame& frame) { return impl_->AddFrame(frame); }
 void Reconstructor::CountDropped(int num_frames) { impl_->dropped += num_frames; }
 Scene Reconstructor::Finish(const std::stop_token& stop,
-                            const std::function<void(double, std::string_view)>& progress) {
+                            const std::function<void(double, const Message&)>& progress) {
   return impl_->Finish(stop, progress);
 }
 

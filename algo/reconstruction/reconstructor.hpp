@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Turns a stream of RGB-D frames into a scene: one class for the whole method.
 #pragma once
 
@@ -5,8 +6,8 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
-#include <string_view>
 
+#include "algo/base/message.hpp"
 #include "algo/sensor_model/sensor_profile.hpp"
 #include "algo/types/frame.hpp"
 #include "algo/types/scene.hpp"
@@ -73,9 +74,8 @@ class Reconstructor {
   Reconstructor(const StreamInfo& info, const ReconstructorOptions& options);
   ~Reconstructor();
 
-  /// @param fewer_keypoints  See Tracker::Track().
   /// @throws DataError if the images do not have the size stated by the intrinsics.
-  TrackingReport AddFrame(const Frame& frame, bool fewer_keypoints = false);
+  TrackingReport AddFrame(const Frame& frame);
 
   /// Counts a frame that was dropped before it arrived here (live, too slow).
   void CountDropped(int num_frames);
@@ -85,7 +85,7 @@ class Reconstructor {
   /// @throws Interrupted on a stop request.
   [[nodiscard]] Scene Finish(
       const std::stop_token& stop = {},
-      const std::function<void(double fraction, std::string_view what)>& progress = {});
+      const std::function<void(double fraction, const Message& what)>& progress = {});
 
  private:
   struct Impl;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Computes the pose of every frame from the refined keyframes.
 #pragma once
 

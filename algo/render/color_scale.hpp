@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Colours of height differences.
 #pragma once
 
@@ -10,7 +11,7 @@ namespace plumb {
 
 /// Colour of cells where nothing was measured, in every picture; no scale uses it.
 inline constexpr Color kHoleColor = {150, 152, 156};
-/// Not measured inside the region; the same colour as on the page (web/assets/maps.js).
+/// Not measured inside the region; the same colour as on the page (web/page/drawings/maps.js).
 inline constexpr Color kRegionHoleColor = {176, 86, 196};
 
 /// `fraction_of_b` of the way from `a` to `b`, which is from 0 to 1.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A page for drawing antialiased text, lines and pictures.
 #pragma once
 

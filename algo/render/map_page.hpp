@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Draws the page around a map: title, axes, scale bar, legend column and the research notice. Used
 // by all pictures.
 #pragma once

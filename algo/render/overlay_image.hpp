@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Draws both surfaces in one picture.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Texts in pictures, replaceable so that a report in another language can translate them, and the
 // marks at the edges of maps.
 #pragma once

@@ -1,6 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/sensor_model/calibration_model.hpp"
-
-#include "algo/sensor_model/calibration_prior.hpp"
 
 namespace plumb {
 
@@ -46,16 +45,6 @@ Intrinsics CalibrationModel::Corrected(const Intrinsics& stated) const {
   corrected.cy += lens[3] * scale;
   for (std::size_t i = 0; i < 4; ++i) corrected.distortion[i] += lens[4 + i];
   return corrected;
-}
-
-std::map<std::string, double> CalibrationModel::Named() const {
-  const CalibrationVector values = ToVector(*this);
-  std::map<std::string, double> named;
-  for (int i = 0; i < kCalibrationSize; ++i) {
-    const std::string& name = CalibrationNames()[static_cast<std::size_t>(i)];
-    named[name] = values[i] + (name.ends_with("_scale") ? 1.0 : 0.0);
-  }
-  return named;
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Corrections to a sensor's stated calibration that a sweep estimates, with their prior
 // uncertainty.
 #pragma once
@@ -19,8 +20,8 @@ struct CalibrationModel {
   static constexpr int kLensSize = 8;
   using Lens = std::array<double, kLensSize>;
   Lens lens{};
-  /// Time to read the colour image's rows from top to bottom, seconds; the stamp belongs to the
-  /// middle row.
+  /// Time to read the colour image's rows from top to bottom (ReadByColumns(): its columns from
+  /// left to right), seconds; the stamp belongs to the middle one.
   std::array<double, 1> readout_s{};
   /// Distance by which edges of markers appear too far inside the black (> 0), pixels at 640
   /// columns.
@@ -41,5 +42,11 @@ struct CalibrationModel {
   /// Names for reports, with units.
   [[nodiscard]] std::map<std::string, double> Named() const;
 };
+
+/// Whether a rolling shutter reads this camera's columns one after the other, not its rows: it is a
+/// landscape sensor on its side.
+[[nodiscard]] inline bool ReadByColumns(const Intrinsics& camera) {
+  return camera.height > camera.width;
+}
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A calibration as one vector, and its prior distribution before a sweep.
 #pragma once
 
@@ -8,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "algo/sensor_model/calibration_model.hpp"
+#include "algo/types/depth_sensor.hpp"
 
 namespace plumb {
 
@@ -32,6 +34,7 @@ void MoveCalibration(const CalibrationVector& by, CalibrationModel& calibration)
 struct CalibrationPrior {
   CalibrationVector mean = CalibrationVector::Zero();
   CalibrationMatrix information = CalibrationMatrix::Zero();
+  int num_terms = kCalibrationSize;  ///< Those that the sensor's class has.
 
   [[nodiscard]] double Cost(const CalibrationVector& x) const {
     return 0.5 * (x - mean).dot(information * (x - mean));
@@ -41,8 +44,20 @@ struct CalibrationPrior {
 /// Standard deviations of a calibration of which this is the information; none if it is singular.
 [[nodiscard]] std::optional<CalibrationVector> SigmasOf(const CalibrationMatrix& information);
 
-/// Prior of a unit of which only the stated calibration is known.
+/// What is known of a unit before its first sweep.
+struct UnitKnowledge {
+  DepthSensor sensor = DepthSensor::kStructuredLight;
+  /// All of the lens's distortion is stated as 0, which a maker does who has not measured it.
+  bool lens_stated_straight = false;
+  /// The two images of each pair bear one stamp, so that up to half a period may lie between them.
+  bool one_stamp = false;
+};
+
+/// Prior of a unit of which only its class and the stated calibration are known. A constant shift
+/// of the disparity changes depth by its square, that is kDepthScale and the constant growth
+/// together (as far as FieldGrowth() reaches), so the two are correlated where the class has one;
+/// so are the slopes and the linear growth for a shift that changes over the image.
 [[nodiscard]] CalibrationPrior PriorOfAnyUnit(
-    double edge_bias_sigma_px = CalibrationModel::kEdgeBiasSigma);
+    double edge_bias_sigma_px = CalibrationModel::kEdgeBiasSigma, const UnitKnowledge& unit = {});
 
 }  // namespace plumb

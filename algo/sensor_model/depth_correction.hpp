@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A calibration's correction of depth, evaluated over an image.
 #pragma once
 
@@ -18,6 +19,11 @@ class DepthCorrection {
   [[nodiscard]] double Correct(std::size_t cell, double z_m) const {
     const Cell& c = cells_[cell];
     return z_m * (1.0 + c.factor + c.growth * FieldGrowth(z_m)) + c.offset_m;
+  }
+  /// Derivative of Correct() with the depth: what becomes of a small error of the measurement.
+  [[nodiscard]] double Slope(std::size_t cell, double z_m) const {
+    const Cell& c = cells_[cell];
+    return 1.0 + c.factor + c.growth * (FieldGrowth(z_m) + z_m * FieldGrowthSlope(z_m));
   }
 
  private:

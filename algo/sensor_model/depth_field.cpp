@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/sensor_model/depth_field.hpp"
 
 #include <algorithm>

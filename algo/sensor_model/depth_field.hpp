@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Distortion of a depth camera's readings over the image and with distance.
 #pragma once
 
@@ -20,7 +21,8 @@ enum DepthTerm : int {
   /// Fraction of the depth per half width, from a depth camera rotated against the colour camera.
   kDepthSlopeX = 6,
   kDepthSlopeY = 7,  ///< The same downwards.
-  /// Seconds to read the image from top to bottom; the stamp belongs to the middle row.
+  /// Seconds to read the image from top to bottom, or as ReadByColumns() says; the stamp belongs to
+  /// the middle line.
   kDepthReadout = 8,
   kDepthField = 9,    ///< First of the distortion field's terms.
   kDepthGrowth = 36,  ///< First of the field's terms that grow with distance.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/sensor_model/profile_gate.hpp"
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "algo/base/errors.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
@@ -51,8 +53,7 @@ ProfileAgreement Agreement(const SensorProfile& before, const SensorProfile& aft
   CalibrationMatrix prior = before.covariance;
   prior.diagonal() += DriftBetweenSweeps().cwiseAbs2();
   const Eigen::LLT<Reduced> root(WithoutEdges(prior));
-  if (root.info() != Eigen::Success)
-    throw DataError("the sensor profile's covariance is not positive definite: reset it");
+  if (root.info() != Eigen::Success) throw DataError(say::sensor::ProfileCovarianceReset());
   Eigen::Matrix<double, kCalibrationSize - 1, 1> moved;
   for (Eigen::Index i = 0; i < moved.size(); ++i)
     moved[i] = after.mean[Place(i)] - before.mean[Place(i)];

@@ -1,12 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tests whether a sweep agrees with its sensor unit's profile, and ages the profile.
 #pragma once
 
 #include "algo/sensor_model/sensor_profile.hpp"
 
 namespace plumb {
-
-/// Standard deviations of the changes between consecutive sweeps of one unit.
-[[nodiscard]] CalibrationVector DriftBetweenSweeps();
 
 /// The profile after a number of days without a sweep: for each month its covariance grows by the
 /// variation between sweeps. A negative age counts as zero.

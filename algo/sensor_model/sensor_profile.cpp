@@ -1,19 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/sensor_model/sensor_profile.hpp"
 
 #include <Eigen/Cholesky>
 
 #include "algo/base/errors.hpp"
-#include "algo/sensor_model/profile_gate.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
 
-CalibrationMatrix Inverse(const CalibrationMatrix& m, const char* of) {
+CalibrationMatrix Inverse(const CalibrationMatrix& m, const Message& unusable) {
   const Eigen::LLT<CalibrationMatrix> solver(m);
   const CalibrationMatrix inverse = solver.solve(CalibrationMatrix::Identity());
-  if (solver.info() != Eigen::Success || !inverse.allFinite())
-    throw DataError(std::string("the sensor profile's ") + of +
-                    " is not positive definite: make the profile again with plumb calibrate");
+  if (solver.info() != Eigen::Success || !inverse.allFinite()) throw DataError(unusable);
   return 0.5 * (inverse + inverse.transpose());
 }
 
@@ -40,20 +39,17 @@ CalibrationVector DriftBetweenSweeps() {
   return sigma;
 }
 
-SensorProfile ProfileOfAnyUnit(const Intrinsics& stated) {
+SensorProfile ProfileOfAnyUnit(const Intrinsics& stated, const UnitKnowledge& unit) {
   SensorProfile profile;
   profile.stated = stated;
-  const CalibrationPrior prior = PriorOfAnyUnit();
-  profile.covariance = prior.information.diagonal().cwiseInverse().asDiagonal();
+  const CalibrationPrior prior = PriorOfAnyUnit(CalibrationModel::kEdgeBiasSigma, unit);
+  profile.covariance = Inverse(prior.information, say::sensor::ProfileCovariance());
   return profile;
 }
 
 CalibrationPrior PriorOfNextSweep(const SensorProfile& profile, const Intrinsics& stated,
                                   double edge_bias_sigma_px) {
-  if (profile.stated != stated)
-    throw DataError(
-        "the sensor profile belongs to a sensor with another camera.yaml than this recording's: "
-        "use the profile of this unit, or make one with plumb calibrate");
+  if (profile.stated != stated) throw DataError(say::sensor::ProfileOfOtherCamera());
   CalibrationMatrix covariance = profile.covariance;
   covariance.diagonal() += DriftBetweenSweeps().cwiseAbs2();
   covariance.row(kEdgeBiasAt).setZero();
@@ -62,7 +58,7 @@ CalibrationPrior PriorOfNextSweep(const SensorProfile& profile, const Intrinsics
   CalibrationPrior prior;
   prior.mean = profile.mean;
   prior.mean[kEdgeBiasAt] = 0.0;
-  prior.information = Inverse(covariance, "covariance");
+  prior.information = Inverse(covariance, say::sensor::ProfileCovariance());
   return prior;
 }
 
@@ -75,7 +71,8 @@ SensorProfile Learn(const SensorProfile& profile, const CalibrationPrior& prior,
   const CalibrationVector own =
       (evidence.information + lambda) * evidence.solution - lambda * prior.mean;
   SensorProfile learned = profile;
-  learned.covariance = Inverse(lambda + fraction * evidence.information, "information");
+  learned.covariance =
+      Inverse(lambda + fraction * evidence.information, say::sensor::ProfileInformation());
   learned.mean = learned.covariance * (lambda * prior.mean + fraction * own);
   ++learned.num_sweeps;
   return learned;

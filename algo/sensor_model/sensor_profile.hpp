@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The calibration of one sensor unit as learned from several sweeps, used as the prior of the next.
 #pragma once
 
@@ -24,8 +25,12 @@ struct SensorProfile {
 /// known truth: with it all lens terms are within 1.5 standard deviations.
 inline constexpr double kSharedErrors = 3.0;
 
+/// Standard deviations of the changes between consecutive sweeps of one unit.
+[[nodiscard]] CalibrationVector DriftBetweenSweeps();
+
 /// State before the first sweep.
-[[nodiscard]] SensorProfile ProfileOfAnyUnit(const Intrinsics& stated);
+[[nodiscard]] SensorProfile ProfileOfAnyUnit(const Intrinsics& stated,
+                                             const UnitKnowledge& unit = {});
 
 /// Prior for the next sweep: the profile's covariance plus the variation from sweep to sweep,
 /// mostly thermal.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/tracking/followed_points.hpp"
 
 #include <algorithm>
@@ -5,12 +6,30 @@
 #include <set>
 #include <utility>
 
+#include "algo/tracking/view_geometry.hpp"
+
 namespace plumb {
 namespace {
 
 constexpr std::size_t kKeptPyramids = 6;  // Pyramids of keyframes, 2.3 MB each.
 // Relative change of exposure that KLT tolerates without correction.
 constexpr double kSameBrightness = 0.08;
+
+// Standard deviations in pixels of a point followed from the last image, and of one found again
+// from an older keyframe's patch, which was seen from elsewhere.
+constexpr double kSigmaFollowed_px = 1.2;
+constexpr double kSigmaFoundAgain_px = 2.0;
+// A keypoint's depth is less certain than a surface's: it is often a corner of the surface, too.
+constexpr double kDepthNoiseFactor = 2.0;
+constexpr double kUsualCosine = 0.8;  // Of the incidence; the surface's own is not known here.
+constexpr double kDepthError_m = 0.003;
+// Difference of a landmark's depth from the image's above which it is hidden, or another surface.
+constexpr double kHidden_m = 0.01;
+constexpr double kHiddenPart = 0.03;     // Of the depth.
+constexpr int kBorder_px = 8;            // Patches nearer to the border are incomplete.
+constexpr double kSearch_px = 6.0;       // Farthest that a landmark is found from its projection.
+constexpr double kObserved_px = 4.0;     // Once the pose is known.
+constexpr int kReassociationLevels = 1;  // Of the pyramid: the projection is a good start.
 
 }  // namespace
 
@@ -23,8 +42,9 @@ void FollowedPoints::Follow(const Pyramid& last, const GrayImage& image, const c
   for (const ActivePoint& a : active_) {
     from.push_back(a.pixel);
     const Eigen::Vector3d p = T_camera_world * map_.landmark(a.landmark).p_world;
-    guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(intrinsics_, p).cast<float>())
-                                   : a.pixel);
+    guesses.push_back(p.z() > kNearestInView_m
+                          ? Eigen::Vector2f(Project(intrinsics_, p).cast<float>())
+                          : a.pixel);
   }
   const KltResult klt = FollowAtAnyBrightness(last, image, from, guesses, options_.levels);
   for (std::size_t i = 0; i < active_.size(); ++i) {
@@ -33,10 +53,12 @@ void FollowedPoints::Follow(const Pyramid& last, const GrayImage& image, const c
     point.p_world = map_.landmark(active_[i].landmark).p_world;
     const Eigen::Vector2d pixel = klt.points[i].cast<double>();
     point.ideal = Undistort(intrinsics_, pixel);
-    point.sigma = 1.2 * SigmaPx() / intrinsics_.fx;
+    point.sigma = kSigmaFollowed_px * SigmaPx() / intrinsics_.fx;
     if (const double z = DepthAt(depth_m, pixel); z > 0) {
       point.inverse_z = 1.0 / z;
-      point.inverse_z_sigma = (2.0 * DepthSigma(depth_noise_, z, 0.8) + 0.003) / (z * z);
+      const double sigma_m =
+          kDepthNoiseFactor * DepthSigma(depth_noise_, z, kUsualCosine) + kDepthError_m;
+      point.inverse_z_sigma = sigma_m / (z * z);
     }
     points.push_back(point);
     followed.push_back({active_[i].landmark, klt.points[i]});
@@ -77,30 +99,31 @@ void FollowedPoints::Reassociate(const GrayImage& image, const cv::Mat& depth_m,
       const Landmark& landmark = map_.landmark(o.landmark);
       if (!landmark.usable || followed.contains(o.landmark)) continue;
       const Eigen::Vector3d p = T_camera_world * landmark.p_world;
-      if (p.z() < 0.1) continue;
+      if (p.z() < kNearestInView_m) continue;
       const Eigen::Vector2d pixel = Project(intrinsics_, p);
-      if (pixel.x() < 8 || pixel.y() < 8 || pixel.x() > intrinsics_.width - 9 ||
-          pixel.y() > intrinsics_.height - 9)
+      if (pixel.x() < kBorder_px || pixel.y() < kBorder_px ||
+          pixel.x() > intrinsics_.width - 1 - kBorder_px ||
+          pixel.y() > intrinsics_.height - 1 - kBorder_px)
         continue;
       const double z = DepthAt(depth_m, pixel);
-      // Occluded, or another surface.
-      if (z > 0 && std::abs(z - p.z()) > 0.03 * z + 0.01) continue;
+      if (z > 0 && std::abs(z - p.z()) > kHiddenPart * z + kHidden_m) continue;
       landmarks.push_back(o.landmark);
       from.push_back(o.pixel.cast<float>());
       guesses.push_back(pixel.cast<float>());
     }
     if (landmarks.empty()) continue;
-    const KltResult klt = FollowAtAnyBrightness(PyramidOfKeyframe(k), image, from, guesses, 1);
+    const KltResult klt =
+        FollowAtAnyBrightness(PyramidOfKeyframe(k), image, from, guesses, kReassociationLevels);
     for (std::size_t i = 0; i < landmarks.size(); ++i) {
       if (!klt.found[i] ||
-          (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx()))
+          (klt.points[i] - guesses[i]).norm() > static_cast<float>(kSearch_px * SigmaPx()))
         continue;
       followed.insert(landmarks[i]);
       active_.push_back({landmarks[i], klt.points[i]});
       PosePoint point;
       point.p_world = map_.landmark(landmarks[i]).p_world;
       point.ideal = Undistort(intrinsics_, klt.points[i].cast<double>());
-      point.sigma = 2.0 * SigmaPx() / intrinsics_.fx;
+      point.sigma = kSigmaFoundAgain_px * SigmaPx() / intrinsics_.fx;
       points.push_back(point);
     }
   }
@@ -137,7 +160,8 @@ void FollowedPoints::Observe(const std::vector<PosePoint>& found, std::size_t fi
   for (std::size_t i = first; i < active_.size(); ++i) {
     const PosePoint& point = found[i - first];
     const Eigen::Vector3d p = T_camera_world * point.p_world;
-    if ((p.head<2>() / p.z() - point.ideal).norm() * intrinsics_.fx >= 4.0 * SigmaPx()) continue;
+    if ((p.head<2>() / p.z() - point.ideal).norm() * intrinsics_.fx >= kObserved_px * SigmaPx())
+      continue;
     kept.push_back(active_[i]);
     AddObservation(active_[i], keyframe);
   }

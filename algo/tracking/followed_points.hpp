@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The landmarks that are tracked from frame to frame, and their pixels in the last frame.
 #pragma once
 
@@ -11,8 +12,8 @@
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
+#include "algo/map/map.hpp"
 #include "algo/tracking/keypoints.hpp"
-#include "algo/tracking/map.hpp"
 #include "algo/tracking/pose_optimizer.hpp"
 #include "algo/types/depth_noise.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Natural keypoints: detection, tracking and recognition.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/tracking/loop_closer.hpp"
 
 #include <algorithm>
@@ -8,6 +9,8 @@
 
 #include <Eigen/SparseCholesky>
 
+#include "algo/tracking/view_geometry.hpp"
+
 namespace plumb {
 namespace {
 
@@ -15,8 +18,6 @@ constexpr int kMaxCandidates = 4;
 // Common landmarks above which keyframes count as already covisible.
 constexpr int kSharedEnough = 10;
 constexpr int kCovisible = 15;  // Common landmarks that form a constraint.
-constexpr double kViewReach =
-    0.7;  // Largest distance of two views: fraction of the depth plus radians.
 // Largest plausible drift: a constant, and the same per metre travelled.
 constexpr double kDrift_m = 0.30;
 constexpr double kDriftPerMetre = 0.05;
@@ -131,13 +132,14 @@ std::vector<int> LoopCandidates(const TrackingMap& map) {
     const auto i = static_cast<std::size_t>(k);
     const MapKeyframe& older = map.keyframes[i];
     if (shared[i] >= kSharedEnough || (older.descriptors.empty() && older.gray.empty())) continue;
-    const Pose T = map.keyframes[i].T_world_color.inverse() * map.keyframes.back().T_world_color;
+    const Pose& T_world_newest = map.keyframes.back().T_world_color;
+    const Pose T = older.T_world_color.inverse() * T_world_newest;
     const DriftBound drift = BoundOf(way[i]);
-    const double depth = std::clamp(map.keyframes[i].median_depth_m, 0.4, 3.0);
-    const double apart = std::max(0.0, T.translation().norm() - drift.translation_m) / depth +
-                         std::max(0.0, RotationAngle(T) - drift.rotation_rad);
+    const double apart =
+        std::max(0.0, T.translation().norm() - drift.translation_m) / ScaleOfView(older) +
+        std::max(0.0, RotationAngle(T) - drift.rotation_rad);
     // Among those within reach, the ones whose views would overlap most without drift.
-    if (apart < kViewReach) near.emplace_back(T.translation().norm() / depth + RotationAngle(T), k);
+    if (apart < kViewReach) near.emplace_back(ViewDistance(older, T_world_newest), k);
   }
   std::sort(near.begin(), near.end());
   std::vector<int> candidates;

@@ -1,11 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 // Loop closure: which keyframes to compare with a new one, and how to correct the map so that both
 // visits of a place agree.
 #pragma once
 
 #include <vector>
 
-#include "algo/tracking/keyframe_link.hpp"
-#include "algo/tracking/map.hpp"
+#include "algo/map/keyframe_link.hpp"
+#include "algo/map/map.hpp"
 
 namespace plumb {
 

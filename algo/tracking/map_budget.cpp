@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/tracking/map_budget.hpp"
 
 #include <algorithm>
@@ -7,15 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "algo/tracking/view_geometry.hpp"
+
 namespace plumb {
 namespace {
-
-// Dissimilarity of two views: distance as a fraction of the depth, plus radians.
-double Apart(const MapKeyframe& a, const MapKeyframe& b) {
-  const double depth = std::clamp(a.median_depth_m, 0.4, 3.0);
-  const Pose T = a.T_world_color.inverse() * b.T_world_color;
-  return T.translation().norm() / depth + RotationAngle(T);
-}
 
 // The keyframe of `path` that may be given up and whose neighbours before and after are most alike,
 // so that the path stays covered without it. 0: there is none.
@@ -27,7 +23,8 @@ std::size_t LeastMissed(const TrackingMap& map, const std::vector<std::size_t>& 
   for (std::size_t i = 1; i + 1 < path.size(); ++i) {
     const std::size_t k = path[i];
     if (!may_go(k, path[i - 1])) continue;
-    const double apart = Apart(map.keyframes[path[i - 1]], map.keyframes[path[i + 1]]);
+    const double apart =
+        ViewDistance(map.keyframes[path[i - 1]], map.keyframes[path[i + 1]].T_world_color);
     if (apart >= least) continue;
     least = apart;
     chosen = k;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Limits the memory of a sweep of any length: a fixed number of keyframes keep their images, and a
 // fixed number enter the joint solve.
 #pragma once
@@ -5,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "algo/tracking/map.hpp"
+#include "algo/map/map.hpp"
 #include "algo/tracking/tracker.hpp"
 
 namespace plumb {

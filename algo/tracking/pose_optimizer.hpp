@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // Estimates one frame's pose robustly from keypoints, marker corners and depth together.
 #pragma once
 
 #include <vector>
 
 #include "algo/base/pose.hpp"
-#include "algo/tracking/dense_view.hpp"
+#include "algo/map/dense_view.hpp"
 #include "algo/types/depth_noise.hpp"
 
 namespace plumb {

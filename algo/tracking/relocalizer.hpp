@@ -1,11 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the camera again after tracking was lost, by known markers or by descriptors.
 #pragma once
 
 #include <optional>
 #include <vector>
 
+#include "algo/map/map.hpp"
 #include "algo/tracking/keypoints.hpp"
-#include "algo/tracking/map.hpp"
 
 namespace plumb {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/tracking/tracker.hpp"
 
 #include <algorithm>
@@ -11,13 +12,52 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/statistics.hpp"
+#include "algo/tracking/surface_agreement.hpp"
+#include "algo/tracking/view_geometry.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
 
-// Largest plausible speed of a hand-held sensor, metres per second.
-constexpr double kMaxSpeed = 2.5;
-constexpr double kMaxTurn = 4.0;  // Radians per second.
+// Fastest plausible motion of a hand-held sensor, and what a pose may be off besides. Measured: up
+// to 0.8 m/s and 0.5 rad/s in a sweep of sim-a, 0.5 m/s and 2.7 rad/s where somebody turned a
+// Kinect about all axes on purpose.
+constexpr double kMaxSpeed = 2.5;  // Metres per second.
+constexpr double kMaxTurn = 4.0;   // Radians per second.
+constexpr double kJump_m = 0.02;
+constexpr double kJump_rad = 0.03;
+// Two images are at least and at most this far apart in time for that bound.
+constexpr double kShortestStep_s = 0.02;
+constexpr double kLongestStep_s = 1.0;
+// The last frame's velocity is believed no longer than this.
+constexpr double kPrediction_s = 0.3;
+
+// Points that hold a pose: many of which a part agrees, or few of which most agree; one marker
+// gives four. Measured: in a sweep of sim-a at least 157 points and 67 % of them agree with a right
+// pose; after the sensor had been covered, and on the Kinect, 7 to 16 and 5 to 7 % do in one frame
+// of twenty. All numbers from kMaxSpeed to kEstablishedBy made laxer at once, by a factor of two,
+// and all but those two of landmarks made stricter (fractions 0.5 to 0.8), give the same bits on
+// that covered sweep. On the Kinect, with half a second cut out, laxer ones make the path's error
+// 9.3 instead of 7.0 mm; with the sensor covered, stricter ones lose four images of 54 and make it
+// 10.7 instead of 7.6 mm.
+constexpr int kManyPoints = 12;
+constexpr double kPartOfMany = 0.35;
+constexpr int kFewPoints = 4;
+constexpr double kPartOfFew = 0.6;
+// Fraction of the frame's cells that lie on the keyframe's surface: enough to hold a pose without
+// points, and too few to be believed with few points. Measured: 84 to 95 % in a sweep of sim-a, 67
+// to 83 % on the Kinect; 7 % of a covered sensor's first image where it was wrong.
+constexpr double kHoldingOverlap = 0.4;
+constexpr double kContradictingOverlap = 0.25;
+// Standard deviations of a pose above which a direction counts as unconstrained. Measured: at most
+// 2.5 mrad and 2.1 mm, so that this rejects only poses without any hold.
+constexpr double kMaxSigma_rad = 0.02;
+constexpr double kMaxSigma_m = 0.02;
+// A landmark rejected more often than this, and seen by fewer keyframes than that, is given up.
+constexpr int kMaxRejections = 3;
+constexpr int kEstablishedBy = 3;
+// The error of the map and of the rolling shutter at a marker's corner, beside the detector's.
+constexpr double kCornerInMap_px = 0.5;
 
 // How keypoints and marker corners agree with a pose.
 struct PointSupport {
@@ -30,8 +70,8 @@ PointSupport SupportOf(const PoseEstimate& estimate, std::size_t num_points) {
   if (num_points == 0) return {};
   const double fraction =
       static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points);
-  return {.by_many = estimate.num_inliers >= 12 && fraction > 0.35,
-          .by_markers = estimate.num_inliers >= 4 && fraction > 0.6};
+  return {.by_many = estimate.num_inliers >= kManyPoints && fraction > kPartOfMany,
+          .by_markers = estimate.num_inliers >= kFewPoints && fraction > kPartOfFew};
 }
 
 }  // namespace
@@ -48,11 +88,10 @@ Tracker::Tracker(const StreamInfo& info, const TrackerOptions& options)
       options_(options),
       dense_maker_(info.intrinsics),
       followed_points_(info.intrinsics, info.depth_noise, map_) {
-  if (const std::optional<std::string> fault = FaultOf(info_.depth_noise))
-    throw DataError(fmt::format(
-        "the depth noise stated for the sensor cannot be used: {}; correct what states it",
-        *fault));
-  if (options_.use_markers) detector_.emplace(MarkerDictionary::ByName(info_.marker_dictionary));
+  if (const std::optional<Message> fault = FaultOf(info_.depth_noise))
+    throw DataError(say::sensor::NoiseUnusable(*fault));
+  if (options_.use_markers)
+    detector_.emplace(MarkerDictionary::ByName(info_.room_markers.dictionary));
 }
 
 Tracker::FrameData Tracker::Prepare(const Frame& frame) const {
@@ -79,7 +118,7 @@ void Tracker::FindMarkers(const Frame& frame, FrameData& prepared) const {
     return;
   }
   const Pose T_camera_world = PredictedPose(frame).inverse();
-  const MarkerCorners in_marker = CornersInMarkerFrame(info_.marker_length_m);
+  const MarkerCorners in_marker = CornersInMarkerFrame(info_.room_markers.length_m);
   std::vector<ImageCorners> expected;
   for (const auto& [id, marker] : map_.markers) {
     const Pose T_camera_marker = T_camera_world * marker.T_world_marker;
@@ -87,7 +126,7 @@ void Tracker::FindMarkers(const Frame& frame, FrameData& prepared) const {
     bool in_front = true;
     for (std::size_t i = 0; i < 4; ++i) {
       const Eigen::Vector3d p = T_camera_marker * in_marker[i];
-      in_front = in_front && p.z() > 0.1;
+      in_front = in_front && p.z() > kNearestInView_m;
       if (in_front) corners[i] = Project(info_.intrinsics, p);
     }
     if (in_front) expected.push_back(corners);
@@ -103,16 +142,17 @@ void Tracker::FindAllMarkers(FrameData& prepared) const {
 
 // Predicted with the velocity of the last frame.
 Pose Tracker::PredictedPose(const Frame& frame) const {
-  return PoseAfter(T_world_last_, velocity_, std::min(frame.color_time_s - last_time_s_, 0.3));
+  return PoseAfter(T_world_last_, velocity_,
+                   std::min(frame.color_time_s - last_time_s_, kPrediction_s));
 }
 
-TrackedFrame Tracker::Track(const Frame& frame, bool fewer_keypoints) {
+TrackedFrame Tracker::Track(const Frame& frame) {
   FrameData prepared = Prepare(frame);
   TrackedFrame result;
   result.frame_index = frame.index;
   result.color_time_s = frame.color_time_s;
   result.depth_time_s = frame.depth_time_s;
-  result.fewer_keypoints = fewer_keypoints;
+  result.fewer_keypoints = frame.fewer_keypoints;
   if (map_.keyframes.empty()) {
     // A map that starts with an empty image could never be found again.
     if (ShowsSomething(prepared)) {
@@ -145,7 +185,7 @@ double Tracker::SigmaPx() const { return info_.intrinsics.width / 640.0; }
 
 void Tracker::AddMarkerPoints(const std::vector<MarkerObservation>& markers,
                               std::vector<PosePoint>& points) const {
-  const MarkerCorners in_marker = CornersInMarkerFrame(info_.marker_length_m);
+  const MarkerCorners in_marker = CornersInMarkerFrame(info_.room_markers.length_m);
   for (const MarkerObservation& m : markers) {
     const auto known = map_.markers.find(m.id);
     if (known == map_.markers.end()) continue;
@@ -153,9 +193,7 @@ void Tracker::AddMarkerPoints(const std::vector<MarkerObservation>& markers,
       PosePoint point;
       point.p_world = known->second.T_world_marker * in_marker[i];
       point.ideal = Undistort(info_.intrinsics, m.corners[i]);
-      // Half a pixel for the error of the map and the rolling shutter, in addition to the
-      // detector's.
-      point.sigma = std::hypot(m.sigma_px[i], 0.5 * SigmaPx()) / info_.intrinsics.fx;
+      point.sigma = std::hypot(m.sigma_px[i], kCornerInMap_px * SigmaPx()) / info_.intrinsics.fx;
       points.push_back(point);
     }
   }
@@ -195,20 +233,20 @@ double Tracker::PlausibleStep_s(double step_s) const {
 // plausible speed for a hand.
 bool Tracker::Plausible(const PoseEstimate& estimate, std::size_t num_points, double dt_s) const {
   const PointSupport support = SupportOf(estimate, num_points);
-  const bool by_depth =
-      estimate.num_dense > 600 && estimate.dense_overlap > 0.4 && estimate.dense_rms_m < 0.012;
+  const bool by_depth = SurfacesAgree(estimate) && estimate.dense_overlap > kHoldingOverlap;
   if (!support.is_enough() && !by_depth) return false;
   // Depth that contradicts a pose from few points: the start was wrong.
-  if (!support.by_many && estimate.num_dense > 0 && estimate.dense_overlap < 0.25) return false;
+  if (!support.by_many && estimate.num_dense > 0 && estimate.dense_overlap < kContradictingOverlap)
+    return false;
   const Matrix6d covariance = estimate.information.ldlt().solve(Matrix6d::Identity());
   const double rotation_rad = std::sqrt(std::max(0.0, covariance.topLeftCorner<3, 3>().trace()));
   const double translation_m =
       std::sqrt(std::max(0.0, covariance.bottomRightCorner<3, 3>().trace()));
-  if (!(rotation_rad < 0.02) || !(translation_m < 0.02)) return false;
+  if (!(rotation_rad < kMaxSigma_rad) || !(translation_m < kMaxSigma_m)) return false;
   const Pose T_last_now = T_world_last_.inverse() * estimate.T_world_camera;
-  const double dt = std::clamp(dt_s, 0.02, 1.0);
-  return lost_ || (T_last_now.translation().norm() < kMaxSpeed * dt + 0.02 &&
-                   RotationAngle(T_last_now) < kMaxTurn * dt + 0.03);
+  const double dt = std::clamp(dt_s, kShortestStep_s, kLongestStep_s);
+  return lost_ || (T_last_now.translation().norm() < kMaxSpeed * dt + kJump_m &&
+                   RotationAngle(T_last_now) < kMaxTurn * dt + kJump_rad);
 }
 
 std::optional<PoseEstimate> Tracker::FollowFrame(const Frame& frame, const FrameData& prepared,
@@ -244,7 +282,8 @@ std::optional<PoseEstimate> Tracker::FollowFrame(const Frame& frame, const Frame
     Landmark& landmark = map_.landmark(best->followed[i].landmark);
     if (best->estimate.inlier[best->num_corners + i]) {
       agreeing.push_back(best->followed[i]);
-    } else if (++landmark.num_rejections > 3 && landmark.num_observations < 3) {
+    } else if (++landmark.num_rejections > kMaxRejections &&
+               landmark.num_observations < kEstablishedBy) {
       landmark.usable = false;
     }
   }
@@ -279,7 +318,7 @@ std::optional<PoseEstimate> Tracker::Relocalize(const Frame& frame, FrameData& p
   velocity_.setZero();
   FindAllMarkers(prepared);
   std::optional<Relocalization> found = RelocalizeByMarkers(
-      map_, info_.intrinsics, info_.marker_length_m, prepared.markers, frame.depth_m);
+      map_, info_.intrinsics, info_.room_markers.length_m, prepared.markers, frame.depth_m);
   std::optional<DescribedFeatures> features;
   for (int attempt = 0; attempt < 2; ++attempt) {
     if (!found && options_.use_keypoints && !features) {
@@ -295,7 +334,7 @@ std::optional<PoseEstimate> Tracker::Relocalize(const Frame& frame, FrameData& p
                                  KeyframesNear(found->T_world_color, map_.keyframes.size()),
                                  problem.points);
     PoseEstimate estimate = OptimizePose(problem, found->T_world_color);
-    if (Plausible(estimate, problem.points.size(), 1.0)) {
+    if (Plausible(estimate, problem.points.size(), kLongestStep_s)) {
       result.num_markers = CountMarkers(prepared.markers, estimate);
       result.num_keypoints = static_cast<int>(followed_points_.points().size());
       keyframe_wanted_ = true;

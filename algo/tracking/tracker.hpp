@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tracks the camera: one robust pose per frame from keypoints, marker corners and depth; keyframes,
 // and relocalisation after loss.
 #pragma once
@@ -9,12 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include "algo/map/dense_view.hpp"
+#include "algo/map/keyframe_link.hpp"
+#include "algo/map/map.hpp"
 #include "algo/markers/marker_detector.hpp"
-#include "algo/tracking/dense_view.hpp"
 #include "algo/tracking/followed_points.hpp"
-#include "algo/tracking/keyframe_link.hpp"
 #include "algo/tracking/keypoints.hpp"
-#include "algo/tracking/map.hpp"
 #include "algo/tracking/pose_optimizer.hpp"
 #include "algo/tracking/relocalizer.hpp"
 #include "algo/types/frame.hpp"
@@ -56,7 +57,7 @@ struct TrackedFrame {
       Pose::Identity();  ///< If it became a keyframe: its camera in that one's, as tracked.
   Vector6d velocity_per_s = Vector6d::Zero();  ///< In the camera frame.
   int num_keypoints = 0;
-  bool fewer_keypoints = false;  ///< As passed to Track().
+  bool fewer_keypoints = false;  ///< As in the frame.
   int num_markers = 0;
 };
 
@@ -78,10 +79,9 @@ class Tracker {
   Tracker& operator=(const Tracker&) = delete;
 
   /// The frame's images are shared by reference count and kept for keyframes.
-  /// @param fewer_keypoints  For a computer that is too slow: from each keyframe on, only one
-  ///         keypoint in each larger cell is followed. The keyframe itself still observes all that
-  ///         were followed until then.
-  TrackedFrame Track(const Frame& frame, bool fewer_keypoints = false);
+  /// Frame::fewer_keypoints: from each keyframe on, only one keypoint in each larger cell is
+  /// followed. The keyframe itself still observes all that were followed until then.
+  TrackedFrame Track(const Frame& frame);
 
   [[nodiscard]] const TrackingMap& map() const { return map_; }
   /// The map, for refinement after the last frame.

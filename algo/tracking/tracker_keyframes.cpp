@@ -1,13 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keyframes of the tracker: when one is made, what it observes, and loops.
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "algo/base/statistics.hpp"
-#include "algo/tracking/local_bundle.hpp"
+#include "algo/bundle/bundle_adjustment.hpp"
 #include "algo/tracking/loop_closer.hpp"
 #include "algo/tracking/map_budget.hpp"
+#include "algo/tracking/surface_agreement.hpp"
 #include "algo/tracking/tracker.hpp"
+#include "algo/tracking/view_geometry.hpp"
 
 namespace plumb {
 namespace {
@@ -21,8 +24,13 @@ constexpr double kDriftFollowed_rad = 0.001;
 // Keyframes not compared after one that matched no older keyframe: a scene in view stays for
 // several keyframes, and a comparison costs as much as tracking a frame.
 constexpr int kLongestLoopPause = 2;
-constexpr int kLoopInliers =
-    30;  // Features, and keypoints after them, that must agree to recognise a place.
+// Features, and keypoints after them, that must agree to recognise a place.
+constexpr int kLoopInliers = 30;
+// Lost keypoints alone make a keyframe only once the camera has moved, or hardly any are left:
+// where it stands still, others would be found in the same places.
+constexpr double kSmallMove_m = 0.01;
+constexpr double kSmallMove_rad = 0.01;
+constexpr std::size_t kFewPointsLeft = 30;
 
 // Median of a view's usable cells, metres; 1 without any.
 double MedianDepth(const DenseView& view) {
@@ -48,15 +56,15 @@ cv::Mat MiddlesOfBlocks(const cv::Mat& rgb, int block) {
 bool Tracker::NeedsKeyframe(const Pose& T_world_color) const {
   const MapKeyframe& keyframe = ReferenceKeyframe();
   const Pose T_keyframe_now = keyframe.T_world_color.inverse() * T_world_color;
-  if (T_keyframe_now.translation().norm() >
-      options_.keyframe_distance * std::clamp(keyframe.median_depth_m, 0.4, 3.0))
+  if (T_keyframe_now.translation().norm() > options_.keyframe_distance * ScaleOfView(keyframe))
     return true;
   if (RotationAngle(T_keyframe_now) > options_.keyframe_angle_rad) return true;
   return options_.use_keypoints &&
          static_cast<double>(followed_points_.points().size()) <
              options_.min_tracked_fraction * static_cast<double>(reference_count_) &&
-         (T_keyframe_now.translation().norm() > 0.01 || RotationAngle(T_keyframe_now) > 0.01 ||
-          followed_points_.points().size() < 30);
+         (T_keyframe_now.translation().norm() > kSmallMove_m ||
+          RotationAngle(T_keyframe_now) > kSmallMove_rad ||
+          followed_points_.points().size() < kFewPointsLeft);
 }
 
 // The nearest by pose of the first `count` keyframes with a similar view. The reference is
@@ -67,10 +75,8 @@ std::vector<std::size_t> Tracker::KeyframesNear(const Pose& T_world_color,
   for (std::size_t k = 0; k < count; ++k) {
     if (!lost_ && static_cast<int>(k) == reference_) continue;
     if (map_.keyframes[k].gray.empty()) continue;
-    const Pose T = map_.keyframes[k].T_world_color.inverse() * T_world_color;
-    const double depth = std::clamp(map_.keyframes[k].median_depth_m, 0.4, 3.0);
-    const double distance = T.translation().norm() / depth + RotationAngle(T);
-    if (distance < 0.7) near.emplace_back(distance, k);
+    const double distance = ViewDistance(map_.keyframes[k], T_world_color);
+    if (distance < kViewReach) near.emplace_back(distance, k);
   }
   std::sort(near.begin(), near.end());
   std::vector<std::size_t> result;
@@ -211,10 +217,9 @@ std::optional<Pose> Tracker::EstimatePoseFromKeyframe(int older, const Pose& T_w
   const PoseEstimate estimate = OptimizePose(problem, T_world_guess);
   followed_points_.SetPoints(followed);
   reference_ = followed_reference;
-  const bool by_depth =
-      !options_.use_dense || (estimate.num_dense > 300 && estimate.dense_rms_m < 0.015);
   if (estimate.num_inliers < kLoopInliers ||
-      2 * estimate.num_inliers < static_cast<int>(problem.points.size()) || !by_depth)
+      2 * estimate.num_inliers < static_cast<int>(problem.points.size()) ||
+      (options_.use_dense && !SurfacesAgree(estimate)))
     return std::nullopt;
   return estimate.T_world_camera;
 }
@@ -237,7 +242,7 @@ void Tracker::AddNewMarkers(const cv::Mat& depth_m, const MapKeyframe& keyframe)
     auto known = map_.markers.find(m.id);
     if (known == map_.markers.end()) {
       const auto T_camera_marker =
-          MarkerPoseInCamera(info_.intrinsics, info_.marker_length_m, m, depth_m);
+          MarkerPoseInCamera(info_.intrinsics, info_.room_markers.length_m, m, depth_m);
       if (!T_camera_marker) continue;
       known = map_.markers.emplace(m.id, MapMarker{keyframe.T_world_color * *T_camera_marker, 0, 1})
                   .first;
@@ -248,12 +253,17 @@ void Tracker::AddNewMarkers(const cv::Mat& depth_m, const MapKeyframe& keyframe)
 
 void Tracker::AdjustLocally(int index) {
   if (index == 0) return;
-  LocalBundleOptions bundle;
-  bundle.marker_length_m = info_.marker_length_m;
+  BundleOptions bundle;
+  bundle.marker_length_m = info_.room_markers.length_m;
   bundle.depth_noise = info_.depth_noise;
+  // The joint solve ends what is begun here.
+  bundle.max_iterations = 4;
+  bundle.function_tolerance = 1e-3;
+  bundle.min_corner_sigma_px = 0.3;
   for (int k = std::max(1, index + 1 - options_.local_keyframes); k <= index; ++k)
     if (IsConstrained(map_, map_.keyframe(k))) bundle.free_keyframes.push_back(k);
-  AdjustLocalMap(info_.intrinsics, bundle, map_);
+  CalibrationModel as_stated;
+  BundleAdjust(info_.intrinsics, bundle, {}, map_, as_stated);
 }
 
 }  // namespace plumb

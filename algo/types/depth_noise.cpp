@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/types/depth_noise.hpp"
 
 #include <array>
 
-#include <fmt/format.h>
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
@@ -25,7 +26,7 @@ double SmallestFacing_m(const DepthNoise& noise) {
 
 }  // namespace
 
-std::optional<std::string> FaultOf(const DepthNoise& noise) {
+std::optional<Message> FaultOf(const DepthNoise& noise) {
   const std::array<Range, 5> ranges = {{
       {"constant_m", noise.constant_m, -0.1, 0.1},
       {"linear_m_per_m", noise.linear_m_per_m, -1.0, 1.0},
@@ -35,15 +36,12 @@ std::optional<std::string> FaultOf(const DepthNoise& noise) {
   }};
   for (const Range& range : ranges) {
     if (!(range.value >= range.least && range.value <= range.most))
-      return fmt::format("{} is {}, expected a number from {} to {}", range.name, range.value,
-                         range.least, range.most);
+      return say::sensor::NoiseOutOfRange(range.name, range.value, range.least, range.most);
   }
   if (const double smallest_m = SmallestFacing_m(noise); !(smallest_m >= kLeastDepthNoise_m))
-    return fmt::format("the standard deviation falls to {} m, expected at least {} m everywhere",
-                       smallest_m, kLeastDepthNoise_m);
+    return say::sensor::NoiseFalls(smallest_m, kLeastDepthNoise_m);
   if (const double at_1m_m = noise.SigmaFacing_m(1.0); !(at_1m_m <= kMostDepthNoiseAt1m_m))
-    return fmt::format("the standard deviation at 1 m is {} m, expected at most {} m", at_1m_m,
-                       kMostDepthNoiseAt1m_m);
+    return say::sensor::NoiseTooLarge(at_1m_m, kMostDepthNoiseAt1m_m);
   return std::nullopt;
 }
 

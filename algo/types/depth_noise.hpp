@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How much the measurements of a depth camera scatter, as its driver or its recording states it.
 #pragma once
 
@@ -6,6 +7,8 @@
 #include <concepts>
 #include <optional>
 #include <string>
+
+#include "algo/base/message.hpp"
 
 namespace plumb {
 
@@ -53,6 +56,6 @@ inline constexpr double kMostDepthNoiseAt1m_m = 0.1;
 /// Why a stated noise cannot be used: the value's name, what it is and what is expected. Nothing if
 /// it can be used: then it is at least kLeastDepthNoise_m at every distance from 0 on, and finite
 /// at every finite one.
-[[nodiscard]] std::optional<std::string> FaultOf(const DepthNoise& noise);
+[[nodiscard]] std::optional<Message> FaultOf(const DepthNoise& noise);
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One RGB-D image pair, and the interface of its sources.
 #pragma once
 
@@ -9,7 +10,9 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/base/intrinsics.hpp"
+#include "algo/base/message.hpp"
 #include "algo/types/depth_noise.hpp"
+#include "algo/types/depth_sensor.hpp"
 #include "algo/types/marker.hpp"
 
 namespace plumb {
@@ -24,19 +27,22 @@ struct Frame {
   cv::Mat color_rgb;  ///< CV_8UC3, channels red, green, blue.
   cv::Mat depth_m;    ///< CV_32FC1, metres along the optical axis, 0 where nothing was measured.
                       ///< Registered to the colour image, same size.
+  /// The computer was too slow for all keypoints when this pair came, see Tracker::Track().
+  bool fewer_keypoints = false;
 };
 
 /// Properties of a stream that are known before its first frame.
 struct StreamInfo {
-  Intrinsics intrinsics;        ///< Of the colour camera (and therefore of the registered depth).
-  DepthNoise depth_noise = {};  ///< Of the sensor; structured light unless stated otherwise.
+  Intrinsics intrinsics;  ///< Of the colour camera (and therefore of the registered depth).
+  /// Class of the depth camera; decides what is expected of its calibration and its edges.
+  DepthSensor depth_sensor = DepthSensor::kStructuredLight;
+  DepthNoise depth_noise = {};      ///< Of the sensor; that of its class unless stated otherwise.
+  UsableDepth usable_depth = {};    ///< Likewise.
   bool intrinsics_assumed = false;  ///< The recording has no calibration; nominal values are used.
-  /// OpenCV's name, or DICT_ARUCO_MIP_36h12.
-  std::string marker_dictionary = kDefaultMarkerDictionary;
-  double marker_length_m = kDefaultMarkerLength_m;  ///< Side of the black square.
-  std::optional<int> reference_marker;     ///< Id of the marker whose frame is the scene's frame.
+  bool depth_unit_assumed = false;  ///< Nothing states the unit of the depth images.
+  RoomMarkers room_markers = {};
   std::optional<std::int64_t> num_frames;  ///< Number of image pairs, if known beforehand.
-  std::vector<std::string> warnings;       ///< Assumptions and omissions of the source.
+  std::vector<Message> warnings;           ///< Assumptions and omissions of the source.
 };
 
 /// A stream of frames in order. Not thread-safe: read from one thread.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The height map: z above the reference marker's plane on a regular grid.
 #pragma once
 

@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fiducial markers in images and in scenes.
 #pragma once
 
 #include <array>
 #include <map>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -14,6 +17,33 @@ namespace plumb {
 inline constexpr double kDefaultMarkerLength_m = 0.104;
 /// Dictionary of the markers in the same case.
 inline constexpr const char* kDefaultMarkerDictionary = "DICT_6X6_250";
+
+/// The markers of a room.
+struct RoomMarkers {
+  /// OpenCV's name, or DICT_ARUCO_MIP_36h12.
+  std::string dictionary = kDefaultMarkerDictionary;
+  double length_m = kDefaultMarkerLength_m;  ///< Side of the black square.
+  std::optional<int> reference = {};         ///< Id of the marker whose frame is the scene's frame.
+
+  bool operator==(const RoomMarkers&) const = default;
+
+  /// Where nothing is known of them: the length places no marker.
+  [[nodiscard]] static RoomMarkers Unknown() { return {.dictionary = {}, .length_m = 0.0}; }
+};
+
+/// What a file states of a room's markers.
+struct StatedMarkers {
+  std::optional<std::string> dictionary = {};
+  std::optional<double> length_m = {};
+  std::optional<int> reference = {};
+
+  /// These, and the others where they state nothing.
+  [[nodiscard]] RoomMarkers Or(const RoomMarkers& others) const {
+    return {.dictionary = dictionary.value_or(others.dictionary),
+            .length_m = length_m.value_or(others.length_m),
+            .reference = reference ? reference : others.reference};
+  }
+};
 
 /// Corners in detector order: top-left first, clockwise as seen on the print. In the marker's own
 /// frame (x right, y up on the print, z out of it) they are (-,+), (+,+), (+,-), (-,-) times

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/types/marker_dictionary.hpp"
 
 #include <algorithm>
@@ -8,10 +9,10 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "algo/base/errors.hpp"
 #include "algo/types/marker_codes.hpp"
+#include "words/recording.hpp"
 
 namespace plumb {
 namespace {
@@ -95,10 +96,7 @@ std::optional<MarkerDictionary> MarkerDictionary::Find(std::string_view name) {
 MarkerDictionary MarkerDictionary::ByName(std::string_view name) {
   std::optional<MarkerDictionary> dictionary = Find(name);
   if (!dictionary) {
-    throw DataError(
-        fmt::format("unknown marker dictionary '{}': expected one of {}; correct marker_dictionary "
-                    "in camera.yaml or the configuration",
-                    name.substr(0, 80), fmt::join(KnownNames(), ", ")));
+    throw DataError(say::recording::UnknownDictionary(name.substr(0, 80), KnownNames()));
   }
   return *std::move(dictionary);
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The supported families of square fiducial markers: names, code words, patterns.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A reconstructed scene, which `plumb reconstruct` writes and `plumb compare` reads.
 #pragma once
 
@@ -7,10 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "algo/base/pose.hpp"
+#include "algo/types/depth_sensor.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/marker.hpp"
+#include "algo/types/planning_source.hpp"
 #include "algo/types/point_cloud.hpp"
 #include "algo/types/sensor_sensitivity.hpp"
 
@@ -20,10 +24,16 @@ enum class Preset { kBest, kPaper };
 template <>
 inline constexpr auto kNamesOf<Preset> = NamesUpTo<Preset::kPaper>({"best", "paper"});
 
-enum class SceneFrame { kReferenceMarker, kFirstKeyframe };
+/// kIec: origin at the isocentre of a plan, axes of IEC 61217.
+enum class SceneFrame { kReferenceMarker, kFirstKeyframe, kIec };
 template <>
-inline constexpr auto kNamesOf<SceneFrame> =
-    NamesUpTo<SceneFrame::kFirstKeyframe>({"reference_marker", "first_keyframe"});
+inline constexpr auto kNamesOf<SceneFrame> = NamesUpTo<SceneFrame::kIec>({"reference_marker",
+                                                                          "first_keyframe", "iec"});
+
+/// What a scene was made of.
+enum class SceneSource { kSweep, kDicom };
+template <>
+inline constexpr auto kNamesOf<SceneSource> = NamesUpTo<SceneSource::kDicom>({"sweep", "dicom"});
 
 /// A camera pose with its time (the depth image's stamp).
 struct StampedPose {
@@ -44,9 +54,9 @@ struct Breathing {
 struct Scene {
   Preset preset = Preset::kBest;
   SceneFrame frame = SceneFrame::kFirstKeyframe;
-  std::string marker_dictionary;
-  double marker_length_m = 0.0;
-  std::optional<int> reference_marker;
+  std::optional<PlanningSource> planning;  ///< Of a scene that a planning CT gave; frame: kIec.
+  RoomMarkers room_markers = RoomMarkers::Unknown();
+  std::optional<DepthSensor> depth_sensor;  ///< Absent where no depth camera made the scene.
   MarkerMap markers;
 
   std::vector<StampedPose> keyframes;
@@ -69,8 +79,16 @@ struct Scene {
   /// Standard deviations of its terms after this sweep and before it. Terms that the sweep does not
   /// determine keep their prior one. Empty where nothing was calibrated.
   std::map<std::string, double> calibration_sigma, calibration_prior_sigma;
+  /// Chi-square of the calibration against what was known before, for each of its terms; not set
+  /// where nothing was calibrated.
+  std::optional<double> calibration_chi2_per_term;
   std::map<std::string, double> timings_s;
-  std::vector<std::string> warnings;
+  std::vector<Message> warnings;
+  /// Why the scene must not be compared; empty if it may. Among the warnings, too.
+  std::vector<Message> refusals;
+  /// Fraction by which its lengths may be wrong beyond what every print may, because depth and the
+  /// size of the markers disagree; 0 if they agree.
+  double scale_doubt = 0.0;
 };
 
 }  // namespace plumb

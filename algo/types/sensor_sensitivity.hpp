@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How a scene would change if its sensor's calibration were another one.
 #pragma once
 

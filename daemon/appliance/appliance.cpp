@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/appliance.hpp"
 
 #include <algorithm>
@@ -11,8 +12,11 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/appliance/control_lines.hpp"
+#include "daemon/database/stored_values.hpp"
 #include "daemon/loop/log.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "words/audit.hpp"
+#include "words/monitoring.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
@@ -41,29 +45,33 @@ Json ConfigChanges(const Config& before, const Config& after,
   return changes;
 }
 
-StorageOptions StorageOf(const ApplianceParts& parts) {
-  StorageOptions options = parts.storage;
-  options.state = parts.config.appliance.state;
-  return options;
-}
-
 }  // namespace
 
-Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
-    : loop_(loop),
-      parts_(std::move(parts)),
-      storage_(loop, StorageOf(parts_), *this, store_thread_, check_thread_),
-      store_(storage_.store()),
-      upkeep_(
-          loop, storage_, parts_.config, [this](web::EventKind kind) { NotifyWeb(kind); },
-          parts_.clock_trusted_after, store_thread_, check_thread_),
-      room_(store_, parts_.config, [this] { return sensors_->snapshot(); }),
-      profiles_(parts_.config, [this] { return sensors_->snapshot(); }),
-      references_(store_, parts_.config, !parts_.demo_patient.empty(),
-                  [this] { return sensors_->snapshot(); }),
-      session_(loop, parts_.config, [this] { OnSessionUnused(); }),
-      button_(loop, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }) {
-  storage_.Open();
+Appliance::Appliance(SharedParts& shared)
+    : loop_(shared.loop),
+      parts_(shared.given),
+      notices_(shared.notices),
+      storage_(shared.storage),
+      store_(shared.store),
+      upkeep_(shared.upkeep),
+      room_(shared.room),
+      profiles_(shared.profiles),
+      references_(shared.references),
+      session_(shared.session),
+      store_thread_(shared.store_thread),
+      monitoring_(shared.monitoring),
+      sensors_(shared.sensors),
+      button_(loop_, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }) {
+  shared.sensor_changed = [this](const SensorEvent& event) { OnSensor(event); };
+  shared.session_unused = [this] { OnSessionUnused(); };
+  monitoring_.SetHooks(
+      {.ask =
+           [this](bool starts, const Actor& actor) {
+             return Handle(starts ? ScanEvent::kMonitorStart : ScanEvent::kMonitorStop, &actor);
+           },
+       .changed = [this] { Show(); },
+       .failed = [this](const Message& why) { OnMonitorFailed(why); }});
+  storage_.Open(*this);
   room_.Refresh();
   result_timer_ =
       loop_.MakeTimer("result expired", [this] { (void)Handle(ScanEvent::kResultExpired); });
@@ -76,20 +84,14 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
   if (!storage_.fault().empty()) (void)Handle(ScanEvent::kStorageFailed);
   Show();
   upkeep_.Run();
-  sensors_ = std::make_unique<SensorThread>(
-      parts_.make_provider,
-      SensorThreadOptions{.serial = parts_.config.appliance.sensor_serial,
-                          .before_scan = parts_.before_scan},
-      [this](const SensorEvent& event) {
-        loop_.Post("sensor", [this, event] { OnSensor(event); });
-      });
   WatchSpace();
 }
 
 Appliance::~Appliance() {
   upkeep_.Stop();
+  (void)monitoring_.End({});
+  monitoring_.SetHooks({});
   running_.reset();
-  sensors_.reset();
 }
 
 bool Appliance::IsRunning() const {
@@ -97,21 +99,8 @@ bool Appliance::IsRunning() const {
 }
 
 Appliance::Answer Appliance::WhyNotIdle() const {
-  return IsRunning() ? "a scan is running or being computed: wait for its result" : "";
-}
-
-Appliance::Answer Appliance::WhyNotRestart() const {
-  if (std::string why = WhyNotIdle(); !why.empty()) return why;
-  if (session_.IsPatients())
-    return "the session of a patient is open: close it first, then restart";
-  return {};
-}
-
-Appliance::Answer Appliance::WhyNotInstall() const {
-  if (std::string why = WhyNotIdle(); !why.empty()) return why;
-  if (session_.IsPatients())
-    return "the session of a patient is open: close it first, then install the update";
-  return {};
+  if (state_.phase == ApplianceState::kMonitoring) return say::monitoring::RunsAlready();
+  return IsRunning() ? say::scan::WaitForResult() : Message();
 }
 
 /// Without a running scan and a shown result, a long press ends the treatment session.
@@ -135,11 +124,11 @@ Appliance::Answer Appliance::Cancel(const Actor& actor) {
 
 /// Checks beyond the state, which has accepted the event already.
 Appliance::Answer Appliance::WhyNotScan() const {
-  if (stopped_) return "the appliance is being switched off";
-  if (std::string why = WhyBlocked(); !why.empty()) return why;
-  if (!storage_.IsUsable()) return "nothing can be stored";
-  if (std::string why = store_->WhyOtherScans(); !why.empty()) return why;
-  if (std::string why = session_.WhyNotScan(); !why.empty()) return why;
+  if (stopped_) return say::scan::SwitchingOff();
+  if (Message why = session_.WhyBlocked(); !why.empty()) return why;
+  if (!storage_.IsUsable()) return say::scan::NothingStored();
+  if (Message why = store_->WhyOtherScans(); !why.empty()) return why;
+  if (Message why = session_.WhyNotScan(); !why.empty()) return why;
   return WhyNoSpace();
 }
 
@@ -148,27 +137,33 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const Actor* actor) {
   ScanTransition transition = Next(state_, event);
   const bool starts = std::find(transition.actions.begin(), transition.actions.end(),
                                 ScanAction::kStartScan) != transition.actions.end();
-  Answer answer(transition.refusal);
+  Answer answer = transition.refusal;
   if (!answer.empty() && before.fault == FaultKind::kStorage && !space_fault_.empty())
     answer = space_fault_;
-  if (starts) {
-    answer = WhyNotScan();
+  const bool monitors = std::find(transition.actions.begin(), transition.actions.end(),
+                                  ScanAction::kStartMonitor) != transition.actions.end();
+  if (starts || monitors) {
+    answer = starts ? WhyNotScan() : WhyNotMonitor();
     if (!answer.empty())
       transition = {.state = before, .actions = {ScanAction::kRefuse}, .refusal = {}};
   }
   if (!answer.empty()) {
-    Log(LogLevel::kNotice,
-        fmt::format("{} ignored in state {}: {}", Name(event), Name(before.phase), answer));
-    PublishEvent(IgnoredEvent(event, before.phase, answer));
+    Log(LogLevel::kNotice, fmt::format("{} ignored in state {}: {}", Name(event),
+                                       Name(before.phase), answer.English()));
+    notices_.TellWatchers(IgnoredEvent(event, before.phase, answer));
   }
+  if (before.phase == ApplianceState::kMonitoring &&
+      (event == ScanEvent::kSensorLost || event == ScanEvent::kSensorFailed))
+    monitor_end_ = event == ScanEvent::kSensorLost ? say::monitoring::SensorLost() : sensor_fault_;
   state_ = transition.state;
   if (state_.phase != ApplianceState::kResult) result_timer_.Disarm();
   for (const ScanAction action : transition.actions) {
     Act(action);
-    if (actor != nullptr) AuditAct(action, *actor);
+    if (actor != nullptr || action == ScanAction::kEndMonitor)
+      AuditAct(action, actor != nullptr ? *actor : kSelf);
   }
   if (actor != nullptr && transition.actions.empty())  // a fault or a result was acknowledged
-    Audit(*actor, "press", "", std::string(Name(state_.phase)));
+    Audit(*actor, "press", "", say::audit::State(Name(state_.phase)));
   if (state_ != before) PublishState();
   return answer;
 }
@@ -176,11 +171,15 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const Actor* actor) {
 void Appliance::AuditAct(ScanAction action, const Actor& actor) {
   switch (action) {
     case ScanAction::kStartScan:
-      return Audit(actor, "scan.start", scan_.session_id, ScanKind());
+      return Audit(actor, "scan.start", scan_.session_id, say::audit::ScanKind(ScanKind()));
     case ScanAction::kEndSweep:
-      return Audit(actor, "scan.end", scan_.session_id, ScanKind());
+      return Audit(actor, "scan.end", scan_.session_id, say::audit::ScanKind(ScanKind()));
     case ScanAction::kCancelScan:
-      return Audit(actor, "cancel", scan_.session_id, ScanKind());
+      return Audit(actor, "cancel", scan_.session_id, say::audit::ScanKind(ScanKind()));
+    case ScanAction::kStartMonitor:
+      return Audit(actor, "monitor.start", monitoring_.status().scan_id, {});
+    case ScanAction::kEndMonitor:
+      return Audit(actor, "monitor.stop", monitoring_.status().scan_id, monitored_);
     case ScanAction::kArmResultTimer:
     case ScanAction::kRefuse:
       return;
@@ -188,18 +187,18 @@ void Appliance::AuditAct(ScanAction action, const Actor& actor) {
 }
 
 void Appliance::Audit(const Actor& actor, const std::string& action, const std::string& subject,
-                      const std::string& detail) {
+                      const Message& detail) {
   const auto report = [action](std::string_view why) {
     Log(LogLevel::kError, fmt::format("cannot write '{}' to the audit log: {}", action, why));
   };
-  if (store_ == nullptr) return report(storage_.fault());
-  const bool posted = store_thread_.Post([=, this] {
+  if (store_ == nullptr) return report(storage_.fault().English());
+  const bool posted = store_thread_.Post([=, this, &store = store_, &loop = loop_] {
     try {
-      store_->audit.Log(actor, action, subject, detail);
+      store->audit.Log(actor, action, subject, detail);
     } catch (const std::exception& error) {
       return report(error.what());
     }
-    loop_.Post("audit log written", [this] { NotifyWeb(web::EventKind::kData); });
+    loop.Post("audit log written", [this] { notices_.TellPage(web::EventKind::kData); });
   });
   if (!posted) report("the store is busy");
 }
@@ -210,31 +209,35 @@ void Appliance::Act(ScanAction action) {
       return StartScan();
     case ScanAction::kEndSweep:
       limit_timer_.Disarm();
-      scan_.images = sensors_->snapshot().statistics.Since(scan_.sensor_before);
-      return sensors_->EndScan();
+      scan_.images = sensors_.snapshot().statistics.Since(scan_.sensor_before);
+      return sensors_.EndScan();
     case ScanAction::kCancelScan:
       limit_timer_.Disarm();
       scan_.cancelled_at = Clock::now();
       if (running_) running_->Cancel();
-      return sensors_->EndScan();
+      return sensors_.EndScan();
     case ScanAction::kArmResultTimer:
       return result_timer_.ArmAfterSeconds(parts_.result_s);
+    case ScanAction::kStartMonitor:
+      return StartMonitor();
+    case ScanAction::kEndMonitor:
+      return EndMonitor();
     case ScanAction::kRefuse:
       return;
   }
 }
 
 Appliance::Answer Appliance::OpenCheck(const Actor& actor) {
-  if (std::string why = WhyNotIdle(); !why.empty()) return why;
+  if (Message why = WhyNotIdle(); !why.empty()) return why;
   session_.SetCheck(actor);
-  NotifyWeb(web::EventKind::kStatus);
+  notices_.TellPage(web::EventKind::kStatus);
   return {};
 }
 
 void Appliance::OnSensor(const SensorEvent& event) {
   LogSensor(event);
-  PublishEvent(SensorChanged(event));
-  NotifyWeb(web::EventKind::kStatus);
+  notices_.TellWatchers(SensorChanged(event));
+  notices_.TellPage(web::EventKind::kStatus);
   if (event.kind == SensorEvent::Kind::kOthers || event.kind == SensorEvent::Kind::kStalled) return;
   sensor_fault_ = event.reason;
   (void)Handle(event.kind == SensorEvent::Kind::kReady  ? ScanEvent::kSensorReady
@@ -246,25 +249,25 @@ void Appliance::LogSensor(const SensorEvent& event) {
   const std::string& serial = event.sensor.serial;
   if (event.kind == SensorEvent::Kind::kLost) Log(LogLevel::kNotice, "no sensor is attached");
   if (event.kind == SensorEvent::Kind::kFailed)
-    Log(LogLevel::kError, fmt::format("the sensor does not work: {}", event.reason),
+    Log(LogLevel::kError, fmt::format("the sensor does not work: {}", event.reason.English()),
         {{"SERIAL", serial}});
   if (event.kind == SensorEvent::Kind::kStalled)
-    Log(LogLevel::kWarning, event.reason, {{"SERIAL", serial}});
+    Log(LogLevel::kWarning, event.reason.English(), {{"SERIAL", serial}});
   if (event.kind == SensorEvent::Kind::kReady) {
     references_.SensorReady();
     Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", serial}});
-    if (const std::string why = profiles_.WhyNone(event.sensor); !why.empty())
-      Log(LogLevel::kNotice, fmt::format("no profile is kept of this sensor: {}", why),
+    if (const Message why = profiles_.WhyNone(event.sensor); !why.empty())
+      Log(LogLevel::kNotice, fmt::format("no profile is kept of this sensor: {}", why.English()),
           {{"SERIAL", serial}});
-    const StreamInfo info = sensors_->snapshot().info;
+    const StreamInfo info = sensors_.snapshot().info;
     if (!last_serial_.empty() && last_serial_ != serial) {
       Log(LogLevel::kNotice,
           fmt::format("another sensor than before: {} instead of {}, {}", serial, last_serial_,
                       info.intrinsics_assumed ? "not calibrated" : "with its own calibration"));
     }
     last_serial_ = serial;
-    for (const std::string& warning : info.warnings)
-      Log(LogLevel::kWarning, warning, {{"SERIAL", serial}});
+    for (const Message& warning : info.warnings)
+      Log(LogLevel::kWarning, warning.English(), {{"SERIAL", serial}});
   }
   const bool has_others = event.kind == SensorEvent::Kind::kReady && !event.others.empty();
   if (!has_others && event.kind != SensorEvent::Kind::kOthers) return;
@@ -278,33 +281,37 @@ void Appliance::LogSensor(const SensorEvent& event) {
 
 void Appliance::OpenSession(const std::string& session_id, const std::string& patient_id,
                             ScanPurpose purpose, const std::string& reason, const Actor& actor) {
+  if (monitoring_.IsActive()) (void)Handle(ScanEvent::kMonitorStop, &actor);
   session_.Open(session_id, patient_id, purpose, reason, actor);
-  NotifyWeb(web::EventKind::kStatus);
+  notices_.TellPage(web::EventKind::kStatus);
 }
 
 void Appliance::ForgetSession() {
+  if (monitoring_.IsActive()) (void)Handle(ScanEvent::kMonitorEnded);
   session_.Forget();
-  NotifyWeb(web::EventKind::kStatus);
+  notices_.TellPage(web::EventKind::kStatus);
 }
 
 Appliance::Answer Appliance::CloseSession(const Actor& actor) {
-  if (std::string why = WhyNotIdle(); !why.empty()) return why;
-  if (std::string why = session_.WhyNotChange(); !why.empty()) return why;
-  if (!session_.IsOpen()) return "no session is open";
+  if (monitoring_.IsActive()) (void)Handle(ScanEvent::kMonitorStop, &actor);
+  if (Message why = WhyNotIdle(); !why.empty()) return why;
+  if (Message why = session_.WhyNotChange(); !why.empty()) return why;
+  if (!session_.IsOpen()) return say::scan::NoSession();
   ForgetSession();
-  (void)store_thread_.Post([this, actor] {
+  (void)store_thread_.Post([this, actor, &store = store_, &loop = loop_] {
     try {
-      store_->treatments.CloseAll(actor);
+      store->treatments.CloseAll(actor);
     } catch (const std::exception& error) {
       Log(LogLevel::kError, fmt::format("cannot note the end of the session: {}", error.what()));
     }
-    loop_.Post("session closed", [this] { NotifyWeb(web::EventKind::kData); });
+    loop.Post("session closed", [this] { notices_.TellPage(web::EventKind::kData); });
   });
   return {};
 }
 
 void Appliance::OnSessionUnused() {
-  if (IsRunning() || !session_.WhyNotChange().empty()) return session_.ArmTimer();
+  if (IsRunning() || monitoring_.IsActive() || !session_.WhyNotChange().empty())
+    return session_.ArmTimer();
   Log(LogLevel::kNotice, fmt::format("the session was closed: nothing was scanned for {:g} minutes",
                                      parts_.config.appliance.session_idle_min));
   (void)CloseSession(kSelf);
@@ -323,7 +330,7 @@ void Appliance::Reload(const Config& config) {
   references_.Configure(parts_.config);
   room_.Refresh();
   Log(LogLevel::kInfo, "the configuration was read again");
-  if (!changes.empty()) Audit(kSelf, "config.reload", "", changes.dump());
+  if (!changes.empty()) Audit(kSelf, "config.reload", "", Message::Verbatim(changes.dump()));
   if (!kept.empty())
     Log(LogLevel::kWarning,
         fmt::format("changed, but in use only after a restart: {}", fmt::join(kept, ", ")));
@@ -332,6 +339,7 @@ void Appliance::Reload(const Config& config) {
 void Appliance::Stop(std::function<void()> stopped) {
   upkeep_.Stop();
   storage_.Stop();
+  if (monitoring_.IsActive()) (void)Handle(ScanEvent::kMonitorEnded);
   if (!IsRunning()) {
     stopped();
     stopped_ = [] {};
@@ -350,7 +358,7 @@ void Appliance::OnTick() {
 
 bool Appliance::WorkersAreAlive() const {
   const double now_s = SteadySeconds();
-  if (now_s - sensors_->heartbeat_s() > parts_.sensor_silence_s) return false;
+  if (now_s - sensors_.heartbeat_s() > parts_.sensor_silence_s) return false;
   // During the sweep the scan's thread waits for frames; their arrival is monitored by the sensor
   // thread.
   const bool is_working = state_.phase == ApplianceState::kWorking && running_ != nullptr;
@@ -374,7 +382,7 @@ void Appliance::StoreOpened(Store& store) {
 }
 
 void Appliance::StorageFailed() {
-  space_fault_.clear();
+  space_fault_ = {};
   (void)Handle(ScanEvent::kStorageFailed);
   PublishState();
 }
@@ -384,8 +392,8 @@ void Appliance::StorageWorks() {
   WatchSpace();
   room_.Refresh();
   upkeep_.Run();
-  NotifyWeb(web::EventKind::kStatus);
-  NotifyWeb(web::EventKind::kData);
+  notices_.TellPage(web::EventKind::kStatus);
+  notices_.TellPage(web::EventKind::kData);
 }
 
 }  // namespace plumb

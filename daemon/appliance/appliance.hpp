@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The appliance: sensor, button, light, scans and store behind one state, on the event loop.
 #pragma once
 
@@ -10,36 +11,31 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "daemon/appliance/appliance_parts.hpp"
+#include "algo/base/message.hpp"
 #include "daemon/appliance/button_watch.hpp"
 #include "daemon/appliance/current_scan.hpp"
-#include "daemon/appliance/current_session.hpp"
-#include "daemon/appliance/page_identity.hpp"
-#include "daemon/appliance/reference_gate.hpp"
-#include "daemon/appliance/room_in_use.hpp"
 #include "daemon/appliance/scan_session.hpp"
 #include "daemon/appliance/scan_state.hpp"
-#include "daemon/appliance/sensor_thread.hpp"
-#include "daemon/appliance/storage_upkeep.hpp"
-#include "daemon/appliance/storage_watch.hpp"
-#include "daemon/appliance/unit_profiles.hpp"
+#include "daemon/appliance/shared_parts.hpp"
 #include "daemon/loop/event_loop.hpp"
-#include "daemon/loop/work_thread.hpp"
+#include "daemon/unit/page_identity.hpp"
 #include "web/service/appliance_service.hpp"
 
 namespace plumb {
 
 /// Not thread-safe: call it on the loop's thread, except for functions marked "from any thread".
 /// They return at once. Its threads: daemon/README.md. The loop must not run after its destruction.
+/// Commands in, events out: who needs a part of it gets that from SharedParts.
 class Appliance : private StorageUser {
  public:
-  Appliance(EventLoop& loop, ApplianceParts parts);
+  /// The parts are borrowed.
+  explicit Appliance(SharedParts& shared);
   ~Appliance() override;
   Appliance(const Appliance&) = delete;
   Appliance& operator=(const Appliance&) = delete;
 
-  /// Empty if the appliance does it, otherwise one sentence why not.
-  using Answer = std::string;
+  /// Empty if the appliance does it, otherwise why not.
+  using Answer = Message;
   /// The audit log names the actor of this and the next three functions, and the session of the
   /// scan that the call started, ended or discarded.
   Answer Press(ButtonPress press, const Actor& actor);
@@ -48,52 +44,27 @@ class Appliance : private StorageUser {
   Answer EndSweep(const Actor& actor);
   /// Discards the running scan.
   Answer Cancel(const Actor& actor);
-  /// Called before each scan; returns a reason why none may begin now, or nothing.
-  void SetBlockingReason(std::function<std::string()> blocking_reason) {
-    blocking_reason_ = std::move(blocking_reason);
-  }
-  [[nodiscard]] Answer WhyBlocked() const {
-    return blocking_reason_ ? blocking_reason_() : std::string();
-  }
   /// The session that the store has opened: scans belong to it until it is closed.
   void OpenSession(const std::string& session_id, const std::string& patient_id,
                    ScanPurpose purpose, const std::string& reason, const Actor& actor);
   /// Ends the session, also in the store. Not while a scan runs.
   Answer CloseSession(const Actor& actor);
-  [[nodiscard]] bool IsRunning() const override;
   /// For what has to wait until no scan runs; empty: none does.
   [[nodiscard]] Answer WhyNotIdle() const;
-  /// Why the machine may not be restarted now: a scan runs, or a patient's session is open (the
-  /// demo's does not count). Empty if it may.
-  [[nodiscard]] Answer WhyNotRestart() const;
-  /// The same for a system update, during which no scan can begin.
-  [[nodiscard]] Answer WhyNotInstall() const;
   /// Shown by status and light until it is empty: the machine has gone back to the previous system.
-  void SetRolledBack(const std::string& text);
+  void SetRolledBack(const Message& why);
   /// Closes this patient if it is open. An open daily check stays open.
   void ClosePatient(const std::string& patient_id);
   /// The next scan is the daily check of the room's markers; scans after it belong to the open
   /// patient again.
   Answer OpenCheck(const Actor& actor);
-  /// Discards the last scan's objection to the profile.
-  void ForgetDrift();
-  /// Age of the last result of this run, by a monotonic clock; nothing for another scan.
-  [[nodiscard]] std::optional<double> AgeOf(const std::string& scan_id) const;
   /// Applies changes that are possible while running and logs those that are not. For SIGHUP.
   void Reload(const Config& config);
   /// Calls `stopped` once no scan runs any more; a running one is discarded.
   void Stop(std::function<void()> stopped);
 
-  /// Sends each event as one JSON object ({"event", "time", ...}) to the control socket's watchers.
-  void SetEventListener(std::function<void(const std::string& line)> listener) {
-    notify_watchers_ = std::move(listener);
-  }
-  void SetWebListener(std::function<void(web::EventKind)> listener) {
-    notify_page_ = std::move(listener);
-  }
-
   /// The status of the page.
-  void SetPage(PageNotes page) { page_ = std::move(page); }
+  void SetPage(PageNotes page);
   /// The answer of the control socket to "status".
   [[nodiscard]] nlohmann::json StatusJson();
   [[nodiscard]] Status WebStatus();
@@ -103,29 +74,16 @@ class Appliance : private StorageUser {
   /// False if a busy worker shows no progress: systemd's watchdog must then not be fed.
   [[nodiscard]] bool WorkersAreAlive() const;
 
-  /// In safe mode a read-only store, or null. From any thread.
-  [[nodiscard]] Store* store() { return store_.get(); }
-  [[nodiscard]] const std::string& storage_fault() const { return storage_.fault(); }
-  [[nodiscard]] StorageWatch& storage() { return storage_; }
-  [[nodiscard]] StorageUpkeep& upkeep() { return upkeep_; }
-  [[nodiscard]] CurrentSession& session() { return session_; }
-  [[nodiscard]] RoomInUse& room() { return room_; }
-  [[nodiscard]] UnitProfiles& profiles() { return profiles_; }
-  [[nodiscard]] ReferenceGate& references() { return references_; }
-  [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
   /// Surface of the running sweep; null if there is none or nothing has been seen yet.
   [[nodiscard]] std::shared_ptr<const LiveSurfaceView> SurfaceSoFar() const {
     return state_.phase == ApplianceState::kScanning ? scan_.update.surface : nullptr;
   }
   [[nodiscard]] const ScanState& state() const { return state_; }
-  /// Changes of the store, one after the other, off the loop.
-  [[nodiscard]] WorkThread& store_thread() { return store_thread_; }
-  [[nodiscard]] EventLoop& loop() { return loop_; }
-  /// Plan of a new reference, from settings and configuration.
-  [[nodiscard]] ReferencePlan DefaultPlan();
-  void NotifyWeb(web::EventKind kind);
 
  private:
+  [[nodiscard]] bool IsRunning() const override;
+  /// Age of the last result of this run, by a monotonic clock; nothing for another scan.
+  [[nodiscard]] std::optional<double> AgeOf(const std::string& scan_id) const;
   void StoreOpened(Store& store) override;
   void StorageFailed() override;
   void StorageFaultChanged() override { PublishState(); }
@@ -136,7 +94,7 @@ class Appliance : private StorageUser {
   /// @param actor  Who asks for it; null: the appliance itself.
   Answer Handle(ScanEvent event, const Actor* actor = nullptr);
   void Audit(const Actor& actor, const std::string& action, const std::string& subject,
-             const std::string& detail);
+             const Message& detail);
   /// Adds what a person did with the scan to the audit log.
   void AuditAct(ScanAction action, const Actor& actor);
   /// Purpose of the running or last scan by its stored name, or "unassigned".
@@ -147,6 +105,11 @@ class Appliance : private StorageUser {
   void Act(ScanAction action);
   Answer WhyNotScan() const;
   void StartScan();
+  Answer WhyNotMonitor() const;
+  void StartMonitor();
+  [[nodiscard]] MonitorJob MakeMonitorJob();
+  void EndMonitor();
+  void OnMonitorFailed(const Message& why);
   void BeginSession();
   [[nodiscard]] ScanJob MakeJob(const Settings& settings);
   [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);
@@ -160,44 +123,42 @@ class Appliance : private StorageUser {
   [[nodiscard]] std::uint64_t NeededBytes() const;
   [[nodiscard]] Answer WhyFull() const;
   [[nodiscard]] Answer WhyNoSpace() const;
-  [[nodiscard]] std::vector<std::string> StorageWarnings() const {
+  [[nodiscard]] std::vector<Message> StorageWarnings() const {
     return upkeep_.Warnings(!parts_.demo_patient.empty());
   }
   void ReadStored(Status& status);
   void ReadStoredOrFail(Status& status);
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
-  void PublishEvent(const nlohmann::json& event);
   void PublishState();
-  [[nodiscard]] std::string FaultReason() const;
+  [[nodiscard]] Message FaultReason() const;
 
   EventLoop& loop_;
-  ApplianceParts parts_;
-  StorageWatch storage_;
+  ApplianceParts& parts_;
+  Notices& notices_;
+  StorageWatch& storage_;
   const CurrentStore& store_;
-  StorageUpkeep upkeep_;
-  RoomInUse room_;
-  UnitProfiles profiles_;
-  ReferenceGate references_;
-  CurrentSession session_;
-  std::string space_fault_;    ///< Why no scan can be stored although the store works.
-  std::string profile_fault_;  ///< The sensor's contradiction of its profile in the last scan.
-  std::function<std::string()> blocking_reason_;
+  StorageUpkeep& upkeep_;
+  RoomInUse& room_;
+  UnitProfiles& profiles_;
+  ReferenceGate& references_;
+  CurrentSession& session_;
+  WorkThread& store_thread_;
+  LiveMonitoring& monitoring_;
+  SensorThread& sensors_;
+  Message space_fault_;  ///< Why no scan can be stored although the store works.
   ScanState state_;
-  std::string sensor_fault_, scan_fault_, rolled_back_;
+  Message sensor_fault_, scan_fault_, rolled_back_;
   CurrentScan scan_;
   std::optional<CurrentScan> last_result_;
   std::string last_serial_;  ///< Serial of the last used sensor.
   PageNotes page_;
   IndicatorPattern shown_ = IndicatorPattern::kOff;
-  std::function<void(const std::string&)> notify_watchers_;
-  std::function<void(web::EventKind)> notify_page_;
   std::function<void()> stopped_;
   EventLoop::Source result_timer_, limit_timer_, tick_timer_;
   ButtonWatch button_;
-  WorkThread store_thread_{256};
-  WorkThread check_thread_{4};  ///< Reads stored files; changes do not wait for it.
-  std::unique_ptr<SensorThread> sensors_;
+  Message monitor_end_;                   ///< Why monitoring ends; empty: somebody ends it.
+  Message monitored_;                     ///< How it was, for the audit log.
   std::unique_ptr<ScanSession> running_;  // last: its thread uses the members above
 };
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What an appliance is made of.
 #pragma once
 
@@ -6,8 +7,8 @@
 #include <memory>
 #include <string>
 
-#include "daemon/appliance/storage_watch.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/storage/storage_watch.hpp"
 #include "drivers/button.hpp"
 #include "drivers/indicator.hpp"
 #include "drivers/sensor.hpp"
@@ -34,6 +35,7 @@ struct ApplianceParts {
   /// Unit of the intervals between checks, removals and backups.
   std::chrono::milliseconds tick{1000};
   std::chrono::milliseconds clock_trusted_after = std::chrono::hours(1);  ///< See StorageUpkeep.
+  RemovalRules removal_rules = {};
 };
 
 }  // namespace plumb

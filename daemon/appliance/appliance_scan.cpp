@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A scan of the appliance from its beginning to its result.
 #include <cmath>
 #include <utility>
@@ -8,8 +9,9 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/control_lines.hpp"
 #include "daemon/appliance/plan_options.hpp"
+#include "daemon/database/stored_values.hpp"
 #include "daemon/loop/log.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
@@ -23,14 +25,47 @@ double Milliseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
+Message CheckAnswer(MarkerCheckStatus status) {
+  switch (status) {
+    case MarkerCheckStatus::kPassed:
+      return say::scan::AnswerCheckPassed();
+    case MarkerCheckStatus::kFailed:
+      return say::scan::AnswerCheckFailed();
+    case MarkerCheckStatus::kNoBaseline:
+      return say::scan::AnswerCheckNoBaseline();
+  }
+  return {};
+}
+
+Message VerdictAnswer(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kInTolerance:
+      return say::scan::AnswerInTolerance();
+    case Verdict::kUnsure:
+      return say::scan::AnswerUnsure();
+    case Verdict::kMove:
+      return say::scan::AnswerMove();
+    case Verdict::kNoAnswer:
+      return say::scan::AnswerNoAnswer();
+  }
+  return {};
+}
+
+/// The verdict, or why there is none.
+Message AnswerOf(const EndedScan& outcome) {
+  if (outcome.check) return CheckAnswer(outcome.check->check.status);
+  if (outcome.verdict) return VerdictAnswer(*outcome.verdict);
+  return outcome.kind == EndedScan::Kind::kNoScene ? outcome.reason : say::scan::NoComparison();
+}
+
 }  // namespace
 
 void Appliance::StartScan() {
   try {
     BeginSession();
   } catch (const std::exception& error) {
-    scan_fault_ = fmt::format("the scan could not begin: {}", error.what());
-    Log(LogLevel::kError, scan_fault_);
+    scan_fault_ = say::scan::CouldNotBegin(MessageOf(error));
+    Log(LogLevel::kError, scan_fault_.English());
     loop_.Post("scan failed", [this] { (void)Handle(ScanEvent::kScanFailed); });
   }
 }
@@ -46,21 +81,21 @@ void Appliance::BeginSession() {
   const Settings settings = store_->settings.Get();
   ScanJob job = MakeJob(settings);
   if (job.is_reference) {
-    if (const std::string why = references_.WhyNot(); !why.empty()) throw DataError(why);
+    if (const Message why = references_.WhyNot(); !why.empty()) throw DataError(why);
   }
   const NewScan record{.patient_id = scan_.patient_id,
                        .reference_id = scan_.reference_id,
                        .purpose = scan_.purpose,
-                       .sensor_serial = sensors_->snapshot().sensor.serial,
+                       .sensor_serial = sensors_.snapshot().sensor.serial,
                        .reason = session_.reason(),
                        .session_id = scan_.session_id,
                        .sensor_on_s = references_.SensorOn_s(),
                        .daily_check = references_.CheckToday()};
-  scan_.sensor_before = sensors_->snapshot().statistics;
+  scan_.sensor_before = sensors_.snapshot().statistics;
   session_.ArmTimer();
   running_ = std::make_unique<ScanSession>(
       std::move(job), is_check ? MakeCheckCallbacks(record) : MakeCallbacks(record));
-  sensors_->BeginScan(running_->feed());
+  sensors_.BeginScan(running_->feed());
   limit_timer_.ArmAfterSeconds(settings.scan_limit_s);
 }
 
@@ -71,7 +106,7 @@ std::string Appliance::ScanKind() const {
 
 ScanJob Appliance::MakeJob(const Settings& settings) {
   ScanJob job;
-  const SensorSnapshot sensor = sensors_->snapshot();
+  const SensorSnapshot sensor = sensors_.snapshot();
   job.info = sensor.info;
   job.reconstructor = parts_.config.reconstruct;
   job.reconstructor.sensor_serial = OwnSerial(sensor.sensor);
@@ -85,7 +120,7 @@ ScanJob Appliance::MakeJob(const Settings& settings) {
     return job;
   }
   if (scan_.patient_id.empty()) return job;  // no session is open, so there is no comparison
-  const std::optional<Reference> reference = store_->references.Approved(scan_.patient_id);
+  const std::optional<Reference> reference = store_->references.OfSession(scan_.session_id);
   if (reference) scan_.reference_area_m2 = store_->scans.SweptArea(reference->scan_id);
   if (!reference && scan_.purpose == ScanPurpose::kFraction)
     scan_.purpose = ScanPurpose::kReference;
@@ -103,15 +138,6 @@ ScanJob Appliance::MakeJob(const Settings& settings) {
   return job;
 }
 
-ReferencePlan Appliance::DefaultPlan() {
-  const Settings settings = store_ ? store_->settings.Get() : Settings{};
-  return {.region_m = {},
-          .isocentre_m = {},
-          .tolerance = settings.tolerance,
-          .posture = settings.posture,
-          .couch_markers = settings.couch_markers};
-}
-
 /// These run on the scan's thread: they use the store, which is thread-safe, and copies; everything
 /// else is posted. Of a check only its numbers are kept.
 ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
@@ -123,7 +149,7 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
     return store_->folders.Staging(*id);
   };
   const bool is_demo = !parts_.demo_patient.empty() && record.purpose == ScanPurpose::kReference;
-  const ReferencePlan plan = DefaultPlan();
+  const ReferencePlan plan = DefaultPlan(store_->settings.Get());
   const bool is_reference = record.purpose == ScanPurpose::kReference;
   callbacks.save = [this, id, plan, is_demo, is_reference, reason = record.reason,
                     actor = session_.opened_by(),
@@ -182,8 +208,8 @@ void Appliance::OnUpdate(const ScanUpdate& update) {
   NoteDropped(update);
   scan_.update = update;
   Show();
-  PublishEvent(ProgressEvent(scan_.id, scan_.update, scan_.Coverage()));
-  NotifyWeb(web::EventKind::kProgress);
+  notices_.TellWatchers(ProgressEvent(scan_.id, scan_.update, scan_.Coverage()));
+  notices_.TellPage(web::EventKind::kProgress);
 }
 
 void Appliance::NoteDropped(const ScanUpdate& update) {
@@ -197,7 +223,7 @@ void Appliance::NoteDropped(const ScanUpdate& update) {
 void Appliance::OnEnded(const EndedScan& outcome) {
   using Kind = EndedScan::Kind;
   limit_timer_.Disarm();
-  sensors_->EndScan();
+  sensors_.EndScan();
   // Its thread has nothing left to do, but may still wait for a processor to end.
   (void)store_thread_.Post(
       [ended = std::shared_ptr<ScanSession>(std::move(running_))]() mutable { ended.reset(); });
@@ -211,8 +237,8 @@ void Appliance::OnEnded(const EndedScan& outcome) {
         {{"SCAN", scan_.id}});
     (void)Handle(ScanEvent::kScanCancelled);
   } else if (outcome.kind == Kind::kFailed) {
-    scan_fault_ = fmt::format("the scan failed: {}", outcome.reason);
-    Log(LogLevel::kError, scan_fault_, {{"SCAN", scan_.id}});
+    scan_fault_ = say::scan::Failed(outcome.reason);
+    Log(LogLevel::kError, scan_fault_.English(), {{"SCAN", scan_.id}});
     (void)Handle(ScanEvent::kScanFailed);
     upkeep_.CheckDiskAtOnce();
   } else {
@@ -221,14 +247,11 @@ void Appliance::OnEnded(const EndedScan& outcome) {
           {{"SCAN", scan_.id}});
     const bool is_check = scan_.purpose == ScanPurpose::kDailyCheck;
     if (!is_check) last_result_ = scan_;
-    const std::string answer =
-        outcome.check     ? fmt::format("daily check {}", Name(outcome.check->check.status))
-        : outcome.verdict ? std::string(Name(*outcome.verdict))
-        : outcome.kind == Kind::kNoScene ? outcome.reason
-                                         : "no comparison";
+    const Message answer = AnswerOf(outcome);
     Log(LogLevel::kInfo,
         fmt::format("the scan is done {:.2f} s after its last frame, {} frames, {} dropped: {}",
-                    outcome.after_last_frame_s, outcome.frames, outcome.frames_dropped, answer),
+                    outcome.after_last_frame_s, outcome.frames, outcome.frames_dropped,
+                    answer.English()),
         {{"SCAN", scan_.id}});
     const SensorStatistics& images = scan_.images;
     if (images.num_lost + images.num_unpaired + images.num_discarded > 0) {
@@ -239,13 +262,13 @@ void Appliance::OnEnded(const EndedScan& outcome) {
           {{"SCAN", scan_.id}});
     }
     (void)Handle(ScanEvent::kScanDone);
-    PublishEvent(ResultEvent(scan_.id, answer));
+    notices_.TellWatchers(ResultEvent(scan_.id, answer));
   }
-  if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
+  if (outcome.kind == Kind::kDone) profiles_.SetDrift(outcome.drift);
   if (scan_.purpose == ScanPurpose::kDailyCheck) room_.Refresh();
   session_.SetCheck({});
-  NotifyWeb(web::EventKind::kResult);
-  NotifyWeb(web::EventKind::kData);
+  notices_.TellPage(web::EventKind::kResult);
+  notices_.TellPage(web::EventKind::kData);
   upkeep_.ScanEnded();
   if (stopped_) std::exchange(stopped_, nullptr)();
 }

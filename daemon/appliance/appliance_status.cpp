@@ -1,6 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // The appliance's reports about itself: status, events, light.
 #include <exception>
-#include <functional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -8,11 +8,11 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/control_lines.hpp"
 #include "daemon/config/version.hpp"
+#include "daemon/database/store_json.hpp"
 #include "daemon/files/result_folder.hpp"
-#include "daemon/loop/explain.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/loop/loop_report.hpp"
-#include "daemon/records/store_json.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 
@@ -20,14 +20,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
-
-/// The loop ends with an exception that leaves its callbacks; a listener that fails must not do
-/// that.
-void Guarded(const char* whom, const std::function<void()>& notify) try {
-  notify();
-} catch (const std::exception& error) {
-  Log(LogLevel::kError, fmt::format("{} could not be notified: {}", whom, Explain(error)));
-}
 
 double SecondsSince(Clock::time_point time) {
   return std::chrono::duration<double>(Clock::now() - time).count();
@@ -41,6 +33,50 @@ SweepAdvice AdviceOn(SweepAdvice seen, double dropped_fraction) {
   return is_slow ? SweepAdvice::kComputerTooSlow : seen;
 }
 
+Json SensorFields(const SensorSnapshot& sensor) {
+  Json fields = {{"present", sensor.present},
+                 {"serial", sensor.sensor.serial},
+                 {"name", sensor.sensor.name},
+                 {"fps", sensor.present ? sensor.statistics.frames_per_second : 0.0},
+                 {"pairs", sensor.statistics.num_pairs},
+                 {"unpaired", sensor.statistics.num_unpaired},
+                 {"discarded", sensor.statistics.num_discarded},
+                 {"lost", sensor.statistics.num_lost},
+                 {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
+                 {"others", sensor.others}};
+  PutMessages(fields, "warning", sensor.info.warnings);
+  return fields;
+}
+
+Json ResultFields(const CurrentScan& scan) {
+  const EndedScan& ended = scan.outcome;
+  const bool is_done = ended.kind == EndedScan::Kind::kDone;
+  const bool has_no_scene = ended.kind == EndedScan::Kind::kNoScene;
+  Json last = {{"scan", scan.id},
+               {"is_reference", is_done && !ended.verdict},
+               {"verdict", has_no_scene ? Json(Name(Verdict::kNoAnswer)) : Json(nullptr)},
+               {"correction", nullptr},
+               {"frames", ended.frames},
+               {"frames_dropped", ended.frames_dropped},
+               {"images_lost", scan.images.num_lost},
+               {"images_unpaired", scan.images.num_unpaired},
+               {"images_discarded", scan.images.num_discarded},
+               {"after_last_frame_s", ended.after_last_frame_s}};
+  PutMessages(last, "reason",
+              has_no_scene               ? std::vector{ended.reason}
+              : is_done && ended.verdict ? ended.reasons
+                                         : std::vector<Message>());
+  if (!is_done || !ended.verdict) return last;
+  last["verdict"] = Name(*ended.verdict);
+  // The numbers of a result without an answer are left out, because they must not be acted on.
+  const bool is_shown = ended.correction && *ended.verdict != Verdict::kNoAnswer;
+  const Json correction = is_shown ? Json(CorrectionJson(*ended.correction)) : Json(nullptr);
+  last["correction"] = correction;
+  for (const NumberAxis& axis : kNumberAxes)
+    last[axis.key] = correction.is_object() ? correction[axis.key] : Json(nullptr);
+  return last;
+}
+
 }  // namespace
 
 IndicatorPattern Appliance::Pattern() const {
@@ -49,10 +85,13 @@ IndicatorPattern Appliance::Pattern() const {
       return IndicatorPattern::kNoSensor;
     case ApplianceState::kReady:
       if (!rolled_back_.empty()) return IndicatorPattern::kReadyRolledBack;
+      if (page_.are_guesses_running) return IndicatorPattern::kReadyGuessed;
       return storage_.IsNearlyFull() ? IndicatorPattern::kReadyDiskNearlyFull
                                      : IndicatorPattern::kReady;
     case ApplianceState::kWorking:
       return IndicatorPattern::kWorking;
+    case ApplianceState::kMonitoring:
+      return monitoring_.Pattern();
     case ApplianceState::kFault:
       return IndicatorPattern::kFault;
     case ApplianceState::kScanning:
@@ -86,37 +125,28 @@ void Appliance::Show() {
   if (pattern == shown_) return;
   shown_ = pattern;
   if (parts_.indicator != nullptr) parts_.indicator->Show(pattern);
-  PublishEvent(LightEvent(pattern));
+  notices_.TellWatchers(LightEvent(pattern));
 }
 
-void Appliance::SetRolledBack(const std::string& text) {
-  rolled_back_ = text;
+void Appliance::SetPage(PageNotes page) {
+  page_ = std::move(page);
   Show();
-  NotifyWeb(web::EventKind::kStatus);
+  notices_.TellPage(web::EventKind::kStatus);
 }
 
-void Appliance::ForgetDrift() {
-  profile_fault_.clear();
-  NotifyWeb(web::EventKind::kStatus);
-}
-
-void Appliance::PublishEvent(const Json& event) {
-  if (notify_watchers_)
-    Guarded("the control socket's watchers", [&] { notify_watchers_(EventLine(event)); });
+void Appliance::SetRolledBack(const Message& why) {
+  rolled_back_ = why;
+  Show();
+  notices_.TellPage(web::EventKind::kStatus);
 }
 
 void Appliance::PublishState() {
   Show();
-  PublishEvent(StateEvent(state_.phase, FaultReason(), state_.cancelling));
-  NotifyWeb(web::EventKind::kStatus);
+  notices_.TellWatchers(StateEvent(state_.phase, FaultReason(), state_.cancelling));
+  notices_.TellPage(web::EventKind::kStatus);
 }
 
-void Appliance::NotifyWeb(web::EventKind kind) {
-  if (kind == web::EventKind::kData) upkeep_.CountAgain();
-  if (notify_page_) Guarded("the page", [&] { notify_page_(kind); });
-}
-
-std::string Appliance::FaultReason() const {
+Message Appliance::FaultReason() const {
   if (state_.phase != ApplianceState::kFault) return {};
   switch (state_.fault) {
     case FaultKind::kStorage:
@@ -135,13 +165,16 @@ std::string Appliance::StatusLine() const {
   std::string line = fmt::format("{}", Name(state_.phase));
   if (state_.phase == ApplianceState::kScanning)
     line += fmt::format(", {} frames", scan_.update.frames);
-  if (state_.phase == ApplianceState::kWorking) line += fmt::format(", {}", scan_.update.step);
-  if (state_.phase == ApplianceState::kFault) line += ": " + FaultReason();
+  if (state_.phase == ApplianceState::kWorking)
+    line += fmt::format(", {}", scan_.update.step.English());
+  if (state_.phase == ApplianceState::kMonitoring)
+    line += fmt::format(", {}", monitoring_.status().advice);
+  if (state_.phase == ApplianceState::kFault) line += ": " + FaultReason().English();
   return line;
 }
 
 Json Appliance::StatusJson() {
-  const SensorSnapshot sensor = sensors_->snapshot();
+  const SensorSnapshot sensor = sensors_.snapshot();
   const ScanUpdate& update = scan_.update;
   Json scan = ProgressFields(update, scan_.Coverage());
   scan["active"] = IsRunning();
@@ -150,61 +183,26 @@ Json Appliance::StatusJson() {
   scan["without_new_surface_s"] = update.guidance.without_new_surface_s;
   scan["first_frame_ms"] = scan_.first_frame_ms;
   scan["cancel_ms"] = scan_.cancel_ms;
-  Json last = nullptr;
-  if (last_result_) {
-    const EndedScan& ended = last_result_->outcome;
-    const bool is_done = ended.kind == EndedScan::Kind::kDone;
-    const bool has_no_scene = ended.kind == EndedScan::Kind::kNoScene;
-    last = {{"scan", last_result_->id},
-            {"is_reference", is_done && !ended.verdict},
-            {"verdict", has_no_scene ? Json(Name(Verdict::kNoAnswer)) : Json(nullptr)},
-            {"reasons", has_no_scene ? Json{ended.reason} : Json::array()},
-            {"correction", nullptr},
-            {"frames", ended.frames},
-            {"frames_dropped", ended.frames_dropped},
-            {"images_lost", last_result_->images.num_lost},
-            {"images_unpaired", last_result_->images.num_unpaired},
-            {"images_discarded", last_result_->images.num_discarded},
-            {"after_last_frame_s", ended.after_last_frame_s}};
-    if (is_done && ended.verdict) {
-      last["verdict"] = Name(*ended.verdict);
-      last["reasons"] = ended.reasons;
-      // A result without an answer shows no numbers, so that nobody acts on them.
-      const bool is_shown = ended.correction && *ended.verdict != Verdict::kNoAnswer;
-      const Json correction = is_shown ? Json(CorrectionJson(*ended.correction)) : Json(nullptr);
-      last["correction"] = correction;
-      for (const NumberAxis& axis : kNumberAxes)
-        last[axis.key] = correction.is_object() ? correction[axis.key] : Json(nullptr);
-    }
-  }
-  return {{"state", Name(state_.phase)},
-          {"reason", FaultReason()},
-          {"sensor",
-           {{"present", sensor.present},
-            {"serial", sensor.sensor.serial},
-            {"name", sensor.sensor.name},
-            {"fps", sensor.present ? sensor.statistics.frames_per_second : 0.0},
-            {"pairs", sensor.statistics.num_pairs},
-            {"unpaired", sensor.statistics.num_unpaired},
-            {"discarded", sensor.statistics.num_discarded},
-            {"lost", sensor.statistics.num_lost},
-            {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
-            {"warnings", sensor.info.warnings},
-            {"profile_fault", profile_fault_},
-            {"others", sensor.others}}},
-          {"scan", scan},
-          {"last_result", last},
-          {"light", Name(shown_)},
-          {"rolled_back", rolled_back_},
-          {"warnings", StorageWarnings()},
-          {"page",
-           {{"url", page_.url}, {"certificate", page_.certificate}, {"warnings", page_.warnings}}},
-          {"loop", LoopJson(loop_.meter())},
-          {"version", Version()}};
+  const Json last = last_result_ ? ResultFields(*last_result_) : Json(nullptr);
+  Json status = {{"state", Name(state_.phase)},
+                 {"sensor", SensorFields(sensor)},
+                 {"scan", scan},
+                 {"last_result", last},
+                 {"monitor", MonitorJson(monitoring_.status())},
+                 {"light", Name(shown_)},
+                 {"page", {{"url", page_.url}, {"certificate", page_.certificate}}},
+                 {"loop", LoopJson(loop_.meter())},
+                 {"version", Version()}};
+  PutMessage(status, "reason", FaultReason());
+  PutMessage(status, "rolled_back", rolled_back_);
+  PutMessages(status, "warning", StorageWarnings());
+  PutMessages(status["page"], "warning", page_.warnings);
+  PutMessage(status["sensor"], "profile_fault", profiles_.drift());
+  return status;
 }
 
 Status Appliance::WebStatus() {
-  const SensorSnapshot sensor = sensors_->snapshot();
+  const SensorSnapshot sensor = sensors_.snapshot();
   Status status;
   status.state = state_.phase;
   status.fault = FaultReason();
@@ -242,7 +240,7 @@ Status Appliance::WebStatus() {
   }
   status.version = Version();
   status.warnings = page_.warnings;
-  if (!profile_fault_.empty()) status.warnings.push_back(profile_fault_);
+  if (!profiles_.drift().empty()) status.warnings.push_back(profiles_.drift());
   status.rolled_back = rolled_back_;
   room_.Report(status);
   ReadStoredOrFail(status);
@@ -286,14 +284,15 @@ void Appliance::ReadStoredOrFail(Status& status) {
 
 Health Appliance::health() {
   if (storage_.has_configuration_fault()) return {.ok = false, .reason = storage_.fault()};
-  if (!storage_.fault().empty()) return {.ok = false, .reason = "storage: " + storage_.fault()};
+  if (!storage_.fault().empty())
+    return {.ok = false, .reason = say::upkeep::StorageUnhealthy(storage_.fault())};
   if (storage_.IsReadOnly())
-    return {.ok = false, .reason = "storage: the state folder is on a read-only disk"};
-  if (const std::string full = WhyNoSpace(); !full.empty())
-    return {.ok = false, .reason = "storage: " + full};
-  if (!WorkersAreAlive()) return {.ok = false, .reason = "a worker thread shows no progress"};
+    return {.ok = false, .reason = say::upkeep::StorageUnhealthy(say::upkeep::ReadOnlyDisk())};
+  if (const Message full = WhyNoSpace(); !full.empty())
+    return {.ok = false, .reason = say::upkeep::StorageUnhealthy(full)};
+  if (!WorkersAreAlive()) return {.ok = false, .reason = say::upkeep::NoProgress()};
   if (state_.phase == ApplianceState::kFault && state_.fault == FaultKind::kSensor)
-    return {.ok = false, .reason = "sensor: " + sensor_fault_};
+    return {.ok = false, .reason = say::upkeep::SensorUnhealthy(sensor_fault_)};
   return {};
 }
 

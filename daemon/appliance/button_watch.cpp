@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/button_watch.hpp"
 
 #include <sys/epoll.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The running scan, or the last one.
 #pragma once
 

@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/current_session.hpp"
 
 #include <utility>
 
-#include "daemon/records/stored_values.hpp"
+#include "daemon/database/stored_values.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 
@@ -37,15 +39,15 @@ bool CurrentSession::IsPatients() const {
   return opening_ || (IsOpen() && opened_by_.user != kSelf.user);
 }
 
-std::string CurrentSession::WhyNotChange() const {
-  if (opening_) return "a patient is being opened: try again in a moment";
-  if (wiping_) return "this patient's data is being removed: try again in a moment";
+Message CurrentSession::WhyNotChange() const {
+  if (opening_) return say::scan::OpeningPatient();
+  if (wiping_) return say::scan::RemovingPatient();
   return {};
 }
 
-std::string CurrentSession::WhyNotScan() const {
-  if (opening_) return "a patient is being opened: press again in a moment";
-  if (wiping_) return "this patient's data is being removed: press again in a moment";
+Message CurrentSession::WhyNotScan() const {
+  if (opening_) return say::scan::PressAfterOpening();
+  if (wiping_) return say::scan::PressAfterRemoving();
   return {};
 }
 

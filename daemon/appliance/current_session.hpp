@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // To whom the next scan belongs and what it is for: the treatment session that is open, and the
 // daily check.
 #pragma once
@@ -7,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "algo/base/message.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/loop/event_loop.hpp"
 #include "web/model/account.hpp"
@@ -42,8 +44,16 @@ class CurrentSession {
   void SetWiping(bool wiping) { wiping_ = wiping; }
   /// Why no session can be opened or closed at the moment, because the store and the page could end
   /// up with different ones; empty: one can.
-  [[nodiscard]] std::string WhyNotChange() const;
-  [[nodiscard]] std::string WhyNotScan() const;
+  [[nodiscard]] Message WhyNotChange() const;
+  [[nodiscard]] Message WhyNotScan() const;
+  /// Asked before each scan and each opening of a patient: returns a reason why none may begin now,
+  /// or nothing.
+  void SetBlockingReason(std::function<Message()> blocking_reason) {
+    blocking_reason_ = std::move(blocking_reason);
+  }
+  [[nodiscard]] Message WhyBlocked() const {
+    return blocking_reason_ ? blocking_reason_() : Message();
+  }
 
   /// The next scan is the daily check of the room's markers; scans after it belong to the open
   /// patient again.
@@ -60,6 +70,7 @@ class CurrentSession {
   ScanPurpose purpose_ = ScanPurpose::kFraction;
   bool opening_ = false, wiping_ = false;
   std::optional<Actor> check_;
+  std::function<Message()> blocking_reason_;
   EventLoop::Source timer_;
 };
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/plan_options.hpp"
 
 #include <algorithm>
@@ -5,42 +6,45 @@
 #include <cmath>
 #include <string_view>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
 
-[[noreturn]] void Fail(std::string_view what) {
-  throw DataError(fmt::format(
-      "the approved plan of the reference cannot be used: {}; plan and approve it again", what));
-}
+[[noreturn]] void Fail(const Message& what) { throw DataError(say::scan::PlanUnusable(what)); }
 
 PatientPosture PostureOf(std::string_view name) {
   if (const auto posture = Named<PatientPosture>(name)) return *posture;
-  Fail(fmt::format("posture: expected HFS, HFP, FFS or FFP, found '{}'", name.substr(0, 20)));
+  Fail(say::scan::PlanPosture(name.substr(0, 20)));
 }
 
 double CheckedTolerance(std::string_view field, double value) {
-  if (!(std::isfinite(value) && value > 0))
-    Fail(fmt::format("{}: expected a number above 0, found {}", field, value));
+  if (!(std::isfinite(value) && value > 0)) Fail(say::scan::PlanTolerance(field, value));
   return value;
 }
 
 template <std::size_t N>
 void CheckPoint(std::string_view field, const std::array<double, N>& point) {
   if (!std::all_of(point.begin(), point.end(), [](double v) { return std::isfinite(v); }))
-    Fail(fmt::format("{}: expected finite metres", field));
+    Fail(say::scan::PlanPoint(field));
 }
 
 }  // namespace
 
+ReferencePlan DefaultPlan(const Settings& settings) {
+  return {.region_m = {},
+          .isocentre_m = {},
+          .tolerance = settings.tolerance,
+          .posture = settings.posture,
+          .couch_markers = settings.couch_markers};
+}
+
 CompareOptions CompareOptionsFor(const ReferencePlan& plan, const CompareOptions& configured) {
   CompareOptions options = configured;
   if (!plan.region_m.empty() && plan.region_m.size() < 3)
-    Fail(fmt::format("region_m: expected no corner or at least 3, found {}", plan.region_m.size()));
+    Fail(say::scan::PlanRegion(static_cast<std::int64_t>(plan.region_m.size())));
   options.region_polygon_m.clear();
   for (const auto& corner : plan.region_m) {
     CheckPoint("region_m", corner);

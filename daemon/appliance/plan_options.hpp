@@ -1,10 +1,16 @@
-// Converts the approved plan of a reference to options of the comparison.
+// SPDX-License-Identifier: Apache-2.0
+// From the settings to the plan of a new reference, and from an approved plan to options of the
+// comparison.
 #pragma once
 
 #include "algo/comparison/comparison.hpp"
 #include "web/model/reference.hpp"
+#include "web/model/settings.hpp"
 
 namespace plumb {
+
+/// Of a new reference, until a physicist has planned it.
+[[nodiscard]] ReferencePlan DefaultPlan(const Settings& settings);
 
 /// The comparison options of a live scan. Region, isocentre, tolerances, posture and kind of
 /// markers come from the plan alone, also where it leaves them open (no region: the segmented body;

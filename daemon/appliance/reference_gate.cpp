@@ -1,10 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/reference_gate.hpp"
 
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "daemon/appliance/room_in_use.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 
@@ -24,55 +24,43 @@ DailyCheck ReferenceGate::CheckToday() const {
   return store_->checks.StateSince(StartOfDay(), sensor_().sensor.serial);
 }
 
-std::string ReferenceGate::WhyNot(const std::optional<Scan>& scan) const {
+Message ReferenceGate::WhyNot(const std::optional<Scan>& scan) const {
   if (is_demo_ || store_ == nullptr) return {};
   const DailyCheck today = CheckToday();
   if (today == DailyCheck::kFailed) {
-    return "the daily check has failed, and references need one that has passed since: open Daily "
-           "check, find out why it failed, sweep over all markers of the room, then go on here";
+    return say::scan::CheckFailed();
   }
   if (today == DailyCheck::kOverdue) {
-    return "the daily check is overdue, and references need one that has passed today: open Daily "
-           "check, sweep over all markers of the room, then go on here";
+    return say::scan::CheckOverdue();
   }
   const bool is_unconfirmed =
       scan && scan->daily_check != DailyCheck::kPassed && !store_->checks.ConfirmsScan(scan->id);
   if (is_unconfirmed && scan->daily_check == DailyCheck::kFailed) {
-    return "this scan was taken after a failed daily check, and no check of the same day and "
-           "sensor has confirmed it: scan the reference again";
+    return say::scan::ScannedAfterFailedCheck();
   }
   if (is_unconfirmed) {
-    return "this scan was taken while the daily check was overdue, and no check of the same day "
-           "and sensor has confirmed it: scan the reference again";
+    return say::scan::ScannedWhileOverdue();
   }
   if (scan && store_->checks.RefutesScan(scan->id)) {
-    return "the first daily check after this scan failed, so the markers may already have been out "
-           "of place during it: scan the reference again";
+    return say::scan::RefutedByCheck();
   }
   return WhyCold(scan);
 }
 
 /// Depth drifts while a sensor warms up: a reference would keep that error for a whole course.
-std::string ReferenceGate::WhyCold(const std::optional<Scan>& scan) const {
+Message ReferenceGate::WhyCold(const std::optional<Scan>& scan) const {
   const std::optional<double> on_s = scan ? scan->sensor_on_s : SensorOn_s();
   if (!on_s || *on_s >= 60 * warm_up_min()) return {};
-  if (scan) {
-    return fmt::format(
-        "the sensor was still warming up at this scan, and references need one that has been on "
-        "for {:g} min: scan the reference again",
-        warm_up_min());
-  }
-  return fmt::format(
-      "the sensor is still warming up, and references need one that has been on for {:g} min: "
-      "wait, then scan",
-      warm_up_min());
+  return scan ? say::scan::WasWarmingUp(warm_up_min()) : say::scan::IsWarmingUp(warm_up_min());
 }
 
 CheckStatus ReferenceGate::Checks() const {
   constexpr int kShown = 60;
-  return {.checks = store_->checks.List(kShown),
-          .baseline = store_->checks.Baseline(),
-          .today = CheckToday()};
+  CheckStatus status{.checks = store_->checks.List(kShown),
+                     .baseline = store_->checks.Baseline(),
+                     .today = CheckToday()};
+  if (!status.checks.empty()) status.changes = store_->checks.ChangesBy(status.checks.front().id);
+  return status;
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether a reference may be scanned or approved now: the daily check of the room, and the sensor's
 // temperature.
 #pragma once
@@ -6,11 +7,11 @@
 #include <chrono>
 #include <functional>
 #include <optional>
-#include <string>
 
-#include "daemon/appliance/current_store.hpp"
-#include "daemon/appliance/sensor_thread.hpp"
+#include "algo/base/message.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/storage/current_store.hpp"
+#include "daemon/sweep/sensor_thread.hpp"
 #include "web/model/check.hpp"
 #include "web/model/scan.hpp"
 
@@ -33,7 +34,7 @@ class ReferenceGate {
   /// @param scan  The scan that is to be the reference. One taken before a check had passed must be
   ///         confirmed by a later check of the same day (CheckStore::ConfirmsScan), or repeated. It
   ///         must also be repeated if the first check after it failed.
-  [[nodiscard]] std::string WhyNot(const std::optional<Scan>& scan = {}) const;
+  [[nodiscard]] Message WhyNot(const std::optional<Scan>& scan = {}) const;
   /// Time that the sensor must have been on before a reference scan; from any thread.
   [[nodiscard]] double warm_up_min() const { return warm_up_min_; }
   /// Not set without a sensor.
@@ -42,7 +43,7 @@ class ReferenceGate {
   [[nodiscard]] CheckStatus Checks() const;
 
  private:
-  [[nodiscard]] std::string WhyCold(const std::optional<Scan>& scan) const;
+  [[nodiscard]] Message WhyCold(const std::optional<Scan>& scan) const;
 
   const CurrentStore& store_;
   const bool is_demo_;

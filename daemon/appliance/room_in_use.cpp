@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/room_in_use.hpp"
 
 #include <ctime>
@@ -5,10 +6,12 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
 #include "algo/comparison/room_board.hpp"
-#include "daemon/files/marker_sheet.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/sheets/marker_sheet.hpp"
+#include "words/room.hpp"
 
 namespace plumb {
 namespace {
@@ -62,12 +65,13 @@ void RoomInUse::Refresh() {
       if (room.calibration) room.due = store_->room.WhyDue(*room.calibration, config_.check);
     } catch (const std::exception& error) {  // the orientation of the room is then unknown
       room.calibration.reset();
-      room.due = error.what();
+      room.due = MessageOf(error);
     }
   }
   const std::lock_guard lock(mutex_);
-  if (!room.due.empty() && room.due != room_.due)
-    Log(LogLevel::kWarning, fmt::format("the room has to be calibrated again: {}", room.due));
+  if (!room.due.empty() && !(room.due == room_.due))
+    Log(LogLevel::kWarning,
+        fmt::format("the room has to be calibrated again: {}", room.due.English()));
   room_ = std::move(room);
 }
 
@@ -93,15 +97,18 @@ std::optional<RoomWays> RoomInUse::In(const MarkerMap& scene) const {
   return T_iec_scene ? std::optional(WaysOfRoom(*T_iec_scene)) : std::nullopt;
 }
 
+std::optional<Eigen::Vector3d> RoomInUse::LasersIn(const MarkerMap& scene) const {
+  const std::lock_guard lock(mutex_);
+  if (!room_.due.empty() || !room_.calibration) return std::nullopt;
+  const std::optional<Pose> T_iec_scene = RoomOf(room_.calibration->fit.markers_iec, scene);
+  return T_iec_scene ? std::optional<Eigen::Vector3d>(T_iec_scene->inverse().translation())
+                     : std::nullopt;
+}
+
 void RoomInUse::Report(Status& status) const {
-  if (!room_.due.empty())
-    status.warnings.push_back(fmt::format(
-        "The room must be calibrated again; until then, directions refer to the patient: {}",
-        room_.due));
+  if (!room_.due.empty()) status.warnings.push_back(say::room::CalibrateAgain(room_.due));
   if ((room_.calibration || !room_.due.empty()) && room_.configured)
-    status.warnings.push_back(
-        "The signed room calibration is in effect; T_iec_reference of the configuration is "
-        "ignored");
+    status.warnings.push_back(say::room::ConfigurationIgnored());
   const std::optional<Pose> room = T_iec_reference();
   const Eigen::Matrix3d R_iec_reference = room.value_or(Pose::Identity()).linear();
   status.room = {.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)},
@@ -140,9 +147,9 @@ web::RoomCalibrationStatus RoomInUse::Calibration() const {
 
 std::string RoomInUse::BoardPdf() const {
   const StreamInfo info = sensor_().info;
-  const MarkerSheet sheet({.dictionary = info.marker_dictionary,
+  const MarkerSheet sheet({.dictionary = info.room_markers.dictionary,
                            .ids = {},
-                           .length_m = info.marker_length_m,
+                           .length_m = info.room_markers.length_m,
                            .is_board = true});
   return sheet.Pdf();
 }

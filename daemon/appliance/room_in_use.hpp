@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The axes of the room that are in use: those of the signed calibration.
 #pragma once
 
@@ -7,12 +8,13 @@
 #include <string>
 #include <utility>
 
+#include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/comparison/body_parts.hpp"
-#include "daemon/appliance/current_store.hpp"
 #include "daemon/appliance/scan_session.hpp"
-#include "daemon/appliance/sensor_thread.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/storage/current_store.hpp"
+#include "daemon/sweep/sensor_thread.hpp"
 #include "web/model/status.hpp"
 #include "web/service/room_services.hpp"
 
@@ -34,6 +36,9 @@ class RoomInUse {
   /// @param scene  Its markers: the reference marker may have lain otherwise than when the room
   ///         was calibrated.
   [[nodiscard]] std::optional<RoomWays> In(const MarkerMap& scene) const;
+  /// Where the lasers cross in the frame of that scene: the origin of the calibration's axes. Not
+  /// set without a calibration that holds. From any thread.
+  [[nodiscard]] std::optional<Eigen::Vector3d> LasersIn(const MarkerMap& scene) const;
   void Report(Status& status) const;
   /// From any thread.
   [[nodiscard]] web::RoomCalibrationStatus Calibration() const;
@@ -48,7 +53,7 @@ class RoomInUse {
   /// The calibration in use, as found by Refresh().
   struct Room {
     std::optional<SignedRoom> calibration;
-    std::string due;  ///< Set without a calibration: one is stored but cannot be read.
+    Message due;  ///< Set without a calibration: one is stored but cannot be read.
     std::optional<Pose> configured;  ///< T_iec_reference of the configuration.
   };
 

@@ -1,23 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/scan_session.hpp"
 
 #include <future>
 #include <tuple>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
 #include "algo/comparison/room_board.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/files/text_report.hpp"
-#include "daemon/loop/explain.hpp"
 #include "daemon/loop/freed_memory.hpp"
 #include "daemon/pipeline/frame_thinning.hpp"
 #include "daemon/pipeline/learning_gate.hpp"
 #include "daemon/pipeline/recording_feed.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "daemon/result/text_report.hpp"
+#include "daemon/sweep/explain.hpp"
+#include "words/room.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
@@ -25,43 +26,40 @@ namespace {
 constexpr double kUpdateEvery_s = 0.1;
 constexpr double kShowEvery_s = 0.4;  // interval at which pages ask for the surface from above
 
-/// A reference that differs from the approved one gives no verdict.
-Scene ReadReference(const ScanJob& job, const std::stop_token& stop) {
-  constexpr const char* kRemedy =
-      "put a backup of the scan's files in their place, or take a new reference";
-  if (job.check_reference) {
-    const std::string fault = job.check_reference(stop);
+void ThrowIfStopped(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Interrupted(say::scan::Discarded());
+}
+
+}  // namespace
+
+Scene ReadApprovedScene(const std::filesystem::path& folder,
+                        const std::function<Message(const std::stop_token&)>& check,
+                        const std::stop_token& stop) {
+  if (check) {
+    const Message fault = check(stop);
     if (!fault.empty())
-      throw std::runtime_error(fmt::format("the patient's reference cannot be used: {} in {}; {}",
-                                           fault, job.reference_scene.parent_path().string(),
-                                           kRemedy));
+      throw MessageError(say::scan::ReferenceUnusable(fault, folder.parent_path().string()));
   }
   try {
-    return ReadScene(job.reference_scene);
+    return ReadScene(folder);
   } catch (const std::exception& error) {
-    throw std::runtime_error(
-        fmt::format("the patient's reference cannot be read: {}; {}", error.what(), kRemedy));
+    throw MessageError(say::scan::ReferenceUnreadable(MessageOf(error)));
   }
 }
 
-/// Puts the room's axes in the reference scene's frame, by the room's markers that it contains.
 std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Scene& reference,
                                    CompareOptions& compare) {
   if (!room) return std::nullopt;
   compare.T_iec_reference.reset();
-  if (!room->why_not.empty()) return ResultRoom{room->version, room->why_not};
+  ResultRoom used{room->version, {}};
+  if (!room->why_not.empty()) {
+    used.why_not_used = room->why_not;
+    return used;
+  }
   compare.T_iec_reference = RoomOf(room->markers_iec, reference.markers);
-  if (compare.T_iec_reference) return ResultRoom{room->version, {}};
-  return ResultRoom{room->version,
-                    "fewer than 3 of the room's markers lie in the reference as they lay when the "
-                    "room was calibrated"};
+  if (!compare.T_iec_reference) used.why_not_used = say::room::MarkersMoved();
+  return used;
 }
-
-void ThrowIfStopped(const std::stop_token& stop) {
-  if (stop.stop_requested()) throw Interrupted("the scan was discarded");
-}
-
-}  // namespace
 
 ScanSession::ScanSession(ScanJob job, ScanCallbacks callbacks)
     : job_(std::move(job)),
@@ -87,13 +85,15 @@ void ScanSession::Run(const std::stop_token& stop) {
     outcome_.kind = EndedScan::Kind::kCancelled;
   } catch (const DataError& error) {
     outcome_.kind = EndedScan::Kind::kNoScene;
-    outcome_.reason = error.what();
-    if (job_.check)
-      outcome_.check = TakenCheck{
-          {.status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {error.what()}}};
+    outcome_.reason = error.message();
+    if (job_.check) {
+      MarkerCheck failed{.status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {}};
+      failed.reasons.push_back(error.message());
+      outcome_.check = TakenCheck{std::move(failed)};
+    }
   } catch (const std::bad_alloc&) {
     outcome_.kind = EndedScan::Kind::kFailed;
-    outcome_.reason = "out of memory: make a shorter sweep, or close other programs";
+    outcome_.reason = say::scan::SweepOutOfMemory();
   } catch (const std::exception& error) {
     outcome_.kind = EndedScan::Kind::kFailed;
     outcome_.reason = Explain(error);
@@ -114,7 +114,8 @@ void ScanSession::Scan(const std::stop_token& stop) {
   // Read during the sweep, because it is needed as soon as the new scene is available.
   if (!job_.reference_scene.empty()) {
     reference_ = std::async(std::launch::async, [this, stop, grid = surface_.grid()] {
-                   Reference reference{ReadReference(job_, stop), {}};
+                   Reference reference{
+                       ReadApprovedScene(job_.reference_scene, job_.check_reference, stop), {}};
                    try {
                      reference.region =
                          RegionToSee(reference.scene, job_.compare.region_polygon_m, grid);
@@ -145,7 +146,7 @@ void ScanSession::Save() {
     return;
   } catch (const std::exception& error) {
     if (outcome_.kind == EndedScan::Kind::kDone || outcome_.reason.empty())
-      outcome_.reason = error.what();
+      outcome_.reason = MessageOf(error);
     outcome_.kind = EndedScan::Kind::kFailed;
   }
   try {
@@ -176,7 +177,7 @@ Scene ScanSession::Track(const std::stop_token& stop) {
     Scene scene = RunScan(feed, job_.info, job_.reconstructor, stop,
                           [this](const ScanProgress& progress) { OnProgress(progress); });
     if (recording) recording->Complete(stop);
-    if (const std::string warning = thinned.Warning(); !warning.empty())
+    if (const Message warning = thinned.Warning(); !warning.empty())
       scene.warnings.push_back(warning);
     return scene;
   } catch (...) {
@@ -205,7 +206,7 @@ void ScanSession::OnProgress(const ScanProgress& progress) {
         !std::exchange(complete_reported_, true))
       callbacks_.sweep_complete();
   }
-  ReportProgress(std::string(progress.step), progress.fraction);
+  ReportProgress(progress.step, progress.fraction);
 }
 
 void ScanSession::Show(const Frame& frame, const TrackingReport& report) {
@@ -217,7 +218,7 @@ void ScanSession::Show(const Frame& frame, const TrackingReport& report) {
 }
 
 /// Reports at most ten times a second, but each new step and the first frame at once.
-void ScanSession::ReportProgress(std::string step, double fraction) {
+void ScanSession::ReportProgress(Message step, double fraction) {
   const double now_s = SteadySeconds();
   heartbeat_s_ = now_s;
   if (step == update_.step && now_s - reported_s_ < kUpdateEvery_s) return;
@@ -228,15 +229,14 @@ void ScanSession::ReportProgress(std::string step, double fraction) {
 }
 
 void ScanSession::Check(const Scene& scene) {
-  ReportProgress("checking", 0.0);
+  ReportProgress(say::scan::Checking(), 0.0);
   // The board of the room calibration is present in this scan only: its markers do not belong to
   // the room.
   Scene room, board;
-  room.marker_dictionary = board.marker_dictionary = scene.marker_dictionary;
-  room.marker_length_m = board.marker_length_m = scene.marker_length_m;
+  room.room_markers = board.room_markers = scene.room_markers;
   room.calibration = scene.calibration;
   std::tie(board.markers, room.markers) =
-      SplitRoomBoard(scene.markers, MarkerDictionary::ByName(scene.marker_dictionary).size());
+      SplitRoomBoard(scene.markers, MarkerDictionary::ByName(scene.room_markers.dictionary).size());
   MarkerCheck check = CheckMarkers(room, job_.check->baseline, job_.check->limits);
   if (!outcome_.drift.empty()) {
     check.status = MarkerCheckStatus::kFailed;
@@ -248,18 +248,16 @@ void ScanSession::Check(const Scene& scene) {
                               .seen = BaselineOf(room, job_.check->limits),
                               .board = BaselineOf(board, job_.check->limits).markers,
                               .reference_marker = scene.frame == SceneFrame::kReferenceMarker
-                                                      ? scene.reference_marker
+                                                      ? scene.room_markers.reference
                                                       : std::nullopt};
 }
 
 void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   ThrowIfStopped(stop);
   if (job_.is_reference && (scene.frame != SceneFrame::kReferenceMarker || !scene.height_map)) {
-    throw DataError(
-        "this scan cannot become a reference: the reference marker was not seen; keep it in view "
-        "during a part of the sweep");
+    throw DataError(say::scan::NoReferenceMarker());
   }
-  ReportProgress("saving", 0.0);
+  ReportProgress(say::scan::Saving(), 0.0);
   // The scene is written to the disk while it is compared.
   std::future<void> writing =
       std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene", stop); });
@@ -267,7 +265,7 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   std::optional<ResultRoom> room;
   ResultPictures pictures;
   if (reference_.valid()) {
-    ReportProgress("comparing", 0.0);
+    ReportProgress(say::scan::Comparing(), 0.0);
     const Scene& reference = reference_.get().scene;
     ThrowIfStopped(stop);
     CompareOptions compare = job_.compare;
@@ -277,28 +275,27 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
       comparison = Compare(reference, scene, compare);
       // not an error of the sweep: another one would end the same way
     } catch (const DataError& error) {
-      throw std::runtime_error(
-          fmt::format("the scan does not fit its reference: {}", error.what()));
+      throw MessageError(say::scan::DoesNotFit(error.message()));
     }
     ThrowIfStopped(stop);
     if (room && !room->why_not_used.empty()) {
       comparison->warnings.push_back(
-          fmt::format("the calibration of the room, version {}, is not used: {}", room->version,
-                      room->why_not_used));
+          say::room::CalibrationNotUsed(room->version, room->why_not_used));
     }
     pictures = DrawResult(*comparison, reference.height_map ? &*reference.height_map : nullptr,
                           {.tolerance_m = job_.compare.limits.shift_tolerance_m,
                            .subtitle = PictureSubtitle(*comparison)});
-    ReportProgress("saving", 0.5);
+    ReportProgress(say::scan::Saving(), 0.5);
   }
   writing.get();
   if (!comparison) return;
   ThrowIfStopped(stop);
   WriteResult(*comparison, pictures, folder_ / "result", room);
-  outcome_.result_json = ResultJson(*comparison, room);
+  const StoredResult stored = Stored(*comparison, room);
+  outcome_.result_json = ResultText(stored);
   outcome_.verdict = comparison->verdict;
   outcome_.reasons = comparison->reasons;
-  outcome_.correction = comparison->correction;
+  outcome_.correction = stored.correction;
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One scan from its first live frame to the stored result: the tracking thread and its reports.
 #pragma once
 
@@ -13,14 +14,17 @@
 #include <thread>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "algo/comparison/comparison.hpp"
 #include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
-#include "daemon/appliance/live_surface.hpp"
-#include "daemon/appliance/sweep_guidance.hpp"
 #include "daemon/appliance/unit_profile.hpp"
+#include "daemon/files/result_folder.hpp"
+#include "daemon/files/stored_result.hpp"
 #include "daemon/pipeline/live_feed.hpp"
 #include "daemon/records/check_json.hpp"
+#include "daemon/sweep/live_surface.hpp"
+#include "daemon/sweep/sweep_guidance.hpp"
 
 namespace plumb {
 
@@ -34,7 +38,7 @@ struct CheckJob {
 struct RoomAxes {
   int version = 0;
   MarkerMap markers_iec;
-  std::string why_not;  ///< Why it is not used at present; empty if it is.
+  Message why_not;  ///< Why it is not used at present; empty if it is.
 };
 
 /// Purpose and input of a scan.
@@ -48,7 +52,7 @@ struct ScanJob {
   std::filesystem::path reference_scene;  ///< Scene folder to compare with; empty if there is none.
   /// Why the reference differs from the approved one; empty if it does not. Called before it is
   /// read.
-  std::function<std::string(const std::stop_token&)> check_reference;
+  std::function<Message(const std::stop_token&)> check_reference;
   bool is_reference =
       false;  ///< The scene must be usable as a reference; otherwise there is no answer.
   /// If set, the scan is a daily check, of which only the numbers are kept.
@@ -59,9 +63,19 @@ struct ScanJob {
   double stop_after_s = 10.0;  ///< Time without new coverage after which the sweep is complete.
 };
 
+/// A reference that differs from the approved one gives no verdict: throws why.
+/// @param check  See ScanJob::check_reference.
+[[nodiscard]] Scene ReadApprovedScene(const std::filesystem::path& folder,
+                                      const std::function<Message(const std::stop_token&)>& check,
+                                      const std::stop_token& stop);
+
+/// Puts the room's axes in the reference scene's frame, by the room's markers that it contains.
+[[nodiscard]] std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room,
+                                                 const Scene& reference, CompareOptions& compare);
+
 /// Progress of the scan for the light, the page and `watch`.
 struct ScanUpdate {
-  std::string step;  ///< "tracking", then the steps of the reconstruction, "comparing", "saving".
+  Message step;  ///< "tracking", then the steps of the reconstruction, "comparing", "saving".
   double fraction = 0.0;  ///< Completed fraction of this step.
   std::int64_t frames = 0;
   std::int64_t frames_tracked = 0;
@@ -75,17 +89,17 @@ struct ScanUpdate {
 struct EndedScan {
   enum class Kind { kDone, kNoScene, kCancelled, kFailed };
   Kind kind = Kind::kFailed;
-  std::string reason;       ///< kNoScene: why the frames give no scene. kFailed: the error.
+  Message reason;           ///< kNoScene: why the frames give no scene. kFailed: the error.
   std::string result_json;  ///< kDone with a reference: the text of result.json, for the store.
-  std::vector<std::string> reasons;      ///< kDone with a reference: those of the verdict.
-  std::optional<Correction> correction;  ///< kDone with a reference that gave numbers.
-  std::optional<TakenCheck> check;       ///< kDone or kNoScene of a daily check.
+  std::vector<Message> reasons;                ///< kDone with a reference: those of the verdict.
+  std::optional<StoredCorrection> correction;  ///< kDone with a reference that gave numbers.
+  std::optional<TakenCheck> check;             ///< kDone or kNoScene of a daily check.
   std::optional<Verdict> verdict;  ///< For a check: in tolerance if it passed, otherwise no answer.
   std::int64_t frames = 0, frames_tracked = 0, frames_dropped = 0;
   double swept_area_m2 = 0.0;
-  std::string drift;  ///< That the sensor contradicts its profile; empty if it does not.
+  Message drift;  ///< That the sensor contradicts its profile; empty if it does not.
   /// Why the profile does not learn from this scan; empty if it does.
-  std::string why_not_learned;
+  Message why_not_learned;
   double after_last_frame_s = 0.0;  ///< Time until everything was written.
 };
 
@@ -129,7 +143,7 @@ class ScanSession {
   void Evaluate(const Scene& scene, const std::stop_token& stop);
   void OnProgress(const struct ScanProgress& progress);
   void Show(const Frame& frame, const TrackingReport& report);
-  void ReportProgress(std::string step, double fraction);
+  void ReportProgress(Message step, double fraction);
 
   ScanJob job_;
   ScanCallbacks callbacks_;

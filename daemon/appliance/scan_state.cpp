@@ -1,4 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/scan_state.hpp"
+
+#include <utility>
+
+#include "words/monitoring.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 
@@ -8,8 +14,8 @@ ScanTransition Stay(const ScanState& state) {
   return {.state = state, .actions = {}, .refusal = {}};
 }
 
-ScanTransition Refuse(const ScanState& state, std::string_view why) {
-  return {.state = state, .actions = {ScanAction::kRefuse}, .refusal = why};
+ScanTransition Refuse(const ScanState& state, Message why) {
+  return {.state = state, .actions = {ScanAction::kRefuse}, .refusal = std::move(why)};
 }
 
 /// The fault while no scan has failed and storage works.
@@ -17,10 +23,8 @@ FaultKind SensorFault(const ScanState& state) {
   return state.sensor_fails ? FaultKind::kSensor : FaultKind::kNone;
 }
 
-std::string_view WhyNoSensor(const ScanState& state) {
-  return state.sensor_fails ? "the sensor does not work: see the reason in the status; unplug it "
-                              "and plug it in again"
-                            : "no sensor is attached: plug it in and wait for the ready light";
+Message WhyNoSensor(const ScanState& state) {
+  return state.sensor_fails ? say::scan::SensorFails() : say::scan::PlugSensorIn();
 }
 
 /// Resting state when no scan runs and no result is shown.
@@ -37,6 +41,11 @@ ScanTransition Settle(ScanState state) {
 ScanTransition Start(ScanState state) {
   state.phase = ApplianceState::kScanning;
   return {.state = state, .actions = {ScanAction::kStartScan}, .refusal = {}};
+}
+
+ScanTransition Monitor(ScanState state) {
+  state.phase = ApplianceState::kMonitoring;
+  return {.state = state, .actions = {ScanAction::kStartMonitor}, .refusal = {}};
 }
 
 /// Requests a running scan to stop, once. The state changes when it has stopped.
@@ -71,10 +80,13 @@ ScanTransition InNoSensor(const ScanState& state, ScanEvent event) {
     case ScanEvent::kShortPress:
     case ScanEvent::kLongPress:
     case ScanEvent::kStart:
+    case ScanEvent::kMonitorStart:
       return Refuse(state, WhyNoSensor(state));
+    case ScanEvent::kMonitorStop:
+      return Refuse(state, say::monitoring::NotRunning());
     case ScanEvent::kEndSweep:
     case ScanEvent::kCancel:
-      return Refuse(state, "no scan is running");
+      return Refuse(state, say::scan::NotRunning());
     default:
       return Settle(state);
   }
@@ -88,7 +100,11 @@ ScanTransition InReady(const ScanState& state, ScanEvent event) {
     case ScanEvent::kLongPress:
     case ScanEvent::kEndSweep:
     case ScanEvent::kCancel:
-      return Refuse(state, "no scan is running: press shortly to start one");
+      return Refuse(state, say::scan::PressToStart());
+    case ScanEvent::kMonitorStart:
+      return Monitor(state);
+    case ScanEvent::kMonitorStop:
+      return Refuse(state, say::monitoring::NotRunning());
     default:
       return Settle(state);
   }
@@ -98,8 +114,9 @@ ScanTransition InScanning(ScanState state, ScanEvent event) {
   const bool is_command = event == ScanEvent::kShortPress || event == ScanEvent::kLongPress ||
                           event == ScanEvent::kStart || event == ScanEvent::kEndSweep ||
                           event == ScanEvent::kCancel;
-  if (is_command && state.cancelling)
-    return Refuse(state, "the scan is being discarded: wait a moment");
+  if (is_command && state.cancelling) return Refuse(state, say::scan::BeingDiscarded());
+  if (event == ScanEvent::kMonitorStart) return Refuse(state, say::monitoring::ScanRuns());
+  if (event == ScanEvent::kMonitorStop) return Refuse(state, say::monitoring::NotRunning());
   switch (event) {
     case ScanEvent::kShortPress:
     case ScanEvent::kEndSweep:
@@ -108,7 +125,7 @@ ScanTransition InScanning(ScanState state, ScanEvent event) {
       state.phase = ApplianceState::kWorking;
       return {.state = state, .actions = {ScanAction::kEndSweep}, .refusal = {}};
     case ScanEvent::kStart:
-      return Refuse(state, "a scan is running already: end or cancel it first");
+      return Refuse(state, say::scan::RunningAlready());
     case ScanEvent::kLongPress:
     case ScanEvent::kCancel:
     // a partial scan is discarded and never mixed with frames of a re-plugged sensor
@@ -126,10 +143,14 @@ ScanTransition InWorking(const ScanState& state, ScanEvent event) {
     case ScanEvent::kShortPress:
     case ScanEvent::kStart:
     case ScanEvent::kEndSweep:
-      return Refuse(state, "the last scan is being worked on: wait for its result");
+      return Refuse(state, say::scan::BeingComputed());
+    case ScanEvent::kMonitorStart:
+      return Refuse(state, say::monitoring::ScanRuns());
+    case ScanEvent::kMonitorStop:
+      return Refuse(state, say::monitoring::NotRunning());
     case ScanEvent::kLongPress:
     case ScanEvent::kCancel:
-      if (state.cancelling) return Refuse(state, "the scan is being discarded: wait a moment");
+      if (state.cancelling) return Refuse(state, say::scan::BeingDiscarded());
       return Cancel(state);
     case ScanEvent::kStorageFailed:
       return Cancel(state);
@@ -154,9 +175,14 @@ ScanTransition InResult(const ScanState& state, ScanEvent event) {
     case ScanEvent::kStart:
       if (state.has_sensor && state.fault == FaultKind::kNone) return Start(state);
       return Refuse(Settle(state).state, WhyNoSensor(state));
+    case ScanEvent::kMonitorStart:
+      if (state.has_sensor && state.fault == FaultKind::kNone) return Monitor(state);
+      return Refuse(Settle(state).state, WhyNoSensor(state));
+    case ScanEvent::kMonitorStop:
+      return Refuse(state, say::monitoring::NotRunning());
     case ScanEvent::kEndSweep:
     case ScanEvent::kCancel:
-      return Refuse(state, "no scan is running");
+      return Refuse(state, say::scan::NotRunning());
     case ScanEvent::kLongPress:
     case ScanEvent::kResultExpired:
     case ScanEvent::kSensorLost:
@@ -168,20 +194,46 @@ ScanTransition InResult(const ScanState& state, ScanEvent event) {
   }
 }
 
+ScanTransition InMonitoring(const ScanState& state, ScanEvent event) {
+  switch (event) {
+    case ScanEvent::kStart: {
+      ScanTransition start = Start(state);
+      start.actions.insert(start.actions.begin(), ScanAction::kEndMonitor);
+      return start;
+    }
+    case ScanEvent::kMonitorStart:
+      return Refuse(state, say::monitoring::RunsAlready());
+    case ScanEvent::kEndSweep:
+    case ScanEvent::kCancel:
+      return Refuse(state, say::scan::NotRunning());
+    case ScanEvent::kShortPress:
+    case ScanEvent::kLongPress:
+    case ScanEvent::kMonitorStop:
+    case ScanEvent::kMonitorEnded:
+    case ScanEvent::kSensorLost:
+    case ScanEvent::kSensorFailed:
+    case ScanEvent::kStorageFailed: {
+      ScanTransition end = Settle(state);
+      end.actions = {ScanAction::kEndMonitor};
+      return end;
+    }
+    default:
+      return Stay(state);
+  }
+}
+
 ScanTransition InFault(ScanState state, ScanEvent event) {
   const bool is_press = event == ScanEvent::kShortPress || event == ScanEvent::kLongPress;
   const bool is_command = is_press || event == ScanEvent::kStart || event == ScanEvent::kEndSweep ||
                           event == ScanEvent::kCancel;
-  if (!is_command) return Settle(state);
+  if (event == ScanEvent::kMonitorStop) return Refuse(state, say::monitoring::NotRunning());
+  if (!is_command && event != ScanEvent::kMonitorStart) return Settle(state);
   if (state.fault == FaultKind::kScan && is_press) {
     state.fault = SensorFault(state);  // it may have failed meanwhile, and reports so only once
     return Settle(state);
   }
-  if (state.fault == FaultKind::kStorage)
-    return Refuse(state,
-                  "the storage has failed: see the reason in the status; nothing can be scanned");
-  if (state.fault == FaultKind::kScan)
-    return Refuse(state, "the last scan failed: press the button to acknowledge it");
+  if (state.fault == FaultKind::kStorage) return Refuse(state, say::scan::StorageFailed());
+  if (state.fault == FaultKind::kScan) return Refuse(state, say::scan::AcknowledgeFailure());
   return Refuse(state, WhyNoSensor(state));
 }
 
@@ -206,6 +258,8 @@ ScanTransition Next(const ScanState& before, ScanEvent event) {
       return InWorking(state, event);
     case ApplianceState::kResult:
       return InResult(state, event);
+    case ApplianceState::kMonitoring:
+      return InMonitoring(state, event);
     case ApplianceState::kFault:
       return InFault(state, event);
   }
@@ -213,10 +267,11 @@ ScanTransition Next(const ScanState& before, ScanEvent event) {
 }
 
 const char* Name(ScanEvent event) {
-  static constexpr auto kNames = NamesUpTo<ScanEvent::kStorageWorks>(
+  static constexpr auto kNames = NamesUpTo<ScanEvent::kMonitorEnded>(
       {"sensor_ready", "sensor_lost", "sensor_failed", "short_press", "long_press", "start",
        "end_sweep", "cancel", "sweep_complete", "scan_done", "scan_failed", "scan_cancelled",
-       "result_expired", "storage_failed", "storage_works"});
+       "result_expired", "storage_failed", "storage_works", "monitor_start", "monitor_stop",
+       "monitor_ended"});
   return kNames.at(static_cast<std::size_t>(event)).data();
 }
 

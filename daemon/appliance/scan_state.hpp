@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // The state machine of the appliance: a pure function of the present state and an event.
 #pragma once
 
-#include <string_view>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/model/status.hpp"
 
 namespace plumb {
@@ -36,14 +37,25 @@ enum class ScanEvent {
   kResultExpired,  ///< Old enough to be dismissed.
   kStorageFailed,
   kStorageWorks,  ///< Again, after it had failed.
+  kMonitorStart,
+  kMonitorStop,
+  kMonitorEnded,  ///< It cannot go on.
 };
 
-enum class ScanAction { kStartScan, kEndSweep, kCancelScan, kArmResultTimer, kRefuse };
+enum class ScanAction {
+  kStartScan,
+  kEndSweep,
+  kCancelScan,
+  kArmResultTimer,
+  kStartMonitor,
+  kEndMonitor,
+  kRefuse
+};
 
 struct ScanTransition {
   ScanState state;
   std::vector<ScanAction> actions;
-  std::string_view refusal;  ///< With kRefuse: one sentence why, and what to do.
+  Message refusal;  ///< With kRefuse: why, and what to do.
 };
 
 /// Total: every event is defined in every state. Invalid events change nothing.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/unit_profile.hpp"
 
 #include <chrono>
@@ -7,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "daemon/loop/log.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 
@@ -17,7 +19,7 @@ void UnitProfile::Begin(ReconstructorOptions& options) {
   try {
     ProfileShelf::InUse in_use = shelf_->Read(serial_);
     begun_from_ = in_use.version;
-    if (!in_use.fault.empty()) Log(LogLevel::kError, in_use.fault, {{"SERIAL", serial_}});
+    if (!in_use.fault.empty()) Log(LogLevel::kError, in_use.fault.English(), {{"SERIAL", serial_}});
     if (in_use.newest && in_use.newest->profile && in_use.newest->profile->stated != stated_) {
       Log(LogLevel::kWarning,
           fmt::format("the profile of sensor {} belongs to another calibration file: it is not "
@@ -52,20 +54,18 @@ std::optional<ProfileAgreement> UnitProfile::Compared() const {
   }
 }
 
-std::string UnitProfile::Drift() const {
+Message UnitProfile::Drift() const {
   const std::optional<ProfileAgreement> compared = Compared();
   if (!compared || compared->agrees()) return {};
-  return fmt::format(
-      "the sensor {} no longer agrees with its profile (chi-square {:.0f}, at most {:.0f} for "
-      "{} terms): let it warm up and repeat the check; if this recurs, reset the unit's "
-      "profile on the settings page",
-      serial_, compared->chi_square, compared->limit, compared->num_terms);
+  return say::scan::ProfileDrift(serial_, compared->chi_square, compared->limit,
+                                 compared->num_terms);
 }
 
 void UnitProfile::LearnFromScan() {
   if (!learned_) return;
-  if (const std::string drift = Drift(); !drift.empty()) {
-    Log(LogLevel::kWarning, drift + "; this sweep was not joined with it", {{"SERIAL", serial_}});
+  if (const Message drift = Drift(); !drift.empty()) {
+    Log(LogLevel::kWarning, drift.English() + "; this sweep was not joined with it",
+        {{"SERIAL", serial_}});
     return;
   }
   try {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Use of a sensor unit's profile by one scan: its start values, and what the profile learns from
 // it.
 #pragma once
@@ -6,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "algo/base/message.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/sensor_model/profile_gate.hpp"
 #include "algo/types/scene.hpp"
@@ -25,8 +27,8 @@ class UnitProfile {
   void Begin(ReconstructorOptions& options);
 
   /// Called after the sweep. Empty if it agrees with the profile, there is none, or nothing was
-  /// learned; otherwise a sentence that the unit has changed and what to do.
-  [[nodiscard]] std::string Drift() const;
+  /// learned; otherwise that the unit has changed, and what to do.
+  [[nodiscard]] Message Drift() const;
 
   /// Adds a new version from a sweep that passed its checks, unless Drift() reports a change.
   void LearnFromScan();

@@ -1,11 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/unit_profiles.hpp"
 
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
@@ -41,9 +41,9 @@ std::string OwnSerial(const SensorDescription& sensor) {
 }
 
 /// Empty if a profile is kept.
-std::string UnitProfiles::WhyNone(const SensorDescription& sensor) const {
-  if (is_off_) return "profiles are switched off in the configuration";
-  if (OwnSerial(sensor).empty()) return "it has no serial by which it would be known again";
+Message UnitProfiles::WhyNone(const SensorDescription& sensor) const {
+  if (is_off_) return say::scan::ProfilesOff();
+  if (OwnSerial(sensor).empty()) return say::scan::NoSerial();
   return {};
 }
 
@@ -58,7 +58,7 @@ SensorProfiles UnitProfiles::OfConnected() const {
   const SensorSnapshot sensor = sensor_();
   SensorProfiles shown;
   if (!sensor.present) {
-    shown.why_none = "no sensor is attached";
+    shown.why_none = say::scan::NoSensor();
     return shown;
   }
   shown.serial = sensor.sensor.serial;
@@ -77,10 +77,9 @@ std::optional<std::string> UnitProfiles::FileOf(int version) const {
   return std::nullopt;
 }
 
-std::string UnitProfiles::WhyNotChange(const std::string& serial) const {
+Message UnitProfiles::WhyNotChange(const std::string& serial) const {
   const SensorSnapshot sensor = sensor_();
-  if (!sensor.present || sensor.sensor.serial != serial)
-    return fmt::format("the sensor {} is not connected: look at this page again", serial);
+  if (!sensor.present || sensor.sensor.serial != serial) return say::scan::OtherSensor(serial);
   return WhyNone(sensor.sensor);
 }
 

@@ -1,21 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb backup` and `plumb restore`: copies of the state folder.
 #include <unistd.h>
 
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <string_view>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
+#include "daemon/archive/backup.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
+#include "daemon/cli/backup_keys.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/config/config.hpp"
-#include "daemon/control/unix_socket.hpp"
-#include "daemon/records/backup.hpp"
-#include "daemon/records/database.hpp"
-#include "daemon/records/file_cipher.hpp"
+#include "daemon/database/database.hpp"
+#include "drivers/files/unix_socket.hpp"
+#include "words/backup.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 namespace {
@@ -24,15 +28,22 @@ namespace fs = std::filesystem;
 
 struct BackupArguments {
   fs::path folder;
-  std::optional<fs::path> key_file;
+  RecipientOptions recipients;
+  IdentityOptions keys;
+  bool verify_only = false;
   std::optional<fs::path> state;
 };
 
-fs::path StateFolder(const BackupArguments& options) {
-  if (options.state) return fs::absolute(*options.state);
+/// The configuration counts where no state folder is named.
+ApplianceConfig ConfigOf(const BackupArguments& options) {
+  ApplianceConfig config;
   std::error_code ignored;
-  return fs::exists(kDefaultConfig, ignored) ? ReadConfig(kDefaultConfig).appliance.state
-                                             : ApplianceConfig{}.state;
+  if (options.state) {
+    config.state = fs::absolute(*options.state);
+  } else if (fs::exists(kDefaultConfig, ignored)) {
+    config = ReadConfig(kDefaultConfig).appliance;
+  }
+  return config;
 }
 
 bool IsPlumbdThere(const fs::path& control) {
@@ -44,66 +55,73 @@ bool IsPlumbdThere(const fs::path& control) {
   }
 }
 
-void PrintReport(const char* done, const fs::path& folder, const BackupReport& report) {
-  std::string text =
-      fmt::format("{} {}: {} scans, {} files, {:.1f} MB\n", done, folder.string(), report.scans,
-                  report.files, static_cast<double>(report.bytes) / 1e6);
-  for (const std::string& problem : report.problems) text += "  " + problem + "\n";
+void PrintReport(Message (*done)(std::string_view, std::int64_t, std::int64_t, double),
+                 const fs::path& folder, const BackupReport& report,
+                 const CommandContext& context) {
+  std::string text = context.Said(done(folder.string(), static_cast<std::int64_t>(report.scans),
+                                       static_cast<std::int64_t>(report.files),
+                                       static_cast<double>(report.bytes) / 1e6)) +
+                     "\n";
+  for (const Message& problem : report.problems) text += "  " + context.Said(problem) + "\n";
   PrintOut(text);
 }
 
-std::unique_ptr<BackupSecret> SecretOf(const BackupArguments& options) {
-  return options.key_file ? std::make_unique<BackupSecret>(*options.key_file) : nullptr;
-}
-
-void AddKeyFile(CLI::App& app, BackupArguments& options, const char* what) {
-  app.add_option("--key-file", options.key_file, what)->type_name("FILE");
-}
-
-/// plumbd reads the key file itself, so that no key is sent through the socket.
-BackupReport AskForBackup(const fs::path& folder, const BackupArguments& options,
+BackupReport AskForBackup(const fs::path& folder, const AgeRecipients& recipients,
                           const CommandContext& context) {
-  const nlohmann::json answer = AskPlumbd(
-      context.control,
-      {.kind = ControlRequest::Kind::kBackup,
-       .action = {},
-       .argument = {},
-       .folder = folder.string(),
-       .key_file = options.key_file ? fs::absolute(*options.key_file).string() : std::string()},
-      context.stop, std::nullopt);
-  if (!answer.value("ok", false)) throw IoError(answer.value("error", "refused without a reason"));
+  const nlohmann::ordered_json answer = AskPlumbd(context.control,
+                                                  {.kind = ControlRequest::Kind::kBackup,
+                                                   .action = {},
+                                                   .argument = {},
+                                                   .folder = folder.string(),
+                                                   .recipients = recipients},
+                                                  context.stop, std::nullopt);
+  if (!answer.value("ok", false)) throw IoError(WhyRefused(answer));
   return {.scans = answer.value("scans", std::size_t{0}),
           .files = answer.value("files", std::size_t{0}),
           .bytes = answer.value("bytes", std::uint64_t{0}),
-          .problems = answer.value("problems", std::vector<std::string>())};
+          .problems = AllSaidIn(answer, "problem"),
+          .target = answer.value("target", folder.string())};
+}
+
+int Verify(BackupArguments& options, const CommandContext& context) {
+  const fs::path backup = fs::absolute(options.folder);
+  const BackupReport report = VerifyBackup(backup, context.stop, options.keys.Read());
+  PrintOut(context.Said(say::cli::Verified(backup.string(), static_cast<std::int64_t>(report.scans),
+                                           static_cast<std::int64_t>(report.files))) +
+           "\n");
+  return kDone;
 }
 
 /// A running plumbd makes the backup. For a named state folder, or without plumbd, this program
 /// does.
-int Backup(const BackupArguments& options, const CommandContext& context) {
+int Backup(BackupArguments& options, const CommandContext& context) {
+  if (options.verify_only) return Verify(options, context);
   const fs::path folder = fs::absolute(options.folder);
+  AgeRecipients recipients = options.recipients.Read();
   BackupReport report;
   if (!options.state && IsPlumbdThere(context.control)) {
-    report = AskForBackup(folder, options, context);
+    report = AskForBackup(folder, recipients, context);
   } else {
+    const ApplianceConfig config = ConfigOf(options);
+    if (recipients.empty()) recipients = config.backup_recipients;
+    if (recipients.empty() && !config.backup_key_file.empty())
+      throw DataError(say::backup::NeedsRecipients(config.backup_key_file.string()));
     try {
-      report = BackUpStopped(StateFolder(options), folder, context.stop, SecretOf(options).get());
+      report = BackUpStopped(config.state, folder, context.stop, recipients);
     } catch (const DatabaseBusy& error) {
-      throw IoError(
-          fmt::format("{}. A running plumbd makes the backup itself: leave out --state, "
-                      "and name its socket with --control",
-                      error.what()));
+      throw IoError(say::cli::StateInUse(error.message()));
     }
   }
-  PrintReport("backed up to", folder, report);
+  PrintReport(say::cli::BackedUp, report.target, report, context);
   return report.problems.empty() ? kDone : kBadInput;
 }
 
-int Restore(const BackupArguments& options, const CommandContext& context) {
-  const fs::path state = StateFolder(options);
-  PrintReport(
-      "restored into", state,
-      RestoreBackup(fs::absolute(options.folder), state, context.stop, SecretOf(options).get()));
+int Restore(BackupArguments& options, const CommandContext& context) {
+  const fs::path backup = fs::absolute(options.folder);
+  if (options.verify_only) return Verify(options, context);
+  const BackupKeys keys = options.keys.Read();
+  const fs::path state = ConfigOf(options).state;
+  PrintReport(say::cli::Restored, state, RestoreBackup(backup, state, context.stop, keys), context);
   return kDone;
 }
 
@@ -113,16 +131,21 @@ Command AddBackup(CLI::App& app) {
   auto options = std::make_shared<BackupArguments>();
   app.add_option("folder", options->folder,
                  "Folder of the backup, or one file if its name ends in .tar; an older backup "
-                 "there is replaced")
+                 "there is replaced. An encrypted one is a file, and .tar.age is added to its name")
       ->required()
       ->type_name("FOLDER|FILE.tar");
   app.add_option(
          "--state", options->state,
          "State folder that no plumbd is using; without it a running plumbd makes the backup")
       ->type_name("DIR");
-  AddKeyFile(app, *options,
-             "Encrypt with the key in this file: one line, a passphrase or a random key. A running "
-             "plumbd must be able to read it");
+  options->recipients.AddTo(app);
+  auto* const verify = app.add_flag(
+      "--verify", options->verify_only,
+      "Open the backup that is there, verify every file of it and its database, and make none");
+  options->keys.AddTo(app);
+  for (const char* name : {"--identity", "--key-file"}) app.get_option(name)->needs(verify);
+  for (const char* name : {"--state", "--recipient", "--recipients-file"})
+    verify->excludes(app.get_option(name));
   return [options](const CommandContext& context) { return Backup(*options, context); };
 }
 
@@ -132,7 +155,9 @@ Command AddRestore(CLI::App& app) {
   app.add_option("--state", options->state,
                  "State folder, missing or empty; default: the one of the configuration")
       ->type_name("DIR");
-  AddKeyFile(app, *options, "File with the key of an encrypted backup");
+  options->keys.AddTo(app);
+  app.add_flag("--verify", options->verify_only,
+               "Verify every file of the backup, and restore nothing");
   return [options](const CommandContext& context) { return Restore(*options, context); };
 }
 

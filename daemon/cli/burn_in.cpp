@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/cli/burn_in.hpp"
 
 #include <fcntl.h>
@@ -21,7 +22,9 @@
 #include "daemon/pipeline/scan_runner.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/temporary.hpp"
-#include "drivers/simulated/suite.hpp"
+#include "drivers/simulator/suites/suite.hpp"
+#include "words/cli.hpp"
+#include "words/doctor.hpp"
 
 namespace plumb {
 namespace {
@@ -38,8 +41,12 @@ void Append(std::string& bytes, const std::vector<Value>& values) {
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Value));
 }
 
-/// All deterministic results of two sweeps and their comparison.
-std::string ScanOnce(const fs::path& suite, const std::stop_token& stop) {
+/// All deterministic results of two sweeps and their comparison, or why there are none.
+struct Scanned {
+  std::string bytes;
+  Message fault;
+};
+Scanned ScanOnce(const fs::path& suite, const std::stop_token& stop) {
   const Config config;
   const auto scene = [&](const char* name) {
     const std::unique_ptr<FrameSource> recording =
@@ -48,8 +55,9 @@ std::string ScanOnce(const fs::path& suite, const std::stop_token& stop) {
   };
   const Comparison comparison = Compare(scene("reference"), scene("moved"), config.compare);
   if (!comparison.correction || !comparison.deviation)
-    return "no answer: " +
-           (comparison.reasons.empty() ? std::string() : comparison.reasons.front());
+    return {.bytes = {},
+            .fault = say::doctor::NoAnswer(
+                comparison.reasons.empty() ? Message() : comparison.reasons.front())};
   std::string bytes;
   Append(bytes, comparison.deviation->z);
   const CouchNumbers& numbers = comparison.correction->value;
@@ -57,7 +65,7 @@ std::string ScanOnce(const fs::path& suite, const std::stop_token& stop) {
        {numbers.vertical_mm.value_or(0.0), numbers.longitudinal_mm.value_or(0.0),
         numbers.lateral_mm.value_or(0.0), numbers.pitch_deg, numbers.roll_deg, numbers.yaw_deg})
     bytes += fmt::format("{:a} ", number);
-  return bytes;
+  return {.bytes = std::move(bytes), .fault = {}};
 }
 
 /// Temperature of the hottest zone that the kernel lists, in degrees Celsius.
@@ -80,10 +88,10 @@ struct SensorLook {
 std::optional<SensorLook> CheckSensor(const fs::path& control, const std::stop_token& stop) {
   constexpr int kTimeoutMs = 2000;
   try {
-    const nlohmann::json answer =
+    const nlohmann::ordered_json answer =
         AskPlumbd(control, {.kind = ControlRequest::Kind::kStatus, .action = {}, .argument = {}},
                   stop, kTimeoutMs);
-    const nlohmann::json& sensor = answer.at("sensor");
+    const nlohmann::ordered_json& sensor = answer.at("sensor");
     return SensorLook{.present = sensor.at("present").get<bool>(),
                       .pairs = sensor.at("pairs").get<std::int64_t>(),
                       .lost = sensor.at("lost").get<std::int64_t>()};
@@ -107,10 +115,10 @@ class Rounds {
     const auto begin = Clock::now();
     const auto seconds = [](auto span) { return std::chrono::duration<double>(span).count(); };
     for (; seconds(Clock::now() - begin) < 60.0 * options_.minutes || count_ < kLeastRounds;) {
-      if (stop_.stop_requested()) throw Interrupted("the burn-in was not finished");
-      progress.Update("burn-in",
+      if (stop_.stop_requested()) throw Interrupted(say::doctor::BurnInStopped());
+      progress.Update(say::doctor::BurnIn(),
                       std::min(1.0, seconds(Clock::now() - begin) / (60.0 * options_.minutes)),
-                      fmt::format("round {}", count_ + 1));
+                      say::doctor::Round(count_ + 1));
       const auto start = Clock::now();
       Once();
       const double took_s = seconds(Clock::now() - start);
@@ -120,18 +128,16 @@ class Rounds {
   }
 
   void Report(DoctorReport& report) const {
-    const std::string work =
-        fmt::format("{} rounds, {:.1f} to {:.1f} s each", count_, fastest_s_, slowest_s_);
-    Report(report, "processor", scan_fault_, work + "; each gave the same bits",
-           "the processor or its memory computes wrongly: do not use this unit");
+    const Message work = say::doctor::Rounds(count_, fastest_s_, slowest_s_);
+    Report(report, say::doctor::Processor(), scan_fault_, say::doctor::SameBits(work),
+           say::doctor::ComputesWrongly());
     if (slowest_s_ > kSlowedDown * fastest_s_)
-      report.Note("speed", work, "something slows the processor: heat, or another program");
-    Report(report, "memory", memory_fault_, fmt::format("{} MB a round", kMemoryBytes >> 20),
-           "replace the memory");
-    Report(report, "disk", disk_fault_, fmt::format("{} MB a round, read back", kDiskBytes >> 20),
-           "replace the disk, or free space on it");
-    if (hottest_c_)
-      report.Good("temperature", fmt::format("{:.0f} degrees Celsius at most", *hottest_c_));
+      report.Note(say::doctor::Speed(), work, say::doctor::SlowedDown());
+    Report(report, say::doctor::Memory(), memory_fault_,
+           say::doctor::MemoryTested(kMemoryBytes >> 20), say::doctor::ReplaceMemory());
+    Report(report, say::doctor::Disk(), disk_fault_, say::doctor::DiskTested(kDiskBytes >> 20),
+           say::doctor::ReplaceDisk());
+    if (hottest_c_) report.Good(say::doctor::Temperature(), say::doctor::Hottest(*hottest_c_));
     ReportSensor(report);
   }
 
@@ -140,9 +146,10 @@ class Rounds {
 
   void Once() {
     ++count_;
-    const std::string result = ScanOnce(folder_ / "suite", stop_);
-    if (count_ == 1) first_ = result;
-    Keep(scan_fault_, result.starts_with("no answer") ? result : FirstDifference(first_, result));
+    const Scanned scanned = ScanOnce(folder_ / "suite", stop_);
+    if (count_ == 1) first_ = scanned.bytes;
+    Keep(scan_fault_,
+         scanned.fault.empty() ? FirstDifference(first_, scanned.bytes) : scanned.fault);
     const auto seed = static_cast<std::uint64_t>(count_);
     Keep(memory_fault_, TestMemory(kMemoryBytes, seed));
     Keep(disk_fault_, TestDisk(folder_, kDiskBytes, seed));
@@ -150,16 +157,16 @@ class Rounds {
       hottest_c_ = std::max(hottest_c_.value_or(*now_c), *now_c);
     if (sensor_before_ && sensor_before_->present) {
       const std::optional<SensorLook> now = CheckSensor(options_.control, stop_);
-      if (!now || !now->present) Keep(sensor_fault_, "it was gone");
+      if (!now || !now->present) Keep(sensor_fault_, say::doctor::SensorGone());
     }
   }
 
-  void Keep(std::string& kept, const std::string& fault) const {
-    if (kept.empty() && !fault.empty()) kept = fmt::format("round {}: {}", count_, fault);
+  void Keep(Message& kept, const Message& fault) const {
+    if (kept.empty() && !fault.empty()) kept = say::doctor::InRound(count_, fault);
   }
 
-  static void Report(DoctorReport& report, const char* what, const std::string& fault,
-                     const std::string& good, const char* remedy) {
+  static void Report(DoctorReport& report, const Message& what, const Message& fault,
+                     const Message& good, const Message& remedy) {
     if (fault.empty()) {
       report.Good(what, good);
     } else {
@@ -169,14 +176,13 @@ class Rounds {
 
   void ReportSensor(DoctorReport& report) const {
     if (!sensor_before_ || !sensor_before_->present)
-      return report.Note("sensor", "not part of this burn-in",
-                         "start plumbd with its sensor to have it watched");
+      return report.Note(say::doctor::Sensor(), say::doctor::SensorNotWatched(),
+                         say::doctor::WatchSensor());
     if (!sensor_fault_.empty())
-      return report.Bad("sensor", sensor_fault_, "look at its cable and its power");
+      return report.Bad(say::doctor::Sensor(), sensor_fault_, say::doctor::CheckCable());
     const SensorLook now = CheckSensor(options_.control, stop_).value_or(*sensor_before_);
-    report.Good("sensor",
-                fmt::format("attached all the time; {} frames, {} lost",
-                            now.pairs - sensor_before_->pairs, now.lost - sensor_before_->lost));
+    report.Good(say::doctor::Sensor(), say::doctor::SensorStayed(now.pairs - sensor_before_->pairs,
+                                                                 now.lost - sensor_before_->lost));
   }
 
   const BurnInOptions& options_;
@@ -185,22 +191,24 @@ class Rounds {
   const std::optional<SensorLook> sensor_before_;
   int count_ = 0;
   double fastest_s_ = 0.0, slowest_s_ = 0.0;
-  std::string first_, scan_fault_, memory_fault_, disk_fault_, sensor_fault_;
+  std::string first_;
+  Message scan_fault_, memory_fault_, disk_fault_, sensor_fault_;
   std::optional<double> hottest_c_;
 };
 
 }  // namespace
 
-std::string FirstDifference(const std::string& first, const std::string& now) {
+Message FirstDifference(const std::string& first, const std::string& now) {
   if (first.size() != now.size())
-    return fmt::format("the same scan gave {} bytes instead of {}", now.size(), first.size());
+    return say::doctor::OtherLength(static_cast<std::int64_t>(now.size()),
+                                    static_cast<std::int64_t>(first.size()));
   const auto differ = std::mismatch(first.begin(), first.end(), now.begin()).first;
   if (differ == first.end()) return {};
-  return fmt::format("the same scan gave another result, from byte {} on", differ - first.begin());
+  return say::doctor::OtherResult(differ - first.begin());
 }
 
-std::string TestMemory(std::size_t bytes, std::uint64_t seed,
-                       const std::function<void(std::uint64_t*, std::size_t)>& between) {
+Message TestMemory(std::size_t bytes, std::uint64_t seed,
+                   const std::function<void(std::uint64_t*, std::size_t)>& between) {
   std::vector<std::uint64_t> words(bytes / sizeof(std::uint64_t));
   for (const bool inverted : {false, true}) {
     std::mt19937_64 random(seed);
@@ -210,14 +218,15 @@ std::string TestMemory(std::size_t bytes, std::uint64_t seed,
     for (std::size_t i = 0; i < words.size(); ++i) {
       const std::uint64_t expected = inverted ? ~random() : random();
       if (words[i] != expected)
-        return fmt::format("wrote {:016x} and read {:016x}", expected, words[i]);
+        return say::doctor::MemoryDiffers(fmt::format("{:016x}", expected),
+                                          fmt::format("{:016x}", words[i]));
     }
   }
   return {};
 }
 
-std::string TestDisk(const fs::path& folder, std::size_t bytes, std::uint64_t seed,
-                     const std::function<void(const fs::path&)>& between) try {
+Message TestDisk(const fs::path& folder, std::size_t bytes, std::uint64_t seed,
+                 const std::function<void(const fs::path&)>& between) try {
   std::string written(bytes, '\0');
   std::mt19937_64 random(seed);
   for (std::size_t i = 0; i + sizeof(std::uint64_t) <= bytes; i += sizeof(std::uint64_t)) {
@@ -235,28 +244,28 @@ std::string TestDisk(const fs::path& folder, std::size_t bytes, std::uint64_t se
   if (between) between(file);
   const std::string read = ReadTextFile(file, bytes);
   fs::remove(file);
-  return read == written ? "" : fmt::format("{} does not hold what was written", file.string());
+  return read == written ? Message() : say::doctor::DiskDiffers(file.string());
 } catch (const std::exception& error) {
-  return error.what();
+  return MessageOf(error);
 }
 
-void BurnIn(const BurnInOptions& options, const std::stop_token& stop, DoctorReport& report) try {
+void BurnIn(const BurnInOptions& options, const CommandContext& context, DoctorReport& report) try {
   const TemporaryFolder work(options.folder, ".burn-in-");
-  Progress progress;
+  Progress progress(context.language);
   SimulateOptions simulate;
   simulate.out = work.path() / "suite";
   simulate.frames = options.frames;
   simulate.width = 320;
   simulate.height = 240;
-  SimulateSuite(simulate, stop, [&](double fraction, std::string_view what) {
-    progress.Update("simulating", fraction, what);
+  SimulateSuite(simulate, context.stop, [&](double fraction, std::string_view what) {
+    progress.Update(say::cli::Simulating(), fraction, Message::Verbatim(what));
   });
-  Rounds rounds(options, stop, work.path());
+  Rounds rounds(options, context.stop, work.path());
   rounds.Run(progress);
   progress.Clear();
   rounds.Report(report);
 } catch (const IoError& error) {
-  report.Bad("burn-in", error.what(), "name a folder with --burn-in-folder", kInternalError);
+  report.Bad(say::doctor::BurnIn(), error.message(), say::doctor::NameFolder(), kInternalError);
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <memory>
 #include <vector>
 
@@ -8,10 +9,12 @@
 #include "algo/sensor_model/profile_gate.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
+#include "daemon/cli/language.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
 #include "daemon/pipeline/learning_gate.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 namespace {
@@ -24,53 +27,46 @@ struct CalibrateArguments {
 };
 
 // Why a sweep is left out; empty if the profile learns from it.
-std::string WhyLeftOut(const Scene& scene, const std::optional<SensorProfile>& before,
-                       const std::optional<SensorProfile>& learned,
-                       const AcceptanceLimits& limits) {
-  if (!learned) return "its views did not agree better under any calibration";
-  if (std::string why = WhyNotLearned(scene, std::nullopt, limits); !why.empty()) return why;
+Message WhyLeftOut(const Scene& scene, const std::optional<SensorProfile>& before,
+                   const std::optional<SensorProfile>& learned, const AcceptanceLimits& limits) {
+  if (!learned) return say::cli::NotBetter();
+  if (Message why = WhyNotLearned(scene, std::nullopt, limits); !why.empty()) return why;
   if (!before) return {};
   const ProfileAgreement agreement = Agreement(*before, *learned);
   if (agreement.agrees()) return {};
-  return fmt::format(
-      "it contradicts the profile so far (chi-square {:.0f}, at most {:.0f} for {} terms): is it "
-      "of the same unit, and was the sensor warm?",
-      agreement.chi_square, agreement.limit, agreement.num_terms);
+  return say::cli::ContradictsProfile(agreement.chi_square, agreement.limit, agreement.num_terms);
 }
 
 int Run(const CalibrateArguments& options, const CommandContext& context) {
   Config config = options.method.Read();
   if (config.reconstruct.preset == Preset::kPaper)
-    throw std::invalid_argument(
-        "the preset paper uses the stated calibration, so it cannot learn a profile");
-  Progress progress;
-  std::vector<std::string> left_out;
+    throw InvalidRequest(say::cli::PaperLearnsNothing());
+  Progress progress(context.language);
+  std::vector<Message> left_out;
   for (const std::filesystem::path& path : options.recordings) {
     const std::unique_ptr<FrameSource> recording = OpenRecording(path, config.markers);
     std::optional<SensorProfile> learned;
     config.reconstruct.on_learned = [&](const SensorProfile& profile) { learned = profile; };
-    const Scene scene = RunScan(
-        *recording, {.reconstructor = config.reconstruct}, context.stop,
-        [&](const ScanProgress& scan) { Show(progress, path.filename().string() + ": ", scan); });
-    const std::string why =
+    const Scene scene =
+        RunScan(*recording, {.reconstructor = config.reconstruct}, context.stop,
+                [&](const ScanProgress& scan) { Show(progress, path.filename().string(), scan); });
+    const Message why =
         WhyLeftOut(scene, config.reconstruct.profile, learned, config.compare.limits);
     if (why.empty()) {
       config.reconstruct.profile = std::move(learned);
     } else {
-      left_out.push_back(fmt::format("{}: {}", path.string(), why));
+      left_out.push_back(say::cli::LeftOut(path.string(), why));
     }
   }
   progress.Clear();
-  for (const std::string& reason : left_out) fmt::print(stderr, "left out {}\n", reason);
-  if (left_out.size() == options.recordings.size())
-    throw DataError(
-        "no recording could be used: sweep slowly over a scene with several markers, and try "
-        "again");
+  for (const Message& reason : left_out) fmt::print(stderr, "{}\n", context.Said(reason));
+  if (left_out.size() == options.recordings.size()) throw DataError(say::cli::NothingLearned());
   const SensorProfile& profile = *config.reconstruct.profile;
   WriteSensorProfile(profile, options.out);
-  PrintOut(options.json
-               ? SensorProfileJson(profile)
-               : fmt::format("{}\n  sweeps     {}\n", options.out.string(), profile.num_sweeps));
+  PrintOut(options.json ? SensorProfileJson(profile)
+                        : fmt::format("{}\n  {} {}\n", options.out.string(),
+                                      LeftAligned(context.Said(say::cli::Sweeps()), 10),
+                                      profile.num_sweeps));
   return kDone;
 }
 

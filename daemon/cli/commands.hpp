@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The commands of `plumb`: each adds its own options to the command line and returns how to run it.
 #pragma once
 
@@ -6,6 +7,8 @@
 #include <span>
 #include <stop_token>
 #include <string>
+
+#include "algo/base/message.hpp"
 
 namespace CLI {
 class App;
@@ -28,6 +31,9 @@ enum ExitCode : int {
 struct CommandContext {
   std::stop_token stop;           ///< Ctrl-C or SIGTERM.
   std::filesystem::path control;  ///< Control socket of plumbd.
+  const Catalogue& language;      ///< Of what is printed for people.
+
+  [[nodiscard]] std::string Said(const Message& message) const { return Text(message, language); }
 };
 
 /// Runs the command. Its return value is the exit code; exceptions are converted to the other codes
@@ -39,14 +45,19 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddReconstruct(CLI::App& app);
 [[nodiscard]] Command AddCalibrate(CLI::App& app);
 [[nodiscard]] Command AddCompare(CLI::App& app);
+[[nodiscard]] Command AddRepeat(CLI::App& app);
+[[nodiscard]] Command AddMonitor(CLI::App& app);
 [[nodiscard]] Command AddMesh(CLI::App& app);
 [[nodiscard]] Command AddInfo(CLI::App& app);
+[[nodiscard]] Command AddImport(CLI::App& app);
+[[nodiscard]] Command AddImportDicom(CLI::App& app);
 [[nodiscard]] Command AddEvaluate(CLI::App& app);
 [[nodiscard]] Command AddRecord(CLI::App& app);
 [[nodiscard]] Command AddMarkers(CLI::App& app);
 [[nodiscard]] Command AddDoctor(CLI::App& app);
 [[nodiscard]] Command AddStatus(CLI::App& app);
 [[nodiscard]] Command AddPress(CLI::App& app);
+[[nodiscard]] Command AddPresence(CLI::App& app);
 [[nodiscard]] Command AddWatch(CLI::App& app);
 [[nodiscard]] Command AddSim(CLI::App& app);
 [[nodiscard]] Command AddUpdate(CLI::App& app);

@@ -1,17 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/cli/common_options.hpp"
 
 #include <set>
 #include <string>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/files/scene_folder.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "drivers/importers/import.hpp"
 #include "drivers/live/sensor_driver.hpp"
 #include "drivers/replay/tum_recording.hpp"
+#include "words/cli.hpp"
+#include "words/output.hpp"
 
 namespace plumb {
 
@@ -35,48 +39,55 @@ Config MethodOptions::Read() const {
   if (preset) config.reconstruct.preset = config.compare.preset = Named<Preset>(*preset).value();
   if (profile_file) config.reconstruct.profile = ReadSensorProfile(*profile_file);
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
+  if (config.markers_scene) {
+    Scene taught = ReadStoredScene(*config.markers_scene).scene;
+    if (taught.frame != SceneFrame::kReferenceMarker)
+      throw DataError(say::cli::MarkersSceneFrame(config.markers_scene->string()));
+    config.compare.room_markers = std::move(taught.markers);
+  }
   return config;
 }
 
 std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
-                                           const MarkerConfig& markers) {
+                                           const StatedMarkers& markers,
+                                           std::optional<double> rate_hz) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
-    throw DataError(
-        fmt::format("no recording at '{}': expected a folder in the TUM RGB-D layout (rgb.txt, "
-                    "depth.txt) or an .oni file, found nothing",
-                    path.string()));
+    throw DataError(say::cli::NoRecording(path.string()));
   }
   RecordingDefaults defaults;
-  if (markers.dictionary) defaults.marker_dictionary = *markers.dictionary;
-  if (markers.length_m) defaults.marker_length_m = *markers.length_m;
-  defaults.reference_marker = markers.reference;
+  defaults.room_markers = markers.Or(defaults.room_markers);
+  defaults.rate_hz = rate_hz;
+  if (IsImportable(path)) return OpenImported(path, defaults);
   if (std::filesystem::is_directory(path, error)) return OpenTumRecording(path, defaults);
   if (const RecordingKind* kind = BuiltInSensors().KindWithExtension(path.extension().string()))
     return kind->Open(path, defaults);
   // Whatever its name, its contents may be a recording.
   if (const RecordingKind* kind = BuiltInSensors().KindOf(path)) return kind->Open(path, defaults);
-  throw DataError(fmt::format(
-      "'{}' is neither a folder nor a file of a kind that this build reads; expected a "
-      "folder in the TUM RGB-D layout (rgb.txt, depth.txt), or an .oni file where Plumb "
-      "was built with OpenNI2",
-      path.string()));
+  RefuseUnreadFormat(path);
+  throw DataError(say::cli::NotARecording(path.string()));
 }
 
 void EnsureFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error)
-    throw IoError(fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()));
+  if (error) throw IoError(say::cli::CannotMakeFolder(folder.string(), error.message()));
 }
 
-void Show(Progress& progress, const std::string& prefix, const ScanProgress& scan) {
-  std::string detail;
-  if (scan.tracking != nullptr) {
-    detail = fmt::format("frame {}, {} tracked", scan.frames, scan.frames_tracked);
-    if (scan.frames_dropped > 0) detail += fmt::format(", {} dropped", scan.frames_dropped);
-  }
-  progress.Update(prefix + std::string(scan.step), scan.fraction, detail);
+void Show(Progress& progress, const std::string& name, const ScanProgress& scan) {
+  Message detail;
+  if (scan.tracking != nullptr)
+    detail = scan.frames_dropped > 0
+                 ? say::cli::FramesDropped(scan.frames, scan.frames_tracked, scan.frames_dropped)
+                 : say::cli::FramesTracked(scan.frames, scan.frames_tracked);
+  progress.Update(name.empty() ? scan.step : say::cli::StepOf(name, scan.step), scan.fraction,
+                  detail);
+}
+
+OutputKind RecordingOutput() {
+  return {say::output::Recording(),
+          "depth.txt",
+          {"rgb", "depth", "rgb.txt", "depth.txt", "camera.yaml", kFewerKeypointsFile}};
 }
 
 }  // namespace plumb

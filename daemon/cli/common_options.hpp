@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Options and helper functions that several commands share.
 #pragma once
 
@@ -9,6 +10,7 @@
 #include "algo/types/frame.hpp"
 #include "algo/types/scene.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/files/atomic_folder.hpp"
 
 namespace CLI {
 class App;
@@ -37,16 +39,21 @@ struct MethodOptions {
   [[nodiscard]] Config Read() const;
 };
 
-/// Opens a recording of any kind that this build reads.
+/// Opens a recording of any kind that this build reads, other programs' too.
+/// @param rate_hz  Of folders of images without time stamps; nothing: as their reader assumes.
 /// @throws DataError if it is not a recording.
 [[nodiscard]] std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
-                                                         const MarkerConfig& markers);
+                                                         const StatedMarkers& markers,
+                                                         std::optional<double> rate_hz = {});
 
 /// Creates a folder and its missing parents.
 /// @throws IoError
 void EnsureFolder(const std::filesystem::path& folder);
 
-/// Shows a scan's progress; `prefix` is printed before the step's name.
-void Show(Progress& progress, const std::string& prefix, const ScanProgress& scan);
+/// Shows a scan's progress; the name, if any, is printed before the step.
+void Show(Progress& progress, const std::string& name, const ScanProgress& scan);
+
+/// A recording, as TumWriter writes it.
+[[nodiscard]] OutputKind RecordingOutput();
 
 }  // namespace plumb

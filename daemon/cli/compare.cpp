@@ -1,7 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <memory>
 #include <vector>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
@@ -12,8 +12,10 @@
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/files/text_report.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "daemon/result/text_report.hpp"
+#include "words/cli.hpp"
+#include "words/progress.hpp"
 
 namespace plumb {
 namespace {
@@ -23,6 +25,7 @@ struct CompareArguments {
   std::optional<std::filesystem::path> region;
   std::vector<double> isocentre_m;
   MethodOptions method;
+  MethodOptions reference_method;  ///< Only its --config: the room of the reference.
   bool paper_colors = false;
   bool json = false;
 };
@@ -32,6 +35,13 @@ CompareOptions MethodOf(const CompareArguments& options) {
   if (options.region) compare.region_polygon_m = ReadRegion(*options.region);
   if (!options.isocentre_m.empty())
     compare.isocentre_m = Eigen::Vector3d(options.isocentre_m.data());
+  if (options.reference_method.config_file) {
+    CompareOptions room = options.reference_method.Read().compare;
+    compare.reference_room = {.T_iec_reference = room.T_iec_reference,
+                              .u95_m = room.iec_u95_m,
+                              .u95_rad = room.iec_u95_rad,
+                              .markers = std::move(room.room_markers)};
+  }
   compare.now_s = SteadySeconds;
   return compare;
 }
@@ -39,19 +49,19 @@ CompareOptions MethodOf(const CompareArguments& options) {
 int Run(const CompareArguments& options, const CommandContext& context) {
   const CompareOptions method = MethodOf(options);
   { const AtomicFolder check(options.out, ResultOutput()); }  // rejects a bad place before the work
-  Progress progress;
+  Progress progress(context.language);
   const auto stop_if_asked = [&] {
-    if (context.stop.stop_requested()) throw Interrupted("nothing was written");
+    if (context.stop.stop_requested()) throw Interrupted(say::cli::NothingWritten());
   };
-  progress.Update("reading scenes", 0.1);
+  progress.Update(say::cli::ReadingScenes(), 0.1);
   const Scene reference = ReadScene(options.reference);
   stop_if_asked();
   const Scene current = ReadScene(options.current);
   stop_if_asked();
-  progress.Update("comparing", 0.3);
+  progress.Update(say::progress::Comparing(), 0.3);
   Comparison comparison = Compare(reference, current, method);
   stop_if_asked();
-  progress.Update("drawing", 0.8);
+  progress.Update(say::cli::Drawing(), 0.8);
   const double start_s = SteadySeconds();
   const ResultPictures pictures =
       DrawResult(comparison, reference.height_map ? &*reference.height_map : nullptr,
@@ -60,12 +70,13 @@ int Run(const CompareArguments& options, const CommandContext& context) {
                   .subtitle = PictureSubtitle(comparison)});
   comparison.timings_s["pictures"] = SteadySeconds() - start_s;
   stop_if_asked();
-  progress.Update("writing", 0.9);
+  progress.Update(say::cli::Writing(), 0.9);
   WriteResult(comparison, pictures, options.out);
   progress.Clear();
-  PrintOut(options.json ? ResultJson(comparison)
-                        : ComparisonText(comparison, method) +
-                              fmt::format("\nWritten to {}\n", options.out.string()));
+  const StoredResult result = Stored(comparison);
+  PrintOut(options.json ? ResultText(result)
+                        : ComparisonText(result, context.language) + "\n" +
+                              context.Said(say::cli::WrittenTo(options.out.string())) + "\n");
   return comparison.verdict == Verdict::kNoAnswer ? kNoAnswer : kDone;
 }
 
@@ -81,6 +92,9 @@ Command AddCompare(CLI::App& app) {
       ->type_name("CURRENT_SCENE");
   app.add_option("--out", options->out, "Result folder to write")->required()->type_name("RESULT");
   options->method.AddTo(app);
+  app.add_option("--reference-config", options->reference_method.config_file,
+                 "The room of the reference, where that is another one: its [iec] as TOML")
+      ->type_name("FILE");
   app.add_option("--region", options->region,
                  "Region of interest, a JSON polygon in the reference marker's frame; default: the "
                  "segmented body")

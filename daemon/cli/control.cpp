@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb status|press|watch|sim`: talks to a running plumbd through its control socket.
 #include <poll.h>
 #include <sys/socket.h>
@@ -17,18 +18,23 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "algo/acceptance/acceptance.hpp"
+#include "algo/acceptance/gates.hpp"
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/message_json.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
 #include "daemon/cli/commands.hpp"
+#include "daemon/cli/language.hpp"
 #include "daemon/control/control_protocol.hpp"
-#include "daemon/control/unix_socket.hpp"
+#include "daemon/files/stored_result.hpp"
+#include "drivers/files/unix_socket.hpp"
+#include "words/cli.hpp"
+#include "words/control.hpp"
 
 namespace plumb {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxAnswer = 4 << 20;
 
@@ -40,7 +46,7 @@ class ControlConnection {
     const std::string line = ControlRequestText(request) + "\n";
     if (Send(line, request.file ? request.file->fd() : -1) != static_cast<ssize_t>(line.size())) {
       ::close(fd_);
-      throw DeviceError("plumbd hung up before it was asked");
+      throw DeviceError(say::control::HungUpBefore());
     }
   }
   ~ControlConnection() { ::close(fd_); }
@@ -56,14 +62,13 @@ class ControlConnection {
         received_.erase(0, end + 1);
         return line;
       }
-      if (received_.size() > kMaxAnswer)
-        throw DeviceError(fmt::format("the reply of plumbd exceeds {} bytes", kMaxAnswer));
+      if (received_.size() > kMaxAnswer) throw DeviceError(say::control::AnswerTooLong(kMaxAnswer));
       constexpr int kStep_ms = 100;
       pollfd ready{.fd = fd_, .events = POLLIN, .revents = 0};
       if (::poll(&ready, 1, kStep_ms) == 0) waited_ms += kStep_ms;
-      if (stop.stop_requested()) throw Interrupted("stopped waiting for plumbd");
+      if (stop.stop_requested()) throw Interrupted(say::control::StoppedWaiting());
       if (timeout_ms && waited_ms >= *timeout_ms)
-        throw DeviceError(fmt::format("plumbd did not answer within {} s", *timeout_ms / 1000));
+        throw DeviceError(say::control::NoAnswerInTime(*timeout_ms / 1000.0));
       if (ready.revents == 0) continue;
       char buffer[4096];
       const ssize_t count = ::recv(fd_, buffer, sizeof(buffer), 0);
@@ -103,72 +108,97 @@ Json Ask(const std::filesystem::path& socket, const ControlRequest& request,
 }
 
 /// One of the six numbers: "+1.2 ± 0.3 mm  up", with no digit below the uncertainty.
-std::string NumberText(const Json& correction, const std::string& name, const char* unit) {
-  const std::string key = name + "_" + unit;
-  const Json value = correction.value(key, Json());
-  if (!value.is_number()) return "not known";
-  const Json u95 = correction.value("uncertainty", Json::object()).value(key, Json());
-  const double half = u95.is_number() ? u95.get<double>() : 0.0;
-  const int most = std::string_view(unit) == "mm" ? 1 : 2;
-  const int digits = DecimalsFor(half, most);
-  const std::string words =
-      std::abs(value.get<double>()) > half
-          ? correction.value("words", Json::object()).value(name, std::string())
-          : "less than its uncertainty";
-  return fmt::format("{:>+8.{}f} \u00b1 {:.{}f} {:<4} {}", value.get<double>(), digits, half, most,
-                     unit, words);
+std::string NumberText(const StoredCorrection& correction, std::size_t i,
+                       const CommandContext& context) {
+  const std::optional<double>&value = correction.value.at(i), &u95 = correction.u95.at(i);
+  if (!value) return context.Said(say::cli::NumberNotKnown());
+  const int most = IsShift(i) ? 1 : 2;
+  std::string number =
+      fmt::format("{:>+8.{}f} \u00b1 {}", *value, DecimalsFor(u95.value_or(0.0), most),
+                  u95 ? fmt::format("{:.{}f}", *u95, most) : "?");
+  std::replace(number.begin(), number.end(), '.', context.language.decimal);
+  const bool is_still = u95 && !(std::abs(*value) > *u95);
+  return fmt::format(
+      "{} {:<4} {}", number, UnitOf(i),
+      context.Said(is_still ? say::cli::BelowUncertainty() : correction.words.at(i)));
 }
 
-std::string StatusText(const Json& status) {
-  const Json sensor = status.value("sensor", Json::object());
-  const Json scan = status.value("scan", Json::object());
-  std::string text =
-      fmt::format("state    {}{}\n", status.value("state", "?"),
-                  status.value("reason", "").empty() ? "" : ": " + status.value("reason", ""));
-  text += sensor.value("present", false)
-              ? fmt::format("sensor   {} ({}), {:.1f} pairs/s\n", sensor.value("serial", ""),
-                            sensor.value("name", ""), sensor.value("fps", 0.0))
-              : std::string("sensor   none\n");
+/// "state    ready: why", with the label in the language of the reader.
+class StatusLines {
+ public:
+  explicit StatusLines(const CommandContext& context) : context_(context) {}
+
+  void Add(const Message& label, const std::string& value) {
+    text_ += LeftAligned(context_.Said(label), kLabel) + " " + value + "\n";
+  }
+  void Add(const Message& label, const Message& value) { Add(label, context_.Said(value)); }
+  void More(const std::string& value) { Add(Message(), value); }
+  void More(const Message& value) { Add(Message(), value); }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  static constexpr std::size_t kLabel = 8;
+
+  const CommandContext& context_;
+  std::string text_;
+};
+
+void AddSensor(StatusLines& lines, const Json& sensor) {
+  if (sensor.value("present", false)) {
+    lines.Add(say::cli::Sensor(),
+              say::cli::SensorAtWork(sensor.value("serial", ""), sensor.value("name", ""),
+                                     sensor.value("fps", 0.0)));
+  } else {
+    lines.Add(say::cli::Sensor(), say::cli::None());
+  }
   for (const Json& other : sensor.value("others", Json::array()))
-    text += fmt::format("         {} is attached too, and not used\n",
-                        other.is_string() ? other.get<std::string>() : "");
-  for (const Json& warning : sensor.value("warnings", Json::array()))
-    text += fmt::format("         {}\n", warning.is_string() ? warning.get<std::string>() : "");
-  const Json page = status.value("page", Json::object());
-  text += fmt::format("page     {}\n", page.value("url", ""));
-  if (const std::string certificate = page.value("certificate", ""); !certificate.empty())
-    text += fmt::format("         certificate, SHA-256: {}\n", certificate);
-  for (const Json& warning : page.value("warnings", Json::array()))
-    text += fmt::format("         {}\n", warning.is_string() ? warning.get<std::string>() : "");
-  if (const auto lost =
-          sensor.value("lost", 0) + sensor.value("unpaired", 0) + sensor.value("discarded", 0);
-      lost > 0) {
-    text += fmt::format("         images: {} lost, {} unpaired, {} discarded\n",
-                        sensor.value("lost", 0), sensor.value("unpaired", 0),
-                        sensor.value("discarded", 0));
-  }
-  if (scan.value("active", false)) {
-    text += fmt::format("scan     {} {}: {} frames, {} tracked, {} dropped; {}\n",
-                        scan.value("id", ""), scan.value("step", ""), scan.value("frames", 0),
-                        scan.value("frames_tracked", 0), scan.value("frames_dropped", 0),
-                        scan.value("guidance", ""));
-  }
-  if (const Json last = status.value("last_result", Json()); last.is_object()) {
-    const Json verdict = last.value("verdict", Json());
-    text += fmt::format("result   scan {}: {}\n", last.value("scan", ""),
-                        verdict.is_string() ? verdict.get<std::string>() : "reference taken");
-    if (const Json correction = last.value("correction", Json()); correction.is_object()) {
-      for (std::size_t i = 0; i < kNumberNames.size(); ++i) {
-        text += fmt::format("         {:<13}{}\n", kNumberNames[i],
-                            NumberText(correction, kNumberNames[i], UnitOf(i)));
-      }
+    lines.More(say::cli::OtherSensor(other.is_string() ? other.get<std::string>() : ""));
+  for (const Message& warning : AllSaidIn(sensor, "warning")) lines.More(warning);
+}
+
+void AddLastResult(StatusLines& lines, const Json& last, const CommandContext& context) {
+  const Json verdict = last.value("verdict", Json());
+  lines.Add(say::cli::ScanResult(),
+            verdict.is_string()
+                ? say::cli::ResultOfScan(last.value("scan", ""), verdict.get<std::string>())
+                : say::cli::ReferenceOfScan(last.value("scan", "")));
+  if (const Json sent = last.value("correction", Json()); sent.is_object()) {
+    const StoredCorrection correction = ParseCorrection(sent);
+    for (std::size_t i = 0; i < kNumberNames.size(); ++i) {
+      const std::string name(kNumberNames[i]);
+      const Message shown = MessageFromJson({{"id", "number." + name}}, name);
+      lines.More(LeftAligned(context.Said(shown), 13) + NumberText(correction, i, context));
     }
-    for (const Json& reason : last.value("reasons", Json::array()))
-      text += fmt::format("         {}\n", reason.is_string() ? reason.get<std::string>() : "");
   }
-  for (const Json& warning : status.value("warnings", Json::array()))
-    text += fmt::format("warning  {}\n", warning.is_string() ? warning.get<std::string>() : "");
-  return text + fmt::format("version  {}\n", status.value("version", ""));
+  for (const Message& reason : AllSaidIn(last, "reason")) lines.More(reason);
+}
+
+std::string StatusText(const Json& status, const CommandContext& context) {
+  StatusLines lines(context);
+  const std::string state = status.value("state", "?");
+  const Message reason = SaidIn(status, "reason");
+  lines.Add(say::cli::State(), reason.empty() ? state : state + ": " + context.Said(reason));
+  const Json sensor = status.value("sensor", Json::object());
+  AddSensor(lines, sensor);
+  const Json page = status.value("page", Json::object());
+  lines.Add(say::cli::Page(), page.value("url", ""));
+  if (const std::string certificate = page.value("certificate", ""); !certificate.empty())
+    lines.More(say::cli::Certificate(certificate));
+  for (const Message& warning : AllSaidIn(page, "warning")) lines.More(warning);
+  const int lost = sensor.value("lost", 0), unpaired = sensor.value("unpaired", 0),
+            discarded = sensor.value("discarded", 0);
+  if (lost + unpaired + discarded > 0) lines.More(say::cli::ImagesLost(lost, unpaired, discarded));
+  if (const Json scan = status.value("scan", Json::object()); scan.value("active", false))
+    lines.Add(say::cli::Scan(),
+              say::cli::ScanRunning(scan.value("id", ""), SaidIn(scan, "step"),
+                                    scan.value("frames", 0), scan.value("frames_tracked", 0),
+                                    scan.value("frames_dropped", 0), scan.value("guidance", "")));
+  if (const Json last = status.value("last_result", Json()); last.is_object())
+    AddLastResult(lines, last, context);
+  for (const Message& warning : AllSaidIn(status, "warning"))
+    lines.Add(say::cli::Warning(), warning);
+  lines.Add(say::cli::Version(), status.value("version", ""));
+  return lines.text();
 }
 
 /// Presses are ignored in some states. That is not an error, but it is reported.
@@ -177,16 +207,15 @@ int Press(bool is_long, const CommandContext& context) {
       Ask(context.control,
           {.kind = ControlRequest::Kind::kPress, .is_long = is_long, .action = {}, .argument = {}},
           context);
-  PrintOut(answer.value("ok", false)
-               ? std::string("pressed\n")
-               : fmt::format("ignored: {}\n", answer.value("error", "no reason given")));
+  PrintOut(context.Said(answer.value("ok", false) ? say::cli::Pressed()
+                                                  : say::cli::PressIgnored(WhyRefused(answer))) +
+           "\n");
   return kDone;
 }
 
 int Simulate(const ControlRequest& request, const CommandContext& context) {
   const Json answer = Ask(context.control, request, context);
-  if (!answer.value("ok", false))
-    throw DeviceError(answer.value("error", "refused without a reason"));
+  if (!answer.value("ok", false)) throw DeviceError(WhyRefused(answer));
   return kDone;
 }
 
@@ -213,7 +242,7 @@ int Status(const StatusOptions& options, const CommandContext& context) {
     PrintOut(ValueAt(status, options.get) + "\n");
   } else {
     PrintOut(options.json ? status.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
-                          : StatusText(status));
+                          : StatusText(status, context));
   }
   return kDone;
 }
@@ -224,20 +253,37 @@ int Watch(const CommandContext& context) {
       {.kind = ControlRequest::Kind::kWatch, .is_long = false, .action = {}, .argument = {}});
   while (const std::optional<std::string> line = connection.ReadLine(context.stop, std::nullopt))
     PrintOut(*line + "\n");
-  throw DeviceError("plumbd hung up");
+  throw DeviceError(say::control::HungUp());
 }
 
 }  // namespace
 
-nlohmann::json AskPlumbd(const std::filesystem::path& socket, const ControlRequest& request,
-                         const std::stop_token& stop, std::optional<int> timeout_ms) {
+Json AskPlumbd(const std::filesystem::path& socket, const ControlRequest& request,
+               const std::stop_token& stop, std::optional<int> timeout_ms) {
   ControlConnection connection(socket, request);
   const std::optional<std::string> line = connection.ReadLine(stop, timeout_ms);
-  if (!line) throw DeviceError("plumbd hung up without an answer");
+  if (!line) throw DeviceError(say::control::HungUpUnanswered());
   Json answer = Json::parse(*line, nullptr, /*allow_exceptions=*/false);
-  if (!answer.is_object())
-    throw DeviceError("plumbd's answer is no JSON object; are both of one version?");
+  if (!answer.is_object()) throw DeviceError(say::control::AnswerNoObject());
   return answer;
+}
+
+Message SaidIn(const Json& answer, const std::string& key) {
+  const Json english = answer.value(key, Json());
+  return MessageFromJson(answer.value(key + "_message", Json()),
+                         english.is_string() ? english.get<std::string>() : std::string());
+}
+
+std::vector<Message> AllSaidIn(const Json& answer, const std::string& key) {
+  std::vector<std::string> english;
+  for (const Json& one : answer.value(key + "s", Json::array()))
+    english.push_back(one.is_string() ? one.get<std::string>() : std::string());
+  return MessagesFromJson(answer.value(key + "_messages", Json()), english);
+}
+
+Message WhyRefused(const Json& answer) {
+  Message why = SaidIn(answer, "error");
+  return why.empty() ? say::control::NoReason() : why;
 }
 
 Command AddStatus(CLI::App& app) {
@@ -255,6 +301,18 @@ Command AddPress(CLI::App& app) {
   return [is_long](const CommandContext& context) { return Press(*is_long, context); };
 }
 
+Command AddPresence(CLI::App&) {
+  return [](const CommandContext& context) {
+    const Json answer = Ask(
+        context.control,
+        {.kind = ControlRequest::Kind::kPresence, .is_long = false, .action = {}, .argument = {}},
+        context);
+    if (!answer.value("ok", false)) throw DeviceError(WhyRefused(answer));
+    PrintOut(answer.value("code", "") + "\n");
+    return kDone;
+  };
+}
+
 Command AddWatch(CLI::App&) { return Watch; }
 
 Command AddSim(CLI::App& app) {
@@ -265,8 +323,8 @@ Command AddSim(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("action", options->action, "Command to the virtual sensor")
       ->required()
-      ->check(CLI::IsMember(
-          {"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch", "speed"}));
+      ->check(CLI::IsMember({"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch",
+                             "speed", "mount", "move"}));
   app.add_option("argument", options->words,
                  "A unit's serial; with glitch: late, double, old, size or lone, and for how many "
                  "pairs of images; with speed: times real time")

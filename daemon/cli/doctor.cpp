@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb doctor`: checks what is attached, permitted and configured, and gives advice for what is
 // not; on request a burn-in. It does not change stored data. Its exit code shows whether something
 // necessary is missing.
@@ -20,10 +21,11 @@
 #include "daemon/cli/doctor_report.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/config/sensor_settings.hpp"
-#include "daemon/control/unix_socket.hpp"
+#include "drivers/files/unix_socket.hpp"
 #include "drivers/gpio/gpio.hpp"
 #include "drivers/live/sensor_calibration.hpp"
 #include "drivers/live/sensor_driver.hpp"
+#include "words/doctor.hpp"
 
 namespace plumb {
 namespace {
@@ -34,17 +36,17 @@ Config CheckConfig(DoctorReport& report, const std::optional<fs::path>& wanted) 
   const fs::path file = wanted.value_or(kDefaultConfig);
   std::error_code error;
   if (!wanted && !fs::exists(file, error)) {
-    report.Note("configuration", fmt::format("no {}: using defaults", file.string()),
-                "write one where the defaults do not fit");
+    report.Note(say::doctor::Configuration(), say::doctor::NoConfiguration(file.string()),
+                say::doctor::WriteConfiguration());
     return {};
   }
   try {
     Config config = ReadConfig(file, ConfigUse::kAppliance);
-    report.Good("configuration", file.string());
+    report.Good(say::doctor::Configuration(), say::doctor::File(file.string()));
     return config;
   } catch (const DataError& problem) {
-    report.Bad("configuration", problem.what(),
-               "correct it; `plumbd --check-config` confirms when it is right", kBadInput);
+    report.Bad(say::doctor::Configuration(), problem.message(), say::doctor::CorrectConfiguration(),
+               kBadInput);
     return {};
   }
 }
@@ -55,16 +57,16 @@ void CheckCalibration(DoctorReport& report, const SensorSettings& settings,
   const fs::path file = CalibrationFile(settings.calibration_folder, serial);
   std::error_code error;
   if (!fs::exists(file, error)) {
-    report.Note("calibration", fmt::format("none for {}: nominal intrinsics are used", serial),
-                fmt::format("calibrate the unit and put its camera.yaml at {}", file.string()));
+    report.Note(say::doctor::Calibration(), say::doctor::NotCalibrated(serial),
+                say::doctor::CalibrateUnit(file.string()));
     return;
   }
   try {
     const StreamInfo info = LiveStreamInfo(settings, serial, 640, 480, 0.0);
-    report.Good("calibration",
-                fmt::format("{}, focal length {:.1f} pixels", file.string(), info.intrinsics.fx));
+    report.Good(say::doctor::Calibration(),
+                say::doctor::Calibrated(file.string(), info.intrinsics.fx));
   } catch (const DeviceError& problem) {
-    report.Bad("calibration", problem.what(), "");
+    report.Bad(say::doctor::Calibration(), problem.message(), {});
   }
 }
 
@@ -73,19 +75,18 @@ void CheckAttached(DoctorReport& report, const SensorDriver& driver, const Senso
   const auto setup = driver.set_up(settings, {}, {}, {});
   const auto provider = setup->MakeProvider();
   const std::vector<SensorDescription> sensors = provider->List();
-  report.Good(driver.title,
-              fmt::format("loaded, {} sensor{}", sensors.size(), sensors.size() == 1 ? "" : "s"));
+  report.Good(Message::Verbatim(driver.title),
+              say::doctor::Loaded(static_cast<std::int64_t>(sensors.size())));
   if (sensors.empty())
-    report.Bad("sensor", "none is attached", "plug one in; look at USB above if it is");
+    report.Bad(say::doctor::Sensor(), say::doctor::NoSensor(), say::doctor::PlugIn());
   bool found_wanted = wanted.empty();
   for (const SensorDescription& sensor : sensors) {
     found_wanted = found_wanted || sensor.serial == wanted;
-    report.Good("sensor", fmt::format("{}, serial {}", sensor.name, sensor.serial));
+    report.Good(say::doctor::Sensor(), say::doctor::Attached(sensor.name, sensor.serial));
     CheckCalibration(report, settings, sensor.serial);
   }
   if (!found_wanted && !sensors.empty())
-    report.Bad("sensor", fmt::format("the configuration wants serial {}", wanted),
-               "plug that one in, or change sensor_serial");
+    report.Bad(say::doctor::Sensor(), say::doctor::OtherSerial(wanted), say::doctor::PlugInThat());
 }
 
 void CheckSensor(DoctorReport& report, const Config& config) try {
@@ -104,57 +105,52 @@ void CheckSensor(DoctorReport& report, const Config& config) try {
   try {
     CheckAttached(report, driver, settings, config.appliance.sensor_serial);
   } catch (const DeviceError& error) {
-    report.Bad(driver.title, error.what(), "");
+    report.Bad(Message::Verbatim(driver.title), error.message(), {});
   }
 } catch (const DataError& problem) {
-  report.Bad("configuration", problem.what(), "", kBadInput);
+  report.Bad(say::doctor::Configuration(), problem.message(), {}, kBadInput);
 }
 
 void CheckGpio(DoctorReport& report) try {
   const std::vector<GpioChipDescription> chips = ListGpioChips();
   if (chips.empty())
-    report.Note("GPIO", "no chip: no hardware button and light",
-                "use the page's button, `plumb press` or a board with GPIO");
+    report.Note(say::doctor::Gpio(), say::doctor::NoChip(), say::doctor::UsePageOrBoard());
   for (const GpioChipDescription& chip : chips) {
     if (chip.problem.empty())
-      report.Good("GPIO", fmt::format("{} \"{}\", named lines: {}", chip.name, chip.label,
-                                      fmt::join(chip.lines, " ")));
+      report.Good(
+          say::doctor::Gpio(),
+          say::doctor::Chip(chip.name, chip.label, fmt::format("{}", fmt::join(chip.lines, " "))));
     else
-      report.Note("GPIO", fmt::format("{} cannot be opened", chip.name), chip.problem);
+      report.Note(say::doctor::Gpio(), say::doctor::ChipClosed(chip.name), chip.problem);
   }
 } catch (const DeviceError& error) {
-  report.Note("GPIO", error.what(), "use the page's button or `plumb press`");
+  report.Note(say::doctor::Gpio(), error.message(), say::doctor::UsePage());
 }
 
-void CheckFolder(DoctorReport& report, const char* what, const fs::path& folder) {
+void CheckFolder(DoctorReport& report, const Message& what, const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    report.Note(what, fmt::format("{} does not exist", folder.string()),
-                "the installation makes it (systemd-tmpfiles --create)");
+    report.Note(what, say::doctor::NoFolder(folder.string()), say::doctor::InstallMakesIt());
     return;
   }
   const bool writable = ::access(folder.c_str(), W_OK) == 0;
   const auto free_gb = static_cast<double>(fs::space(folder, error).available) / 1e9;
   if (!writable) {
-    report.Note(what, fmt::format("{} is not writable for this user", folder.string()),
-                "the service's own user writes there; for tests give another");
+    report.Note(what, say::doctor::NotWritable(folder.string()), say::doctor::ServiceWrites());
   } else if (free_gb < 2.0) {
-    report.Bad(what, fmt::format("{}: {:.1f} GB free", folder.string(), free_gb),
-               "free space: a scan needs up to 1 GB while it runs", kInternalError);
+    report.Bad(what, say::doctor::LittleSpace(folder.string(), free_gb), say::doctor::FreeSpace(),
+               kInternalError);
   } else {
-    report.Good(what, fmt::format("{}: {:.0f} GB free", folder.string(), free_gb));
+    report.Good(what, say::doctor::Space(folder.string(), free_gb));
   }
 }
 
 void CheckDaemon(DoctorReport& report, const fs::path& control) {
   try {
     ::close(ConnectUnix(control));
-    report.Good("plumbd",
-                fmt::format("answers at {}; while it runs no other program can use the sensor",
-                            control.string()));
+    report.Good(say::doctor::Plumbd(), say::doctor::PlumbdAnswers(control.string()));
   } catch (const std::exception& error) {
-    report.Note("plumbd", error.what(),
-                "start it with systemctl start plumbd, or name its socket with --control");
+    report.Note(say::doctor::Plumbd(), MessageOf(error), say::doctor::StartPlumbd());
   }
 }
 
@@ -185,18 +181,18 @@ Command AddDoctor(CLI::App& app) {
     const Config config = CheckConfig(report, options->config);
     CheckSensor(report, config);
     CheckGpio(report);
-    CheckFolder(report, "state", config.appliance.state);
+    CheckFolder(report, say::doctor::State(), config.appliance.state);
     CheckDaemon(report, context.control);
     if (options->burn_in_min > 0.0) {
       BurnIn({.minutes = options->burn_in_min,
               .folder = options->burn_in_folder.value_or(config.appliance.state),
               .control = context.control},
-             context.stop, report);
+             context, report);
     }
     PrintOut(options->json ? report.Json().dump(2, ' ', false,
                                                 nlohmann::ordered_json::error_handler_t::replace) +
                                  "\n"
-                           : report.Text());
+                           : report.Text(context.language));
     return report.exit_code();
   };
 }

@@ -1,17 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <map>
 #include <memory>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "algo/planning/planned_scene.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/cli/watch_recording.hpp"
 #include "daemon/evaluation/evaluation.hpp"
+#include "daemon/evaluation/live_accuracy.hpp"
 #include "daemon/evaluation/report.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/files/text_report.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "daemon/result/text_report.hpp"
+#include "drivers/dicom/planning_files.hpp"
 #include "drivers/files/file_io.hpp"
 
 namespace plumb {
@@ -29,22 +35,72 @@ struct EvaluateArguments {
 Scene Reconstruct(const Suite& suite, const std::string& name, const Config& config,
                   const std::filesystem::path& folder, const CommandContext& context,
                   Progress& progress) {
+  const std::filesystem::path structures = suite.recordings.at(name) / "structures.dcm";
+  if (std::filesystem::exists(structures)) {
+    Scene planned = MakePlannedScene(ReadStructureSet(structures),
+                                     ReadTreatmentPlan(suite.recordings.at(name) / "plan.dcm"));
+    WriteScene(planned, folder);
+    return planned;
+  }
   const std::unique_ptr<FrameSource> recording =
       OpenRecording(suite.recordings.at(name), config.markers);
   Scene scene = RunScan(*recording, {.reconstructor = config.reconstruct}, context.stop,
-                        [&](const ScanProgress& scan) { Show(progress, name + ": ", scan); });
+                        [&](const ScanProgress& scan) { Show(progress, name, scan); });
   WriteScene(scene, folder);
   return scene;
 }
 
+// Of a suite's recordings of a sensor at rest.
+LiveEvaluation EvaluateLive(const Suite& suite, const EvaluateOptions& evaluate,
+                            const Config& config, const std::filesystem::path& out,
+                            const CommandContext& context, Progress& progress) {
+  LiveEvaluation live;
+  std::map<std::string, Scene> scenes;
+  const auto scene = [&](const std::string& name) -> const Scene& {
+    const std::filesystem::path folder = out / "scenes" / name;  // Made for the pairs already.
+    if (!scenes.contains(name))
+      scenes[name] = IsSceneFolder(folder) ? ReadScene(folder) : evaluate.get_scene(name);
+    return scenes[name];
+  };
+  const auto evaluate_one = [&](const std::string& name, const std::vector<std::string>& of) {
+    LiveTruth truth = ReadLiveTruth(suite.truths.at(of.front()));
+    for (std::size_t i = 1; i < of.size(); ++i)
+      truth = TruthTogether(truth, ReadLiveTruth(suite.truths.at(of[i])));
+    const Scene &reference = scene(truth.reference), &current = scene(truth.scene);
+    std::vector<Message> warnings;
+    MonitorOptions monitoring = MonitorOptionsOf(evaluate.compare, &reference, current, warnings);
+    // The body is moved about its place at the zero: the tolerances are judged since then.
+    monitoring.judges_reference = false;
+    Recordings recordings;
+    for (const std::string& one : of)
+      recordings.push_back(OpenRecording(suite.recordings.at(one), config.markers));
+    const MonitoringRecord record =
+        WatchRecordings(recordings, current, monitoring, name, progress, context);
+    EnsureFolder(out / "monitoring");
+    WriteMonitoring(record, out / "monitoring" / name);
+    live[name] = FiguresOf(record.lines, truth, record.centroid_m, record.reference_centroid_m,
+                           ReadSceneTruth(suite.truths.at(truth.reference)).T_world_body,
+                           config.compare.limits);
+    live[name].cpu_s = record.cpu_s;
+  };
+  for (const std::string& name : suite.live) evaluate_one(name, {name});
+  for (const auto& [name, recordings] : suite.live_together) evaluate_one(name, recordings);
+  return live;
+}
+
 int Run(const EvaluateArguments& options, const CommandContext& context) {
-  const Config config = options.method.Read();
+  MethodOptions method = options.method;
+  // A suite with planning CTs brings its room.
+  if (const auto room = options.suite / "room.toml";
+      !method.config_file && std::filesystem::exists(room))
+    method.config_file = room;
+  const Config config = method.Read();
   const Suite suite = OpenSuite(options.suite);
   const Preset preset = config.reconstruct.preset;
   const std::filesystem::path out =
       options.out.value_or(options.suite / fmt::format("results-{}", Name(preset)));
   EnsureFolder(out);
-  Progress progress;
+  Progress progress(context.language);
   EvaluateOptions evaluate{.compare = config.compare};
   evaluate.compare.preset = preset;
   evaluate.compare.now_s = SteadySeconds;
@@ -65,11 +121,19 @@ int Run(const EvaluateArguments& options, const CommandContext& context) {
                   out / "results" / (reference + "_" + current));
     };
   }
-  const Evaluation evaluation = EvaluateSuite(
-      suite, evaluate, context.stop,
-      [&](const std::string& step, double fraction) { progress.Update(step, fraction); });
+  const Evaluation evaluation =
+      EvaluateSuite(suite, evaluate, context.stop,
+                    [&](const Message& step, double fraction) { progress.Update(step, fraction); });
+  const LiveEvaluation live = EvaluateLive(suite, evaluate, config, out, context, progress);
   progress.Clear();
-  const std::string json = EvaluationJson(evaluation), table = EvaluationTable(evaluation);
+  const std::string json = EvaluationJson(evaluation);
+  std::string table = EvaluationTable(evaluation);
+  if (!live.empty()) {
+    table += "\n" + LiveTable(live);
+    WriteFileAtomically(out / "live.json", [&](const std::filesystem::path& file) {
+      WriteWholeFile(file, LiveJson(live));
+    });
+  }
   WriteFileAtomically(out / "evaluation.json",
                       [&](const std::filesystem::path& file) { WriteWholeFile(file, json); });
   WriteFileAtomically(out / "evaluation.txt",

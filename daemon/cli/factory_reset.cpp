@@ -1,16 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb factory-reset`: for an engineer with a shell on a unit on whose page nobody can log in any
 // more.
-#include "daemon/records/factory_reset.hpp"
+#include "daemon/archive/factory_reset.hpp"
 
 #include <filesystem>
 #include <memory>
-#include <stdexcept>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 namespace {
@@ -22,22 +22,16 @@ struct FactoryResetArguments {
   bool keep_records = false, wipe = false, yes = false;
 };
 
-int Reset(const FactoryResetArguments& options) {
-  if (options.keep_records == options.wipe)
-    throw std::invalid_argument("give one of --keep-records and --wipe");
+int Reset(const FactoryResetArguments& options, const CommandContext& context) {
+  if (options.keep_records == options.wipe) throw InvalidRequest(say::cli::KeepOrWipe());
   if (!fs::is_directory(options.state))
-    throw DataError(fmt::format("{} is not a folder: name the state folder of plumbd with --state",
-                                options.state.string()));
-  const char* what = options.wipe
-                         ? "every patient, reference, scan, account and setting, and the log"
-                         : "all accounts, paired displays, settings and keys of the page";
-  if (!options.yes)
-    throw std::invalid_argument(
-        fmt::format("this removes {} in {}: confirm with --yes", what, options.state.string()));
+    throw DataError(say::cli::NoStateFolder(options.state.string()));
+  const Message what = options.wipe ? say::cli::Wiped() : say::cli::AccountsRemoved();
+  if (!options.yes) throw InvalidRequest(say::cli::ConfirmReset(what, options.state.string()));
   RequestFactoryReset(options.state,
                       options.wipe ? FactoryReset::kWipe : FactoryReset::kKeepRecords,
                       {.user = "command line", .address = {}});
-  PrintOut(fmt::format("the next start of plumbd removes {}: systemctl restart plumbd\n", what));
+  PrintOut(context.Said(say::cli::ResetNext(what)) + "\n");
   return kDone;
 }
 
@@ -53,7 +47,7 @@ Command AddFactoryReset(CLI::App& app) {
       ->type_name("DIR")
       ->capture_default_str();
   app.add_flag("--yes", options->yes, "Confirm the reset");
-  return [options](const CommandContext&) { return Reset(*options); };
+  return [options](const CommandContext& context) { return Reset(*options, context); };
 }
 
 }  // namespace plumb

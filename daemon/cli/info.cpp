@@ -1,19 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <memory>
+#include <set>
+
+#include <Eigen/Geometry>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/message_json.hpp"
+#include "algo/base/units.hpp"
+#include "daemon/cli/ask_plumbd.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/files/scene_json.hpp"
+#include "daemon/files/stored_scene.hpp"
+#include "drivers/dicom/planning_files.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/importers/import.hpp"
 #include "drivers/live/sensor_driver.hpp"
 #include "drivers/replay/tum_index.hpp"
 #include "drivers/replay/tum_recording.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 namespace {
@@ -29,7 +39,8 @@ struct InfoArguments {
 };
 
 /// Stamps of the depth images in seconds, without decoding any image.
-std::vector<double> DepthStamps(const fs::path& recording) {
+std::vector<double> DepthStamps(const fs::path& recording, const ImportedRecording* imported) {
+  if (imported != nullptr) return imported->facts().depth_s;
   if (const RecordingKind* kind = BuiltInSensors().KindOf(recording))
     return kind->DepthStamps(recording);
   std::vector<double> stamps_s;
@@ -40,13 +51,46 @@ std::vector<double> DepthStamps(const fs::path& recording) {
 }
 
 bool IsRecording(const fs::path& path) {
-  return BuiltInSensors().KindOf(path) != nullptr || IsTumRecording(path);
+  return BuiltInSensors().KindOf(path) != nullptr || IsTumRecording(path) || IsImportable(path);
+}
+
+/// What was recognised of a recording of another program; null where it states nothing.
+void AddImportedFacts(const ImportedFacts& imported, ordered_json& facts) {
+  const auto stated = [](const std::string& text) {
+    return text.empty() ? ordered_json() : ordered_json(text);
+  };
+  facts["format"] = imported.format;
+  facts["calibration"] = imported.calibration;
+  facts["sensor"] = {{"name", stated(imported.name)},
+                     {"serial", stated(imported.serial)},
+                     {"firmware", stated(imported.firmware)}};
+  facts["color_images"] = imported.color_images;
+  facts["depth_images"] = imported.depth_s.size();
+  const CameraFile& camera = imported.camera;
+  ordered_json& depth = facts["depth"];
+  depth = {{"registered", !camera.depth_camera && !camera.depth_camera_unknown},
+           {"unit_mm", nullptr},
+           {"stereo_baseline_mm", nullptr}};
+  if (camera.depth_scale) depth["unit_mm"] = 1e3 / *camera.depth_scale;
+  if (imported.stereo_baseline_m) depth["stereo_baseline_mm"] = 1e3 * *imported.stereo_baseline_m;
+  if (!camera.depth_camera) return;
+  const Intrinsics& own = camera.depth_camera->intrinsics;
+  const Eigen::Vector3d t_m = camera.depth_camera->T_color_depth.translation();
+  depth["image_width"] = own.width;
+  depth["image_height"] = own.height;
+  depth["focal_px"] = {own.fx, own.fy};
+  depth["centre_px"] = {own.cx, own.cy};
+  depth["distortion"] = LensCoefficients(own);
+  depth["colour_from_depth_mm"] = {1e3 * t_m.x(), 1e3 * t_m.y(), 1e3 * t_m.z()};
+  depth["colour_from_depth_deg"] =
+      Eigen::AngleAxisd(camera.depth_camera->T_color_depth.linear()).angle() / kDegree;
 }
 
 ordered_json RecordingFacts(const fs::path& path) {
   const std::unique_ptr<FrameSource> recording = OpenRecording(path, {});
+  const auto* imported = dynamic_cast<const ImportedRecording*>(recording.get());
   const StreamInfo& info = recording->info();
-  const std::vector<double> depth_s = DepthStamps(path);
+  const std::vector<double> depth_s = DepthStamps(path, imported);
   const double duration_s = depth_s.size() > 1 ? depth_s.back() - depth_s.front() : 0.0;
   const Intrinsics& camera = info.intrinsics;
   ordered_json facts = {
@@ -58,29 +102,76 @@ ordered_json RecordingFacts(const fs::path& path) {
       {"image_height", camera.height},
       {"focal_px", {camera.fx, camera.fy}},
       {"centre_px", {camera.cx, camera.cy}},
-      {"distortion", camera.distortion},
-      {"calibration", info.intrinsics_assumed  ? "assumed"
-                      : fs::is_directory(path) ? "from camera.yaml"
-                                               : "from the file beside it"},
+      {"distortion", LensCoefficients(camera)},
+      {"calibration", info.intrinsics_assumed            ? "assumed"
+                      : fs::exists(path / "camera.yaml") ? "from camera.yaml"
+                      : fs::is_directory(path)           ? "from another program's file"
+                                                         : "from the file beside it"},
+      {"depth_sensor", Name(info.depth_sensor)},
+      {"depth_range_m", {info.usable_depth.nearest_m, info.usable_depth.farthest_m}},
       {"depth_noise",
        {{"constant_m", info.depth_noise.constant_m},
         {"linear_m_per_m", info.depth_noise.linear_m_per_m},
         {"quadratic_m_per_m2", info.depth_noise.quadratic_m_per_m2},
         {"origin_m", info.depth_noise.origin_m},
         {"grazing_m", info.depth_noise.grazing_m}}},
-      {"marker_dictionary", info.marker_dictionary},
-      {"marker_length_m", info.marker_length_m},
+      {"marker_dictionary", info.room_markers.dictionary},
+      {"marker_length_m", info.room_markers.length_m},
       {"reference_marker", nullptr},
-      {"warnings", info.warnings}};
-  if (info.reference_marker) facts["reference_marker"] = *info.reference_marker;
+      {"warnings", EnglishTexts(info.warnings)},
+      {"warning_messages", MessagesJson(info.warnings)}};
+  if (imported != nullptr) AddImportedFacts(imported->facts(), facts);
+  if (info.room_markers.reference) facts["reference_marker"] = *info.room_markers.reference;
   return facts;
 }
 
-/// One line per fact; nested values as short JSON.
-std::string Lines(const ordered_json& facts) {
+/// Of a DICOM file; no name and no identifier of the patient.
+ordered_json DicomFacts(const fs::path& path) {
+  const PlanningContent content = ReadDicomFile(path);
+  ordered_json facts = {{"kind", "dicom"},
+                        {"modality", content.modality},
+                        {"label", content.file.label},
+                        {"date", content.file.date},
+                        {"class_uid", content.file.class_uid},
+                        {"instance_uid", content.file.instance_uid},
+                        {"frame_of_reference_uid", content.file.frame_of_reference_uid}};
+  if (content.structures) {
+    ordered_json& rois = facts["rois"] = ordered_json::object();
+    for (const PlannedRoi& roi : content.structures->rois) {
+      std::size_t points = 0;
+      for (const PlannedContour& contour : roi.contours) points += contour.points_mm.size();
+      rois[roi.name] = {{"type", roi.type}, {"contours", roi.contours.size()}, {"points", points}};
+    }
+  }
+  if (!content.plan) return facts;
+  facts["approval"] = content.plan->approval;
+  facts["geometry"] = content.plan->geometry;
+  facts["structure_set_uid"] = content.plan->structure_set_uid;
+  std::set<std::string> positions;
+  for (const PatientSetup& setup : content.plan->setups) positions.insert(setup.position);
+  facts["positions"] = positions;
+  ordered_json& beams = facts["beams"] = ordered_json::object();
+  for (const PlannedBeam& beam : content.plan->beams) {
+    ordered_json& one =
+        beams[beam.name] = {{"isocentre_lps_mm", nullptr}, {"couch_deg", beam.couch_deg}};
+    if (const auto& p = beam.isocentre_mm) one["isocentre_lps_mm"] = {p->x(), p->y(), p->z()};
+  }
+  return facts;
+}
+
+/// One line per fact; nested values as short JSON. Sentences are in the language of the reader, so
+/// their messages are not listed.
+std::string Lines(const ordered_json& facts, const CommandContext& context) {
   std::string text;
   for (const auto& [key, value] : facts.items()) {
-    if (value.is_object()) {
+    if (key.ends_with("_message") || key.ends_with("_messages")) continue;
+    const bool has_messages =
+        key.ends_with("s") && facts.contains(key.substr(0, key.size() - 1) + "_messages");
+    if (has_messages && !value.empty()) {
+      text += fmt::format("{}\n", key);
+      for (const Message& said : AllSaidIn(facts, key.substr(0, key.size() - 1)))
+        text += fmt::format("  {}\n", context.Said(said));
+    } else if (value.is_object()) {
       text += fmt::format("{}\n", key);
       for (const auto& [inner, v] : value.items())
         text +=
@@ -96,7 +187,7 @@ std::string Lines(const ordered_json& facts) {
   return text;
 }
 
-int Run(const InfoArguments& options) {
+int Run(const InfoArguments& options, const CommandContext& context) {
   ordered_json facts;
   if (IsSceneFolder(options.path)) {
     facts = {{"kind", "scene"}};
@@ -104,17 +195,18 @@ int Run(const InfoArguments& options) {
         SceneJson(ReadScene(options.path, {.cloud = false, .height_map = false, .mesh = false}))));
   } else if (IsResultFolder(options.path)) {
     facts = {{"kind", "result"}};
-    facts.update(ordered_json::parse(ReadResultJson(options.path)));
+    facts.update(ordered_json::parse(ResultText(ReadResult(options.path))));
   } else if (IsRecording(options.path)) {
     facts = RecordingFacts(options.path);
+  } else if (IsDicomFile(options.path)) {
+    facts = DicomFacts(options.path);
   } else {
-    throw DataError(
-        fmt::format("'{}' is neither a recording (rgb.txt, depth.txt, or an .oni file) nor a scene "
-                    "(scene.json) nor a result (result.json){}",
-                    options.path.string(), fs::exists(options.path) ? "" : "; it does not exist"));
+    const Message why = say::cli::NothingToDescribe(options.path.string());
+    RefuseUnreadFormat(options.path);
+    throw DataError(fs::exists(options.path) ? why : say::cli::DoesNotExist(why));
   }
   PrintOut(options.json ? facts.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"
-                        : Lines(facts));
+                        : Lines(facts, context));
   return kDone;
 }
 
@@ -122,12 +214,14 @@ int Run(const InfoArguments& options) {
 
 Command AddInfo(CLI::App& app) {
   auto options = std::make_shared<InfoArguments>();
-  app.add_option("path", options->path,
-                 "A recording (folder or .oni file), or the folder of a scene or a result")
+  app.add_option(
+         "path", options->path,
+         "A recording (folder, .oni, or another program's file), or the folder of a scene or "
+         "a result, or a DICOM file")
       ->required()
       ->type_name("RECORDING|SCENE|RESULT");
   app.add_flag("--json", options->json, "Print JSON on the standard output");
-  return [options](const CommandContext&) { return Run(*options); };
+  return [options](const CommandContext& context) { return Run(*options, context); };
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb markers`: printable sheets.
 #include <memory>
 
@@ -6,7 +7,8 @@
 
 #include "daemon/cli/commands.hpp"
 #include "daemon/files/atomic_folder.hpp"
-#include "daemon/files/marker_sheet.hpp"
+#include "daemon/sheets/marker_sheet.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 namespace {
@@ -26,15 +28,15 @@ fs::path PageFile(const fs::path& out, int page, int num_pages) {
          fmt::format("{}-{:02}{}", out.stem().string(), page + 1, out.extension().string());
 }
 
-int Run(const MarkersArguments& options) {
+int Run(const MarkersArguments& options, const CommandContext& context) {
   SheetOptions sheet_options = options.sheet;
+  sheet_options.language = &context.language;
   if (!sheet_options.is_board) sheet_options.ids = ParseIds(options.ids);
   const MarkerSheet sheet(sheet_options);
   std::string text;
   if (options.out.extension() == ".pdf") {
     WriteFileAtomically(options.out, [&](const fs::path& hidden) { sheet.WritePdf(hidden); });
-    text = fmt::format("{}: {} page{}\n", options.out.string(), sheet.num_pages(),
-                       sheet.num_pages() == 1 ? "" : "s");
+    text = context.Said(say::cli::Sheets(options.out.string(), sheet.num_pages())) + "\n";
   } else {
     for (int page = 0; page < sheet.num_pages(); ++page) {
       const fs::path file = PageFile(options.out, page, sheet.num_pages());
@@ -42,9 +44,7 @@ int Run(const MarkersArguments& options) {
       text += file.string() + "\n";
     }
   }
-  PrintOut(text +
-           "Print at 100 %, without fitting to the page, and check the ruler: it must measure 100 "
-           "mm.\n");
+  PrintOut(text + context.Said(say::cli::PrintTrue()) + "\n");
   return kDone;
 }
 
@@ -64,9 +64,9 @@ Command AddMarkers(CLI::App& app) {
       ->type_name("M");
   CLI::Option* paper =
       app.add_option("--paper", options->sheet.paper, "Paper size of the sheets, upright")
-          ->check(CLI::IsMember({"A4", "A3"}))
+          ->check(CLI::IsMember({"A4", "A3", "Letter", "Tabloid"}))
           ->capture_default_str()
-          ->type_name("A4|A3");
+          ->type_name("A4|A3|Letter|Tabloid");
   app.add_flag("--board", options->sheet.is_board,
                "One sheet for the room's calibration: the dictionary's last four markers around a "
                "cross for the lasers; on A4 if it fits, otherwise on A3")
@@ -81,7 +81,7 @@ Command AddMarkers(CLI::App& app) {
                    : "expected a file that ends in .pdf or .svg";
       })
       ->type_name("FILE.pdf|FILE.svg");
-  return [options](const CommandContext&) { return Run(*options); };
+  return [options](const CommandContext& context) { return Run(*options, context); };
 }
 
 }  // namespace plumb

@@ -1,31 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <memory>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/files/mesh_file.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 namespace {
 
 struct MeshArguments {
   std::filesystem::path scene, out;
+  std::string unit;
 };
 
-int Run(const MeshArguments& options) {
+int Run(const MeshArguments& options, const CommandContext& context) {
   const Scene scene = ReadScene(options.scene, {.cloud = false, .height_map = false, .mesh = true});
   if (scene.mesh.triangles.empty()) {
-    throw DataError(
-        fmt::format("scene '{}' has no mesh: it has no height map, because the reference marker "
-                    "was not seen; its surface is cloud.ply",
-                    options.scene.string()));
+    throw DataError(say::cli::NoMesh(options.scene.string()));
   }
-  WriteMeshFile(options.out, scene.mesh);
-  PrintOut(fmt::format("{}: {} vertices, {} triangles\n", options.out.string(),
-                       scene.mesh.vertices.size(), scene.mesh.triangles.size()));
+  const MeshUnit unit = Named<MeshUnit>(options.unit).value_or(UsualUnit(options.out));
+  WriteMeshFile(options.out, scene.mesh, unit);
+  PrintOut(context.Said(say::cli::Mesh(
+               options.out.string(), static_cast<std::int64_t>(scene.mesh.vertices.size()),
+               static_cast<std::int64_t>(scene.mesh.triangles.size()), Name(unit))) +
+           "\n");
   return kDone;
 }
 
@@ -37,7 +39,11 @@ Command AddMesh(CLI::App& app) {
   app.add_option("--out", options->out, "File to write; its extension selects the format")
       ->required()
       ->type_name("FILE.ply|.stl|.obj");
-  return [options](const CommandContext&) { return Run(*options); };
+  app.add_option("--unit", options->unit,
+                 "Of the coordinates: by default mm in .stl, m in .ply and .obj")
+      ->check(CLI::IsMember({"mm", "m"}))
+      ->type_name("mm|m");
+  return [options](const CommandContext& context) { return Run(*options, context); };
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Linked in place of store_commands.cpp in a build without the appliance.
 #include "daemon/cli/commands.hpp"
 

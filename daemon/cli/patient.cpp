@@ -1,13 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb export-patient` and `plumb import-patient`: one patient out of a store, into another one.
+#include <cstdint>
 #include <memory>
-#include <optional>
+#include <string_view>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "daemon/archive/patient_transfer.hpp"
+#include "daemon/cli/backup_keys.hpp"
 #include "daemon/cli/commands.hpp"
-#include "daemon/records/file_cipher.hpp"
-#include "daemon/records/patient_transfer.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 namespace {
@@ -17,34 +19,34 @@ namespace fs = std::filesystem;
 struct PatientArguments {
   std::string code;
   fs::path folder, state;
-  std::optional<fs::path> key_file;
+  RecipientOptions recipients;
+  IdentityOptions keys;
 };
 
-std::unique_ptr<BackupSecret> SecretOf(const PatientArguments& options) {
-  return options.key_file ? std::make_unique<BackupSecret>(*options.key_file) : nullptr;
-}
-
-void PrintReport(const char* done, const PatientReport& report) {
-  std::string text = fmt::format("{} {}: {} scans, {} references, {} files, {:.1f} MB\n", done,
-                                 report.code, report.scans, report.references, report.files,
-                                 static_cast<double>(report.bytes) / 1e6);
-  for (const std::string& problem : report.problems) text += "  " + problem + "\n";
+void PrintReport(Message (*done)(std::string_view, std::int64_t, std::int64_t, std::int64_t,
+                                 double),
+                 const PatientReport& report, const CommandContext& context) {
+  std::string text = context.Said(done(report.code, static_cast<std::int64_t>(report.scans),
+                                       static_cast<std::int64_t>(report.references),
+                                       static_cast<std::int64_t>(report.files),
+                                       static_cast<double>(report.bytes) / 1e6)) +
+                     "\n";
+  for (const Message& problem : report.problems) text += "  " + context.Said(problem) + "\n";
   PrintOut(text);
 }
 
 int Export(const PatientArguments& options, const CommandContext& context) {
   const PatientReport report =
       ExportPatient(fs::absolute(options.state), options.code, fs::absolute(options.folder),
-                    context.stop, SecretOf(options).get());
-  PrintReport("exported", report);
+                    context.stop, options.recipients.Read());
+  PrintReport(say::cli::Exported, report, context);
   return report.problems.empty() ? kDone : kBadInput;
 }
 
-int Import(const PatientArguments& options, const CommandContext& context) {
-  const PatientReport report =
-      ImportPatient(fs::absolute(options.folder), fs::absolute(options.state), context.stop,
-                    SecretOf(options).get());
-  PrintReport(report.was_there ? "is there already with the same data:" : "imported", report);
+int Import(PatientArguments& options, const CommandContext& context) {
+  const PatientReport report = ImportPatient(
+      fs::absolute(options.folder), fs::absolute(options.state), context.stop, options.keys.Read());
+  PrintReport(report.was_there ? say::cli::AlreadyThere : say::cli::Imported, report, context);
   return kDone;
 }
 
@@ -56,7 +58,7 @@ Command AddExportPatient(CLI::App& app) {
   app.add_option(
          "folder", options->folder,
          "Folder of the export, or one file if its name ends in .tar; an older export there is "
-         "replaced")
+         "replaced. An encrypted one is a file, and .tar.age is added to its name")
       ->required()
       ->type_name("FOLDER|FILE.tar");
   app.add_option(
@@ -64,8 +66,7 @@ Command AddExportPatient(CLI::App& app) {
          "State folder that no plumbd is using, or the folder of a backup that is not encrypted")
       ->required()
       ->type_name("DIR");
-  app.add_option("--key-file", options->key_file, "Encrypt with the key in this file")
-      ->type_name("FILE");
+  options->recipients.AddTo(app);
   return [options](const CommandContext& context) { return Export(*options, context); };
 }
 
@@ -75,8 +76,7 @@ Command AddImportPatient(CLI::App& app) {
   app.add_option("--state", options->state, "State folder that no plumbd is using")
       ->required()
       ->type_name("DIR");
-  app.add_option("--key-file", options->key_file, "File with the key of an encrypted export")
-      ->type_name("FILE");
+  options->keys.AddTo(app);
   return [options](const CommandContext& context) { return Import(*options, context); };
 }
 

@@ -1,13 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/cli/progress.hpp"
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <fmt/format.h>
 
+#include "daemon/cli/language.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 
 namespace plumb {
@@ -22,16 +25,18 @@ int TerminalWidth() {
 
 }  // namespace
 
-Progress::Progress(bool quiet) : quiet_(quiet), is_terminal_(isatty(STDERR_FILENO) == 1) {}
+Progress::Progress(const Catalogue& language, bool quiet)
+    : language_(language), quiet_(quiet), is_terminal_(isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() { Clear(); }
 
-void Progress::Update(std::string_view step, double fraction, std::string_view detail) {
+void Progress::Update(const Message& step, double fraction, const Message& detail) {
   if (quiet_) return;
-  const bool is_new = step != step_;
-  step_ = step;
+  std::string said = Text(step, language_);
+  const bool is_new = said != step_;
+  step_ = std::move(said);
   if (!is_terminal_) {
-    if (is_new) fmt::print(stderr, "{}\n", step);
+    if (is_new) fmt::print(stderr, "{}\n", step_);
     return;
   }
   const double now_s = SteadySeconds();
@@ -40,14 +45,15 @@ void Progress::Update(std::string_view step, double fraction, std::string_view d
   Draw(std::clamp(fraction, 0.0, 1.0), detail);
 }
 
-void Progress::Draw(double fraction, std::string_view detail) {
+void Progress::Draw(double fraction, const Message& detail) {
   constexpr int kBar = 24;
   const int filled = static_cast<int>(fraction * kBar + 0.5);
-  std::string line = fmt::format(
-      "{:<24} [{}{}] {:3.0f} %  {}", step_, std::string(static_cast<std::size_t>(filled), '#'),
-      std::string(static_cast<std::size_t>(kBar - filled), '.'), 100 * fraction, detail);
-  line.resize(std::min(line.size(), static_cast<std::size_t>(TerminalWidth() - 1)));
-  fmt::print(stderr, "\r\x1b[K{}", line);
+  const std::string line = fmt::format("{} [{}{}] {:3.0f} %  {}", LeftAligned(step_, 24),
+                                       std::string(static_cast<std::size_t>(filled), '#'),
+                                       std::string(static_cast<std::size_t>(kBar - filled), '.'),
+                                       100 * fraction, Text(detail, language_));
+  fmt::print(stderr, "\r\x1b[K{}",
+             FirstCharacters(line, static_cast<std::size_t>(TerminalWidth() - 1)));
   std::fflush(stderr);
   is_drawn_ = true;
 }

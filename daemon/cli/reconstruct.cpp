@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <memory>
 
 #include <fmt/format.h>
@@ -6,11 +7,13 @@
 #include "algo/base/units.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
+#include "daemon/cli/language.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/files/scene_json.hpp"
+#include "daemon/files/stored_scene.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 namespace {
@@ -22,41 +25,46 @@ struct ReconstructArguments {
   bool json = false;
 };
 
-std::string BreathingText(const Breathing& breathing) {
-  if (breathing.amplitude_m > 0.0)
-    return fmt::format("rose by {:.1f} mm (standard deviation {:.1f} mm) every {:.1f} s",
-                       breathing.amplitude_m / kMillimetre, breathing.sigma_m / kMillimetre,
-                       breathing.period_s);
-  return fmt::format("none found; a rise of {:.1f} mm or more would have been",
-                     breathing.limit_m / kMillimetre);
+Message BreathingMessage(const Breathing& breathing) {
+  return breathing.amplitude_m > 0.0
+             ? say::cli::Breathing(breathing.amplitude_m / kMillimetre,
+                                   breathing.sigma_m / kMillimetre, breathing.period_s)
+             : say::cli::NoBreathing(breathing.limit_m / kMillimetre);
 }
 
-std::string Summary(const Scene& scene, const std::filesystem::path& out) {
-  std::string text = fmt::format("{}\n", out.string());
-  text +=
-      fmt::format("  frames     {} of {} tracked, {} dropped; {} keyframes\n", scene.frames_tracked,
-                  scene.frames_total, scene.frames_dropped, scene.keyframes.size());
-  text += fmt::format("  markers    {}", scene.markers.size());
-  if (scene.frame == SceneFrame::kReferenceMarker)
-    text += fmt::format("; the frame is that of marker {}", scene.reference_marker.value_or(-1));
-  text += "\n";
+Message HeightMapMessage(const Scene& scene) {
   if (scene.height_map) {
     const GridShape& grid = scene.height_map->grid;
-    text += fmt::format("  height map {} x {} cells of {:.3g} mm\n", grid.width, grid.height,
-                        grid.step * 1000);
-  } else {
-    text += scene.frame == SceneFrame::kReferenceMarker
-                ? "  height map none: no surface around the reference marker\n"
-                : "  height map none: not in the reference marker's frame\n";
+    return say::cli::HeightMap(grid.width, grid.height, grid.step / kMillimetre);
   }
-  if (scene.breathing) text += fmt::format("  breathing  {}\n", BreathingText(*scene.breathing));
-  text += fmt::format("  surface    {} points, {} triangles\n", scene.cloud.size(),
-                      scene.mesh.triangles.size());
-  if (const auto after = scene.timings_s.find("after_last_frame"); after != scene.timings_s.end()) {
-    text += fmt::format("  time       {:.2f} s after the last frame\n", after->second);
-  }
-  for (const std::string& warning : scene.warnings)
-    text += fmt::format("  warning    {}\n", warning);
+  return scene.frame == SceneFrame::kReferenceMarker ? say::cli::HeightMapNoSurface()
+                                                     : say::cli::HeightMapOtherFrame();
+}
+
+std::string Summary(const Scene& scene, const std::filesystem::path& out,
+                    const CommandContext& context) {
+  std::string text = fmt::format("{}\n", out.string());
+  const auto line = [&](const Message& label, const std::string& value) {
+    text += fmt::format("  {} {}\n", LeftAligned(context.Said(label), 10), value);
+  };
+  line(say::cli::FramesLabel(), context.Said(say::cli::FramesOf(
+                                    scene.frames_tracked, scene.frames_total, scene.frames_dropped,
+                                    static_cast<std::int64_t>(scene.keyframes.size()))));
+  const auto num_markers = static_cast<std::int64_t>(scene.markers.size());
+  line(say::cli::MarkersLabel(), scene.frame == SceneFrame::kReferenceMarker
+                                     ? context.Said(say::cli::FrameOfMarker(
+                                           num_markers, scene.room_markers.reference.value_or(-1)))
+                                     : fmt::to_string(num_markers));
+  line(say::cli::HeightMapLabel(), context.Said(HeightMapMessage(scene)));
+  if (scene.breathing)
+    line(say::cli::BreathingLabel(), context.Said(BreathingMessage(*scene.breathing)));
+  line(say::cli::SurfaceLabel(),
+       context.Said(say::cli::Surface(static_cast<std::int64_t>(scene.cloud.size()),
+                                      static_cast<std::int64_t>(scene.mesh.triangles.size()))));
+  if (const auto after = scene.timings_s.find("after_last_frame"); after != scene.timings_s.end())
+    line(say::cli::TimeLabel(), context.Said(say::cli::TimeAfter(after->second)));
+  for (const Message& warning : scene.warnings)
+    line(say::cli::WarningLabel(), context.Said(warning));
   return text;
 }
 
@@ -66,14 +74,14 @@ int Run(const ReconstructArguments& options, const CommandContext& context) {
     const AtomicFolder check(options.out, SceneOutput());
   }  // rejects a bad place before the long work
   const std::unique_ptr<FrameSource> recording = OpenRecording(options.recording, config.markers);
-  Progress progress;
+  Progress progress(context.language);
   const Scene scene =
       RunScan(*recording, {.reconstructor = config.reconstruct, .realtime = options.realtime},
               context.stop, [&](const ScanProgress& scan) { Show(progress, "", scan); });
-  progress.Update("writing", 0.0);
+  progress.Update(say::cli::Writing(), 0.0);
   WriteScene(scene, options.out);
   progress.Clear();
-  PrintOut(options.json ? SceneJson(scene) : Summary(scene, options.out));
+  PrintOut(options.json ? SceneJson(scene) : Summary(scene, options.out, context));
   return kDone;
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb record`: records a sensor's images into a folder or an .oni file.
 #include <algorithm>
 #include <exception>
@@ -13,12 +14,15 @@
 #include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
+#include "daemon/cli/language.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/loop/bounded_queue.hpp"
 #include "drivers/live/sensor_driver.hpp"
 #include "drivers/replay/tum_writer.hpp"
+#include "words/cli.hpp"
+#include "words/file.hpp"
 
 namespace plumb {
 namespace {
@@ -71,7 +75,7 @@ struct Attached {
     sweeps.frames = std::max(2, static_cast<int>(options.seconds * kSimulatedRate_hz));
     setup = DriverFor(kind, config, options.simulated.has_value())
                 .set_up(settings, sweeps, stop, [&](double fraction, std::string_view scene) {
-                  progress.Update("rendering", fraction, scene);
+                  progress.Update(say::cli::Rendering(), fraction, Message::Verbatim(scene));
                 });
     provider = setup->MakeProvider();
     sensor = OpenSensor(*provider, options.serial);
@@ -85,46 +89,68 @@ struct Attached {
   }
 };
 
-/// Passes on each frame until the time is over. @throws Interrupted on a stop request.
-template <typename Take>
-std::int64_t ReadFor(LiveSensor& sensor, double seconds, const std::stop_token& stop,
-                     Progress& progress, Take&& take) {
-  std::optional<double> begin_s;
-  for (std::int64_t count = 0;; ++count) {
-    if (stop.stop_requested())
-      throw Interrupted("the recording was stopped; nothing of it is kept");
-    std::optional<Frame> frame = sensor.Next();
-    if (!frame) return count;
-    if (!begin_s) begin_s = frame->depth_time_s;
-    const double passed_s = frame->depth_time_s - *begin_s;
-    if (passed_s >= seconds) return count;
-    progress.Update("recording", passed_s / seconds, fmt::format("{} frames", count + 1));
-    take(std::move(*frame));
-  }
-}
+/// The frames of a sensor until the time is over.
+class FramesForATime : public FrameSource {
+ public:
+  FramesForATime(LiveSensor& sensor, double seconds, const std::stop_token& stop,
+                 Progress& progress)
+      : sensor_(sensor), seconds_(seconds), stop_(stop), progress_(progress) {}
 
-std::string RecordFile(const RecordArguments& options, const RecordingKind& kind,
-                       const Attached& attached, const std::stop_token& stop, Progress& progress) {
+  [[nodiscard]] const StreamInfo& info() const override { return sensor_.info(); }
+  /// @throws Interrupted on a stop request.
+  [[nodiscard]] std::optional<Frame> Next() override {
+    if (stop_.stop_requested()) throw Interrupted(say::cli::RecordingStopped());
+    std::optional<Frame> frame = sensor_.Next();
+    if (!frame) return frame;
+    if (!begin_s_) begin_s_ = frame->depth_time_s;
+    const double passed_s = frame->depth_time_s - *begin_s_;
+    if (passed_s >= seconds_) return std::nullopt;
+    ++num_frames_;
+    progress_.Update(say::cli::Recording(), passed_s / seconds_, say::cli::Frames(num_frames_));
+    return frame;
+  }
+  [[nodiscard]] std::int64_t num_frames() const { return num_frames_; }
+
+ private:
+  LiveSensor& sensor_;
+  const double seconds_;
+  const std::stop_token stop_;
+  Progress& progress_;
+  std::optional<double> begin_s_;
+  std::int64_t num_frames_ = 0;
+};
+
+Message RecordFile(const RecordArguments& options, const RecordingKind& kind,
+                   const Attached& attached, const std::stop_token& stop, Progress& progress) {
   FileRecorder::Summary summary;
   WriteFileAtomically(options.out, [&](const fs::path& hidden) {
-    const std::unique_ptr<FileRecorder> recorder =
-        kind.Record(*attached.sensor, hidden, options.jpeg);
-    attached.Begin();
-    (void)ReadFor(*attached.sensor, options.seconds, stop, progress, [](Frame&&) {});
-    summary = recorder->Finish();
+    FramesForATime frames(*attached.sensor, options.seconds, stop, progress);
+    if (options.simulated) {
+      // Its driver is not one whose own recorder could listen.
+      attached.Begin();
+      kind.Write(hidden, frames, stop, {}, options.jpeg);
+      const auto num_frames = static_cast<std::size_t>(frames.num_frames());
+      summary = {num_frames, num_frames};
+    } else {
+      const std::unique_ptr<FileRecorder> recorder =
+          kind.Record(*attached.sensor, hidden, options.jpeg);
+      attached.Begin();
+      while (frames.Next()) {
+      }
+      summary = recorder->Finish();
+    }
     const fs::path beside = kind.SideCar(options.out);
     std::error_code error;
     fs::rename(kind.SideCar(hidden), beside, error);
-    if (error) throw IoError(fmt::format("cannot write {}: {}", beside.string(), error.message()));
+    if (error) throw IoError(say::file::CannotWrite(beside.string(), error.message()));
   });
-  return fmt::format("{} colour and {} depth images", summary.num_color, summary.num_depth);
+  return say::cli::RecordedImages(static_cast<std::int64_t>(summary.num_color),
+                                  static_cast<std::int64_t>(summary.num_depth));
 }
 
-std::string RecordFolder(const RecordArguments& options, const Attached& attached,
-                         const std::stop_token& stop, Progress& progress) {
-  static const OutputKind kKind{
-      "recording", "depth.txt", {"rgb", "depth", "rgb.txt", "depth.txt", "camera.yaml"}};
-  AtomicFolder folder(options.out, kKind);
+Message RecordFolder(const RecordArguments& options, const Attached& attached,
+                     const std::stop_token& stop, Progress& progress) {
+  AtomicFolder folder(options.out, RecordingOutput());
   const TumWriterOptions writing{.depth_scale = kDepthUnitsPerMetre,
                                  .jpeg_quality = options.jpeg ? 92 : 0};
   TumWriter writer(folder.path(), attached.sensor->info(), writing);
@@ -143,39 +169,39 @@ std::string RecordFolder(const RecordArguments& options, const Attached& attache
     });
     try {
       attached.Begin();
-      num_frames = ReadFor(*attached.sensor, options.seconds, stop, progress, [&](Frame&& frame) {
-        num_dropped += queue.PushDroppingOldest(std::move(frame));
-      });
+      FramesForATime frames(*attached.sensor, options.seconds, stop, progress);
+      while (std::optional<Frame> frame = frames.Next())
+        num_dropped += queue.PushDroppingOldest(std::move(*frame));
+      num_frames = frames.num_frames();
     } catch (...) {
       queue.Close();
       throw;
     }
-    progress.Update("writing", 0.0);
+    progress.Update(say::cli::Writing(), 0.0);
     queue.Close();
   }
   if (error) std::rethrow_exception(error);
   writer.Finish();
   folder.Commit();
-  const std::string dropped =
-      num_dropped == 0
-          ? ""
-          : fmt::format(", {} of them lost: the disk is too slow, try --jpeg", num_dropped);
-  return fmt::format("{} frames{}", num_frames, dropped);
+  return num_dropped == 0 ? say::cli::RecordedFrames(num_frames)
+                          : say::cli::RecordedWithLoss(num_frames, num_dropped);
 }
 
 int Run(const RecordArguments& options, const CommandContext& context) {
   const Config config = options.method.Read();
-  Progress progress;
+  Progress progress(context.language);
   const RecordingKind* kind = BuiltInSensors().KindWithExtension(options.out.extension().string());
   const Attached attached(options, kind, config, context.stop, progress);
-  const std::string what = kind != nullptr
-                               ? RecordFile(options, *kind, attached, context.stop, progress)
-                               : RecordFolder(options, attached, context.stop, progress);
+  const Message what = kind != nullptr
+                           ? RecordFile(options, *kind, attached, context.stop, progress)
+                           : RecordFolder(options, attached, context.stop, progress);
   progress.Clear();
-  std::string text = fmt::format("{}: {} of sensor {}\n", options.out.string(), what,
-                                 attached.sensor->description().serial);
-  for (const std::string& warning : attached.sensor->info().warnings)
-    text += fmt::format("  warning    {}\n", warning);
+  std::string text = context.Said(say::cli::Recorded(options.out.string(), what,
+                                                     attached.sensor->description().serial)) +
+                     "\n";
+  for (const Message& warning : attached.sensor->info().warnings)
+    text += fmt::format("  {} {}\n", LeftAligned(context.Said(say::cli::WarningLabel()), 10),
+                        context.Said(warning));
   PrintOut(text);
   return kDone;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts Ctrl-C and SIGTERM to a stop request.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Linked in place of no_store_commands.cpp in a build with the appliance.
 #include "daemon/cli/commands.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb update`: sends a bundle to a running plumbd and follows its installation.
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -9,19 +10,20 @@
 #include <optional>
 #include <thread>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/progress.hpp"
+#include "words/cli.hpp"
+#include "words/update.hpp"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 using Kind = ControlRequest::Kind;
 
 constexpr std::chrono::milliseconds kPollInterval{300};
@@ -36,10 +38,8 @@ std::shared_ptr<const AttachedFile> OpenBundle(const fs::path& path) {
       std::make_shared<const AttachedFile>(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   struct stat status {};
   if (file->fd() < 0 || ::fstat(file->fd(), &status) != 0)
-    throw DataError(fmt::format("{} cannot be read: {}", path.string(), std::strerror(errno)));
-  if (!S_ISREG(status.st_mode))
-    throw DataError(
-        fmt::format("{} is not a regular file: name a bundle, NAME.raucb", path.string()));
+    throw DataError(say::update::Unreadable(path.string(), std::strerror(errno)));
+  if (!S_ISREG(status.st_mode)) throw DataError(say::update::NoBundleFile(path.string()));
   return file;
 }
 
@@ -47,9 +47,8 @@ std::shared_ptr<const AttachedFile> OpenBundle(const fs::path& path) {
 Json Ask(ControlRequest request, const CommandContext& context) {
   Json answer = AskPlumbd(context.control, request, context.stop, std::nullopt);
   if (answer.value("ok", false)) return answer;
-  const std::string why = answer.value("error", "refused without a reason");
-  if (answer.value("input", false)) throw DataError(why);
-  throw DeviceError(why);
+  if (answer.value("input", false)) throw DataError(WhyRefused(answer));
+  throw DeviceError(WhyRefused(answer));
 }
 
 ControlRequest RequestOf(Kind kind) { return {.kind = kind, .action = {}, .argument = {}}; }
@@ -60,34 +59,32 @@ void Follow(Progress& progress, const CommandContext& context) {
     const Json status = Ask(RequestOf(Kind::kUpdateStatus), context);
     if (!status.value("installing", false)) {
       progress.Clear();
-      if (const std::string why = status.value("failure", ""); !why.empty())
-        throw IoError("not installed: " + why);
+      if (const Message why = SaidIn(status, "failure"); !why.empty())
+        throw IoError(say::cli::NotInstalled(why));
       return;
     }
-    const std::string step = status.value("message", "");
-    progress.Update(step.empty() ? "installing" : step, status.value("fraction", 0.0));
-    if (context.stop.stop_requested())
-      throw Interrupted("plumbd goes on with the installation; its page shows how far it is");
+    const Message step = SaidIn(status, "message");
+    progress.Update(step.empty() ? say::cli::Installing() : step, status.value("fraction", 0.0));
+    if (context.stop.stop_requested()) throw Interrupted(say::cli::UpdateGoesOn());
     std::this_thread::sleep_for(kPollInterval);
   }
 }
 
 int Update(const UpdateArguments& options, const CommandContext& context) {
-  if (!options.file && !options.restart)
-    throw std::invalid_argument("name a bundle, or give --restart");
+  if (!options.file && !options.restart) throw InvalidRequest(say::cli::NameABundle());
   if (options.file) {
     ControlRequest request = RequestOf(Kind::kUpdate);
     request.name = options.file->filename().string();
     request.file = OpenBundle(*options.file);
-    Progress progress;
-    progress.Update("sending and checking " + request.name, 0.0);
+    Progress progress(context.language);
+    progress.Update(say::cli::Sending(request.name), 0.0);
     (void)Ask(request, context);
     Follow(progress, context);
-    PrintOut(request.name + " is installed and starts at the next restart of the machine\n");
+    PrintOut(context.Said(say::cli::Installed(request.name)) + "\n");
   }
   if (options.restart) {
     (void)Ask(RequestOf(Kind::kRestart), context);
-    PrintOut("the machine restarts\n");
+    PrintOut(context.Said(say::cli::Restarting()) + "\n");
   }
   return kDone;
 }

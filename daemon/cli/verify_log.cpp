@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `plumb verify-log`: whether a downloaded audit log is as it was written.
 #include <memory>
 
@@ -5,8 +6,10 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/cli/commands.hpp"
-#include "daemon/records/audit_store.hpp"
+#include "daemon/cli/language.hpp"
+#include "daemon/database/audit_store.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/cli.hpp"
 
 namespace plumb {
 
@@ -15,11 +18,12 @@ Command AddVerifyLog(CLI::App& app) {
   app.add_option("file", *file, "The log, as downloaded from the page (plumb_log.jsonl)")
       ->required()
       ->type_name("FILE");
-  return [file](const CommandContext&) {
+  return [file](const CommandContext& context) {
     constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
     const AuditHead head = CheckAuditExport(ReadTextFile(*file, kMaxBytes));
-    PrintOut(fmt::format("the log is as it was written, up to entry {}\nchain    {}\n", head.number,
-                         head.chain.empty() ? "none" : head.chain));
+    PrintOut(fmt::format("{}\n{} {}\n", context.Said(say::cli::LogIntact(head.number)),
+                         LeftAligned(context.Said(say::cli::Chain()), 8),
+                         head.chain.empty() ? context.Said(say::cli::NoChain()) : head.chain));
     return static_cast<int>(kDone);
   };
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/config/config.hpp"
 
 #include <algorithm>
@@ -11,34 +12,33 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
+#include "algo/base/polygon.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/config/config_section.hpp"
 #include "daemon/config/toml.hpp"
+#include "words/config.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr std::uintmax_t kMaxFileBytes = 1 << 20;
 
-std::string ReadText(const std::filesystem::path& file, std::string_view what) {
+std::string ReadText(const std::filesystem::path& file, const Message& what) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
-  if (error)
-    throw DataError(
-        fmt::format("cannot read the {} '{}': {}", what, file.string(), error.message()));
+  if (error) throw DataError(say::config::CannotRead(what, file.string(), error.message()));
   if (size > kMaxFileBytes) {
-    throw DataError(fmt::format("the {} '{}' has {} bytes, expected at most {}", what,
-                                file.string(), size, kMaxFileBytes));
+    throw DataError(say::config::TooLarge(what, file.string(), static_cast<std::int64_t>(size),
+                                          std::int64_t{kMaxFileBytes}));
   }
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw DataError(fmt::format("cannot open the {} '{}' for reading", what, file.string()));
+  if (!in) throw DataError(say::config::CannotOpen(what, file.string()));
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
@@ -49,23 +49,21 @@ bool IsControl(char c) {
 }
 
 void RefuseControlCharacters(const std::string& text, const std::string& name) {
-  std::size_t line = 1;
+  std::int64_t line = 1;
   for (const char c : text) {
     line += c == '\n' ? 1 : 0;
     if (IsControl(c))
-      throw DataError(fmt::format(
-          "{}:{}: not valid TOML: expected text, found a byte {}; the file may be damaged", name,
-          line, static_cast<unsigned char>(c)));
+      throw DataError(say::config::ControlCharacter(name, line, static_cast<unsigned char>(c)));
   }
 }
 
-void ReadMarkers(Section section, MarkerConfig& markers) {
+void ReadMarkers(Section section, StatedMarkers& markers) {
   section.Take("dictionary", markers.dictionary,
-               fmt::format("one of {}", fmt::join(MarkerDictionary::KnownNames(), ", ")),
+               say::config::ExpectedOneOf(MarkerDictionary::KnownNames()),
                [](const std::string& s) { return MarkerDictionary::Find(s).has_value(); });
-  section.Take("length_m", markers.length_m, "a marker's side in metres, above 0 and at most 2",
+  section.Take("length_m", markers.length_m, say::config::ExpectedMarkerSide(),
                [](double v) { return v > 0 && v <= 2; });
-  section.Take("reference", markers.reference, "a marker's id, 0 or more",
+  section.Take("reference", markers.reference, say::config::ExpectedMarkerId(),
                [](int id) { return id >= 0; });
   section.RejectUnknownKeys();
 }
@@ -79,12 +77,12 @@ void ReadReconstruct(Section section, ReconstructorOptions& options) {
   section.TakeFlag("use_tone_curve", options.use_tone_curve);
   section.TakeFlag("use_depth_field", options.use_depth_field);
   section.TakeFlag("use_dense_depth", options.use_dense_depth);
-  section.Take("keyframe_spacing", options.keyframe_spacing,
-               "a number from 0.5 to 2, of the usual spacing",
+  section.Take("keyframe_spacing", options.keyframe_spacing, say::config::ExpectedSpacing(),
                [](double v) { return v >= 0.5 && v <= 2; });
-  section.Take("num_icp_iterations", options.num_icp_iterations, "a whole number from 1 to 1000",
+  section.Take("num_icp_iterations", options.num_icp_iterations,
+               say::config::ExpectedWholeNumber(1, 1000),
                [](int n) { return n >= 1 && n <= 1000; });
-  section.Take("seed", options.seed, "a whole number, 0 or more",
+  section.Take("seed", options.seed, say::config::ExpectedNaturalNumber(),
                [](std::uint64_t) { return true; });
   section.RejectUnknownKeys();
 }
@@ -93,15 +91,10 @@ void ReadReconstruct(Section section, ReconstructorOptions& options) {
 // reference, so that a value in its file would either silently apply to every patient or have no
 // effect.
 void RefuseKeysOfThePlan(const Section& section) {
-  const char* const plan =
-      "it belongs to the plan of each reference: set it on the page, where it is approved";
-  section.Refuse("region", plan);
-  section.Refuse("isocentre_m", plan);
-  const char* const settings =
-      "it belongs to the plan of each reference: set it there, or its default in the settings of "
-      "the page";
+  for (const char* key : {"region", "isocentre_m"})
+    section.Refuse(key, say::config::BelongsToPlanPage());
   for (const char* key : {"marker_kind", "posture", "shift_tolerance_mm", "rotation_tolerance_deg"})
-    section.Refuse(key, settings);
+    section.Refuse(key, say::config::BelongsToPlanOrSettings());
 }
 
 /// The loosest limits that a reader of the file takes. A room may be stricter than the method,
@@ -110,17 +103,12 @@ struct LoosestLimits {
   AcceptanceLimits gates;
   MarkerConsensusOptions markers;
   MarkerCheckLimits check;
-  std::string advice;  ///< In a refusal.
+  Message advice;  ///< In a refusal.
 };
 
 LoosestLimits LoosestFor(ConfigUse use) {
   if (use == ConfigUse::kAppliance)
-    return {.gates = {},
-            .markers = {},
-            .check = {},
-            .advice =
-                "plumbd takes no limit that is looser than the method's own: remove the line, "
-                "or state a stricter one"};
+    return {.gates = {}, .markers = {}, .check = {}, .advice = say::config::NoLooserLimit()};
   return {.gates = kLoosestLimits,
           .markers = {.moved_m = 100 * kMillimetre, .moved_sigmas = 100},
           .check = {.max_misfit_m = 100 * kMillimetre,
@@ -138,23 +126,25 @@ void ReadLimits(Section& section, ConfigUse use, CompareOptions& options) {
   AcceptanceLimits& limits = options.limits;
   section.SetAdvice(loose.advice);
   section.Take("min_shared_markers", limits.min_shared_markers,
-               fmt::format("a whole number from {} to 1000", loosest.min_shared_markers),
+               say::config::ExpectedWholeNumber(loosest.min_shared_markers, 1000),
                [&](int n) { return n >= loosest.min_shared_markers && n <= 1000; });
-  section.TakeNumber("min_coverage", limits.min_coverage, loosest.min_coverage, 1, "a fraction");
+  section.TakeNumber("min_coverage", limits.min_coverage, loosest.min_coverage, 1,
+                     say::config::AFraction());
   const auto take = [&section](std::string_view key, double& value, double most, double unit,
-                               std::string_view unit_name) {
+                               const Message& unit_name) {
     section.TakeLimit(key, value, most, unit, unit_name);
   };
   take("moved_marker_mm", options.markers.moved_m, loose.markers.moved_m, kMillimetre,
-       "millimetres");
+       say::config::Millimetres());
   take("moved_marker_sigmas", options.markers.moved_sigmas, loose.markers.moved_sigmas, 1,
-       "a number");
-  take("max_hole_mm", limits.max_hole_m, loosest.max_hole_m, kMillimetre, "millimetres");
+       say::config::ANumber());
+  take("max_hole_mm", limits.max_hole_m, loosest.max_hole_m, kMillimetre,
+       say::config::Millimetres());
   take("max_residual_p95_mm", limits.max_residual_p95_m, loosest.max_residual_p95_m, kMillimetre,
-       "millimetres");
-  take("max_lost_s", limits.max_lost_s, loosest.max_lost_s, 1, "seconds");
+       say::config::Millimetres());
+  take("max_lost_s", limits.max_lost_s, loosest.max_lost_s, 1, say::config::Seconds());
   take("max_breathing_mm", limits.max_breathing_m, loosest.max_breathing_m, kMillimetre,
-       "millimetres");
+       say::config::Millimetres());
 }
 
 void ReadCompare(Section section, ConfigUse use, Config& config) {
@@ -163,18 +153,18 @@ void ReadCompare(Section section, ConfigUse use, Config& config) {
   options.preset = config.reconstruct.preset;
   section.TakeName("preset", options.preset);
   std::string region;
-  section.Take("region", region, "the path of a region file",
+  section.Take("region", region, say::config::ExpectedRegionPath(),
                [](const std::string& s) { return !s.empty(); });
   if (!region.empty()) config.region_file = region;
-  if (const auto rows = section.TakeRows("isocentre_m", 1, 3, "[x, y, z] in metres")) {
+  if (const auto rows = section.TakeRows("isocentre_m", 1, 3, say::config::ExpectedPoint())) {
     options.isocentre_m = Eigen::Vector3d(rows->front().data());
   }
   section.TakeName("marker_kind", options.marker_kind);
   section.TakeName("posture", options.posture);
   section.TakeLimit("shift_tolerance_mm", options.limits.shift_tolerance_m,
-                    kLoosestLimits.shift_tolerance_m, kMillimetre, "millimetres");
+                    kLoosestLimits.shift_tolerance_m, kMillimetre, say::config::Millimetres());
   section.TakeLimit("rotation_tolerance_deg", options.limits.rotation_tolerance_rad,
-                    kLoosestLimits.rotation_tolerance_rad, kDegree, "degrees");
+                    kLoosestLimits.rotation_tolerance_rad, kDegree, say::config::Degrees());
   ReadLimits(section, use, options);
   section.RejectUnknownKeys();
 }
@@ -185,25 +175,23 @@ void ReadCheck(Section section, ConfigUse use, MarkerCheckLimits& limits) {
   const MarkerCheckLimits& loosest = loose.check;
   section.SetAdvice(loose.advice);
   section.TakeLimit("misfit_mm", limits.max_misfit_m, loosest.max_misfit_m, kMillimetre,
-                    "millimetres");
+                    say::config::Millimetres());
   section.TakeLimit("moved_mm", limits.max_moved_m, loosest.max_moved_m, kMillimetre,
-                    "millimetres");
+                    say::config::Millimetres());
   section.TakeLimit("side_percent", limits.max_side_error, loosest.max_side_error, kPercent,
-                    "percent");
+                    say::config::Percent());
   section.TakeLimit("scale_percent", limits.max_scale_error, loosest.max_scale_error, kPercent,
-                    "percent");
+                    say::config::Percent());
   section.TakeLimit("depth_percent", limits.max_depth_error, loosest.max_depth_error, kPercent,
-                    "percent");
+                    say::config::Percent());
   section.Take("min_views", limits.min_views,
-               fmt::format("a whole number from {} to 1000", loosest.min_views),
+               say::config::ExpectedWholeNumber(loosest.min_views, 1000),
                [&](int n) { return n >= loosest.min_views && n <= 1000; });
   section.RejectUnknownKeys();
 }
 
-void ReadIec(Section section, const toml::table& root, std::optional<Pose>& T_iec_reference) {
-  const std::string_view expected =
-      "a rigid transform: 4 rows of 4 numbers, a rotation and a translation in metres, last row 0 "
-      "0 0 1";
+void ReadIec(Section section, const toml::table& root, Config& config) {
+  const Message expected = say::config::ExpectedTransform();
   if (const auto rows = section.TakeRows("T_iec_reference", 4, 4, expected)) {
     Eigen::Matrix4d matrix;
     for (Eigen::Index r = 0; r < 4; ++r)
@@ -216,50 +204,81 @@ void ReadIec(Section section, const toml::table& root, std::optional<Pose>& T_ie
     const bool is_affine = (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() == 0;
     if (!is_rotation || !is_affine)
       section.Fail(*root["iec"]["T_iec_reference"].node(), "T_iec_reference", expected);
-    T_iec_reference = Orthonormalised(T);
+    config.compare.T_iec_reference = Orthonormalised(T);
   }
+  constexpr double kMost_mm = 100.0, kMost_deg = 10.0;
+  const auto within = [](double most) { return [most](double v) { return v >= 0 && v <= most; }; };
+  section.Take("u95_mm", config.compare.iec_u95_m,
+               say::config::ExpectedRange(say::config::Millimetres(), 0, kMost_mm),
+               within(kMost_mm));
+  section.Take("u95_deg", config.compare.iec_u95_rad,
+               say::config::ExpectedRange(say::config::Degrees(), 0, kMost_deg), within(kMost_deg));
+  if (auto& u95_m = config.compare.iec_u95_m) *u95_m *= kMillimetre;
+  if (auto& u95_rad = config.compare.iec_u95_rad) *u95_rad *= kDegree;
+  std::string markers;
+  section.Take("markers", markers, say::config::ExpectedScenePath(),
+               [](const std::string& s) { return !s.empty(); });
+  if (!markers.empty()) config.markers_scene = markers;
   section.RejectUnknownKeys();
 }
 
 void ReadAppliance(Section section, ApplianceConfig& appliance) {
   // As stored settings may be (web/model/limits.hpp, which not every build has; a test compares).
   const auto is_time = [](double v) { return v >= 0.1 && v <= 3600; };
-  section.Take("auto_stop_s", appliance.auto_stop_s, "seconds from 0.1 to 3600", is_time);
-  section.Take("scan_limit_s", appliance.scan_limit_s, "seconds from 0.1 to 3600", is_time);
-  section.Take("keep_recordings", appliance.keep_recordings, "true or false",
+  const Message time = say::config::ExpectedRange(say::config::Seconds(), 0.1, 3600);
+  section.Take("auto_stop_s", appliance.auto_stop_s, time, is_time);
+  section.Take("scan_limit_s", appliance.scan_limit_s, time, is_time);
+  section.Take("keep_recordings", appliance.keep_recordings, say::config::ExpectedFlag(),
                [](bool) { return true; });
   section.TakePath("state", appliance.state);
   section.TakePath("control", appliance.control);
   section.TakePath("calibration", appliance.calibration);
-  section.Take("sensor_serial", appliance.sensor_serial, "the serial of a sensor",
+  section.Take("sensor_serial", appliance.sensor_serial, say::config::ExpectedSensorSerial(),
                [](const std::string& s) { return s.size() <= 64; });
   section.TakeFlag("sensor_profiles", appliance.sensor_profiles);
-  section.Take("quota_gb", appliance.quota_gb, "gigabytes from 1 to 100000",
+  section.Take("quota_gb", appliance.quota_gb,
+               say::config::ExpectedRange(say::config::Gigabytes(), 1, 100000),
                [](double v) { return v >= 1 && v <= 100000; });
-  section.TakeNumber("warm_up_min", appliance.warm_up_min, 0, 120, "minutes");
-  section.TakeNumber("session_idle_min", appliance.session_idle_min, 1, 600, "minutes");
+  section.TakeNumber("warm_up_min", appliance.warm_up_min, 0, 120, say::config::Minutes());
+  section.TakeNumber("session_idle_min", appliance.session_idle_min, 1, 600,
+                     say::config::Minutes());
   section.RejectUnknownKeys();
 }
 
 void ReadSensor(Section section, ApplianceConfig& appliance) {
   // The known names depend on the drivers and are checked by the program.
-  section.Take("driver", appliance.sensor_driver, "the name of a sensor driver",
+  section.Take("driver", appliance.sensor_driver, say::config::ExpectedSensorDriver(),
                [](const std::string& s) { return !s.empty() && s.size() <= 64; });
+  section.TakePath("socket", appliance.sensor_socket);
   section.RejectUnknownKeys();
 }
 
 void ReadStorage(Section section, ApplianceConfig& appliance) {
   section.TakePath("backup_folder", appliance.backup_folder);
-  section.TakeNumber("backup_hours", appliance.backup_hours, 1, 8760, "hours");
+  section.TakeNumber("backup_hours", appliance.backup_hours, 1, 8760, say::config::Hours());
+  std::vector<std::string> recipients;
+  section.TakeNames("backup_recipients", recipients,
+                    say::config::ExpectedRecipients(AgeRecipients::kMost), AgeRecipients::kMost,
+                    IsAgeRecipient);
+  appliance.backup_recipients = AgeRecipients(std::move(recipients));
   section.TakePath("backup_key_file", appliance.backup_key_file);
   section.RejectUnknownKeys();
 }
 
+void TakeLineName(Section& section, std::string_view key, std::string& name) {
+  section.Take(key, name, say::config::ExpectedLineName(),
+               [](const std::string& s) { return !s.empty() && s.size() <= 64; });
+}
+
+void ReadMonitor(Section section, PanelConfig& panel) {
+  TakeLineName(section, "gate_chip", panel.gate_chip);
+  TakeLineName(section, "gate_line", panel.gate_line);
+  section.TakeFlag("gate_active_low", panel.gate_active_low);
+  section.RejectUnknownKeys();
+}
+
 void ReadPanel(Section button, Section light, PanelConfig& panel) {
-  const auto take = [](Section& section, std::string_view key, std::string& name) {
-    section.Take(key, name, "a name of at most 64 characters",
-                 [](const std::string& s) { return !s.empty() && s.size() <= 64; });
-  };
+  const auto take = TakeLineName;
   take(button, "chip", panel.button_chip);
   take(button, "line", panel.button_line);
   button.TakeFlag("active_low", panel.button_active_low);
@@ -275,19 +294,18 @@ void ReadPanel(Section button, Section light, PanelConfig& panel) {
 
 void ReadUpdate(Section section, UpdateConfig& update) {
   section.TakePath("folder", update.folder);
-  section.Take("max_bundle_mb", update.max_bundle_mb, "a whole number from 1 to 65536",
+  section.Take("max_bundle_mb", update.max_bundle_mb, say::config::ExpectedWholeNumber(1, 65536),
                [](int n) { return n >= 1 && n <= 65536; });
   section.RejectUnknownKeys();
 }
 
 void ReadWeb(Section section, WebConfig& web) {
-  section.Take("listen", web.listen,
-               "an address and a port, such as \"0.0.0.0:8080\" or \"[::]:8080\"",
+  section.Take("listen", web.listen, say::config::ExpectedListenAddress(),
                [](const std::string& s) { return ParseListenAddress(s).has_value(); });
   section.TakePath("tls_certificate", web.tls_certificate);
   section.TakePath("tls_key", web.tls_key);
   section.TakeFlag("plain_http", web.plain_http);
-  section.TakeNames("host_names", web.host_names, "a list of at most 16 host names", 16);
+  section.TakeNames("host_names", web.host_names, say::config::ExpectedHostNames(), 16);
   section.RejectUnknownKeys();
 }
 
@@ -325,12 +343,9 @@ std::optional<ListenAddress> ParseListenAddress(std::string_view text) {
 
 PageTransport TransportOf(const WebConfig& web, bool is_loopback) {
   if (web.tls_certificate.empty() != web.tls_key.empty())
-    throw DataError("web.tls_certificate and web.tls_key: expected both or none, found one");
+    throw DataError(say::config::OneOfTwoTlsFiles());
   const bool is_given = !web.tls_certificate.empty();
-  if (is_given && web.plain_http)
-    throw DataError(
-        "web.plain_http: expected false beside web.tls_certificate, found true; remove one of the "
-        "two");
+  if (is_given && web.plain_http) throw DataError(say::config::PlainHttpBesideTls());
   if (is_given) return PageTransport::kGivenTls;
   if (is_loopback) return PageTransport::kPlain;
   return web.plain_http ? PageTransport::kPlainOnNetwork : PageTransport::kOwnTls;
@@ -340,35 +355,37 @@ toml::table ParseToml(const std::string& text, const std::string& name) try {
   RefuseControlCharacters(text, name);
   return toml::parse(text, name);
 } catch (const toml::parse_error& error) {
-  throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line,
-                              error.description()));
+  throw DataError(say::config::NotToml(name, error.source().begin.line, error.description()));
 }
 
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
   const toml::table root = ParseToml(text, name);
   RejectUnknownTables(root, name,
                       {"markers", "reconstruct", "compare", "check", "iec", "appliance", "storage",
-                       "sensor", "button", "light", "web", "update"});
+                       "sensor", "button", "light", "monitor", "web", "update"});
   Config config;
   config.given = GivenIn(root);
   ReadMarkers(Section(root, "markers", name), config.markers);
   ReadReconstruct(Section(root, "reconstruct", name), config.reconstruct);
   ReadCompare(Section(root, "compare", name), use, config);
   ReadCheck(Section(root, "check", name), use, config.check);
-  ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
+  ReadIec(Section(root, "iec", name), root, config);
   ReadAppliance(Section(root, "appliance", name), config.appliance);
   ReadStorage(Section(root, "storage", name), config.appliance);
   ReadSensor(Section(root, "sensor", name), config.appliance);
   ReadPanel(Section(root, "button", name), Section(root, "light", name), config.panel);
+  ReadMonitor(Section(root, "monitor", name), config.panel);
   ReadWeb(Section(root, "web", name), config.web);
   ReadUpdate(Section(root, "update", name), config.update);
   return config;
 }
 
 Config ReadConfig(const std::filesystem::path& file, ConfigUse use) {
-  Config config = ParseConfig(ReadText(file, "configuration"), file.string(), use);
+  Config config = ParseConfig(ReadText(file, say::config::Configuration()), file.string(), use);
   if (config.region_file && config.region_file->is_relative())
     config.region_file = file.parent_path() / *config.region_file;
+  if (config.markers_scene && config.markers_scene->is_relative())
+    config.markers_scene = file.parent_path() / *config.markers_scene;
   return config;
 }
 
@@ -383,7 +400,7 @@ Config SalvageConfig(const std::filesystem::path& file) {
   };
   attempt([&] {
     const std::string name = file.string();
-    const toml::table root = ParseToml(ReadText(file, "configuration"), name);
+    const toml::table root = ParseToml(ReadText(file, say::config::Configuration()), name);
     const toml::table none;
     attempt([&] { ReadPanel(Section(root, "button", name), {none, "light", name}, config.panel); });
     attempt([&] { ReadPanel({none, "button", name}, Section(root, "light", name), config.panel); });
@@ -395,11 +412,7 @@ Config SalvageConfig(const std::filesystem::path& file) {
 void RefuseResearchPresets(const Config& config) {
   const auto refuse = [](const char* section, Preset preset) {
     if (preset == Preset::kBest) return;
-    throw DataError(fmt::format(
-        "[{0}] preset: expected \"best\", found \"{1}\"; plumbd takes preset \"{1}\" only with "
-        "--simulated, because it is the published method kept for comparison. Remove the key, or "
-        "compare scans with `plumb compare --preset {1}`",
-        section, Name(preset)));
+    throw DataError(say::config::ResearchPreset(section, Name(preset)));
   };
   refuse("reconstruct", config.reconstruct.preset);
   refuse("compare", config.compare.preset);
@@ -424,6 +437,7 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
        next.appliance.keep_recordings);
   keep("appliance.sensor_serial", in_use.appliance.sensor_serial, next.appliance.sensor_serial);
   keep("sensor.driver", in_use.appliance.sensor_driver, next.appliance.sensor_driver);
+  keep("sensor.socket", in_use.appliance.sensor_socket, next.appliance.sensor_socket);
   keep("button.chip", in_use.panel.button_chip, next.panel.button_chip);
   keep("button.line", in_use.panel.button_line, next.panel.button_line);
   keep("button.active_low", in_use.panel.button_active_low, next.panel.button_active_low);
@@ -431,6 +445,9 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("light.red", in_use.panel.red_line, next.panel.red_line);
   keep("light.green", in_use.panel.green_line, next.panel.green_line);
   keep("light.blue", in_use.panel.blue_line, next.panel.blue_line);
+  keep("monitor.gate_chip", in_use.panel.gate_chip, next.panel.gate_chip);
+  keep("monitor.gate_line", in_use.panel.gate_line, next.panel.gate_line);
+  keep("monitor.gate_active_low", in_use.panel.gate_active_low, next.panel.gate_active_low);
   keep("light.beeper", in_use.panel.beeper_line, next.panel.beeper_line);
   keep("light.active_low", in_use.panel.light_active_low, next.panel.light_active_low);
   keep("web.listen", in_use.web.listen, next.web.listen);
@@ -444,42 +461,42 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
 }
 
 std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file) {
-  return ParseRegion(ReadText(file, "region file"), file.string());
+  return ParseRegion(ReadText(file, say::config::RegionFile()), file.string());
 }
 
 std::vector<Eigen::Vector2d> ParseRegion(const std::string& text, const std::string& name) {
-  const auto fail = [&](std::string_view what) {
-    throw DataError(fmt::format("region file '{}': {}", name, what));
+  const auto fail = [&](const Message& why) {
+    throw DataError(say::config::WrongRegion(name, why));
   };
   nlohmann::json json;
   try {
     json = ParseBoundedJson(text);
   } catch (const DataError& error) {
-    fail(error.what());
+    fail(error.message());
   }
-  if (!json.is_object()) fail("expected an object with \"format\", \"frame\" and \"polygon_m\"");
+  if (!json.is_object()) fail(say::config::RegionNoObject());
   if (json.value("format", nlohmann::json()) != 1)
-    fail(fmt::format("expected \"format\": 1, found {}",
-                     json.value("format", nlohmann::json()).dump()));
+    fail(say::config::RegionFormat(json.value("format", nlohmann::json()).dump()));
   if (json.value("frame", nlohmann::json()) != "reference_marker") {
-    fail(fmt::format("expected \"frame\": \"reference_marker\", found {}",
-                     json.value("frame", nlohmann::json()).dump()));
+    fail(say::config::RegionFrame(json.value("frame", nlohmann::json()).dump()));
   }
   const nlohmann::json vertices = json.value("polygon_m", nlohmann::json());
   if (!vertices.is_array() || vertices.size() < 3 || vertices.size() > 10000)
-    fail("expected \"polygon_m\" with 3 to 10000 vertices [x, y] in metres");
+    fail(say::config::RegionVertices());
   std::vector<Eigen::Vector2d> polygon;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const nlohmann::json& vertex = vertices[i];
     const bool is_point =
         vertex.is_array() && vertex.size() == 2 && vertex[0].is_number() && vertex[1].is_number();
     if (!is_point)
-      fail(fmt::format("polygon_m[{}]: expected [x, y] in metres, found {}", i,
-                       vertex.dump().substr(0, 80)));
+      fail(say::config::RegionVertex(static_cast<std::int64_t>(i), vertex.dump().substr(0, 80)));
     polygon.emplace_back(vertex[0].get<double>(), vertex[1].get<double>());
     if (!(polygon.back().cwiseAbs().maxCoeff() <= 100))
-      fail(fmt::format("polygon_m[{}]: expected metres within 100 m", i));
+      fail(say::config::RegionTooFar(static_cast<std::int64_t>(i)));
   }
+  if (const auto crossing = CrossingEdges(polygon))
+    fail(say::config::RegionCrosses(static_cast<std::int64_t>(crossing->first),
+                                    static_cast<std::int64_t>(crossing->second)));
   return polygon;
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The configuration file (TOML): validated options of reconstruct and compare, with line numbers in
 // every error message.
 #pragma once
@@ -13,15 +14,10 @@
 #include "algo/comparison/comparison.hpp"
 #include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
+#include "algo/types/marker.hpp"
+#include "daemon/files/age_recipients.hpp"
 
 namespace plumb {
-
-/// Markers of the room, for recordings without camera.yaml.
-struct MarkerConfig {
-  std::optional<std::string> dictionary;  ///< OpenCV's name, or DICT_ARUCO_MIP_36h12.
-  std::optional<double> length_m;
-  std::optional<int> reference;  ///< Id of the marker whose frame is the scene's frame.
-};
 
 /// For plumbd; the command line ignores it.
 struct ApplianceConfig {
@@ -31,6 +27,8 @@ struct ApplianceConfig {
       "/var/lib/plumb/calibration";  ///< Contains SERIAL.yaml for each calibrated sensor.
   std::string sensor_serial;         ///< Use only this sensor; empty: the first one.
   std::string sensor_driver;         ///< Driver of the sensors; empty: the first of the build.
+  std::filesystem::path sensor_socket =
+      "/run/plumb/sensor.sock";  ///< Where the driver "stream" listens.
   /// Scans start from what earlier scans learned about this sensor unit.
   bool sensor_profiles = true;
   /// Limit for all scans; the oldest are removed first. Not set: a fraction of the disk.
@@ -42,7 +40,10 @@ struct ApplianceConfig {
   double session_idle_min = 30.0;       ///< Time without a scan after which a session is closed.
   std::filesystem::path backup_folder;  ///< Folder of scheduled backups; empty: none are made.
   double backup_hours = 24.0;
-  /// Key that encrypts every backup by plumbd; empty: backups are not encrypted.
+  /// Those for whom every backup by plumbd is encrypted; none: it is not encrypted.
+  AgeRecipients backup_recipients;
+  /// Key of the encrypted backups of 0.2.0: they are still restored with it. It encrypts no more,
+  /// so that with it and without recipients no backup is made at all.
   std::filesystem::path backup_key_file;
 };
 
@@ -53,11 +54,13 @@ struct PanelConfig {
   bool button_active_low = true;
   std::string light_chip = "gpiochip0", red_line, green_line, blue_line, beeper_line;
   bool light_active_low = false;
+  std::string gate_chip = "gpiochip0", gate_line;  ///< Of live monitoring.
+  bool gate_active_low = false;
 };
 
 /// The page that plumbd serves.
 struct WebConfig {
-  std::string listen = "0.0.0.0:8080";
+  std::string listen = "[::]:8080";  ///< IPv6 and IPv4.
   /// PEM files; both or none. Without them a self-made certificate is used except on loopback.
   std::filesystem::path tls_certificate, tls_key;
   /// Serve without TLS beyond loopback: all data can be read on the network.
@@ -93,7 +96,7 @@ enum class PageTransport {
 
 /// The contents of a configuration file; keys that it omits keep these defaults.
 struct Config {
-  MarkerConfig markers;
+  StatedMarkers markers;  ///< For recordings and sensors whose own file states none.
   ReconstructorOptions reconstruct;
   CompareOptions compare;
   MarkerCheckLimits check;  ///< Limits of the daily check.
@@ -103,6 +106,8 @@ struct Config {
   UpdateConfig update;
   std::optional<std::filesystem::path>
       region_file;  ///< Absolute, or relative to the configuration file's folder.
+  /// A scene whose markers are the taught ones of the room; absolute, or relative in the same way.
+  std::optional<std::filesystem::path> markers_scene;
   /// Values as the file gives them, by key: "web.listen" to "'127.0.0.1:80'".
   std::map<std::string, std::string> given;
 };
@@ -126,13 +131,15 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///                    moved_marker_mm, moved_marker_sigmas, min_coverage, max_hole_mm,
 ///                    max_residual_p95_mm, max_lost_s, max_breathing_mm
 ///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views
-///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to IEC fixed frame
-///     [storage]      backup_folder, backup_hours, backup_key_file
+///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to IEC fixed frame,
+///                    u95_mm, u95_deg, markers (folder of a scene of the same room)
+///     [storage]      backup_folder, backup_hours, backup_recipients, backup_key_file
 ///     [appliance]    state, control, calibration, sensor_serial, sensor_profiles, quota_gb,
 ///                    auto_stop_s, scan_limit_s, keep_recordings, warm_up_min, session_idle_min
-///     [sensor]       driver
+///     [sensor]       driver, socket
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low
+///     [monitor]      gate_chip, gate_line, gate_active_low
 ///     [web]          listen, tls_certificate, tls_key, plain_http, host_names
 ///     [update]       folder, max_bundle_mb
 ///

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One table of a configuration file: values are taken key by key, with line numbers in every error
 // message.
 #pragma once
@@ -7,6 +8,7 @@
 #include <concepts>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <initializer_list>
 #include <optional>
 #include <sstream>
@@ -16,11 +18,12 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/names.hpp"
+#include "algo/base/nearest_name.hpp"
 #include "daemon/config/toml.hpp"
+#include "words/config.hpp"
 
 namespace plumb {
 
@@ -33,8 +36,10 @@ inline void RejectUnknownTables(const toml::table& root, const std::string& file
                                 std::initializer_list<std::string_view> known) {
   for (const auto& [key, node] : root) {
     if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
-    throw DataError(fmt::format("{}:{}: unknown table or key '{}'; expected [{}]", file,
-                                node.source().begin.line, key.str(), fmt::join(known, "], [")));
+    std::vector<std::string> tables;
+    for (const std::string_view name : known) tables.push_back(fmt::format("[{}]", name));
+    throw DataError(
+        say::config::UnknownTable(file, node.source().begin.line, key.str(), std::move(tables)));
   }
 }
 
@@ -46,11 +51,11 @@ class Section {
     const toml::node* node = root.get(name_);
     if (node == nullptr) return;
     table_ = node->as_table();
-    if (table_ == nullptr) Fail(*node, name_, "a table, [" + name_ + "]");
+    if (table_ == nullptr) Fail(*node, name_, say::config::ExpectedTable(name_));
   }
 
   template <typename T, typename Check>
-  void Take(std::string_view key, T& value, std::string_view expected, Check is_valid) {
+  void Take(std::string_view key, T& value, const Message& expected, Check is_valid) {
     const toml::node* node = Find(key);
     if (node == nullptr) return;
     std::optional<T> found;
@@ -69,7 +74,7 @@ class Section {
 
   /// The same for an optional key, without which the value stays unchanged.
   template <typename T, typename Check>
-  void Take(std::string_view key, std::optional<T>& value, std::string_view expected,
+  void Take(std::string_view key, std::optional<T>& value, const Message& expected,
             Check is_valid) {
     T found{};
     if (Find(key) == nullptr) return;
@@ -78,35 +83,35 @@ class Section {
   }
 
   void TakeFlag(std::string_view key, bool& value) {
-    Take(key, value, "true or false", [](bool) { return true; });
+    Take(key, value, say::config::ExpectedFlag(), [](bool) { return true; });
   }
 
   void TakePath(std::string_view key, std::filesystem::path& path) {
     std::string text;
-    Take(key, text, "an absolute path of at most 4095 bytes",
+    Take(key, text, say::config::ExpectedAbsolutePath(),
          [](const std::string& s) { return s.starts_with('/') && s.size() < 4096; });
     if (!text.empty()) path = text;
   }
 
   /// A number in a range, with the name of its unit.
   void TakeNumber(std::string_view key, double& value, double least, double most,
-                  std::string_view unit) {
-    Take(key, value, fmt::format("{} from {} to {}", unit, least, most),
+                  const Message& unit) {
+    Take(key, value, say::config::ExpectedRange(unit, least, most),
          [&](double v) { return v >= least && v <= most; });
   }
 
   /// A limit above 0 that may not exceed `most`.
   /// @param value  Like `most` in the unit inside the program, of which the file's is `unit`.
   void TakeLimit(std::string_view key, double& value, double most, double unit,
-                 std::string_view unit_name) {
+                 const Message& unit_name) {
     double number = 0.0;
-    Take(key, number, fmt::format("{} above 0 and at most {:g}", unit_name, most / unit),
+    Take(key, number, say::config::ExpectedLimit(unit_name, most / unit),
          [&](double v) { return v > 0 && v * unit <= most; });
     if (number > 0) value = number * unit;
   }
 
   /// What the user can do about a value that is refused from now on.
-  void SetAdvice(std::string advice) { advice_ = std::move(advice); }
+  void SetAdvice(Message advice) { advice_ = std::move(advice); }
 
   /// One of the names of an enumeration.
   template <typename Enum>
@@ -114,14 +119,16 @@ class Section {
     std::vector<std::string> known;
     for (const std::string_view name : kNamesOf<Enum>) known.push_back(fmt::format("\"{}\"", name));
     std::string found;
-    Take(key, found, fmt::format("one of {}", fmt::join(known, ", ")),
+    Take(key, found, say::config::ExpectedOneOf(std::move(known)),
          [](const std::string& text) { return Named<Enum>(text).has_value(); });
     if (!found.empty()) value = Named<Enum>(found).value();
   }
 
   /// A list of texts that are not empty.
-  void TakeNames(std::string_view key, std::vector<std::string>& names, std::string_view expected,
-                 std::size_t most) {
+  void TakeNames(
+      std::string_view key, std::vector<std::string>& names, const Message& expected,
+      std::size_t most,
+      const std::function<bool(const std::string&)>& is_valid = [](const auto&) { return true; }) {
     const toml::node* node = Find(key);
     if (node == nullptr) return;
     const toml::array* array = node->as_array();
@@ -129,7 +136,8 @@ class Section {
     names.clear();
     for (const toml::node& element : *array) {
       const std::optional<std::string> name = element.value_exact<std::string>();
-      if (!name || name->empty() || name->size() > 255) Fail(element, key, expected);
+      if (!name || name->empty() || name->size() > 255 || !is_valid(*name))
+        Fail(element, key, expected);
       names.push_back(*name);
     }
   }
@@ -139,7 +147,7 @@ class Section {
   std::optional<std::vector<std::vector<double>>> TakeRows(std::string_view key,
                                                            std::size_t num_rows,
                                                            std::size_t num_columns,
-                                                           std::string_view expected) {
+                                                           const Message& expected) {
     const toml::node* node = Find(key);
     if (node == nullptr) return std::nullopt;
     std::vector<std::vector<double>> rows;
@@ -166,34 +174,38 @@ class Section {
 
   /// A key that this program does not take from the file.
   /// @param where  States where the value belongs.
-  void Refuse(std::string_view key, std::string_view where) const {
+  void Refuse(std::string_view key, const Message& where) const {
     if (table_ == nullptr) return;
     const toml::node* node = table_->get(key);
     if (node == nullptr) return;
-    throw DataError(fmt::format("{}:{}: {}.{} is not taken from this file: {}; remove the line",
-                                file_, node->source().begin.line, name_, key, where));
+    throw DataError(say::config::NotTaken(file_, node->source().begin.line, KeyHere(key), where));
   }
 
   void RejectUnknownKeys() const {
     if (table_ == nullptr) return;
     for (const auto& [key, node] : *table_) {
       if (std::find(taken_.begin(), taken_.end(), key.str()) != taken_.end()) continue;
-      throw DataError(fmt::format("{}:{}: unknown key '{}' in [{}]; known are {}", file_,
-                                  node.source().begin.line, key.str(), name_,
-                                  fmt::join(taken_, ", ")));
+      throw DataError(say::config::UnknownKey(file_, node.source().begin.line, key.str(), name_,
+                                              NearestName(key.str(), taken_), taken_));
     }
   }
 
   [[noreturn]] void Fail(const toml::node& node, std::string_view key,
-                         std::string_view expected) const {
+                         const Message& expected) const {
     std::ostringstream found;
     node.visit([&found](const auto& n) { found << n; });
-    throw DataError(fmt::format("{}:{}: {}.{}: expected {}, found {}{}{}", file_,
-                                node.source().begin.line, name_, key, expected, found.str(),
-                                advice_.empty() ? "" : "; ", advice_));
+    const std::int64_t line = node.source().begin.line;
+    throw DataError(advice_.empty()
+                        ? say::config::WrongValue(file_, line, KeyHere(key), expected, found.str())
+                        : say::config::WrongValueWithAdvice(file_, line, KeyHere(key), expected,
+                                                            found.str(), advice_));
   }
 
  private:
+  [[nodiscard]] std::string KeyHere(std::string_view key) const {
+    return fmt::format("{}.{}", name_, key);
+  }
+
   const toml::node* Find(std::string_view key) {
     taken_.emplace_back(key);
     return table_ == nullptr ? nullptr : table_->get(key);
@@ -203,7 +215,7 @@ class Section {
   const std::string& file_;
   const toml::table* table_ = nullptr;
   std::vector<std::string> taken_;
-  std::string advice_;
+  Message advice_;
 };
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "daemon/config/config.hpp"
@@ -9,9 +10,8 @@ namespace plumb {
 [[nodiscard]] inline SensorSettings SensorSettingsOf(const Config& config) {
   SensorSettings settings;
   settings.calibration_folder = config.appliance.calibration;
-  settings.marker_dictionary = config.markers.dictionary.value_or(settings.marker_dictionary);
-  settings.marker_length_m = config.markers.length_m.value_or(settings.marker_length_m);
-  settings.reference_marker = config.markers.reference;
+  settings.stream_socket = config.appliance.sensor_socket;
+  settings.room_markers = config.markers.Or(settings.room_markers);
   return settings;
 }
 

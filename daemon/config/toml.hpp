@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // toml++ without two errors of its version 3.3.
 #pragma once
 

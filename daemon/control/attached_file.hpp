@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An open file that is sent along with a request.
 #pragma once
 

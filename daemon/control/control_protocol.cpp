@@ -1,16 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/control/control_protocol.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/message_json.hpp"
+#include "words/control.hpp"
 
 namespace plumb {
 namespace {
@@ -18,8 +21,8 @@ namespace {
 using Json = nlohmann::json;
 using Kind = ControlRequest::Kind;
 
-constexpr std::array<std::string_view, 8> kActions = {"plug",  "unplug",     "stall",  "resume",
-                                                      "error", "next-scene", "glitch", "speed"};
+constexpr std::array<std::string_view, 10> kActions = {
+    "plug", "unplug", "stall", "resume", "error", "next-scene", "glitch", "speed", "mount", "move"};
 constexpr std::size_t kMaxArgument = 80;
 constexpr std::size_t kMaxFolder = 1024;
 
@@ -39,73 +42,97 @@ bool IsAbsolute(const std::string& path) {
   return path.starts_with('/') && path.size() <= kMaxFolder && path.find('\0') == std::string::npos;
 }
 
+std::string TextOf(const Json& json, const char* key) {
+  const auto value = json.find(key);
+  return value != json.end() && value->is_string() ? value->get<std::string>() : std::string();
+}
+
+void ReadNothing(const Json&, ControlRequest&) {}
+
+void ReadPress(const Json& json, ControlRequest& request) {
+  const auto is_long = json.find("long");
+  if (is_long == json.end()) return;
+  if (!is_long->is_boolean()) throw DataError(say::control::PressLong());
+  request.is_long = is_long->get<bool>();
+}
+
+void ReadSim(const Json& json, ControlRequest& request) {
+  request.action = TextOf(json, "action");
+  if (std::find(kActions.begin(), kActions.end(), request.action) == kActions.end())
+    throw DataError(say::control::SimAction({kActions.begin(), kActions.end()}));
+  request.argument = TextOf(json, "argument");
+  if ((json.contains("argument") && !json["argument"].is_string()) || !IsWords(request.argument))
+    throw DataError(say::control::SimArgument(kMaxArgument));
+}
+
+void ReadMonitor(const Json& json, ControlRequest& request) {
+  const std::string action = TextOf(json, "action");
+  if (action != "start" && action != "stop") throw DataError(say::control::MonitorAction());
+  request.starts = action == "start";
+}
+
+void ReadBackup(const Json& json, ControlRequest& request) {
+  request.folder = TextOf(json, "folder");
+  if (!IsAbsolute(request.folder)) throw DataError(say::control::AbsolutePath("folder"));
+  const auto keys = json.find("recipients");
+  if (keys == json.end()) return;
+  const bool are_texts =
+      keys->is_array() && !keys->empty() &&
+      std::all_of(keys->begin(), keys->end(), [](const Json& key) { return key.is_string(); });
+  if (!are_texts) throw DataError(say::control::Recipients(AgeRecipients::kMost));
+  request.recipients = AgeRecipients(keys->get<std::vector<std::string>>());
+}
+
+void ReadUpdate(const Json& json, ControlRequest& request) {
+  request.name = TextOf(json, "name");
+  if (!IsBundleName(request.name)) throw DataError(say::control::BundleName());
+}
+
+struct CommandSyntax {
+  std::string_view name;
+  Kind kind;
+  std::array<std::string_view, 2> keys;  ///< Beside "command"; empty: none.
+  void (*read)(const Json& json, ControlRequest& request);
+};
+constexpr std::array<CommandSyntax, 10> kCommands = {{
+    {"status", Kind::kStatus, {}, ReadNothing},
+    {"press", Kind::kPress, {"long"}, ReadPress},
+    {"watch", Kind::kWatch, {}, ReadNothing},
+    {"sim", Kind::kSim, {"action", "argument"}, ReadSim},
+    {"backup", Kind::kBackup, {"folder", "recipients"}, ReadBackup},
+    {"update", Kind::kUpdate, {"name"}, ReadUpdate},
+    {"update-status", Kind::kUpdateStatus, {}, ReadNothing},
+    {"restart", Kind::kRestart, {}, ReadNothing},
+    {"presence", Kind::kPresence, {}, ReadNothing},
+    {"monitor", Kind::kMonitor, {"action"}, ReadMonitor},
+}};
+
+const CommandSyntax& SyntaxOf(std::string_view command) {
+  for (const CommandSyntax& syntax : kCommands)
+    if (syntax.name == command) return syntax;
+  std::vector<std::string> names;
+  for (const CommandSyntax& syntax : kCommands) names.emplace_back(syntax.name);
+  throw DataError(say::control::UnknownCommand(names));
+}
+
 }  // namespace
 
 ControlRequest ParseControlRequest(std::string_view line) {
   if (line.size() > kMaxControlLine)
     throw DataError(
-        fmt::format("a request has at most {} bytes, found {}", kMaxControlLine, line.size()));
-  const Json json = ParseBoundedJsonOrNothing(line, /*max_depth=*/1);
-  if (!json.is_object())
-    throw DataError(
-        "expected a request such as {\"command\": \"status\"}, found no flat JSON object");
-  const auto text = [&](const char* key) {
-    const auto value = json.find(key);
-    return value != json.end() && value->is_string() ? value->get<std::string>() : std::string();
-  };
-  const auto allow_only = [&](std::initializer_list<std::string_view> keys) {
-    for (const auto& [name, value] : json.items()) {
-      if (std::find(keys.begin(), keys.end(), name) == keys.end())
-        throw DataError(fmt::format("unknown key '{}' in the request", name.substr(0, 32)));
-    }
-  };
-  ControlRequest request;
-  const std::string command = text("command");
-  if (command == "status" || command == "watch") {
-    request.kind = command == "status" ? Kind::kStatus : Kind::kWatch;
-    allow_only({"command"});
-  } else if (command == "press") {
-    request.kind = Kind::kPress;
-    allow_only({"command", "long"});
-    if (const auto is_long = json.find("long"); is_long != json.end()) {
-      if (!is_long->is_boolean()) throw DataError("press: \"long\" is true or false");
-      request.is_long = is_long->get<bool>();
-    }
-  } else if (command == "sim") {
-    request.kind = Kind::kSim;
-    allow_only({"command", "action", "argument"});
-    request.action = text("action");
-    if (std::find(kActions.begin(), kActions.end(), request.action) == kActions.end()) {
-      throw DataError(fmt::format("sim: expected an action of {}", fmt::join(kActions, ", ")));
-    }
-    request.argument = text("argument");
-    if ((json.contains("argument") && !json["argument"].is_string()) ||
-        !IsWords(request.argument)) {
-      throw DataError(fmt::format(
-          "sim: \"argument\" is at most {} letters, digits, spaces, -, _ and dots", kMaxArgument));
-    }
-  } else if (command == "backup") {
-    request.kind = Kind::kBackup;
-    allow_only({"command", "folder", "key_file"});
-    request.folder = text("folder");
-    request.key_file = text("key_file");
-    if (!IsAbsolute(request.folder)) throw DataError("backup: \"folder\" is an absolute path");
-    if (json.contains("key_file") && !IsAbsolute(request.key_file))
-      throw DataError("backup: \"key_file\" is an absolute path");
-  } else if (command == "update") {
-    request.kind = Kind::kUpdate;
-    allow_only({"command", "name"});
-    request.name = text("name");
-    if (!IsBundleName(request.name))
-      throw DataError(
-          "update: \"name\" is at most 64 letters, digits, -, _ and dots, and ends with .raucb");
-  } else if (command == "update-status" || command == "restart") {
-    request.kind = command == "restart" ? Kind::kRestart : Kind::kUpdateStatus;
-    allow_only({"command"});
-  } else {
-    throw DataError(
-        "expected a command of status, press, watch, sim, backup, update, update-status, restart");
+        say::control::LongRequest(kMaxControlLine, static_cast<std::int64_t>(line.size())));
+  const Json json = ParseBoundedJsonOrNothing(line, /*max_depth=*/2);
+  if (!json.is_object()) throw DataError(say::control::NoObject("{\"command\": \"status\"}"));
+  const CommandSyntax& syntax = SyntaxOf(TextOf(json, "command"));
+  for (const auto& [name, value] : json.items()) {
+    const bool is_known =
+        name == "command" || (!name.empty() && std::find(syntax.keys.begin(), syntax.keys.end(),
+                                                         name) != syntax.keys.end());
+    if (!is_known) throw DataError(say::control::UnknownKey(name.substr(0, 32)));
   }
+  ControlRequest request;
+  request.kind = syntax.kind;
+  syntax.read(json, request);
   return request;
 }
 
@@ -119,7 +146,7 @@ std::string ControlRequestText(const ControlRequest& request) {
       return ControlLine({{"command", "press"}, {"long", request.is_long}});
     case Kind::kBackup: {
       Json backup{{"command", "backup"}, {"folder", request.folder}};
-      if (!request.key_file.empty()) backup["key_file"] = request.key_file;
+      if (!request.recipients.empty()) backup["recipients"] = request.recipients.keys();
       return ControlLine(backup);
     }
     case Kind::kUpdate:
@@ -128,6 +155,10 @@ std::string ControlRequestText(const ControlRequest& request) {
       return ControlLine({{"command", "update-status"}});
     case Kind::kRestart:
       return ControlLine({{"command", "restart"}});
+    case Kind::kPresence:
+      return ControlLine({{"command", "presence"}});
+    case Kind::kMonitor:
+      return ControlLine({{"command", "monitor"}, {"action", request.starts ? "start" : "stop"}});
     case Kind::kSim:
       break;
   }
@@ -142,8 +173,8 @@ std::string ControlLine(const nlohmann::json& json) {
 
 std::string ControlDone() { return R"({"ok":true})"; }
 
-std::string ControlRefusal(std::string_view error, bool is_input) {
-  Json refusal = {{"ok", false}, {"error", error}};
+std::string ControlRefusal(const Message& why, bool is_input) {
+  Json refusal = {{"ok", false}, {"error", why.English()}, {"error_message", MessageJson(why)}};
   if (is_input) refusal["input"] = true;
   return ControlLine(refusal);
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The protocol of the control socket: one JSON object per line for requests and answers.
 #pragma once
 
@@ -8,27 +9,41 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "algo/base/message.hpp"
 #include "daemon/control/attached_file.hpp"
+#include "daemon/files/age_recipients.hpp"
 
 namespace plumb {
 
 inline constexpr std::size_t kMaxControlLine = 4096;  ///< Bytes of a request.
 
 /// {"command": "status" | "press" | "watch" | "sim" | "backup" | "update" | "update-status" |
-/// "restart", "long": bool with press, "action" and, optional, "argument": texts with sim,
-/// "folder": an absolute path with backup, and, optional, "key_file": another, "name": NAME.raucb
-/// with update, whose message carries the open file (SCM_RIGHTS)}
+/// "restart" | "presence" | "monitor", "long": bool with press, "action" and, optional, "argument":
+/// texts with sim, "folder": an absolute path with backup, and, optional, "recipients": public
+/// keys, "name": NAME.raucb with update, whose message carries the open file (SCM_RIGHTS)}
 struct ControlRequest {
-  enum class Kind { kStatus, kPress, kWatch, kSim, kBackup, kUpdate, kUpdateStatus, kRestart };
+  enum class Kind {
+    kStatus,
+    kPress,
+    kWatch,
+    kSim,
+    kBackup,
+    kUpdate,
+    kUpdateStatus,
+    kRestart,
+    kPresence,
+    kMonitor
+  };
   Kind kind = Kind::kStatus;
   bool is_long = false;  ///< kPress
-  std::string
-      action;  ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch, speed.
+  bool starts = false;   ///< kMonitor: "action" is start, otherwise stop.
+  std::string action;    ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch,
+                         ///< speed, mount, move.
   /// kSim: a serial, the kind and number of glitches, or the speed; words of letters, digits, -, _
   /// and dots.
   std::string argument;
   std::string folder = {};                        ///< kBackup: target folder or archive.
-  std::string key_file = {};                      ///< kBackup: file with the key for encryption.
+  AgeRecipients recipients = {};                  ///< kBackup: those for whom it is encrypted.
   std::string name = {};                          ///< kUpdate: name of the bundle.
   std::shared_ptr<const AttachedFile> file = {};  ///< kUpdate: the bundle, open for reading.
   bool operator==(const ControlRequest&) const = default;
@@ -44,9 +59,9 @@ struct ControlRequest {
 /// Text that is not UTF-8, such as a path, does not make a line fail.
 [[nodiscard]] std::string ControlLine(const nlohmann::json& json);
 
-/// {"ok": true} or {"ok": false, "error": text}
+/// {"ok": true} or {"ok": false, "error": English text, "error_message": as in message_json.hpp}
 [[nodiscard]] std::string ControlDone();
 /// @param is_input  The error is in the request, not in the present state: adds "input": true.
-[[nodiscard]] std::string ControlRefusal(std::string_view error, bool is_input = false);
+[[nodiscard]] std::string ControlRefusal(const Message& why, bool is_input = false);
 
 }  // namespace plumb

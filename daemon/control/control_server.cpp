@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/control/control_server.hpp"
 
 #include <sys/epoll.h>
@@ -11,9 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
+#include "words/control.hpp"
 
 namespace plumb {
 
@@ -80,8 +80,7 @@ void ControlServer::Accept() {
   if (fd < 0) return;
   if (clients_.size() >= options_.max_clients && !MakeRoom()) {
     const std::string why =
-        ControlRefusal(fmt::format("{} others are connected: end one of them, then try again",
-                                   clients_.size())) +
+        ControlRefusal(say::control::OthersConnected(static_cast<std::int64_t>(clients_.size()))) +
         "\n";
     (void)::send(fd, why.data(), why.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     ::close(fd);
@@ -140,7 +139,7 @@ void ControlServer::Read(std::uint64_t id) {
     if (!clients_.contains(id)) return;
   }
   if (client.in.size() > kMaxControlLine) {
-    Send(id, ControlRefusal("the request is too long"));
+    Send(id, ControlRefusal(say::control::TooLong()));
     Drop(id);
   }
 }
@@ -150,12 +149,11 @@ void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
     ControlRequest request = ParseControlRequest(line);
     Client& client = *clients_.at(id);
     if (client.unanswered >= options_.max_unanswered) {
-      throw DataError(fmt::format(
-          "{} requests of this connection have no answer yet: wait for them", client.unanswered));
+      throw DataError(say::control::Unanswered(client.unanswered));
     }
     if (request.kind == ControlRequest::Kind::kUpdate) {
       request.file = std::move(client.attached);
-      if (!request.file) throw DataError("update: the open file must come along (SCM_RIGHTS)");
+      if (!request.file) throw DataError(say::control::NoOpenFile());
     }
     if (request.kind == ControlRequest::Kind::kWatch) client.watches = true;
     ++client.unanswered;
@@ -165,9 +163,9 @@ void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
       Send(id, reply);
     }));
   } catch (const DataError& error) {
-    Send(id, ControlRefusal(error.what(), /*is_input=*/true));
+    Send(id, ControlRefusal(error.message(), /*is_input=*/true));
   } catch (const std::exception& error) {  // it costs this connection, and not plumbd
-    Send(id, ControlRefusal(error.what()));
+    Send(id, ControlRefusal(MessageOf(error)));
     Drop(id);
   }
 }

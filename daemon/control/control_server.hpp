@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The control socket: local clients request the status, press the button and watch events.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Errors of a reconstruction, an alignment or a motion against the truth. Pure functions without
 // files.
 #pragma once
@@ -8,7 +9,7 @@
 #include <vector>
 
 #include "algo/base/pose.hpp"
-#include "algo/comparison/deformation.hpp"
+#include "algo/motion/deformation.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/marker.hpp"
 #include "algo/types/scene.hpp"

@@ -1,9 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/evaluation/evaluation.hpp"
 
 #include <algorithm>
 #include <set>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
@@ -11,6 +11,8 @@
 #include "algo/base/units.hpp"
 #include "algo/geometry/rigid_fit.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/evaluation.hpp"
+#include "words/progress.hpp"
 
 namespace plumb {
 namespace {
@@ -24,8 +26,7 @@ constexpr std::size_t kMaxScenes = 1000;
 std::string CheckedName(const Json& value, const fs::path& file) {
   const std::string name = value.is_string() ? value.get<std::string>() : "";
   if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos) {
-    throw DataError(fmt::format("suite file '{}': expected the name of a scene, found {}",
-                                file.string(), value.dump()));
+    throw DataError(say::evaluation::SceneName(file.string(), value.dump()));
   }
   return name;
 }
@@ -38,10 +39,16 @@ void ReadSuiteFile(const fs::path& file, Suite& suite) {
     for (const auto& scene : content.at("scenes")) suite.scenes.push_back(CheckedName(scene, file));
     for (const auto& pair : content.at("pairs"))
       suite.pairs.emplace_back(CheckedName(pair.at(0), file), CheckedName(pair.at(1), file));
+    for (const auto& name : content.value("live", Json::array()))
+      suite.live.push_back(CheckedName(name, file));
+    const Json together = content.value("live_together", Json::object());
+    for (const auto& [name, recordings] : together.items()) {
+      for (const auto& recording : recordings)
+        suite.live_together[CheckedName(name, file)].push_back(CheckedName(recording, file));
+    }
   } catch (const Json::exception& error) {
-    throw DataError(fmt::format(
-        "suite file '{}': expected {{\"name\", \"scenes\": [..], \"pairs\": [[a, b], ..]}}; {}",
-        file.string(), error.what()));
+    throw DataError(say::evaluation::SuiteFile(
+        file.string(), R"({"name", "scenes": [..], "pairs": [[a, b], ..]})", error.what()));
   }
 }
 
@@ -86,8 +93,14 @@ void MeasureMarkers(const Scene& scene, const SceneTruth& truth, SceneEvaluation
   result.marker_scale_permille = 1000 * (cross / square - 1);
 }
 
+/// The frame of a scene's height map in the world; of a planning CT's by the room as configured.
+Pose WorldOfHeights(const Scene& scene, const SceneTruth& truth, const CompareOptions& options) {
+  if (!scene.planning || !options.T_iec_reference) return truth.T_world_reference_marker;
+  return truth.T_world_reference_marker * options.T_iec_reference->inverse();
+}
+
 SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const SceneTruth& truth,
-                             double min_frames_seen) {
+                             const EvaluateOptions& options) {
   SceneEvaluation result;
   result.name = name;
   result.frames_total = scene.frames_total;
@@ -104,7 +117,8 @@ SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const 
   result.marker_intervals = CoverageOfMarkers(scene.markers, truth);
   if (scene.height_map) {
     const HeightMap true_heights =
-        TrueHeights(truth, scene.height_map->grid, truth.T_world_reference_marker, min_frames_seen);
+        TrueHeights(truth, scene.height_map->grid, WorldOfHeights(scene, truth, options.compare),
+                    options.min_frames_seen);
     result.heights = ErrorOfHeights(*scene.height_map, true_heights);
     result.shape = ErrorOfShape(*scene.height_map, true_heights);
   }
@@ -146,12 +160,15 @@ PairEvaluation MeasurePair(const std::string& reference_name, const std::string&
   }
   if (comparison.deviation) {
     const GridShape& grid = comparison.deviation->grid;
-    const Pose& T_world_marker = reference.truth.T_world_reference_marker;
+    const Pose T_world_marker = WorldOfHeights(reference.scene, reference.truth, options.compare);
+    // The motion in the frame of the grid, where that of a planning CT is another one.
+    const Pose T_grid_marker = T_world_marker.inverse() * reference.truth.T_world_reference_marker;
     const double min_seen = options.min_frames_seen;
     HeightMap true_deviation = TrueHeights(current.truth, grid, T_world_marker, min_seen);
     if (comparison.deformation && comparison.motion)
-      result.deformation =
-          ErrorOfDeformation(*comparison.deformation, comparison.motion->T, true_deviation);
+      result.deformation = ErrorOfDeformation(
+          *comparison.deformation, T_grid_marker * comparison.motion->T * T_grid_marker.inverse(),
+          true_deviation);
     const HeightMap before = TrueHeights(reference.truth, grid, T_world_marker, min_seen);
     for (std::size_t cell = 0; cell < before.z.size(); ++cell)
       true_deviation.z[cell] -= before.z[cell];
@@ -186,10 +203,7 @@ MotionStatistics StatisticsOf(const Evaluation& evaluation,
 
 Suite OpenSuite(const fs::path& folder) {
   if (!fs::is_directory(folder / "truth")) {
-    throw DataError(fmt::format(
-        "'{}' is not a suite: expected folders 'truth' and 'recordings' in it, as `plumb "
-        "simulate` writes",
-        folder.string()));
+    throw DataError(say::evaluation::NotASuite(folder.string()));
   }
   Suite suite;
   suite.name = (folder.filename().empty() ? folder.parent_path() : folder).filename().string();
@@ -199,18 +213,24 @@ Suite OpenSuite(const fs::path& folder) {
     FindScenes(folder, suite);
   }
   if (suite.scenes.empty() || suite.scenes.size() > kMaxScenes) {
-    throw DataError(fmt::format("suite '{}': expected 1 to {} scenes, found {}", folder.string(),
-                                kMaxScenes, suite.scenes.size()));
+    throw DataError(say::evaluation::SceneCount(folder.string(), kMaxScenes, suite.scenes.size()));
   }
   const std::set<std::string> known(suite.scenes.begin(), suite.scenes.end());
   for (const auto& [reference, current] : suite.pairs) {
     for (const std::string& name : {reference, current}) {
       if (!known.contains(name))
-        throw DataError(fmt::format("suite '{}': a pair names scene '{}', which is not listed",
-                                    folder.string(), name));
+        throw DataError(say::evaluation::UnknownScene(folder.string(), name));
     }
   }
-  for (const std::string& name : suite.scenes) {
+  for (const auto& [together, recordings] : suite.live_together) {
+    for (const std::string& name : recordings) {
+      if (std::find(suite.live.begin(), suite.live.end(), name) == suite.live.end())
+        throw DataError(say::evaluation::UnknownScene(folder.string(), name));
+    }
+  }
+  std::vector<std::string> recorded = suite.scenes;
+  recorded.insert(recorded.end(), suite.live.begin(), suite.live.end());
+  for (const std::string& name : recorded) {
     const fs::path nested = folder / "recordings" / name;
     const fs::path file = folder / "recordings" / (name + ".oni");
     suite.recordings[name] = fs::is_directory(nested)    ? nested
@@ -219,8 +239,7 @@ Suite OpenSuite(const fs::path& folder) {
     suite.truths[name] = folder / "truth" / name;
     for (const fs::path& path : {suite.recordings[name], suite.truths[name]}) {
       if (!fs::is_directory(path) && path != file)
-        throw DataError(fmt::format("suite '{}': scene '{}' has no folder '{}'", folder.string(),
-                                    name, path.string()));
+        throw DataError(say::evaluation::NoSceneFolder(folder.string(), name, path.string()));
     }
   }
   return suite;
@@ -246,7 +265,7 @@ IntervalCount Evaluation::MarkerIntervals() const {
 
 Evaluation EvaluateSuite(
     const Suite& suite, const EvaluateOptions& options, const std::stop_token& stop,
-    const std::function<void(const std::string& what, double fraction)>& progress) {
+    const std::function<void(const Message& what, double fraction)>& progress) {
   Evaluation evaluation;
   evaluation.suite = suite.name;
   evaluation.preset = options.compare.preset;
@@ -260,9 +279,8 @@ Evaluation EvaluateSuite(
   for (const std::string& name : suite.scenes) {
     KeptScene& entry = kept[name];
     entry.scene = options.get_scene(name);
-    if (stop.stop_requested()) throw Interrupted("the evaluation was interrupted");
-    evaluation.scenes.push_back(
-        MeasureScene(name, entry.scene, entry.truth, options.min_frames_seen));
+    if (stop.stop_requested()) throw Interrupted(say::evaluation::Interrupted());
+    evaluation.scenes.push_back(MeasureScene(name, entry.scene, entry.truth, options));
     if (const auto& trajectory = evaluation.scenes.back().keyframes) {
       entry.T_world_scene = trajectory->T_world_scene;
       entry.has_world = true;
@@ -270,10 +288,10 @@ Evaluation EvaluateSuite(
     entry.scene.mesh = {};  // nine scenes stay in memory: keep only what pairs need
   }
   for (const auto& [reference, current] : suite.pairs) {
-    if (stop.stop_requested()) throw Interrupted("the evaluation was interrupted");
+    if (stop.stop_requested()) throw Interrupted(say::evaluation::Interrupted());
     if (progress)
-      progress("comparing", static_cast<double>(evaluation.pairs.size()) /
-                                static_cast<double>(suite.pairs.size()));
+      progress(say::progress::Comparing(), static_cast<double>(evaluation.pairs.size()) /
+                                               static_cast<double>(suite.pairs.size()));
     const Comparison comparison =
         Compare(kept.at(reference).scene, kept.at(current).scene, options.compare);
     if (options.store) options.store(reference, current, kept.at(reference).scene, comparison);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The accuracy of the complete method on a suite of recordings with truth.
 #pragma once
 
@@ -24,6 +25,10 @@ struct Suite {
   std::vector<std::pair<std::string, std::string>> pairs;  ///< (reference, current)
   std::map<std::string, std::filesystem::path> recordings;
   std::map<std::string, std::filesystem::path> truths;
+  /// Recordings of a sensor at rest; theirs are among `recordings` and `truths`, too.
+  std::vector<std::string> live;
+  /// Names of sensors' recordings of the same time, which are evaluated together, too.
+  std::map<std::string, std::vector<std::string>> live_together;
 };
 
 /// Reads `suite.json`. Without it, every folder of `truth/` is a scene ("reference" first) and all
@@ -54,7 +59,7 @@ struct SceneEvaluation {
 struct PairEvaluation {
   std::string reference, current;
   Verdict verdict = Verdict::kNoAnswer;
-  std::vector<std::string> reasons;
+  std::vector<Message> reasons;
   std::optional<MotionError> motion;
   TrueNumbers truth = {};  ///< At the isocentre of the correction, otherwise at the true centroid.
   std::optional<NumberErrors> numbers;
@@ -102,6 +107,6 @@ struct EvaluateOptions {
 /// @throws DataError from truths, recordings and comparisons; Interrupted on a stop request.
 [[nodiscard]] Evaluation EvaluateSuite(
     const Suite& suite, const EvaluateOptions& options, const std::stop_token& stop = {},
-    const std::function<void(const std::string& what, double fraction)>& progress = {});
+    const std::function<void(const Message& what, double fraction)>& progress = {});
 
 }  // namespace plumb

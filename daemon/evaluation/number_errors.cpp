@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/evaluation/number_errors.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The six numbers of a correction against the truth: coverage of the 95 % intervals and correctness
 // of the verdicts.
 #pragma once
@@ -6,7 +7,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "algo/acceptance/acceptance.hpp"
+#include "algo/acceptance/gates.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/comparison/correction.hpp"
 

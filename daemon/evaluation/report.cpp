@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/evaluation/report.hpp"
 
 #include <array>
@@ -6,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/message_json.hpp"
 #include "algo/base/notice.hpp"
 
 namespace plumb {
@@ -78,7 +80,7 @@ std::string MotionTable(const Evaluation& evaluation) {
   for (const PairEvaluation& pair : evaluation.pairs) {
     if (pair.verdict != Verdict::kNoAnswer || num_listed++ >= kMaxListed) continue;
     text += fmt::format("    {} -> {}: {}\n", pair.reference, pair.current,
-                        pair.reasons.empty() ? "no reason given" : pair.reasons.front());
+                        pair.reasons.empty() ? "no reason given" : pair.reasons.front().English());
   }
   if (num_listed > kMaxListed) text += fmt::format("    and {} more\n", num_listed - kMaxListed);
   text +=
@@ -319,7 +321,8 @@ ordered_json ToJson(const PairEvaluation& p) {
   ordered_json json = {{"reference", p.reference},
                        {"current", p.current},
                        {"verdict", Name(p.verdict)},
-                       {"reasons", p.reasons}};
+                       {"reasons", EnglishTexts(p.reasons)},
+                       {"reason_messages", MessagesJson(p.reasons)}};
   json["rotation_deg"] = p.motion ? ordered_json(p.motion->rotation_deg) : ordered_json();
   json["translation_mm"] = p.motion ? ordered_json(p.motion->translation_mm) : ordered_json();
   json["numbers"] = nullptr;

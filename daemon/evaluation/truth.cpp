@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/evaluation/truth.hpp"
 
 #include <algorithm>
@@ -5,12 +6,12 @@
 #include <sstream>
 #include <utility>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/files/ply_file.hpp"
+#include "words/evaluation.hpp"
 
 namespace plumb {
 namespace {
@@ -20,23 +21,21 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxFileBytes = std::size_t{512} << 20;
 
-[[noreturn]] void Fail(const fs::path& file, std::string_view what) {
-  throw DataError(fmt::format("cannot read the truth file '{}': {}", file.string(), what));
+[[noreturn]] void Fail(const fs::path& file, const Message& what) {
+  throw DataError(say::evaluation::TruthFile(file.string(), what));
 }
 
 std::string ReadWhole(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in)
-    Fail(file,
-         "it does not exist or is not readable; a suite needs groundtruth.txt, markers.json, "
-         "motion.json, body.ply per scene");
+  if (!in) Fail(file, say::evaluation::TruthMissing());
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
   if (error || size > kMaxFileBytes)
-    Fail(file, fmt::format("expected at most {} MiB", kMaxFileBytes >> 20));
+    Fail(file, say::evaluation::TruthTooLarge(kMaxFileBytes >> 20));
   std::string text(static_cast<std::size_t>(size), '\0');
   in.read(text.data(), static_cast<std::streamsize>(size));
-  if (in.gcount() != static_cast<std::streamsize>(size)) Fail(file, "the file ends early");
+  if (in.gcount() != static_cast<std::streamsize>(size))
+    Fail(file, say::evaluation::TruthEndsEarly());
   return text;
 }
 
@@ -44,7 +43,7 @@ json ReadJson(const fs::path& file) {
   try {
     return ParseBoundedJson(ReadWhole(file));
   } catch (const DataError& error) {
-    Fail(file, error.what());
+    Fail(file, MessageOf(error));
   }
 }
 
@@ -68,18 +67,18 @@ std::vector<StampedPose> ReadTrajectory(const fs::path& file) {
     std::istringstream fields(line);
     double t = 0, x = 0, y = 0, z = 0, qx = 0, qy = 0, qz = 0, qw = 0;
     if (!(fields >> t >> x >> y >> z >> qx >> qy >> qz >> qw)) {
-      Fail(file, fmt::format("line {}: expected 'time tx ty tz qx qy qz qw'", number));
+      Fail(file, say::evaluation::PoseLine(number));
     }
     const Eigen::Quaterniond q(qw, qx, qy, qz);
-    if (!(q.norm() > 0.5)) Fail(file, fmt::format("line {}: the quaternion has no length", number));
+    if (!(q.norm() > 0.5)) Fail(file, say::evaluation::Quaternion(number));
     if (!trajectory.empty() && !(t > trajectory.back().time_s))
-      Fail(file, fmt::format("line {}: expected rising times", number));
+      Fail(file, say::evaluation::RisingTimes(number));
     StampedPose pose{.time_s = t};
     pose.T_world_camera.linear() = q.normalized().toRotationMatrix();
     pose.T_world_camera.translation() = Eigen::Vector3d(x, y, z);
     trajectory.push_back(pose);
   }
-  if (trajectory.size() < 2) Fail(file, "expected at least two poses");
+  if (trajectory.size() < 2) Fail(file, say::evaluation::FewPoses());
   return trajectory;
 }
 
@@ -113,7 +112,7 @@ SceneTruth ReadSceneTruth(const fs::path& folder) {
       for (std::size_t k = 0; k < 4; ++k) in_world[k] = T_world_marker * corners[k];
     }
   } catch (const std::exception& error) {
-    Fail(folder / "markers.json", error.what());
+    Fail(folder / "markers.json", MessageOf(error));
   }
   try {
     truth.T_world_body = ToPose(motion.at("T_world_body"));
@@ -125,7 +124,7 @@ SceneTruth ReadSceneTruth(const fs::path& folder) {
         breathing != motion.end() && !breathing->is_null())
       truth.breathing_m = breathing->at("amplitude_m").get<double>();
   } catch (const std::exception& error) {
-    Fail(folder / "motion.json", error.what());
+    Fail(folder / "motion.json", MessageOf(error));
   }
   truth.body = ReadSurface(folder / "body.ply");
   return truth;

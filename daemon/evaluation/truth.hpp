@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The true values of a recorded scene, from the files that a simulator writes beside its recording.
 #pragma once
 

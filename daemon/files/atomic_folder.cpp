@@ -1,8 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/atomic_folder.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -16,6 +16,7 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/output.hpp"
 
 namespace plumb {
 namespace {
@@ -59,33 +60,22 @@ void CheckReplaceable(const fs::path& target, const OutputKind& kind) {
   if (!fs::exists(status)) return;
   if (kind.may_replace) {
     if (fs::is_regular_file(status) && kind.may_replace(target)) return;
-    throw IoError(
-        fmt::format("cannot write {} {}: what has this name is not an older {}; choose another "
-                    "name or move it away",
-                    kind.name, target.string(), kind.name));
+    throw IoError(say::output::NoOlderOne(kind.name, target.string()));
   }
   if (!fs::is_directory(status)) {
-    throw IoError(
-        fmt::format("cannot write {} {}: there is a file of that name; choose another or remove it",
-                    kind.name, target.string()));
+    throw IoError(say::output::IsAFile(kind.name, target.string()));
   }
   bool has_marker = false;
   for (const fs::directory_entry& entry : fs::directory_iterator(target)) {
     const std::string name = entry.path().filename().string();
     if (std::find(kind.known_entries.begin(), kind.known_entries.end(), name) ==
         kind.known_entries.end()) {
-      throw IoError(
-          fmt::format("cannot write {} {}: the folder holds {}, which is not part of a {}; choose "
-                      "an empty or new folder",
-                      kind.name, target.string(), name, kind.name));
+      throw IoError(say::output::ForeignEntry(kind.name, target.string(), name));
     }
     has_marker = has_marker || name == kind.marker_file;
   }
   if (!has_marker && !fs::is_empty(target)) {
-    throw IoError(
-        fmt::format("cannot write {} {}: the folder is not empty and holds no {}; choose an empty "
-                    "or new folder",
-                    kind.name, target.string(), kind.marker_file));
+    throw IoError(say::output::NoMarker(kind.name, target.string(), kind.marker_file));
   }
 }
 
@@ -213,7 +203,7 @@ void WriteFileAtomically(const fs::path& target,
   const fs::path path = Normalised(target);
   std::error_code error;
   if (fs::is_directory(path, error)) {
-    throw IoError(fmt::format("cannot write {}: it is a folder; name a file", path.string()));
+    throw IoError(say::output::IsAFolder(path.string()));
   }
   const fs::path hidden =
       path.parent_path() / (HiddenPrefix(path) + UniqueSuffix() + path.extension().string());

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Outputs that appear complete or not at all.
 #pragma once
 
@@ -6,12 +7,14 @@
 #include <string_view>
 #include <vector>
 
+#include "algo/base/message.hpp"
+
 namespace plumb {
 
 /// The files of one kind of output folder: an existing folder of that kind may be replaced. Or,
 /// with `may_replace`, an output that is one file.
 struct OutputKind {
-  std::string_view name;         ///< For messages: "scene".
+  Message name;                  ///< For messages: say::output::Scene().
   std::string_view marker_file;  ///< Always present, such as "scene.json".
   std::vector<std::string_view>
       known_entries;  ///< All allowed entries at its top level, including the marker file.

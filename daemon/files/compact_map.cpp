@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/compact_map.hpp"
 
 #include <algorithm>
@@ -15,10 +16,11 @@
 #include <opencv2/core.hpp>
 
 #include "algo/base/errors.hpp"
-#include "algo/comparison/region.hpp"
+#include "algo/motion/region.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "drivers/files/image_file.hpp"
+#include "words/scene_file.hpp"
 
 namespace plumb {
 
@@ -38,7 +40,7 @@ std::string Deflated(std::string_view bytes) {
   std::string stream(size, '\0');
   if (compress2(reinterpret_cast<Bytef*>(stream.data()), &size,
                 reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), kLevel) != Z_OK)
-    throw IoError("not enough memory to pack what a browser asked for");
+    throw IoError(say::scene_file::NoMemory());
   stream.resize(size);
   return stream;
 }
@@ -66,8 +68,7 @@ cv::Mat Region(const fs::path& result) {
   const bool has_picture = fs::exists(result / "region.png", ignored);
   const cv::Mat mask = has_picture ? ReadColorImage(result / "region.png")
                                    : ReadFloatTiff(result / "deviation_after.tiff");
-  if (mask.size() != deviation.size())
-    throw DataError("the region of this result has another size than its map");
+  if (mask.size() != deviation.size()) throw DataError(say::scene_file::RegionSize());
   for (int row = 0; row < mask.rows; ++row) {
     for (int column = 0; column < mask.cols; ++column) {
       const bool inside = has_picture ? mask.at<cv::Vec3b>(row, column)[0] != 0
@@ -81,7 +82,7 @@ cv::Mat Region(const fs::path& result) {
 
 cv::Mat BodyRegion(const fs::path& scene_folder) {
   const Scene scene = ReadScene(scene_folder);
-  if (!scene.height_map) throw DataError("its scene has no height map");
+  if (!scene.height_map) throw DataError(say::scene_file::NoHeightMap());
   const std::vector<std::uint8_t> body = ReferenceRegion(scene, {});
   const GridShape& grid = scene.height_map->grid;
   cv::Mat region(grid.height, grid.width, CV_16SC1, cv::Scalar(kNone));
@@ -112,7 +113,7 @@ void Append(std::string& bytes, std::uint16_t value) {
 }
 
 std::string Packed(const cv::Mat& map) {
-  if (map.cols > 0xFFFF || map.rows > 0xFFFF) throw DataError("this map is too large");
+  if (map.cols > 0xFFFF || map.rows > 0xFFFF) throw DataError(say::scene_file::MapTooLarge());
   const cv::Rect part = PartWithValues(map);
   std::string bytes = "PLM1";
   for (const int number : {map.cols, map.rows, part.x, part.y, part.width, part.height})
@@ -140,7 +141,7 @@ std::string CompactMap(const fs::path& scan_folder, std::string_view name) {
     return Packed(Tenths(ReadFloatTiff(scan_folder / "scene/heightmap.tiff")));
   if (name == "deviation" || name == "deviation_after")
     return Packed(Tenths(ReadFloatTiff(scan_folder / fmt::format("result/{}.tiff", name))));
-  throw DataError(fmt::format("there is no map of that name: {}", name));
+  throw DataError(say::scene_file::NoSuchMap(name));
 }
 
 std::string CompactHeights(const HeightMap& heights, const std::vector<std::uint8_t>& missing) {
@@ -171,7 +172,7 @@ void AppendDifference(std::string& bytes, std::int64_t difference) {
 
 std::string CompactMesh(const TriangleMesh& mesh) {
   if (std::max(mesh.vertices.size(), mesh.triangles.size()) > kMostParts)
-    throw DataError("this surface is too large");
+    throw DataError(say::scene_file::SurfaceTooLarge());
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& vertex : mesh.vertices) box.extend(vertex);
   const Eigen::Vector3f least = box.isEmpty() ? Eigen::Vector3f(0, 0, 0) : box.min();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compact encodings of a scan's maps and surface, for a browser on a slow network.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The marks at the edges of drawn maps: what lies in which direction.
 #pragma once
 

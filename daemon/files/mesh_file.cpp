@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/mesh_file.hpp"
 
 #include <fmt/format.h>
@@ -11,9 +12,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "algo/base/errors.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/output.hpp"
 
 namespace plumb {
 namespace {
@@ -29,13 +32,37 @@ void CheckTriangles(const TriangleMesh& mesh) {
   }
 }
 
+std::string EndingOf(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
+TriangleMesh InUnit(TriangleMesh mesh, MeshUnit unit) {
+  if (unit == MeshUnit::kMillimetres)
+    for (Eigen::Vector3f& vertex : mesh.vertices) vertex *= 1000.0F;
+  return mesh;
+}
+
+const char* UnitInWords(MeshUnit unit) {
+  return unit == MeshUnit::kMetres ? "metres" : "millimetres";
+}
+
 }  // namespace
 
-void WriteMeshStl(const std::filesystem::path& path, const TriangleMesh& mesh) {
+MeshUnit UsualUnit(const std::filesystem::path& path) {
+  const std::string ending = EndingOf(path);
+  if (ending == ".stl") return MeshUnit::kMillimetres;
+  if (ending == ".ply" || ending == ".obj") return MeshUnit::kMetres;
+  throw InvalidRequest(say::output::MeshEnding(path.string()));
+}
+
+void WriteMeshStl(const std::filesystem::path& path, const TriangleMesh& mesh, MeshUnit unit) {
   CheckTriangles(mesh);
   FileWriter file(path);
-  std::string header =
-      "Plumb mesh in metres";  // must not begin with "solid", the mark of the text format
+  // Must not begin with "solid", the mark of the text format.
+  std::string header = fmt::format("Plumb mesh in {}", UnitInWords(unit));
   header.resize(80, ' ');
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
   header.append(reinterpret_cast<const char*>(&count), sizeof count);
@@ -56,12 +83,12 @@ void WriteMeshStl(const std::filesystem::path& path, const TriangleMesh& mesh) {
   file.Close();
 }
 
-void WriteMeshObj(const std::filesystem::path& path, const TriangleMesh& mesh) {
+void WriteMeshObj(const std::filesystem::path& path, const TriangleMesh& mesh, MeshUnit unit) {
   CheckTriangles(mesh);
   const bool has_colors = mesh.colors.size() == mesh.vertices.size();
   const bool has_normals = mesh.normals.size() == mesh.vertices.size();
   FileWriter file(path);
-  file.Write(std::string_view("# Plumb mesh in metres\n"));
+  file.Write(fmt::format("# Plumb mesh in {}\n", UnitInWords(unit)));
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Eigen::Vector3f& v = mesh.vertices[i];
     std::string line = fmt::format("v {:.6f} {:.6f} {:.6f}", v.x(), v.y(), v.z());
@@ -88,19 +115,15 @@ void WriteMeshObj(const std::filesystem::path& path, const TriangleMesh& mesh) {
   file.Close();
 }
 
-void WriteMeshFile(const std::filesystem::path& path, const TriangleMesh& mesh) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  void (*write)(const std::filesystem::path&, const TriangleMesh&) = nullptr;
-  if (ending == ".ply") write = WriteMeshPly;
-  if (ending == ".stl") write = WriteMeshStl;
-  if (ending == ".obj") write = WriteMeshObj;
-  if (write == nullptr) {
-    throw std::invalid_argument(fmt::format(
-        "cannot write a mesh as {}: its name must end with .ply, .stl or .obj", path.string()));
-  }
-  WriteFileAtomically(path, [&](const std::filesystem::path& hidden) { write(hidden, mesh); });
+void WriteMeshFile(const std::filesystem::path& path, const TriangleMesh& mesh, MeshUnit unit) {
+  static_cast<void>(UsualUnit(path));  // Refuses another extension.
+  const TriangleMesh scaled = InUnit(mesh, unit);
+  const std::string ending = EndingOf(path);
+  WriteFileAtomically(path, [&](const std::filesystem::path& hidden) {
+    if (ending == ".ply") WriteMeshPly(hidden, scaled);
+    if (ending == ".stl") WriteMeshStl(hidden, scaled, unit);
+    if (ending == ".obj") WriteMeshObj(hidden, scaled, unit);
+  });
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/ply_file.hpp"
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/scene_file.hpp"
 
 static_assert(std::endian::native == std::endian::little,
               "PLY is written and read as the bytes in memory");
@@ -145,17 +147,18 @@ class PlyReader {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()),
                                 std::min(bytes.size(), kMaxHeaderBytes));
     const std::size_t end = text.find(kEnd);
-    if (!text.starts_with("ply\n") || end == std::string_view::npos) Fail("it has no PLY header");
+    if (!text.starts_with("ply\n") || end == std::string_view::npos)
+      Fail(say::scene_file::PlyNoHeader());
     ParseHeader(std::string(text.substr(0, end)));
     body_ = bytes.subspan(end + kEnd.size());
-    if (elements_.empty() || elements_[0].name != "vertex") Fail("its first element is not vertex");
+    if (elements_.empty() || elements_[0].name != "vertex") Fail(say::scene_file::PlyNoVertex());
     Require(elements_[0].count * elements_[0].row_bytes);
   }
 
   [[nodiscard]] PointCloud Vertices() const {
     const Element& vertex = elements_[0];
     const auto position = Three(vertex, {"x", "y", "z"});
-    if (!position) Fail("its vertices have no x, y, z");
+    if (!position) Fail(say::scene_file::PlyNoPosition());
     const auto normal = Three(vertex, {"nx", "ny", "nz"});
     const auto color = Three(vertex, {"red", "green", "blue"});
     PointCloud cloud;
@@ -165,17 +168,16 @@ class PlyReader {
     const std::uint8_t* row = body_.data();
     for (std::size_t i = 0; i < vertex.count; ++i, row += vertex.row_bytes) {
       cloud.points.push_back(Vector(*position, row));
-      if (!cloud.points.back().allFinite()) Fail(fmt::format("vertex {} is not finite", i));
+      if (!cloud.points.back().allFinite()) Fail(say::scene_file::PlyVertexNotFinite(Index(i)));
       if (normal) {
         cloud.normals.push_back(Vector(*normal, row));
-        if (!cloud.normals.back().allFinite())
-          Fail(fmt::format("the normal of vertex {} is not finite", i));
+        if (!cloud.normals.back().allFinite()) Fail(say::scene_file::PlyNormalNotFinite(Index(i)));
       }
       if (color) {
         Color& out = cloud.colors.emplace_back();
         for (std::size_t c = 0; c < 3; ++c) {
           const double value = Value((*color)[c].type, row + (*color)[c].offset);
-          if (!std::isfinite(value)) Fail(fmt::format("the colour of vertex {} is not finite", i));
+          if (!std::isfinite(value)) Fail(say::scene_file::PlyColorNotFinite(Index(i)));
           out[c] = static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0));
         }
       }
@@ -198,11 +200,10 @@ class PlyReader {
 
   [[nodiscard]] std::vector<std::array<std::uint32_t, 3>> Triangles() const {
     const Element& vertex = elements_[0];
-    if (elements_.size() < 2 || elements_[1].name != "face")
-      Fail("it has no faces after its vertices");
+    if (elements_.size() < 2 || elements_[1].name != "face") Fail(say::scene_file::PlyNoFaces());
     const Element& face = elements_[1];
     if (face.properties.size() != 1 || !face.properties[0].list_count)
-      Fail("its faces are not a plain list of vertex indices");
+      Fail(say::scene_file::PlyNoPlainFaces());
     const Scalar count_type = *face.properties[0].list_count;
     const Scalar index_type = face.properties[0].type;
     const std::size_t row_bytes = SizeOf(count_type) + 3 * SizeOf(index_type);
@@ -212,11 +213,12 @@ class PlyReader {
     const std::uint8_t* row = body_.data() + begin;
     for (std::size_t i = 0; i < face.count; ++i, row += row_bytes) {
       const double corners = Value(count_type, row);
-      if (corners != 3) Fail(fmt::format("face {} has {} corners, expected triangles", i, corners));
+      if (corners != 3) Fail(say::scene_file::PlyNoTriangle(Index(i), corners));
       for (std::size_t k = 0; k < 3; ++k) {
         const double index = Value(index_type, row + SizeOf(count_type) + k * SizeOf(index_type));
         if (!(index >= 0 && index < static_cast<double>(vertex.count))) {
-          Fail(fmt::format("face {} names vertex {}, there are {}", i, index, vertex.count));
+          Fail(say::scene_file::PlyNoSuchVertex(Index(i), fmt::to_string(index),
+                                                Index(vertex.count)));
         }
         triangles[i][k] = static_cast<std::uint32_t>(index);
       }
@@ -227,14 +229,15 @@ class PlyReader {
  private:
   using Columns = std::array<Property, 3>;
 
-  [[noreturn]] void Fail(const std::string& what) const {
-    throw DataError(fmt::format("PLY file {} cannot be used: {}", name_, what));
+  static std::int64_t Index(std::size_t index) { return static_cast<std::int64_t>(index); }
+
+  [[noreturn]] void Fail(const Message& why) const {
+    throw DataError(say::scene_file::Ply(name_, why));
   }
 
   void Require(std::size_t bytes) const {
     if (body_.size() < bytes) {
-      Fail(fmt::format("it is truncated: {} bytes after its header, expected {}; make it again",
-                       body_.size(), bytes));
+      Fail(say::scene_file::PlyTruncated(Index(body_.size()), Index(bytes)));
     }
   }
 
@@ -252,25 +255,24 @@ class PlyReader {
         std::string format;
         words >> format;
         if (format != "binary_little_endian")
-          Fail(
-              fmt::format("its format is {}, expected binary_little_endian", format.substr(0, 40)));
+          Fail(say::scene_file::PlyFormat(format.substr(0, 40)));
         has_format = true;
       } else if (key == "element") {
         AddElement(words);
       } else if (key == "property" && !elements_.empty()) {
         AddProperty(words, elements_.back());
       } else {
-        Fail(fmt::format("header line \"{}\" is not understood", line.substr(0, 60)));
+        Fail(say::scene_file::PlyLine(line.substr(0, 60)));
       }
     }
-    if (!has_format) Fail("its header states no format");
+    if (!has_format) Fail(say::scene_file::PlyNoFormat());
   }
 
   void AddElement(std::istringstream& words) {
     Element element;
     std::uint64_t count = 0;
     if (!(words >> element.name >> count) || count > kMaxElements) {
-      Fail(fmt::format("an element of its header has no count from 0 to {}", kMaxElements));
+      Fail(say::scene_file::PlyCount(kMaxElements));
     }
     element.count = static_cast<std::size_t>(count);
     elements_.push_back(std::move(element));
@@ -284,12 +286,11 @@ class PlyReader {
       std::string count_type;
       words >> count_type >> type;
       property.list_count = ScalarOf(count_type);
-      if (!property.list_count || element.name == "vertex")
-        Fail("its header holds a list that is not understood");
+      if (!property.list_count || element.name == "vertex") Fail(say::scene_file::PlyList());
     }
     const std::optional<Scalar> scalar = ScalarOf(type);
     if (!scalar || !(words >> property.name))
-      Fail(fmt::format("a property of its header has the type \"{}\"", type.substr(0, 40)));
+      Fail(say::scene_file::PlyProperty(type.substr(0, 40)));
     property.type = *scalar;
     property.offset = element.row_bytes;
     element.row_bytes += SizeOf(*scalar);

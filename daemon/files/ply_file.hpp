@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Clouds and meshes as binary little-endian PLY.
 #pragma once
 

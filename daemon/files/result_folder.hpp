@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // RESULT folders, which `plumb compare` writes.
 #pragma once
 
@@ -5,12 +6,12 @@
 #include <optional>
 #include <string>
 
-#include <nlohmann/json_fwd.hpp>
 #include <opencv2/core/mat.hpp>
 
 #include "algo/comparison/comparison.hpp"
 #include "algo/types/height_map.hpp"
 #include "daemon/files/atomic_folder.hpp"
+#include "daemon/files/stored_result.hpp"
 
 namespace plumb {
 
@@ -22,18 +23,14 @@ namespace plumb {
 struct ResultRoom {
   int version = 0;
   /// Empty if it was used; otherwise the axes are those of the reference marker.
-  std::string why_not_used;
+  Message why_not_used;
 };
 
-/// A correction as in result.json: the six numbers, their 95 % half-widths and their directions.
-[[nodiscard]] nlohmann::ordered_json CorrectionJson(const Correction& correction);
-
-/// The text of result.json, which `compare --json` also prints. Absent results are null; numbers
-/// are read back bit for bit.
+/// What result.json has of a comparison.
 /// @param room  Not set: no calibration was signed, and the axes are those of the configuration, if
 ///         any.
-[[nodiscard]] std::string ResultJson(const Comparison& comparison,
-                                     const std::optional<ResultRoom>& room = {});
+[[nodiscard]] StoredResult Stored(const Comparison& comparison,
+                                  const std::optional<ResultRoom>& room = {});
 
 struct PictureOptions {
   /// Tolerance of the colour scale.
@@ -59,9 +56,8 @@ struct ResultPictures {
 void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
                  const std::filesystem::path& folder, const std::optional<ResultRoom>& room = {});
 
-/// The text of a result's result.json, checked to be JSON in a format that this version knows.
-/// @throws DataError
-[[nodiscard]] std::string ReadResultJson(const std::filesystem::path& folder);
+/// @throws DataError as ParseResult(), IoError
+[[nodiscard]] StoredResult ReadResult(const std::filesystem::path& folder);
 
 /// True if the folder looks like a result: it contains result.json.
 [[nodiscard]] bool IsResultFolder(const std::filesystem::path& folder);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/scene_folder.hpp"
 
 #include <fmt/format.h>
@@ -10,11 +11,12 @@
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/files/ply_file.hpp"
-#include "daemon/files/scene_json.hpp"
 #include "daemon/files/sensitivity_json.hpp"
 #include "daemon/files/trajectory_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
+#include "words/output.hpp"
+#include "words/scene_file.hpp"
 
 namespace plumb {
 namespace {
@@ -24,11 +26,6 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxSceneBytes = std::size_t{16} << 20;
 constexpr std::size_t kMaxTrajectoryBytes = std::size_t{64} << 20;
 
-SceneHeader ReadHeader(const fs::path& scene_folder) {
-  const fs::path json = scene_folder / "scene.json";
-  return ParseSceneJson(ReadTextFile(json, kMaxSceneBytes), json.string());
-}
-
 std::vector<StampedPose> ReadTrajectory(const fs::path& file) {
   return ParseTrajectory(ReadTextFile(file, kMaxTrajectoryBytes), file.string());
 }
@@ -36,18 +33,15 @@ std::vector<StampedPose> ReadTrajectory(const fs::path& file) {
 HeightMap ReadHeightMap(const fs::path& file, const GridShape& grid) {
   const cv::Mat values = ReadFloatTiff(file);
   if (values.cols != grid.width || values.rows != grid.height) {
-    throw DataError(
-        fmt::format("{} has {}x{} values, scene.json states {}x{}; make the scene again",
-                    file.string(), values.cols, values.rows, grid.width, grid.height));
+    throw DataError(say::scene_file::SizeDiffers(file.string(), values.cols, values.rows,
+                                                 grid.width, grid.height));
   }
   HeightMap map(grid);
   for (int row = 0; row < grid.height; ++row) {
     const auto* in = values.ptr<float>(row);
     for (int column = 0; column < grid.width; ++column) {
       if (std::isinf(in[column])) {
-        throw DataError(
-            fmt::format("{} holds an infinite height in row {}, column {}; make the scene again",
-                        file.string(), row, column));
+        throw DataError(say::scene_file::InfiniteHeight(file.string(), row, column));
       }
     }
     std::memcpy(map.z.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width),
@@ -75,7 +69,7 @@ void CheckFinite(const Scene& scene) {
 }  // namespace
 
 OutputKind SceneOutput() {
-  return {"scene",
+  return {say::output::Scene(),
           "scene.json",
           {"scene.json", "trajectory.txt", "trajectory_all.txt", "cloud.ply", "heightmap.tiff",
            "mesh.ply", "sensitivity.json"}};
@@ -105,22 +99,24 @@ void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_toke
   output.Commit();
 }
 
-MarkerMap ReadSceneMarkers(const fs::path& folder) { return ReadHeader(folder).scene.markers; }
+StoredScene ReadStoredScene(const fs::path& folder) {
+  const fs::path json = folder / "scene.json";
+  return ParseSceneJson(ReadTextFile(json, kMaxSceneBytes), json.string());
+}
 
 Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
   if (!IsSceneFolder(folder)) {
     std::error_code error;
-    throw DataError(fmt::format("scene {} {}; expected a folder that plumb reconstruct wrote",
-                                folder.string(),
-                                fs::exists(folder, error) ? "holds no scene.json" : "is missing"));
+    throw DataError(fs::exists(folder, error) ? say::scene_file::NoScene(folder.string())
+                                              : say::scene_file::Missing(folder.string()));
   }
-  SceneHeader header = ReadHeader(folder);
-  Scene scene = std::move(header.scene);
+  StoredScene stored = ReadStoredScene(folder);
+  Scene scene = std::move(stored.scene);
   scene.keyframes = ReadTrajectory(folder / "trajectory.txt");
-  if (scene.keyframes.size() != header.num_keyframes) {
-    throw DataError(fmt::format(
-        "{} has {} poses, scene.json states {} keyframes; make the scene again",
-        (folder / "trajectory.txt").string(), scene.keyframes.size(), header.num_keyframes));
+  if (scene.keyframes.size() != stored.shape.num_keyframes) {
+    throw DataError(say::scene_file::PosesDiffer(
+        (folder / "trajectory.txt").string(), static_cast<std::int64_t>(scene.keyframes.size()),
+        static_cast<std::int64_t>(stored.shape.num_keyframes)));
   }
   scene.trajectory = ReadTrajectory(folder / "trajectory_all.txt");
   // Scenes of before had none, and those without a calibration have none.
@@ -130,8 +126,8 @@ Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
     scene.sensitivity =
         ParseSensitivityJson(ReadTextFile(sensitivity, kMaxSceneBytes), sensitivity.string());
   if (parts.cloud) scene.cloud = ReadCloudPly(folder / "cloud.ply");
-  if (parts.height_map && header.grid)
-    scene.height_map = ReadHeightMap(folder / "heightmap.tiff", *header.grid);
+  if (parts.height_map && stored.shape.grid)
+    scene.height_map = ReadHeightMap(folder / "heightmap.tiff", *stored.shape.grid);
   const fs::path mesh = folder / "mesh.ply";
   if (parts.mesh && fs::exists(mesh)) scene.mesh = ReadMeshPly(mesh);
   return scene;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SCENE folders, which `plumb reconstruct` writes and `plumb compare` reads.
 #pragma once
 
@@ -6,6 +7,7 @@
 
 #include "algo/types/scene.hpp"
 #include "daemon/files/atomic_folder.hpp"
+#include "daemon/files/stored_scene.hpp"
 
 namespace plumb {
 
@@ -34,8 +36,8 @@ struct SceneParts {
 ///         or truncated files, numbers that are not finite, inconsistent sizes.
 [[nodiscard]] Scene ReadScene(const std::filesystem::path& folder, const SceneParts& parts = {});
 
-/// The markers of a scene, of which nothing else is read. @throws DataError as ReadScene(); IoError
-[[nodiscard]] MarkerMap ReadSceneMarkers(const std::filesystem::path& folder);
+/// The small values of a scene; nothing else is read. @throws DataError as ReadScene(); IoError
+[[nodiscard]] StoredScene ReadStoredScene(const std::filesystem::path& folder);
 
 /// True if the folder looks like a scene: it contains scene.json.
 [[nodiscard]] bool IsSceneFolder(const std::filesystem::path& folder);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/sensitivity_json.hpp"
 
 #include <cmath>
@@ -7,6 +8,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "words/scene_file.hpp"
 
 namespace plumb {
 namespace {
@@ -35,22 +37,22 @@ class Reader {
  public:
   explicit Reader(const std::string& name) : name_(name) {}
 
-  [[noreturn]] void Fail(const std::string& what) const {
-    throw DataError(fmt::format("{}: {}; make the scene again", name_, what));
+  [[noreturn]] void Fail(const Message& why) const {
+    throw DataError(say::scene_file::Sensitivity(name_, why));
   }
   [[nodiscard]] const Json& At(const Json& json, const char* key) const {
-    if (!json.is_object() || !json.contains(key)) Fail(fmt::format("{} is missing", key));
+    if (!json.is_object() || !json.contains(key)) Fail(say::scene_file::NoKey(key));
     return json[key];
   }
   [[nodiscard]] double Number(const Json& json, const char* what) const {
-    if (!json.is_number()) Fail(fmt::format("{} is no number", what));
+    if (!json.is_number()) Fail(say::scene_file::KeyNoNumber(what));
     const double value = json.get<double>();
-    if (!(std::abs(value) <= kLargest)) Fail(fmt::format("{} is out of range", what));
+    if (!(std::abs(value) <= kLargest)) Fail(say::scene_file::KeyOutOfRange(what));
     return value;
   }
   [[nodiscard]] Eigen::VectorXd Vector(const Json& json, std::size_t size, const char* what) const {
     if (!json.is_array() || json.size() != size)
-      Fail(fmt::format("{} is no list of {} numbers", what, size));
+      Fail(say::scene_file::KeyNoNumbers(what, static_cast<std::int64_t>(size)));
     Eigen::VectorXd vector(static_cast<Eigen::Index>(size));
     for (std::size_t i = 0; i < size; ++i)
       vector[static_cast<Eigen::Index>(i)] = Number(json[i], what);
@@ -58,7 +60,7 @@ class Reader {
   }
   [[nodiscard]] SensorSensitivity::Derivative Derivative(const Json& json,
                                                          std::size_t terms) const {
-    return Vector(json, 3 * terms, "a derivative")
+    return Vector(json, 3 * terms, "derivative")
         .cast<float>()
         .reshaped(3, static_cast<Eigen::Index>(terms));
   }
@@ -68,22 +70,15 @@ class Reader {
 };
 
 Json IntrinsicsRow(const Intrinsics& k) {
-  return {k.width,
-          k.height,
-          k.fx,
-          k.fy,
-          k.cx,
-          k.cy,
-          k.distortion[0],
-          k.distortion[1],
-          k.distortion[2],
-          k.distortion[3],
-          k.distortion[4]};
+  Json row = {k.width, k.height, k.fx, k.fy, k.cx, k.cy};
+  for (const double coefficient : LensCoefficients(k)) row.push_back(coefficient);
+  return row;
 }
 
 Intrinsics ToIntrinsics(const Eigen::VectorXd& v) {
-  return {static_cast<int>(v[0]),         static_cast<int>(v[1]), v[2], v[3], v[4], v[5],
-          {v[6], v[7], v[8], v[9], v[10]}};
+  Intrinsics k{static_cast<int>(v[0]), static_cast<int>(v[1]), v[2], v[3], v[4], v[5]};
+  (void)SetLensCoefficients({v.data() + 6, v.data() + v.size()}, k);
+  return k;
 }
 
 }  // namespace
@@ -120,22 +115,24 @@ SensorSensitivity ParseSensitivityJson(std::string_view text, const std::string&
   try {
     json = ParseBoundedJson<Json>(text);
   } catch (const DataError& error) {
-    reader.Fail(error.what());
+    reader.Fail(error.message());
   }
   if (reader.Number(reader.At(json, "format"), "format") != kSensitivityFormat)
-    reader.Fail(fmt::format("format is not {}", kSensitivityFormat));
+    reader.Fail(say::scene_file::KeyNot("format", kSensitivityFormat));
   SensorSensitivity result;
-  result.stated = ToIntrinsics(reader.Vector(reader.At(json, "stated"), 11, "stated"));
+  const Json& stated = reader.At(json, "stated");
+  // With the five coefficients of a plain lens, or the eight of a rational one.
+  result.stated = ToIntrinsics(reader.Vector(stated, stated.size() == 14 ? 14 : 11, "stated"));
   const Json& own = reader.At(json, "stated_for_this_unit");
-  if (!own.is_boolean()) reader.Fail("stated_for_this_unit is neither true nor false");
+  if (!own.is_boolean()) reader.Fail(say::scene_file::KeyNoFlag("stated_for_this_unit"));
   result.stated_for_this_unit = own.get<bool>();
   const Json& serial = reader.At(json, "serial");
   if (!serial.is_string() || serial.get_ref<const std::string&>().size() > kMaxSerialBytes)
-    reader.Fail(fmt::format("serial is no text of at most {} bytes", kMaxSerialBytes));
+    reader.Fail(say::scene_file::KeyNoShortText("serial", kMaxSerialBytes));
   result.serial = serial.get<std::string>();
   const Json& estimate = reader.At(json, "estimate");
   const std::size_t terms = estimate.size();
-  if (terms == 0 || terms > kMaxTerms) reader.Fail("estimate has no or too many terms");
+  if (terms == 0 || terms > kMaxTerms) reader.Fail(say::scene_file::KeyTermCount("estimate"));
   result.estimate = reader.Vector(estimate, terms, "estimate");
   const Eigen::VectorXd lower =
       reader.Vector(reader.At(json, "covariance"), terms * (terms + 1) / 2, "covariance");
@@ -146,20 +143,20 @@ SensorSensitivity ParseSensitivityJson(std::string_view text, const std::string&
       result.covariance(i, j) = result.covariance(j, i) = lower[k];
   const Json& surface = reader.At(json, "surface");
   if (!surface.is_array() || surface.size() > kMaxPatches)
-    reader.Fail(fmt::format("surface is no list of at most {}", kMaxPatches));
+    reader.Fail(say::scene_file::KeyNoShortList("surface", kMaxPatches));
   for (const Json& patch : surface) {
     SensorSensitivity::Patch& read = result.surface.emplace_back();
     read.centre_m = reader.Vector(reader.At(patch, "centre_m"), 3, "centre_m").cast<float>();
     read.weight = static_cast<float>(reader.Number(reader.At(patch, "weight"), "weight"));
-    if (!(read.weight > 0)) reader.Fail("a weight is not positive");
+    if (!(read.weight > 0)) reader.Fail(say::scene_file::WeightNotPositive());
     read.derivative = reader.Derivative(reader.At(patch, "derivative"), terms);
   }
   const Json& markers = reader.At(json, "markers");
   if (!markers.is_object() || markers.size() > kMaxMarkerDerivatives)
-    reader.Fail(fmt::format("markers is no object of at most {}", kMaxMarkerDerivatives));
+    reader.Fail(say::scene_file::KeyNoSmallObject("markers", kMaxMarkerDerivatives));
   for (const auto& [id, derivative] : markers.items()) {
     if (id.empty() || id.size() > 5 || id.find_first_not_of("0123456789") != std::string::npos)
-      reader.Fail("a marker has no id");
+      reader.Fail(say::scene_file::MarkerWithoutId());
     result.markers[std::stoi(id)] = reader.Derivative(derivative, terms);
   }
   return result;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SensorSensitivity as a file.
 #pragma once
 

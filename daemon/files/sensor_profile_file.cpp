@@ -1,9 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/sensor_profile_file.hpp"
 
 #include <cmath>
 #include <vector>
 
-#include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <nlohmann/json.hpp>
 
@@ -11,6 +11,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/scene_file.hpp"
 
 namespace plumb {
 namespace {
@@ -32,9 +33,10 @@ std::vector<double> Flat(const Eigen::Ref<const Eigen::MatrixXd>& m) {
 std::vector<double> Numbers(const Json& json, const char* key, std::size_t count) {
   const auto values = json.at(key).get<std::vector<double>>();
   if (values.size() != count)
-    throw DataError(fmt::format("{} holds {} numbers, expected {}", key, values.size(), count));
+    throw DataError(say::scene_file::ProfileCount(key, static_cast<std::int64_t>(values.size()),
+                                                  static_cast<std::int64_t>(count)));
   for (const double value : values)
-    if (!std::isfinite(value)) throw DataError(fmt::format("{} is not finite", key));
+    if (!std::isfinite(value)) throw DataError(say::scene_file::ProfileNotFinite(key));
   return values;
 }
 
@@ -45,7 +47,7 @@ Json IntrinsicsJson(const Intrinsics& k) {
           {"fy_px", k.fy},
           {"cx_px", k.cx},
           {"cy_px", k.cy},
-          {"distortion", k.distortion}};
+          {"distortion", LensCoefficients(k)}};
 }
 
 Intrinsics ParseIntrinsics(const Json& json) {
@@ -56,19 +58,19 @@ Intrinsics ParseIntrinsics(const Json& json) {
   k.fy = json.at("fy_px").get<double>();
   k.cx = json.at("cx_px").get<double>();
   k.cy = json.at("cy_px").get<double>();
-  k.distortion = json.at("distortion").get<std::array<double, 5>>();
+  if (!SetLensCoefficients(json.at("distortion").get<std::vector<double>>(), k))
+    throw DataError(say::scene_file::KeyNoNumbers("distortion", 5));
   return k;
 }
 
 SensorProfile Parse(const std::string& text) {
   const Json json = ParseBoundedJson<Json>(text);
-  if (json.at("format") != kProfileFormat) throw DataError("it is not a sensor profile");
+  if (json.at("format") != kProfileFormat) throw DataError(say::scene_file::ProfileFormat());
   if (json.at("version") != kVersion)
-    throw DataError(
-        fmt::format("its version is {}, expected {}", json.at("version").dump(), kVersion));
+    throw DataError(say::scene_file::ProfileVersion(json.at("version").dump(), kVersion));
   SensorProfile profile;
   profile.num_sweeps = json.at("sweeps").get<int>();
-  if (profile.num_sweeps < 0) throw DataError("sweeps is negative");
+  if (profile.num_sweeps < 0) throw DataError(say::scene_file::ProfileSweeps());
   profile.stated = ParseIntrinsics(json.at("stated_intrinsics"));
   const auto mean = Numbers(json, "mean", kCalibrationSize);
   const auto covariance =
@@ -77,7 +79,7 @@ SensorProfile Parse(const std::string& text) {
   profile.covariance = Eigen::Map<const CalibrationMatrix>(covariance.data());
   if (!profile.covariance.isApprox(profile.covariance.transpose(), 1e-9) ||
       Eigen::LLT<CalibrationMatrix>(profile.covariance).info() != Eigen::Success)
-    throw DataError("its covariance is not symmetric and positive definite");
+    throw DataError(say::scene_file::ProfileCovariance());
   return profile;
 }
 
@@ -87,7 +89,7 @@ SensorProfile ParseSensorProfile(const std::string& text) {
   try {
     return Parse(text);
   } catch (const nlohmann::json::exception& error) {
-    throw DataError(fmt::format("not a sensor profile: {}", error.what()));
+    throw DataError(say::scene_file::ProfileNotOne(MessageOf(error)));
   }
 }
 
@@ -97,15 +99,9 @@ SensorProfile ReadSensorProfile(const std::filesystem::path& file) {
     profile.name = file.filename().string();
     return profile;
   } catch (const nlohmann::json::exception& error) {
-    throw DataError(
-        fmt::format("cannot read the sensor profile {}: {}; make it again with plumb "
-                    "calibrate",
-                    file.string(), error.what()));
+    throw DataError(say::scene_file::Profile(file.string(), MessageOf(error)));
   } catch (const DataError& error) {
-    throw DataError(
-        fmt::format("cannot read the sensor profile {}: {}; make it again with plumb "
-                    "calibrate",
-                    file.string(), error.what()));
+    throw DataError(say::scene_file::Profile(file.string(), MessageOf(error)));
   }
 }
 

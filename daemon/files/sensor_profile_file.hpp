@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A sensor unit's profile as a JSON file.
 #pragma once
 

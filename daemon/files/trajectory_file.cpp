@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/trajectory_file.hpp"
 
 #include <fmt/format.h>
@@ -7,6 +8,7 @@
 #include <cmath>
 
 #include "algo/base/errors.hpp"
+#include "words/scene_file.hpp"
 
 namespace plumb {
 namespace {
@@ -41,7 +43,7 @@ std::string TrajectoryText(std::span<const StampedPose> poses) {
 
 std::vector<StampedPose> ParseTrajectory(std::string_view text, const std::string& name) {
   std::vector<StampedPose> poses;
-  std::size_t line_number = 0;
+  std::int64_t line_number = 0;
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
     std::string_view line = text.substr(0, end);
@@ -55,23 +57,17 @@ std::vector<StampedPose> ParseTrajectory(std::string_view text, const std::strin
     bool good = true;
     for (double& value : v) good = good && TakeNumber(line, value) && std::isfinite(value);
     if (!good || line.find_first_not_of(" \t") != std::string_view::npos) {
-      throw DataError(fmt::format(
-          "{} line {}: expected 8 finite numbers, time tx ty tz qx qy qz qw; make the scene again",
-          name, line_number));
+      throw DataError(say::scene_file::PoseLine(name, line_number));
     }
     const Eigen::Vector3d translation_m(v[1], v[2], v[3]);
     const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
     if (std::abs(q.norm() - 1) > kQuaternionTolerance ||
         translation_m.cwiseAbs().maxCoeff() > kMaxTranslation_m) {
-      throw DataError(
-          fmt::format("{} line {}: the pose has a quaternion of length {} at {:.3g} m; expected "
-                      "length 1 within {} m",
-                      name, line_number, q.norm(), translation_m.norm(), kMaxTranslation_m));
+      throw DataError(say::scene_file::PoseRange(name, line_number, q.norm(), translation_m.norm(),
+                                                 kMaxTranslation_m));
     }
     if (!poses.empty() && !(v[0] > poses.back().time_s)) {
-      throw DataError(
-          fmt::format("{} line {}: time {:.6f} is not later than the one before ({:.6f})", name,
-                      line_number, v[0], poses.back().time_s));
+      throw DataError(say::scene_file::PoseOrder(name, line_number, v[0], poses.back().time_s));
     }
     StampedPose pose{v[0], Pose::Identity()};
     pose.T_world_camera.linear() = q.normalized().toRotationMatrix();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Trajectories in the TUM format: "time tx ty tz qx qy qz qw", one pose per line.
 #pragma once
 

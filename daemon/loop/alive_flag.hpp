@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Calls that come back to an object which may be destroyed in the meantime.
 #pragma once
 

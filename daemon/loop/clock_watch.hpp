@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether the wall clock can be trusted for actions by date: boards without a battery start in the
 // past until a time server corrects them.
 #pragma once
@@ -14,12 +15,15 @@ class ClockWatch {
 
   ClockWatch(Wall wall, Steady steady) : wall_(wall), steady_(steady) {}
 
-  /// A clock that has stepped since the last call is trusted from now on.
-  void Look(Wall wall, Steady steady) {
+  /// If the clock has stepped since the last call, held() counts from now on. @returns the step,
+  /// positive towards the future; 0 if there was none
+  std::chrono::milliseconds Look(Wall wall, Steady steady) {
     const auto gone =
         std::chrono::duration_cast<std::chrono::milliseconds>((wall - wall_) - (steady - steady_));
-    if (std::chrono::abs(gone) > kStep) *this = ClockWatch(wall, steady);
+    const bool is_step = std::chrono::abs(gone) > kStep;
+    if (is_step) *this = ClockWatch(wall, steady);
     last_ = steady;
+    return is_step ? gone : std::chrono::milliseconds(0);
   }
 
   /// Time since the last step, as of the last call.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reports a crash of the program before it ends.
 #pragma once
 

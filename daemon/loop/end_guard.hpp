@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The end of the process must not wait forever for a thread that does not return, such as a sensor
 // driver that hangs.
 #pragma once

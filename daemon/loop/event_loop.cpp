@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/loop/event_loop.hpp"
 
 #include <signal.h>
@@ -54,14 +55,14 @@ struct EventLoop::Impl {
 
   /// Runs a callback inside sd-event's C code, through which exceptions must not pass.
   void Guard(const char* name, const std::function<void()>& call) noexcept {
-    meter.Begin(name);
+    if constexpr (PLUMB_LOOP_METER) meter.Begin(name);
     try {
       call();
     } catch (...) {
       if (!error) error = std::current_exception();
       sd_event_exit(event, 1);
     }
-    meter.End();
+    if constexpr (PLUMB_LOOP_METER) meter.End();
   }
 
   void RunPosted() {

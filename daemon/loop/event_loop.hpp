@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The event loop of the main thread (sd-event): descriptors, timers, signals, and calls posted by
 // other threads.
 #pragma once
@@ -48,6 +49,7 @@ class EventLoop {
   [[nodiscard]] Source MakeTimer(const char* name, std::function<void()> expired);
 
   /// Cost of the callbacks so far; each callback and each posted call is a turn.
+  /// It measures in developers' builds (PLUMB_LOOP_METER).
   [[nodiscard]] LoopMeter& meter();
 
  private:

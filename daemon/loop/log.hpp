@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Messages to the journal, or to stderr without a journal. They never contain a patient's code or
 // anything typed by a person.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/loop/loop_meter.hpp"
 
 #include <fcntl.h>
@@ -110,16 +111,29 @@ void LoopMeter::End() {
   ClosePart(wall_now, cpu_now);
   const nanoseconds wall = wall_now - wall_at_begin_, cpu = cpu_now - cpu_at_begin_;
   Add(all_, wall, cpu);
-  const bool is_slow = wall > kLimit;
+  const bool is_slow = wall > kLimit, is_slow_by_cpu = cpu > kLimit;
   const bool is_longest = !longest_ || wall > longest_->wall,
              is_longest_cpu = !longest_cpu_ || cpu > longest_cpu_->cpu;
-  if (is_slow || is_longest || is_longest_cpu) {
+  if (is_slow || is_slow_by_cpu || is_longest || is_longest_cpu) {
     const LoopTurn turn = Describe(wall, cpu);
     if (is_longest) longest_ = turn;
     if (is_longest_cpu) longest_cpu_ = turn;
+    if (is_slow_by_cpu) {
+      SlowKind& kind = slow_kinds_[turn.what];
+      kind.longest_part = longest_part_.empty() ? turn_ : longest_part_;
+      ++kind.times;
+    }
     if (is_slow) ReportSlow(turn, wall_now);
   }
   turn_.clear();
+}
+
+std::map<std::string, SlowTurns> LoopMeter::slow_turns() const {
+  std::map<std::string, SlowTurns> turns;
+  for (const auto& [what, kind] : slow_kinds_) {
+    turns[what] = {.times = kind.times, .of = by_name_.at(kind.longest_part).count};
+  }
+  return turns;
 }
 
 void LoopMeter::ReportSlow(const LoopTurn& turn, nanoseconds now) {

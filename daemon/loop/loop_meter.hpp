@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Measures how long the event loop's callbacks take, and on what they spend the time.
 #pragma once
 
@@ -42,6 +43,12 @@ struct LoopFigures {
   std::chrono::nanoseconds longest{}, longest_cpu{};
 };
 
+/// Turns of one kind that took over the limit by the thread's own processor time.
+struct SlowTurns {
+  std::int64_t times = 0;
+  std::int64_t of = 0;  ///< How often what took longest in them was measured, slow or not.
+};
+
 /// Measures each turn, at a cost of about a microsecond. Used on the loop's thread.
 class LoopMeter {
  public:
@@ -67,6 +74,9 @@ class LoopMeter {
   /// The longest turns, by wall time and by processor time. Nothing before the first turn.
   [[nodiscard]] const std::optional<LoopTurn>& longest() const { return longest_; }
   [[nodiscard]] const std::optional<LoopTurn>& longest_cpu() const { return longest_cpu_; }
+  /// By LoopTurn::what. What is slow by itself is so nearly each time; an interrupt, or a host that
+  /// takes the processor away from a virtual machine, hits one turn of many.
+  [[nodiscard]] std::map<std::string, SlowTurns> slow_turns() const;
   /// By name of source or part; the entry of a turn with parts counts the time between its parts.
   [[nodiscard]] const std::map<std::string, LoopFigures, std::less<>>& by_name() const {
     return by_name_;
@@ -89,6 +99,11 @@ class LoopMeter {
   std::chrono::nanoseconds longest_part_wall_{};
   LoopFigures all_;
   std::optional<LoopTurn> longest_, longest_cpu_;
+  struct SlowKind {
+    std::string longest_part;  ///< As it is named in by_name_.
+    std::int64_t times = 0;
+  };
+  std::map<std::string, SlowKind> slow_kinds_;
   std::map<std::string, LoopFigures, std::less<>> by_name_;
   std::optional<std::chrono::nanoseconds> reported_at_;
   std::int64_t unsaid_ = 0;

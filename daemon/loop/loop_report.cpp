@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/loop/loop_report.hpp"
 
 #include <algorithm>
@@ -29,9 +30,15 @@ Json TurnJson(const std::optional<LoopTurn>& turn) {
 }  // namespace
 
 Json LoopJson(const LoopMeter& meter) {
+  if (meter.all().count == 0) return nullptr;
+  Json slow = Json::object();
+  for (const auto& [what, turns] : meter.slow_turns()) {
+    slow[what] = {{"times", turns.times}, {"of", turns.of}};
+  }
   return {{"turns", meter.all().count},
           {"over_10_ms", meter.all().over_limit},
           {"cpu_over_10_ms", meter.all().cpu_over_limit},
+          {"slow", slow},
           {"longest", TurnJson(meter.longest())},
           {"longest_cpu", TurnJson(meter.longest_cpu())}};
 }

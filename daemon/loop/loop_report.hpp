@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The loop meter's results as text and for the status.
 #pragma once
 
@@ -10,8 +11,9 @@
 
 namespace plumb {
 
-/// {"turns", "over_10_ms", "cpu_over_10_ms", "longest", "longest_cpu"}; the last two {"what", "ms",
-/// "cpu_ms", "queued_ms", "blocked_ms"}, null before the first turn.
+/// {"turns", "over_10_ms", "cpu_over_10_ms", "slow", "longest", "longest_cpu"}; the last two
+/// {"what", "ms", "cpu_ms", "queued_ms", "blocked_ms"}, and `slow` {"times", "of"} by what was over
+/// the limit by its own time. Null where nothing was measured.
 [[nodiscard]] nlohmann::json LoopJson(const LoopMeter& meter);
 
 /// A line for each source and part, the longest first.

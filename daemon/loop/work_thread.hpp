@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A thread for work that may wait for a disk or a device and therefore does not belong on the loop.
 // Executes it in order.
 #pragma once

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/pipeline/frame_thinning.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
+#include "words/progress.hpp"
 
 namespace plumb {
 
@@ -66,6 +67,7 @@ std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
     if (Takes(frame->depth_time_s, arrived_s)) {
       ++num_taken_;
       handed_out_s_ = arrived_s;
+      frame->fewer_keypoints = fewer_keypoints_;
       return frame;
     }
     ++num_left_out_;
@@ -112,12 +114,9 @@ bool ThinnedFeed::Takes(double stamp_s, double arrived_s) {
 
 int ThinnedFeed::TakeDropped() { return feed_.TakeDropped() + std::exchange(num_unreported_, 0); }
 
-std::string ThinnedFeed::Warning() const {
+Message ThinnedFeed::Warning() const {
   if (num_left_out_ == 0) return {};
-  return fmt::format(
-      "the computer was too slow: {} of {} frames were left out evenly; sweep more slowly, and "
-      "close other programs on it",
-      num_left_out_, num_left_out_ + num_taken_);
+  return say::progress::FramesLeftOut(num_left_out_, num_left_out_ + num_taken_);
 }
 
 }  // namespace plumb

@@ -1,12 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 // Selects live frames to skip, or to track with fewer keypoints, while the computer is too slow.
 #pragma once
 
 #include <functional>
 #include <optional>
 #include <stop_token>
-#include <string>
 
-#include "daemon/pipeline/scan_runner.hpp"
+#include "algo/base/message.hpp"
+#include "daemon/pipeline/frame_feed.hpp"
 
 namespace plumb {
 
@@ -63,8 +64,8 @@ struct ThinningOptions {
 [[nodiscard]] int NextStride(int stride, const TrackingLoad& load,
                              const ThinningOptions& options = {});
 
-/// A live feed without the skipped frames. Before any is skipped, frames are tracked with fewer
-/// keypoints. Not thread-safe.
+/// A live feed without the skipped frames. Before any is skipped, frames are marked to be tracked
+/// with fewer keypoints. Not thread-safe.
 class ThinnedFeed : public FrameFeed {
  public:
   /// @param feed   Borrowed.
@@ -76,13 +77,12 @@ class ThinnedFeed : public FrameFeed {
   std::optional<Frame> Next(const std::stop_token& stop) override;
   /// Includes skipped frames.
   int TakeDropped() override;
-  [[nodiscard]] bool fewer_keypoints() const override { return fewer_keypoints_; }
   void Finish() override { feed_.Finish(); }
   [[nodiscard]] std::optional<double> last_frame_s() const override { return feed_.last_frame_s(); }
 
   [[nodiscard]] int stride() const { return stride_; }
   /// A sentence for the scene's warnings; empty if no frame was skipped.
-  [[nodiscard]] std::string Warning() const;
+  [[nodiscard]] Message Warning() const;
 
  private:
   [[nodiscard]] bool Takes(double stamp_s, double arrived_s);

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether a sensor unit's profile learns from a sweep.
 #pragma once
 
 #include <optional>
-#include <string>
 
-#include "algo/acceptance/acceptance.hpp"
+#include "algo/acceptance/gates.hpp"
+#include "algo/base/message.hpp"
 #include "algo/types/scene.hpp"
 
 namespace plumb {
@@ -12,7 +13,7 @@ namespace plumb {
 /// Why the profile does not learn from a completed scan; empty if it may. Uses the gates of the
 /// comparison that need only one scene.
 /// @param verdict  Of its comparison or check, if there was one.
-[[nodiscard]] std::string WhyNotLearned(const Scene& scene, const std::optional<Verdict>& verdict,
-                                        const AcceptanceLimits& limits);
+[[nodiscard]] Message WhyNotLearned(const Scene& scene, const std::optional<Verdict>& verdict,
+                                    const AcceptanceLimits& limits);
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Passes live frames from the sensor thread to the tracking thread.
 #pragma once
 
@@ -6,12 +7,11 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "algo/base/errors.hpp"
 #include "daemon/loop/bounded_queue.hpp"
-#include "daemon/pipeline/scan_runner.hpp"
+#include "daemon/pipeline/frame_feed.hpp"
 
 namespace plumb {
 
@@ -27,7 +27,7 @@ class LiveFeed : public FrameFeed {
     // arrived after the end of the sweep, so it does not belong to it and is not lost
     if (closed_) return;
     last_frame_s_ = SteadySeconds();
-    dropped_ += queue_.PushDroppingOldest(std::move(frame));
+    dropped_ += queue_.PushDroppingOldest({std::move(frame), last_frame_s_});
     ++num_pushed_;
   }
   /// No more frames follow; waiting ones are still delivered.
@@ -39,7 +39,7 @@ class LiveFeed : public FrameFeed {
 
   /// The frames are not a complete sweep, for this reason; Next() throws it. Without effect once
   /// closed.
-  void Fail(std::string why) {
+  void Fail(Message why) {
     const std::lock_guard lock(mutex_);
     if (closed_) return;
     failure_ = std::move(why);
@@ -48,12 +48,18 @@ class LiveFeed : public FrameFeed {
   }
 
   [[nodiscard]] std::int64_t num_pushed() const { return num_pushed_; }
+  /// Steady time at which the frame that Next() returned last arrived.
+  [[nodiscard]] double taken_arrived_s() const { return taken_arrived_s_; }
 
   /// @throws DeviceError after Fail().
   std::optional<Frame> Next(const std::stop_token& stop) override {
-    std::optional<Frame> frame = queue_.Pop(stop);
-    if (!frame) ThrowFailure();
-    return frame;
+    std::optional<Arrived> arrived = queue_.Pop(stop);
+    if (!arrived) {
+      ThrowFailure();
+      return std::nullopt;
+    }
+    taken_arrived_s_ = arrived->time_s;
+    return std::move(arrived->frame);
   }
   int TakeDropped() override { return dropped_.exchange(0); }
   void Finish() override {}
@@ -65,13 +71,17 @@ class LiveFeed : public FrameFeed {
     if (!failure_.empty()) throw DeviceError(failure_);
   }
 
-  BoundedQueue<Frame> queue_;
+  struct Arrived {
+    Frame frame;
+    double time_s = 0.0;
+  };
+  BoundedQueue<Arrived> queue_;
   std::mutex mutex_;  // guards pushing and closing
   bool closed_ = false;
-  std::string failure_;
+  Message failure_;
   std::atomic<int> dropped_ = 0;
   std::atomic<std::int64_t> num_pushed_ = 0;
-  std::atomic<double> last_frame_s_ = 0.0;
+  std::atomic<double> last_frame_s_ = 0.0, taken_arrived_s_ = 0.0;
 };
 
 }  // namespace plumb

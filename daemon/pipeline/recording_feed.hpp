@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Records the frames that tracking takes, so that a scan can be computed again from exactly the
 // same data.
 #pragma once
@@ -26,7 +27,6 @@ class RecordingFeed : public FrameFeed {
   /// @throws IoError if the recording cannot be written.
   std::optional<Frame> Next(const std::stop_token& stop) override;
   int TakeDropped() override { return feed_.TakeDropped(); }
-  [[nodiscard]] bool fewer_keypoints() const override { return feed_.fewer_keypoints(); }
   /// No more frames follow; waiting ones are written while the scan is computed.
   void Finish() override;
   /// Waits for the last of them, once, after Finish(). A stop request leaves an incomplete

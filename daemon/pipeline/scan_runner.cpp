@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/pipeline/scan_runner.hpp"
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/loop/bounded_queue.hpp"
 #include "daemon/pipeline/frame_thinning.hpp"
+#include "words/progress.hpp"
 
 namespace plumb {
 namespace {
@@ -95,10 +97,6 @@ class FrameReader : public FrameFeed {
 
 }  // namespace
 
-double SteadySeconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOptions& options,
               const std::stop_token& stop,
               const std::function<void(const ScanProgress&)>& progress) {
@@ -106,14 +104,14 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
   if (!reconstructor_options.now_s) reconstructor_options.now_s = SteadySeconds;
   Reconstructor reconstructor(info, reconstructor_options);
 
-  ScanProgress state{.step = "tracking"};
+  ScanProgress state{.step = say::progress::Tracking()};
   const double expected_frames = static_cast<double>(info.num_frames.value_or(0));
   while (std::optional<Frame> frame = feed.Next(stop)) {
     if (const int dropped = feed.TakeDropped(); dropped > 0) {
       reconstructor.CountDropped(dropped);
       state.frames_dropped += dropped;
     }
-    const TrackingReport report = reconstructor.AddFrame(*frame, feed.fewer_keypoints());
+    const TrackingReport report = reconstructor.AddFrame(*frame);
     ++state.frames;
     state.frames_tracked += report.tracked ? 1 : 0;
     const double seen = static_cast<double>(state.frames + state.frames_dropped);
@@ -125,11 +123,11 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
     state.frame = nullptr;
   }
   const std::optional<double> last_frame_s = feed.last_frame_s();
-  if (stop.stop_requested()) throw Interrupted("the scan was interrupted while tracking");
+  if (stop.stop_requested()) throw Interrupted(say::progress::Interrupted());
   feed.Finish();
   if (const int dropped = feed.TakeDropped(); dropped > 0) reconstructor.CountDropped(dropped);
 
-  Scene scene = reconstructor.Finish(stop, [&](double fraction, std::string_view step) {
+  Scene scene = reconstructor.Finish(stop, [&](double fraction, const Message& step) {
     state.step = step;
     state.fraction = fraction;
     if (progress) progress(state);
@@ -137,8 +135,8 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
   // Live, frames may still have been waiting when the last one arrived; that wait belongs to the
   // time to the result.
   if (last_frame_s) scene.timings_s["after_last_frame"] = SteadySeconds() - *last_frame_s;
-  std::vector<std::string> warnings = info.warnings;
-  for (const std::string& warning : scene.warnings) {
+  std::vector<Message> warnings = info.warnings;
+  for (const Message& warning : scene.warnings) {
     if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end())
       warnings.push_back(warning);
   }
@@ -153,7 +151,7 @@ Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::
     return RunScan(reader, source.info(), options.reconstructor, stop, progress);
   ThinnedFeed thinned(reader);
   Scene scene = RunScan(thinned, source.info(), options.reconstructor, stop, progress);
-  if (const std::string warning = thinned.Warning(); !warning.empty())
+  if (const Message warning = thinned.Warning(); !warning.empty())
     scene.warnings.push_back(warning);
   return scene;
 }

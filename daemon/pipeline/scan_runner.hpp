@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One scan from its first frame to its scene: a source, a decoding thread, a bounded queue, a
 // reconstructor.
 #pragma once
@@ -7,17 +8,18 @@
 #include <functional>
 #include <optional>
 #include <stop_token>
-#include <string_view>
 
+#include "algo/base/message.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/types/frame.hpp"
 #include "algo/types/scene.hpp"
+#include "daemon/pipeline/frame_feed.hpp"
 
 namespace plumb {
 
 /// Progress of a scan for a bar, a light or a page.
 struct ScanProgress {
-  std::string_view step;  ///< "tracking", then the steps of the reconstructor.
+  Message step;  ///< "tracking", then the steps of the reconstructor.
   /// Completed fraction of this step, 0..1; 0 for tracking if the number of frames is unknown.
   double fraction = 0.0;
   std::int64_t frames = 0;
@@ -26,23 +28,6 @@ struct ScanProgress {
   const TrackingReport* tracking =
       nullptr;                   ///< Of the newest frame while tracking; valid during the call.
   const Frame* frame = nullptr;  ///< The newest frame while tracking; valid during the call.
-};
-
-/// Frames that another thread reads, as the tracking thread takes them.
-class FrameFeed {
- public:
-  virtual ~FrameFeed() = default;
-  /// Waits for the next frame; nothing at the end or on a stop request.
-  virtual std::optional<Frame> Next(const std::stop_token& stop) = 0;
-  /// Frames that were dropped since the last call, because tracking was late.
-  virtual int TakeDropped() = 0;
-  /// Whether the last frame is to be tracked with fewer keypoints, because tracking is late.
-  [[nodiscard]] virtual bool fewer_keypoints() const { return false; }
-  /// Called once, after Next() returned nothing without a stop request: throws the error that ended
-  /// the reading, if any.
-  virtual void Finish() = 0;
-  /// Steady time at which the last frame arrived; not set where time has no meaning.
-  [[nodiscard]] virtual std::optional<double> last_frame_s() const = 0;
 };
 
 struct ScanRunnerOptions {
@@ -68,8 +53,5 @@ struct ScanRunnerOptions {
 [[nodiscard]] Scene RunScan(FrameFeed& feed, const StreamInfo& info,
                             const ReconstructorOptions& options, const std::stop_token& stop = {},
                             const std::function<void(const ScanProgress&)>& progress = {});
-
-/// Steady clock in seconds.
-[[nodiscard]] double SteadySeconds();
 
 }  // namespace plumb

@@ -1,16 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/account_store.hpp"
 
-#include <fmt/format.h>
+#include <sstream>
+#include <utility>
 
 #include "algo/base/errors.hpp"
-#include "daemon/records/store_refusal.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "daemon/database/store_refusal.hpp"
+#include "daemon/database/stored_values.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
 
 const std::string kUserColumns =
-    "SELECT name, role, password_hash, disabled, created_at FROM users ";
+    "SELECT name, role, password_hash, disabled, created_at, "
+    "EXISTS (SELECT 1 FROM second_factors WHERE user = name) FROM users ";
 
 /// An account whose role cannot be read is disabled, not left out: if no account were found, the
 /// page would offer to create the first one.
@@ -19,7 +23,8 @@ User ReadUser(const Statement& row) {
             .role = Role::kTechnician,
             .password_hash = row.Text(2),
             .disabled = row.Integer(3) != 0,
-            .created_at = FromStored(row.Integer(4))};
+            .created_at = FromStored(row.Integer(4)),
+            .has_second_factor = row.Integer(5) != 0};
   try {
     user.role = ParseStored<Role>("role", row.Text(1));
   } catch (const DataError&) {
@@ -27,6 +32,17 @@ User ReadUser(const Statement& row) {
   }
   return user;
 }
+
+/// The hashes of recovery codes are stored one a line.
+SecondFactor ReadSecondFactor(const Statement& row) {
+  SecondFactor factor{.secret = row.Text(0), .last_step = row.Integer(1), .recovery_hashes = {}};
+  std::istringstream hashes(row.Text(2));
+  for (std::string hash; std::getline(hashes, hash);) factor.recovery_hashes.push_back(hash);
+  return factor;
+}
+
+constexpr const char* kSecondFactorOf =
+    "SELECT secret, last_step, recovery FROM second_factors WHERE user = ?";
 
 }  // namespace
 
@@ -46,10 +62,9 @@ void UserStore::Add(const Actor& actor, const User& user) {
         "?, ?)",
         user.name, Name(user.role), user.password_hash, user.disabled, StoredNow());
   } catch (const ConstraintBroken&) {
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "there is an account of this name already: choose another name");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::AccountExists());
   }
-  change.Log(actor, "user.add", user.name, std::string(Name(user.role)));
+  change.Log(actor, "user.add", user.name, say::store::LogRole(Name(user.role)));
   change.Commit();
 }
 
@@ -57,26 +72,53 @@ void UserStore::Change(const Actor& actor, const UserChange& wanted) {
   StoreChange change(database_);
   const std::optional<User> found =
       change->First(kUserColumns + "WHERE name = ?", ReadUser, wanted.name);
-  if (!found) throw StoreRefusal(ChangeResult::kNotFound, "there is no such account");
+  if (!found) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoAccount());
   const User& user = *found;
   if (wanted.expected_hash && (user.disabled || user.password_hash != *wanted.expected_hash))
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "the account has been changed by somebody else meanwhile: log in again");
-  std::string changes;
+    throw StoreRefusal(ChangeResult::kConflict, say::store::AccountChanged());
+  std::vector<Message> changes;
   if (wanted.role && *wanted.role != user.role)
-    changes += fmt::format("role {} > {} ", Name(user.role), Name(*wanted.role));
-  if (wanted.password_hash && *wanted.password_hash != user.password_hash) changes += "password ";
+    changes.push_back(say::store::LogRoleChange(say::store::LogRole(Name(user.role)),
+                                                say::store::LogRole(Name(*wanted.role))));
+  if (wanted.password_hash && *wanted.password_hash != user.password_hash)
+    changes.push_back(say::store::LogPassword());
   if (wanted.disabled && *wanted.disabled != user.disabled)
-    changes += *wanted.disabled ? "disabled " : "enabled ";
+    changes.push_back(*wanted.disabled ? say::store::LogDisabled() : say::store::LogEnabled());
   change->Run("UPDATE users SET role = ?, password_hash = ?, disabled = ? WHERE name = ?",
               Name(wanted.role.value_or(user.role)),
               wanted.password_hash.value_or(user.password_hash),
               wanted.disabled.value_or(user.disabled), wanted.name);
   if (!change->Has("SELECT 1 FROM users WHERE role = 'engineer' AND disabled = 0 LIMIT 1"))
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "no enabled engineer would be left: make another one first");
-  if (!changes.empty()) changes.pop_back();
-  change.Log(actor, "user.change", wanted.name, changes);
+    throw StoreRefusal(ChangeResult::kConflict, say::store::NoEngineerLeft());
+  change.Log(actor, "user.change", wanted.name,
+             changes.empty() ? Message() : say::store::LogUserChange(std::move(changes)));
+  change.Commit();
+}
+
+std::optional<SecondFactor> UserStore::SecondFactorOf(const std::string& name) {
+  return database_.ForRows()->First(kSecondFactorOf, ReadSecondFactor, name);
+}
+
+void UserStore::SetSecondFactor(const Actor& actor, const std::string& name,
+                                const std::optional<SecondFactor>& expected,
+                                const std::optional<SecondFactor>& wanted,
+                                const std::string& action) {
+  StoreChange change(database_);
+  if (!change->Has("SELECT 1 FROM users WHERE name = ?", name))
+    throw StoreRefusal(ChangeResult::kNotFound, say::store::NoAccount());
+  if (change->First(kSecondFactorOf, ReadSecondFactor, name) != expected)
+    throw StoreRefusal(ChangeResult::kConflict, say::store::AccountChanged());
+  if (wanted) {
+    std::string hashes;
+    for (const std::string& hash : wanted->recovery_hashes) hashes += hash + "\n";
+    change->Run(
+        "INSERT OR REPLACE INTO second_factors (user, secret, last_step, recovery) "
+        "VALUES (?, ?, ?, ?)",
+        name, wanted->secret, wanted->last_step, hashes);
+  } else {
+    change->Run("DELETE FROM second_factors WHERE user = ?", name);
+  }
+  if (!action.empty()) change.Log(actor, action, name, {});
   change.Commit();
 }
 
@@ -95,7 +137,7 @@ void UserStore::SetPreferences(const std::string& name, const Preferences& prefe
     change->Run("INSERT OR REPLACE INTO preferences (user, language, theme) VALUES (?, ?, ?)", name,
                 preferences.language, preferences.theme);
   } catch (const ConstraintBroken&) {  // a display in the room is no account
-    throw StoreRefusal(ChangeResult::kNotFound, "there is no such account");
+    throw StoreRefusal(ChangeResult::kNotFound, say::store::NoAccount());
   }
   change.Commit();
 }
@@ -125,7 +167,7 @@ std::string DisplayStore::Add(const Actor& actor, const Display& display) {
   StoreChange change(database_);
   Insert(change, actor, display);
   const std::string id = std::to_string(change->last_id());
-  change.Log(actor, "display.pair", display.name, "");
+  change.Log(actor, "display.pair", display.name, {});
   change.Commit();
   return id;
 }
@@ -138,10 +180,9 @@ bool DisplayStore::AddProvisioned(const Display& display) {
   if (change->num_changed() == 0) return false;
   if (change->FirstInteger("SELECT COUNT(*) FROM displays") >=
       static_cast<std::int64_t>(kMaxDisplays))
-    throw StoreRefusal(ChangeResult::kConflict,
-                       fmt::format("{} screens are paired already", kMaxDisplays));
+    throw StoreRefusal(ChangeResult::kConflict, say::store::DisplaysFull(kMaxDisplays));
   Insert(change, kSelf, display);
-  change.Log(kSelf, "display.provision", display.name, "");
+  change.Log(kSelf, "display.provision", display.name, {});
   change.Commit();
   return true;
 }
@@ -150,8 +191,8 @@ void DisplayStore::Remove(const Actor& actor, const std::string& id) {
   StoreChange change(database_);
   const std::optional<std::string> name =
       change->FirstText("DELETE FROM displays WHERE id = ? RETURNING name", ParseId(id));
-  if (!name) throw StoreRefusal(ChangeResult::kNotFound, "there is no such display");
-  change.Log(actor, "display.remove", *name, "");
+  if (!name) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoDisplay());
+  change.Log(actor, "display.remove", *name, {});
   change.Commit();
 }
 

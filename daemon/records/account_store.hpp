@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The accounts of the users of the page, and the displays in the room that may follow the
 // appliance.
 #pragma once
@@ -6,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/records/store_database.hpp"
+#include "daemon/database/store_database.hpp"
 #include "web/model/account.hpp"
 
 namespace plumb {
@@ -22,6 +23,11 @@ class UserStore {
   void Add(const Actor& actor, const User& user);
   /// kConflict if no enabled engineer would be left.
   void Change(const Actor& actor, const UserChange& wanted);
+  [[nodiscard]] std::optional<SecondFactor> SecondFactorOf(const std::string& name);
+  /// As AccountService::SetSecondFactor().
+  void SetSecondFactor(const Actor& actor, const std::string& name,
+                       const std::optional<SecondFactor>& expected,
+                       const std::optional<SecondFactor>& wanted, const std::string& action);
   /// Empty if none were chosen.
   [[nodiscard]] Preferences PreferencesOf(const std::string& name);
   /// Without an entry in the log. kNotFound for a name that no account has.

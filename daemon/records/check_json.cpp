@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/check_json.hpp"
 
 #include <cmath>
@@ -5,7 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
+#include "algo/base/message_json.hpp"
 #include "algo/base/parse_number.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -54,20 +57,24 @@ std::optional<MarkerMap> MarkersIn(const Json& json) {
 }
 
 std::string CheckJson(const TakenCheck& taken) {
+  const std::vector<Message>& reasons = taken.check.reasons;
   Json json = {{"status", Name(taken.check.status)},
-               {"reasons", taken.check.reasons},
+               {"reasons", EnglishTexts(reasons)},
+               {"reason_messages", MessagesJson(reasons)},
                {"items", Json::array()}};
   for (const MarkerCheckItem& item : taken.check.items) {
+    const Message& note = item.note;
     json["items"].push_back(
         Json{{"name", item.name},
              {"value", std::isfinite(item.value) ? Json(item.value) : Json(nullptr)},
              {"limit", item.limit},
              {"unit", item.unit},
              {"passed", item.passed},
-             {"note", item.note}});
+             {"note", note.English()},
+             {"note_message", note.empty() ? Json(nullptr) : MessageJson(note)}});
   }
-  json["dictionary"] = taken.seen.dictionary;
-  json["marker_length_m"] = taken.seen.marker_length_m;
+  json["dictionary"] = taken.seen.room_markers.dictionary;
+  json["marker_length_m"] = taken.seen.room_markers.length_m;
   json["markers"] = MarkersJson(taken.seen.markers);
   if (!taken.board.empty()) json["board"] = MarkersJson(taken.board);
   json["reference_marker"] = taken.reference_marker ? Json(*taken.reference_marker) : Json(nullptr);
@@ -80,24 +87,26 @@ std::optional<MarkerBaseline> BaselineIn(const std::string& check_json) {
     return std::nullopt;
   auto markers = MarkersIn(json["markers"]);
   if (!markers) return std::nullopt;
-  return MarkerBaseline{std::move(*markers), json.value("dictionary", std::string()),
-                        json.value("marker_length_m", 0.0)};
+  return MarkerBaseline{std::move(*markers),
+                        {.dictionary = json.value("dictionary", std::string()),
+                         .length_m = json.value("marker_length_m", 0.0)}};
 }
 
 CheckRecord CheckIn(const std::string& check_json) {
   CheckRecord record;
   const Json json = ParseBoundedJsonOrNothing<Json>(check_json);
-  const auto unreadable = [&record](const char* why) {
+  const auto unreadable = [&record](const Message& why) {
     record = {};
-    record.reasons = {std::string("this check cannot be read: ") + why};
+    record.reasons = {say::store::CheckUnreadable(why)};
     return record;
   };
-  if (!json.is_object()) return unreadable("it is not a JSON object");
+  if (!json.is_object()) return unreadable(say::store::CheckNoObject());
   try {
     const auto status = Named<MarkerCheckStatus>(json.at("status").get<std::string>());
-    if (!status) return unreadable("this version does not know its status");
+    if (!status) return unreadable(say::store::CheckUnknownStatus());
     record.status = *status;
-    record.reasons = json.value("reasons", record.reasons);
+    record.reasons = MessagesFromJson(json.value("reason_messages", Json()),
+                                      json.value("reasons", std::vector<std::string>()));
     record.num_markers = json.value("markers", Json::object()).size();
     for (const Json& item : json.value("items", Json::array())) {
       const Json value = item.value("value", Json());
@@ -107,10 +116,11 @@ CheckRecord CheckIn(const std::string& check_json) {
            .limit = item.value("limit", 0.0),
            .unit = item.value("unit", std::string()),
            .passed = item.value("passed", false),
-           .note = item.value("note", std::string())});
+           .note = MessageFromJson(item.value("note_message", Json()),
+                                   item.value("note", std::string()))});
     }
   } catch (const Json::exception&) {
-    return unreadable("a value of it has another type than expected");
+    return unreadable(say::store::CheckWrongType());
   }
   return record;
 }

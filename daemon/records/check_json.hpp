@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Storage formats of marker maps and of the daily check.
 #pragma once
 

@@ -1,10 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/check_store.hpp"
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
-#include "daemon/records/store_refusal.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "daemon/database/store_refusal.hpp"
+#include "daemon/database/stored_values.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -30,7 +30,7 @@ std::string CheckStore::Add(const Actor& actor, const std::string& sensor_serial
   change->Run("INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (?, ?, ?, ?, ?)",
               StoredNow(), actor.user, sensor_serial, status, CheckJson(taken));
   const std::string id = std::to_string(change->last_id());
-  change.Log(actor, "check.done", id, status);
+  change.Log(actor, "check.done", id, say::store::LogCheck(status));
   change.Commit();
   return id;
 }
@@ -100,42 +100,48 @@ std::optional<MarkerBaseline> CheckStore::BaselineMarkers() {
       "check_baselines.id DESC LIMIT 1");
   if (!json) return std::nullopt;
   std::optional<MarkerBaseline> markers = BaselineIn(*json);
-  if (!markers)
-    throw DataError("the stored baseline of the daily check cannot be read: set another one");
+  if (!markers) throw DataError(say::store::BaselineUnreadable());
   return markers;
 }
 
-void CheckStore::SetBaseline(const Actor& actor, const std::string& check_id) {
+std::vector<Message> CheckStore::ChangesBy(const std::string& check_id) {
+  const std::optional<MarkerBaseline> baseline = BaselineMarkers();
+  const std::optional<std::string> json =
+      database_.ForRows()->FirstText("SELECT json FROM checks WHERE id = ?", ParseId(check_id));
+  const std::optional<MarkerBaseline> wanted = json ? BaselineIn(*json) : std::nullopt;
+  return baseline && wanted ? ChangesOfBaseline(*baseline, *wanted) : std::vector<Message>();
+}
+
+void CheckStore::SetBaseline(const Actor& actor, const std::string& check_id,
+                             const std::string& reason) {
   const std::optional<std::int64_t> number = ParseId(check_id);
   StoreChange change(database_);
-  std::string described;
+  std::size_t num_markers = 0;
   {
     Statement query = change->Prepare("SELECT json, user FROM checks WHERE id = ?", number);
-    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such check");
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoCheck());
     const auto baseline = BaselineIn(query.Text(0));
     if (!baseline || baseline->markers.size() < 3) {
-      throw StoreRefusal(
-          ChangeResult::kConflict,
-          "this check saw fewer than 3 markers well: check again and sweep over all of them");
+      throw StoreRefusal(ChangeResult::kConflict, say::store::BaselineFewMarkers());
     }
     if (query.Text(1) == actor.user) {
-      throw StoreRefusal(
-          ChangeResult::kRefused,
-          "somebody other than the person who took this check must set it as the baseline");
+      throw StoreRefusal(ChangeResult::kRefused, say::store::BaselineSamePerson());
     }
-    described = fmt::format("{} markers", baseline->markers.size());
+    num_markers = baseline->markers.size();
   }
+  Message described = say::store::LogBaseline(num_markers);
   {
     Statement query = change->Prepare(
         "SELECT check_id, json FROM check_baselines JOIN checks ON checks.id = check_id ORDER BY "
         "check_baselines.id DESC LIMIT 1");
     if (query.Step())
-      described += fmt::format("; before: check {} with {} markers", query.Text(0),
-                               CheckIn(query.Text(1)).num_markers);
+      described = say::store::LogBaselineChanged(num_markers, query.Text(0),
+                                                 CheckIn(query.Text(1)).num_markers);
   }
   change->Run("INSERT INTO check_baselines (check_id, set_at, set_by) VALUES (?, ?, ?)", number,
               StoredNow(), actor.user);
-  change.Log(actor, "check.baseline", check_id, described);
+  change.Log(actor, "check.baseline", check_id,
+             say::store::LogBaselineReason(std::move(described), reason));
   change.Commit();
 }
 

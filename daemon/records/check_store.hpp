@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Daily checks of the room's markers, and the baseline that they are compared with.
 #pragma once
 
@@ -5,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/database/store_database.hpp"
 #include "daemon/records/check_json.hpp"
-#include "daemon/records/store_database.hpp"
 #include "web/model/account.hpp"
 #include "web/model/check.hpp"
 #include "web/model/wall_clock.hpp"
@@ -41,7 +42,11 @@ class CheckStore {
   /// The markers of the baseline; nothing without a baseline.
   /// @throws DataError if they cannot be read.
   [[nodiscard]] std::optional<MarkerBaseline> BaselineMarkers();
-  void SetBaseline(const Actor& actor, const std::string& check_id);
+  /// @param reason  A person's; it is logged with what becomes otherwise.
+  void SetBaseline(const Actor& actor, const std::string& check_id, const std::string& reason);
+  /// What becomes otherwise if this check takes the place of the baseline; empty if there is none,
+  /// or the check saw no markers.
+  [[nodiscard]] std::vector<Message> ChangesBy(const std::string& check_id);
 
  private:
   StoreDatabase& database_;

@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/file_integrity.hpp"
 
 #include <algorithm>
 
-#include "daemon/records/scan_digests.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "daemon/database/scan_digests.hpp"
+#include "daemon/database/stored_values.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -13,8 +15,8 @@ constexpr std::chrono::minutes kUnavailableAgain{10};
 
 }  // namespace
 
-std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
-                                 const std::stop_token& stop) {
+Message FileIntegrity::Check(const std::string& scan_id, bool scene_only,
+                             const std::stop_token& stop) {
   const std::int64_t scan = ParseId(scan_id).value_or(0);
   std::vector<FileDigest> files;
   bool is_done = false;
@@ -22,7 +24,7 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
     const StoreDatabase::Held writer = database_.ForChanges();
     const std::optional<std::string> outcome =
         writer->FirstText("SELECT outcome FROM scans WHERE id = ? AND has_folder = 1", scan);
-    if (!outcome) return "it has no files";
+    if (!outcome) return say::store::NoFiles();
     is_done = *outcome == "done";
     files = StoredDigests(*writer, scan);
   }
@@ -32,7 +34,7 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
   };
   const std::filesystem::path folder = folders_.Scan(scan_id);
   std::vector<FileDigest> first_seen;
-  std::string fault;
+  Message fault;
   if (is_done && !has(kSceneMarker)) {  // stored by an older Plumb
     fault = WhyNotThere(folder, {{.path = kSceneMarker}}, look_);
     if (fault.empty()) first_seen = DigestsOfScan(folder, stop);
@@ -45,7 +47,7 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
   StoreChange change(database_);
   const std::optional<std::string> before =
       change->FirstText("SELECT unavailable FROM scans WHERE id = ?", scan);
-  if (!before) return "it was removed meanwhile";
+  if (!before) return say::store::RemovedMeanwhile();
   StoreDigests(*change, scan, first_seen);
   // An intact scene says nothing about the other files.
   if (!scene_only || !fault.empty()) SetUnavailable(*change, scan, *before, fault);
@@ -66,7 +68,7 @@ std::optional<CheckedScan> FileIntegrity::CheckNext(std::chrono::hours at_least,
       ToStored(now - at_least), ToStored(now), ToStored(now - kUnavailableAgain));
   if (!next) return std::nullopt;
   std::string id = ScanId(*next);
-  std::string fault = Check(id, /*scene_only=*/false, stop);
+  Message fault = Check(id, /*scene_only=*/false, stop);
   return CheckedScan{.id = std::move(id), .fault = std::move(fault)};
 }
 

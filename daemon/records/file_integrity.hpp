@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks that the files of the scans are still as they were stored.
 #pragma once
 
@@ -6,15 +7,16 @@
 #include <stop_token>
 #include <string>
 
-#include "daemon/records/scan_files.hpp"
-#include "daemon/records/scan_folders.hpp"
-#include "daemon/records/store_database.hpp"
+#include "algo/base/message.hpp"
+#include "daemon/database/scan_folders.hpp"
+#include "daemon/database/store_database.hpp"
+#include "daemon/scan_files/scan_files.hpp"
 
 namespace plumb {
 
 struct CheckedScan {
   std::string id;
-  std::string fault;  ///< Empty if its files are as they were stored.
+  Message fault;  ///< Empty if its files are as they were stored.
 };
 
 /// What cannot be used because of its files, of patients who are not archived.
@@ -36,8 +38,8 @@ class FileIntegrity {
   /// ...". Empty if they are as they were stored. Files without a digest get one ("first seen").
   /// Updates the scan's row and the log if the result has changed.
   /// @param scene_only  Only the files that a comparison reads.
-  [[nodiscard]] std::string Check(const std::string& scan_id, bool scene_only,
-                                  const std::stop_token& stop = {});
+  [[nodiscard]] Message Check(const std::string& scan_id, bool scene_only,
+                              const std::stop_token& stop = {});
   /// Checks the scan whose last check is the oldest, if it is longer ago than `at_least`. Nothing
   /// if none is due.
   std::optional<CheckedScan> CheckNext(std::chrono::hours at_least,

@@ -1,11 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/patient_store.hpp"
 
 #include <algorithm>
 
-#include <fmt/format.h>
-
-#include "daemon/records/store_refusal.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "daemon/database/store_refusal.hpp"
+#include "daemon/database/stored_values.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -20,6 +20,16 @@ const std::string kPatientColumns =
     " (SELECT id FROM refs WHERE refs.patient_id = patients.id AND approved_by = '' AND version > "
     "   (SELECT ifnull(max(version), 0) FROM refs AS r WHERE r.patient_id = patients.id AND "
     "r.approved_by <> '') ORDER BY version DESC LIMIT 1), note, archived FROM patients ";
+
+/// The newest session for fractions of patient ?1, if it can be resumed: closed since ?2.
+constexpr const char* kResumable =
+    "SELECT id, fraction, (SELECT count(*) FROM scans WHERE session_id = sessions.id AND outcome = "
+    "'done') AS num_scans, closed_at FROM sessions WHERE id = (SELECT max(id) FROM sessions WHERE "
+    "patient_id = ?1 AND purpose = 'fraction') AND closed_at >= ?2 AND num_scans > 0";
+
+std::int64_t ResumableSince() {
+  return StoredNow() - std::int64_t{kResumable_h} * 3600 * 1'000'000;
+}
 
 Patient ReadPatient(const Statement& row) {
   return {.id = row.Text(0),
@@ -41,7 +51,20 @@ std::vector<Patient> PatientStore::List() {
 }
 
 std::optional<Patient> PatientStore::Find(const std::string& id) {
-  return database_.ForRows()->First(kPatientColumns + "WHERE id = ?", ReadPatient, ParseId(id));
+  const StoreDatabase::Held rows = database_.ForRows();
+  auto patient = rows->First(kPatientColumns + "WHERE id = ?", ReadPatient, ParseId(id));
+  if (patient) {
+    patient->last_session = rows->First(
+        kResumable,
+        [](const Statement& row) {
+          return EndedSession{.id = row.Text(0),
+                              .fraction = static_cast<int>(row.Integer(1)),
+                              .num_scans = static_cast<int>(row.Integer(2)),
+                              .closed_at = FromStored(row.Integer(3))};
+        },
+        ParseId(id), ResumableSince());
+  }
+  return patient;
 }
 
 std::optional<Patient> PatientStore::FindByCode(const std::string& code) {
@@ -52,22 +75,20 @@ std::optional<Patient> PatientStore::FindByCode(const std::string& code) {
 std::string PatientStore::Add(const Actor& actor, const std::string& code,
                               const std::string& site) {
   StoreChange change(database_);
-  // PX-1 and px-1 would be confused at the couch.
-  if (const auto same =
-          change->FirstText("SELECT code FROM patients WHERE code = ? COLLATE NOCASE", code))
-    throw StoreRefusal(ChangeResult::kConflict,
-                       fmt::format("there is a patient with the code {} already: choose another "
-                                   "code (capital and small letters count as the same)",
-                                   *same));
+  // PX-1, px-1 and PX1 would be confused at the couch, and by scanners of wristbands.
+  if (const auto same = change->FirstText(
+          "SELECT code FROM patients WHERE replace(code, '-', '') = replace(?, '-', '') COLLATE "
+          "NOCASE AND id > 0",
+          code))
+    throw StoreRefusal(ChangeResult::kConflict, say::store::PatientCodeExists(*same));
   try {
     change->Run("INSERT INTO patients (code, site, created_at) VALUES (?, ?, ?)", code, site,
                 StoredNow());
   } catch (const ConstraintBroken&) {
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "there is a patient with this code already: choose another code");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::PatientExists());
   }
   const std::string id = std::to_string(change->last_id());
-  change.Log(actor, "patient.add", id, "");
+  change.Log(actor, "patient.add", id, {});
   change.Commit();
   return id;
 }
@@ -80,19 +101,17 @@ void PatientStore::Change(const Actor& actor, const std::string& id, const std::
       "SELECT site, note FROM patients WHERE id = ? AND id > 0",
       [](const Statement& row) { return CourseNotes{.site = row.Text(0), .note = row.Text(1)}; },
       number);
-  if (!stored) throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+  if (!stored) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
   if (shown && *shown != *stored)
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "this patient was changed by somebody else meanwhile: look again, then "
-                       "save");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::PatientChanged());
   change->Run("UPDATE patients SET site = ?, note = ? WHERE id = ? AND id > 0", site, note, number);
   // Never the texts themselves: the log keeps its entries when a patient's data is removed.
   const bool has_site = site != stored->site, has_note = note != stored->note;
   change.Log(actor, "patient.change", id,
-             has_site && has_note ? "site and note"
-             : has_site           ? "site"
-             : has_note           ? "note"
-                                  : "");
+             has_site && has_note ? say::store::LogSiteAndNote()
+             : has_site           ? say::store::LogSite()
+             : has_note           ? say::store::LogNote()
+                                  : Message());
   change.Commit();
 }
 
@@ -101,12 +120,11 @@ void PatientStore::Archive(const Actor& actor, const std::string& id, bool archi
   StoreChange change(database_);
   if (archived &&
       change->Has("SELECT 1 FROM sessions WHERE patient_id = ? AND closed_at IS NULL", number))
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "the session of this patient is open: close it first");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::SessionOpen());
   change->Run("UPDATE patients SET archived = ? WHERE id = ? AND id > 0", archived, number);
   if (change->num_changed() == 0)
-    throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
-  change.Log(actor, archived ? "patient.archive" : "patient.unarchive", id, "");
+    throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
+  change.Log(actor, archived ? "patient.archive" : "patient.unarchive", id, {});
   change.Commit();
 }
 
@@ -119,7 +137,7 @@ void CloseOpenSessions(StoreChange& change, const Actor& actor) {
   for (const std::int64_t id : open) {
     change->Run("UPDATE sessions SET closed_at = ?, closed_by = ? WHERE id = ?", StoredNow(),
                 actor.user, id);
-    change.Log(actor, "session.close", std::to_string(id), "");
+    change.Log(actor, "session.close", std::to_string(id), {});
   }
 }
 
@@ -141,19 +159,19 @@ std::string TreatmentStore::Open(const Actor& actor, const std::string& patient_
         "scans.id WHERE sessions.patient_id = ?1 AND sessions.purpose = 'fraction' AND "
         "sessions.fraction = newest.fraction) FROM patients, newest WHERE patients.id = ?1",
         patient);
-    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
     if (query.Integer(1) != 0)
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "this patient is archived: take it out of the archive first");
+      throw StoreRefusal(ChangeResult::kConflict, say::store::PatientArchived());
     if (purpose == ScanPurpose::kFraction)
       fraction = std::max<std::int64_t>(1, query.Integer(0) + query.Integer(2));
   }
   change->Run(
-      "INSERT INTO sessions (patient_id, purpose, fraction, opened_at, opened_by) VALUES (?, "
-      "?, ?, ?, ?)",
+      "INSERT INTO sessions (patient_id, purpose, fraction, opened_at, opened_by, reference_id) "
+      "VALUES (?1, ?2, ?3, ?4, ?5, (SELECT id FROM refs WHERE patient_id = ?1 AND ?2 = 'fraction' "
+      "AND approved_by <> '' ORDER BY version DESC LIMIT 1))",
       patient, Name(purpose), fraction, StoredNow(), actor.user);
   const std::string id = std::to_string(change->last_id());
-  change.Log(actor, "session.open", id, std::string(Name(purpose)));
+  change.Log(actor, "session.open", id, say::store::LogPurpose(Name(purpose)));
   change.Commit();
   return id;
 }
@@ -164,21 +182,91 @@ void TreatmentStore::CloseAll(const Actor& actor) {
   change.Commit();
 }
 
+std::optional<std::string> TreatmentStore::PatientOf(const std::string& session_id) {
+  return database_.ForRows()->First(
+      "SELECT patient_id FROM sessions WHERE id = ?",
+      [](const Statement& row) { return row.Text(0); }, ParseId(session_id));
+}
+
+void TreatmentStore::Resume(const Actor& actor, const std::string& session_id) {
+  const std::optional<std::int64_t> session = ParseId(session_id);
+  StoreChange change(database_);
+  const auto patient = change->FirstInteger(
+      "SELECT patient_id FROM sessions JOIN patients ON patients.id = patient_id WHERE sessions.id "
+      "= ? AND archived = 0",
+      session);
+  const auto resumable =
+      patient ? change->FirstInteger(kResumable, *patient, ResumableSince()) : std::nullopt;
+  if (!resumable || resumable != session)
+    throw StoreRefusal(ChangeResult::kConflict, say::store::SessionNotResumable());
+  CloseOpenSessions(change, actor);
+  change->Run("UPDATE sessions SET closed_at = NULL, closed_by = '', opened_by = ? WHERE id = ?",
+              actor.user, session);
+  change.Log(actor, "session.resume", session_id, {});
+  change.Commit();
+}
+
+void TreatmentStore::CorrectFraction(const Actor& actor, const std::string& session_id,
+                                     int fraction, const std::string& reason) {
+  const std::optional<std::int64_t> session = ParseId(session_id);
+  StoreChange change(database_);
+  const auto before = change->FirstInteger(
+      "SELECT fraction FROM sessions WHERE id = ? AND purpose = 'fraction'", session);
+  if (!before) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoSession());
+  change->Run("UPDATE sessions SET fraction = ? WHERE id = ?", std::int64_t{fraction}, session);
+  change.Log(actor, "session.fraction", session_id,
+             say::store::LogFraction(*before, fraction, reason));
+  change.Commit();
+}
+
+void TreatmentStore::UseReference(const Actor& actor, const std::string& session_id,
+                                  const std::string& reference_id) {
+  const std::optional<std::int64_t> session = ParseId(session_id),
+                                    reference = ParseId(reference_id);
+  StoreChange change(database_);
+  const auto version = change->FirstInteger(
+      "SELECT version FROM refs JOIN sessions ON sessions.patient_id = refs.patient_id WHERE "
+      "refs.id = ?2 AND sessions.id = ?1 AND closed_at IS NULL AND purpose = 'fraction' AND "
+      "approved_by <> '' AND NOT EXISTS (SELECT 1 FROM refs AS newer WHERE newer.patient_id = "
+      "refs.patient_id AND newer.approved_by <> '' AND newer.version > refs.version)",
+      session, reference);
+  if (!version) throw StoreRefusal(ChangeResult::kConflict, say::store::ReferenceNotForSession());
+  change->Run("UPDATE sessions SET reference_id = ? WHERE id = ?", reference, session);
+  change.Log(actor, "session.reference", session_id, say::store::LogVersion(*version));
+  change.Commit();
+}
+
 std::optional<TreatmentSession> TreatmentStore::Opened() {
   return database_.ForRows()->First(
-      "SELECT sessions.id, patient_id, code, purpose, fraction, opened_by, opened_at, (SELECT "
-      "count(*) FROM scans WHERE session_id = sessions.id AND outcome = 'done') FROM sessions JOIN "
-      "patients ON patients.id = patient_id WHERE closed_at IS NULL ORDER BY sessions.id DESC "
-      "LIMIT 1",
+      "WITH open AS (SELECT sessions.*, (SELECT id FROM refs WHERE refs.patient_id = "
+      "sessions.patient_id AND approved_by <> '' ORDER BY version DESC LIMIT 1) AS newest_id FROM "
+      "sessions WHERE closed_at IS NULL ORDER BY id DESC LIMIT 1) "
+      "SELECT open.id, open.patient_id, code, purpose, fraction, opened_by, opened_at, (SELECT "
+      "count(*) FROM scans WHERE session_id = open.id AND outcome = 'done'), kept.id, "
+      "kept.version, newest.id, newest.version, ifnull((SELECT accepted_by = '' AND "
+      "results.scan_id IS NOT NULL FROM scans LEFT JOIN results ON scan_id = scans.id WHERE "
+      "session_id = open.id AND outcome = 'done' ORDER BY scans.id DESC LIMIT 1), 0) FROM open "
+      "JOIN patients ON patients.id = "
+      "open.patient_id LEFT JOIN refs AS kept ON kept.id = ifnull(reference_id, newest_id) LEFT "
+      "JOIN refs AS newest ON newest.id = newest_id",
       [](const Statement& row) {
-        return TreatmentSession{.id = row.Text(0),
-                                .patient_id = row.Text(1),
-                                .patient_code = row.Text(2),
-                                .purpose = ParseStored<ScanPurpose>("purpose", row.Text(3)),
-                                .fraction = static_cast<int>(row.Integer(4)),
-                                .num_scans = static_cast<int>(row.Integer(7)),
-                                .opened_by = row.Text(5),
-                                .opened_at = FromStored(row.Integer(6))};
+        TreatmentSession session{.id = row.Text(0),
+                                 .patient_id = row.Text(1),
+                                 .patient_code = row.Text(2),
+                                 .purpose = ParseStored<ScanPurpose>("purpose", row.Text(3)),
+                                 .fraction = static_cast<int>(row.Integer(4)),
+                                 .num_scans = static_cast<int>(row.Integer(7)),
+                                 .opened_by = row.Text(5),
+                                 .opened_at = FromStored(row.Integer(6)),
+                                 .has_unaccepted = row.Integer(12) != 0};
+        const auto version = [&](int column) {
+          return ReferenceVersion{.id = row.Text(column),
+                                  .version = static_cast<int>(row.Integer(column + 1))};
+        };
+        if (!row.IsNull(8)) session.reference = version(8);
+        if (session.reference && version(10) != *session.reference)
+          session.newer_reference = version(10);
+        return session;
       });
 }
 

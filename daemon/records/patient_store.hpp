@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The patients and their treatment sessions. StoreRemoval removes them.
 #pragma once
 
@@ -5,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/records/store_database.hpp"
+#include "daemon/database/store_database.hpp"
 #include "web/model/account.hpp"
 #include "web/model/patient.hpp"
 #include "web/model/scan.hpp"
@@ -18,6 +19,7 @@ class PatientStore {
   explicit PatientStore(StoreDatabase& database) : database_(database) {}
 
   [[nodiscard]] std::vector<Patient> List();  ///< By code.
+  /// With the session that can be resumed.
   [[nodiscard]] std::optional<Patient> Find(const std::string& id);
   /// Letter case is ignored.
   [[nodiscard]] std::optional<Patient> FindByCode(const std::string& code);
@@ -39,8 +41,21 @@ class TreatmentStore {
  public:
   explicit TreatmentStore(StoreDatabase& database) : database_(database) {}
 
-  /// Closes the open session, if any, and opens one. Returns the id.
+  /// Closes the open session, if any, and opens one. Returns the id. One for fractions keeps the
+  /// reference that is approved now.
   std::string Open(const Actor& actor, const std::string& patient_id, ScanPurpose purpose);
+  /// Opens a session again that Patient::last_session names, and closes the one that is open, if
+  /// any. It goes on with its fraction and its reference. kConflict for any other session.
+  void Resume(const Actor& actor, const std::string& session_id);
+  /// The patient of a session, open or closed.
+  [[nodiscard]] std::optional<std::string> PatientOf(const std::string& session_id);
+  /// Corrects the number of a session for fractions.
+  void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
+                       const std::string& reason);
+  /// From now on the open session is compared with this reference. kConflict unless it is the
+  /// newest approved one of its patient.
+  void UseReference(const Actor& actor, const std::string& session_id,
+                    const std::string& reference_id);
   void CloseAll(const Actor& actor);
   [[nodiscard]] std::optional<TreatmentSession> Opened();
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/profile_shelf.hpp"
 
 #include <algorithm>
@@ -12,8 +13,9 @@
 #include "algo/base/parse_number.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
-#include "daemon/records/scan_files.hpp"
+#include "daemon/scan_files/scan_files.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -46,18 +48,18 @@ ProfileVersion Parse(const std::string& text, const std::string& serial, int ver
   const std::size_t line = text.find('\n');
   const std::string_view head(kHead);
   if (line == std::string::npos || !text.starts_with(head))
-    throw DataError("it does not begin as a profile of this version of Plumb");
+    throw DataError(say::store::ProfileNoHead());
   const std::string body = text.substr(line + 1);
   if (text.substr(head.size(), line - head.size()) != Sha256Of(body))
-    throw DataError("its checksum is wrong: it was damaged or changed");
+    throw DataError(say::store::ProfileChecksum());
   const Json json = ParseBoundedJson<Json>(body);
   if (json.at("serial") != serial)
-    throw DataError(fmt::format("it belongs to the unit {}", json.at("serial").dump()));
+    throw DataError(say::store::ProfileOfOtherUnit(json.at("serial").dump()));
   ProfileVersion found;
   found.version = version;
   found.made = Clock::time_point(std::chrono::seconds(json.at("made_s").get<std::int64_t>()));
   const auto cause = Named<ProfileCause>(json.at("cause").get<std::string>());
-  if (!cause) throw DataError("this version does not know its cause");
+  if (!cause) throw DataError(say::store::ProfileUnknownCause());
   found.cause = *cause;
   if (json.at("profile").is_null()) return found;
   found.profile = ParseSensorProfile(json["profile"].dump());
@@ -107,7 +109,7 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
     in_use.newest = ReadVersion(file, serial, entries.front().version);
     return in_use;
   } catch (const DataError& error) {
-    in_use.fault = fmt::format("the profile of sensor {} cannot be read: {}", serial, error.what());
+    in_use.fault = say::store::ProfileUnreadable(serial, error.message());
   }
   try {
     // Comes first, so that no earlier version replaces it unnoticed at the next scan.
@@ -116,11 +118,9 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
         folder_ / kSetAside / fmt::format("{}-{}", FolderName(serial), file.filename().string());
     fs::create_directories(set_aside.parent_path());
     fs::rename(file, set_aside);
-    in_use.fault += fmt::format(
-        "; it was moved to {}, and scans go on without a profile until one is learned again",
-        set_aside.string());
+    in_use.fault = say::store::ProfileMoved(in_use.fault, set_aside.string());
   } catch (const std::exception& error) {
-    in_use.fault += fmt::format("; it stays where it is ({})", error.what());
+    in_use.fault = say::store::ProfileNotMoved(in_use.fault, MessageOf(error));
   }
   return in_use;
 }
@@ -165,7 +165,7 @@ int ProfileShelf::Add(const std::string& serial, const SensorProfile& profile,
   const std::lock_guard lock(mutex_);
   const std::vector<Entry> entries = Entries(serial);
   if (begun_from && (entries.empty() ? 0 : entries.front().version) != *begun_from)
-    throw DataError("the profile was reset or taken back while the sweep went on");
+    throw DataError(say::store::ProfileChanged());
   return Write(serial, ProfileCause::kLearned, profile);
 }
 
@@ -182,10 +182,7 @@ int ProfileShelf::RollBack(const std::string& serial, int version) {
     if (!earlier.profile) break;
     return Write(serial, ProfileCause::kRolledBack, earlier.profile);
   }
-  throw DataError(
-      fmt::format("the sensor {} has no profile of version {}: choose one of those that "
-                  "are shown",
-                  serial, version));
+  throw DataError(say::store::NoProfileVersion(serial, version));
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Stores the profiles of the sensor units that the appliance has used, with their earlier versions.
 #pragma once
 
@@ -9,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "algo/sensor_model/sensor_profile.hpp"
 #include "web/model/sensor_profile.hpp"
 
@@ -38,7 +40,7 @@ class ProfileShelf {
     int version = 0;  ///< The newest version after this call; 0 if there is none.
     /// If set, the newest version could not be read and was moved to FOLDER/set-aside; the sentence
     /// states where it is. Scans continue without a profile.
-    std::string fault;
+    Message fault;
   };
   /// Never throws because of the contents or errors of the disk. @param serial  Not empty.
   [[nodiscard]] InUse Read(const std::string& serial);

@@ -1,11 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/reference_store.hpp"
 
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
-#include "daemon/records/store_json.hpp"
-#include "daemon/records/store_refusal.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "algo/base/parse_number.hpp"
+#include "daemon/database/store_json.hpp"
+#include "daemon/database/store_refusal.hpp"
+#include "daemon/database/stored_values.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -14,7 +17,7 @@ const std::string kReferenceColumns =
     "SELECT id, patient_id, version, scan_id, created_at, created_by, reason, approved_by, "
     "approved_at, plan, revision, planned_by, (SELECT group_concat(path || ' ' || sha256, "
     "char(10)) FROM (SELECT path, sha256 FROM scan_files WHERE scan_files.scan_id = refs.scan_id "
-    "AND path LIKE 'scene/%' ORDER BY path)) FROM refs ";
+    "AND path LIKE 'scene/%' ORDER BY path)), approved_digest FROM refs ";
 
 /// SHA-256 of the data that an approval signs: all that the summary shows, and the files of the
 /// surface that later scans are compared with.
@@ -24,13 +27,33 @@ std::string DigestOf(const Statement& row) {
                               row.Text(12)));
 }
 
-/// @throws DataError naming the version whose plan cannot be read: it must not be used.
+/// Whether the reference is what its approval signed. The row has no digest if 0.1.0 approved it,
+/// or 0.2.0 after an update was rolled back.
+bool IsAsApproved(const Statement& row) {
+  const std::string approved = row.Text(13);
+  return row.Text(7).empty() || approved.empty() || approved == DigestOf(row);
+}
+
+/// @throws DataError naming the version whose plan cannot be read, or is not the one that was
+/// approved: it must not be used.
 ReferencePlan PlanIn(const Statement& row) {
+  if (!IsAsApproved(row)) throw DataError(say::store::ReferenceNotAsApproved(row.Integer(2)));
   try {
     return ParsePlan(row.Text(9));
   } catch (const DataError& error) {
-    throw DataError(fmt::format("version {} of the reference: {}", row.Integer(2), error.what()));
+    throw DataError(say::store::ReferenceVersion(row.Integer(2), error.message()));
   }
+}
+
+/// What somebody wrote, or Plumb's own sentence of Plan().
+Message ReasonIn(const std::string& stored) {
+  const std::string begin = say::store::ReferenceNewPlan(0).English();
+  const std::string_view head = std::string_view(begin).substr(0, begin.size() - 1);
+  if (stored.starts_with(head)) {
+    if (const auto version = ParseNumber<int>(std::string_view(stored).substr(head.size())))
+      return say::store::ReferenceNewPlan(*version);
+  }
+  return Message::Verbatim(stored);
 }
 
 /// Without its plan.
@@ -41,7 +64,7 @@ Reference ReadReferenceRow(const Statement& row) {
                       .scan_id = ScanId(row.Integer(3)),
                       .created_at = FromStored(row.Integer(4)),
                       .created_by = row.Text(5),
-                      .reason = row.Text(6),
+                      .reason = ReasonIn(row.Text(6)),
                       .revision = static_cast<int>(row.Integer(10)),
                       .planned_by = row.Text(11),
                       .approved_by = row.Text(7)};
@@ -63,25 +86,22 @@ Reference ListReference(const Statement& row) {
   try {
     reference.plan = PlanIn(row);
   } catch (const DataError& error) {
-    reference.unreadable = error.what();
+    reference.unreadable = error.message();
   }
   return reference;
 }
 
 void RequireRevision(std::int64_t stored, int read) {
   if (stored != read)
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "this plan has been changed by somebody else meanwhile: look at it again");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::ReferencePlanChanged());
 }
 
 /// One person plans, another approves.
 void RequireSecondPerson(const Reference& reference, const Actor& approver) {
   if (reference.planned_by.empty())
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "nobody has planned this reference: save its plan first");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::ReferenceNotPlanned());
   if (reference.created_by == approver.user || reference.planned_by == approver.user)
-    throw StoreRefusal(ChangeResult::kRefused,
-                       "who made or planned a reference does not approve it: ask a second person");
+    throw StoreRefusal(ChangeResult::kRefused, say::store::ReferenceSecondPerson());
 }
 
 }  // namespace
@@ -119,6 +139,15 @@ std::optional<Reference> ReferenceStore::Approved(const std::string& patient_id)
       ReadReference, ParseId(patient_id));
 }
 
+std::optional<Reference> ReferenceStore::OfSession(const std::string& session_id) {
+  return database_.ForRows()->First(
+      kReferenceColumns +
+          "WHERE id = (SELECT ifnull(reference_id, (SELECT id FROM refs WHERE refs.patient_id = "
+          "sessions.patient_id AND approved_by <> '' ORDER BY version DESC LIMIT 1)) FROM sessions "
+          "WHERE sessions.id = ?)",
+      ReadReference, ParseId(session_id));
+}
+
 std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
                                 const std::string& reason, const ReferencePlan& plan) {
   const std::int64_t scan = RequireId(scan_id, "scan");
@@ -127,16 +156,13 @@ std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
   {
     Statement query =
         change->Prepare("SELECT patient_id, outcome, has_folder FROM scans WHERE id = ?", scan);
-    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoScan());
     if (query.Text(1) != "done" || query.Integer(2) == 0) {
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "this scan has no scene: only a finished scan can become a reference");
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ScanWithoutScene());
     }
     patient = query.Integer(0);
     if (patient == 0) {
-      throw StoreRefusal(
-          ChangeResult::kConflict,
-          "this scan belongs to no patient: open the patient, then scan a reference");
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ScanWithoutPatient());
     }
   }
   change->Run(
@@ -146,7 +172,7 @@ std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
       "?)",
       patient, patient, scan, StoredNow(), actor.user, reason, PlanJson(plan));
   const std::string id = std::to_string(change->last_id());
-  change.Log(actor, "reference.add", id, "scan " + scan_id);
+  change.Log(actor, "reference.add", id, say::store::LogReferenceScan(scan_id));
   change.Commit();
   return id;
 }
@@ -160,7 +186,7 @@ std::string ReferenceStore::Plan(const Actor& actor, const std::string& id, int 
   {
     Statement query =
         change->Prepare("SELECT approved_by, revision, plan FROM refs WHERE id = ?", number);
-    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoReference());
     is_approved = !query.Text(0).empty();
     RequireRevision(query.Integer(1), revision);
     stored = query.Text(2);
@@ -180,43 +206,39 @@ std::string ReferenceStore::Plan(const Actor& actor, const std::string& id, int 
                 PlanJson(plan), actor.user, number);
   }
   // Both as they are stored: one that cannot be read is kept in the log as it was.
-  change.Log(actor, "reference.plan", changed, stored + "\n" + PlanJson(plan));
+  change.Log(actor, "reference.plan", changed, Message::Verbatim(stored + "\n" + PlanJson(plan)));
   change.Commit();
   return changed;
 }
 
 void ReferenceStore::Approve(const Actor& actor, const std::string& id, int revision,
-                             const std::string& digest, bool two_users) {
+                             const std::string& digest, bool two_users, const std::string& reason) {
   const std::int64_t number = RequireId(id, "reference");
   if (const std::optional<Reference> reference = Find(id)) {  // before the lock is taken
-    const std::string fault = integrity_.Check(reference->scan_id, /*scene_only=*/true);
+    const Message fault = integrity_.Check(reference->scan_id, /*scene_only=*/true);
     if (!fault.empty())
-      throw StoreRefusal(ChangeResult::kConflict,
-                         fmt::format("the scan of this reference is not as it was stored: {}; put "
-                                     "a backup of its files in their place, or scan again",
-                                     fault));
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ReferenceScanChanged(fault));
   }
   StoreChange change(database_);
   const std::optional<Reference> reference =
       change->First(kReferenceColumns + "WHERE id = ?", ReadReferenceRow, number);
-  if (!reference) throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
+  if (!reference) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoReference());
   if (!reference->approved_by.empty())
-    throw StoreRefusal(ChangeResult::kConflict, "this reference is approved already");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::ReferenceApproved());
   RequireRevision(reference->revision, revision);
   if (change->Has(
           "SELECT 1 FROM refs AS other JOIN refs ON other.patient_id = refs.patient_id AND "
           "other.version > refs.version WHERE refs.id = ? AND other.approved_by <> '' LIMIT 1",
           number))
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "a newer version of this reference is approved, and scans are compared "
-                       "with the newest: change the plan of that one");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::ReferenceNewerApproved());
   if (!digest.empty() && digest != reference->digest)
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "what is stored is not what was shown: look at the reference again");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::ReferenceNotAsShown());
   if (two_users) RequireSecondPerson(*reference, actor);
-  change->Run("UPDATE refs SET approved_by = ?, approved_at = ? WHERE id = ?", actor.user,
-              StoredNow(), number);
-  change.Log(actor, "reference.approve", id, "sha256 " + reference->digest);
+  change->Run("UPDATE refs SET approved_by = ?, approved_at = ?, approved_digest = ? WHERE id = ?",
+              actor.user, StoredNow(), reference->digest, number);
+  change.Log(actor, "reference.approve", id,
+             reason.empty() ? say::store::LogDigest(reference->digest)
+                            : say::store::LogDigestReason(reference->digest, reason));
   change.Commit();
 }
 

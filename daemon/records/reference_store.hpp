@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // References: the scans with which later ones are compared, each with its plan.
 #pragma once
 
@@ -5,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/database/store_database.hpp"
 #include "daemon/records/file_integrity.hpp"
-#include "daemon/records/store_database.hpp"
 #include "web/model/account.hpp"
 #include "web/model/reference.hpp"
 
@@ -25,6 +26,8 @@ class ReferenceStore {
   [[nodiscard]] std::vector<Reference> List(const std::string& patient_id);
   [[nodiscard]] std::optional<Reference> Find(const std::string& id);
   [[nodiscard]] std::optional<Reference> Approved(const std::string& patient_id);
+  /// What scans of this session are compared with; nothing before one is approved.
+  [[nodiscard]] std::optional<Reference> OfSession(const std::string& session_id);
 
   /// Creates a draft. Returns the id.
   std::string Add(const Actor& actor, const std::string& scan_id, const std::string& reason,
@@ -37,8 +40,10 @@ class ReferenceStore {
   ///         stored. Empty: not compared.
   /// @param two_users  The approver must be another person than the one who created or planned it;
   ///         false only for the demo's "auto".
+  /// @param reason  Why a scan with cautions becomes the reference, for the log; may be empty.
   void Approve(const Actor& actor, const std::string& id, int revision,
-               const std::string& digest = {}, bool two_users = true);
+               const std::string& digest = {}, bool two_users = true,
+               const std::string& reason = {});
 
  private:
   StoreDatabase& database_;

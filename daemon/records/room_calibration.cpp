@@ -1,17 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/room_calibration.hpp"
 
 #include <cmath>
 #include <span>
 #include <utility>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/records/check_json.hpp"
-#include "daemon/records/scan_files.hpp"
+#include "daemon/scan_files/scan_files.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -39,15 +40,15 @@ Pose PoseIn(const Json& rows) {
   const Eigen::Matrix3d R = T.linear();
   if (!(R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), 1e-6) || R.determinant() < 0 ||
       !T.translation().allFinite())
-    throw DataError("T_iec_reference is not a rigid transform");
+    throw DataError(say::store::RoomNotRigid());
   return T;
 }
 
 std::string JsonOf(const RoomFit& fit, std::span<const BoardScan> scans) {
   Json json = {{"format", kCalibrationFormat},
-               {"dictionary", scans[0].dictionary},
-               {"marker_length_m", scans[0].marker_length_m},
-               {"reference_marker", scans[0].reference_marker.value()},
+               {"dictionary", scans[0].room_markers.dictionary},
+               {"marker_length_m", scans[0].room_markers.length_m},
+               {"reference_marker", scans[0].room_markers.reference.value()},
                {"T_iec_reference", PoseJson(fit.T_iec_reference)},
                {"shift_m", fit.shift_m},
                {"turn_rad", fit.turn_rad},
@@ -75,28 +76,25 @@ std::optional<BoardScan> BoardScanIn(const std::string& check_json) {
   BoardScan seen;
   const auto room = BaselineIn(check_json);
   if (!room) {
-    seen.fault =
-        "none of the room's markers was seen well: sweep over them too, the room is described by "
-        "them";
+    seen.fault = say::store::BoardWithoutRoom();
     return seen;
   }
-  seen.dictionary = room->dictionary;
-  seen.marker_length_m = room->marker_length_m;
+  seen.room_markers = room->room_markers;
   const Json reference = json.value("reference_marker", Json());
   if (!reference.is_number_integer()) {
-    seen.fault = "the reference marker was not seen: keep it in view during a part of the sweep";
+    seen.fault = say::store::BoardWithoutReference();
     return seen;
   }
-  seen.reference_marker = reference.get<int>();
+  seen.room_markers.reference = reference.get<int>();
   try {
-    const int size = MarkerDictionary::ByName(seen.dictionary).size();
-    auto fit = FitRoomBoard(MakeRoomBoard(size, seen.marker_length_m), *board);
-    if (auto* why = std::get_if<std::string>(&fit))
-      seen.fault = std::move(*why);
+    const int size = MarkerDictionary::ByName(seen.room_markers.dictionary).size();
+    auto fit = FitRoomBoard(MakeRoomBoard(size, seen.room_markers.length_m), *board);
+    if (auto* why = std::get_if<1>(&fit))
+      seen.fault = *why;
     else
       seen.scan = RoomScan{room->markers, std::get<BoardFit>(fit)};
   } catch (const std::exception& error) {  // unknown dictionary, or no board of such markers
-    seen.fault = error.what();
+    seen.fault = MessageOf(error);
   }
   return seen;
 }
@@ -107,22 +105,20 @@ RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibratio
   std::vector<RoomScan> seen;
   for (const BoardScan& scan : candidate.scans) {
     if (!scan.scan || used.size() == limits.num_scans) continue;
-    if (!used.empty() &&
-        (scan.dictionary != used[0].dictionary || scan.marker_length_m != used[0].marker_length_m ||
-         scan.reference_marker != used[0].reference_marker))
+    if (!used.empty() && scan.room_markers != used[0].room_markers)
       break;  // the markers were configured differently then
     used.push_back(scan);
     seen.push_back(*scan.scan);
   }
   if (used.empty()) {
     candidate.why_not = candidate.scans.empty()
-                            ? "the board has not been scanned yet"
-                            : "no scan of the board can be used: " + candidate.scans[0].fault;
+                            ? say::store::BoardNotScanned()
+                            : say::store::BoardUnusable(candidate.scans[0].fault);
     return candidate;
   }
   auto fit = FitRoom(seen);
-  if (auto* why = std::get_if<std::string>(&fit)) {
-    candidate.why_not = std::move(*why);
+  if (auto* why = std::get_if<1>(&fit)) {
+    candidate.why_not = *why;
     return candidate;
   }
   candidate.fit = std::get<RoomFit>(std::move(fit));
@@ -136,52 +132,43 @@ SignedRoom SignedRoomIn(const std::string& text) {
   try {
     const Json json = ParseBoundedJson<Json>(text);
     if (json.at("format").get<int>() != kCalibrationFormat)
-      throw DataError(
-          fmt::format("expected format {}, found {}", kCalibrationFormat, json["format"].dump()));
+      throw DataError(say::store::RoomFormat(kCalibrationFormat, json["format"].dump()));
     SignedRoom room;
     room.digest = Sha256Of(text);
-    room.dictionary = json.at("dictionary").get<std::string>();
-    room.marker_length_m = json.at("marker_length_m").get<double>();
-    room.reference_marker = json.at("reference_marker").get<int>();
+    room.room_markers = {.dictionary = json.at("dictionary").get<std::string>(),
+                         .length_m = json.at("marker_length_m").get<double>(),
+                         .reference = json.at("reference_marker").get<int>()};
     room.fit.T_iec_reference = PoseIn(json.at("T_iec_reference"));
     room.fit.shift_m = json.at("shift_m").get<double>();
     room.fit.turn_rad = json.at("turn_rad").get<double>();
     for (const Json& scan : json.at("scans"))
       room.check_ids.push_back(scan.at("check").get<std::string>());
     auto markers = MarkersIn(json.at("markers_iec"));
-    if (!markers || markers->empty()) throw DataError("its markers cannot be read");
+    if (!markers || markers->empty()) throw DataError(say::store::RoomMarkersUnreadable());
     room.fit.markers_iec = std::move(*markers);
     return room;
   } catch (const std::exception& error) {
-    throw DataError(fmt::format(
-        "the stored calibration of the room cannot be used: {}; calibrate the room again",
-        error.what()));
+    throw DataError(say::store::RoomUnusable(MessageOf(error)));
   }
 }
 
-std::optional<std::string> WhyRoomIsDue(const SignedRoom& room, const MarkerBaseline& seen,
-                                        const MarkerCheckLimits& limits) {
-  if (seen.dictionary != room.dictionary ||
-      std::abs(seen.marker_length_m - room.marker_length_m) > 1e-6)
-    return "the room has other markers than when it was calibrated";
+std::optional<Message> WhyRoomIsDue(const SignedRoom& room, const MarkerBaseline& seen,
+                                    const MarkerCheckLimits& limits) {
+  if (seen.room_markers.dictionary != room.room_markers.dictionary ||
+      std::abs(seen.room_markers.length_m - room.room_markers.length_m) > 1e-6)
+    return say::store::RoomOtherMarkers();
   Scene scene;
   scene.markers = seen.markers;
-  scene.marker_dictionary = seen.dictionary;
-  scene.marker_length_m = seen.marker_length_m;
-  const MarkerCheck check = CheckMarkers(
-      scene, MarkerBaseline{room.fit.markers_iec, room.dictionary, room.marker_length_m}, limits);
-  std::optional<std::string> answer;
+  scene.room_markers = seen.room_markers;
+  const MarkerCheck check =
+      CheckMarkers(scene, MarkerBaseline{room.fit.markers_iec, room.room_markers}, limits);
+  std::optional<Message> answer;
   for (const MarkerCheckItem& item : check.items) {
     if (item.name != "misfit" && item.name != "moved") continue;
     if (!answer) answer.emplace();
     if (item.passed || !answer->empty()) continue;
-    *answer =
-        item.name == "moved"
-            ? fmt::format("{} moved {:.0f} mm since the room was calibrated", item.note, item.value)
-            : fmt::format(
-                  "the markers lie {:.1f} mm (RMS) from where they were when the room was "
-                  "calibrated",
-                  item.value);
+    *answer = item.name == "moved" ? say::store::RoomMarkerMoved(item.note, item.value)
+                                   : say::store::RoomMisfit(item.value);
   }
   return answer;
 }

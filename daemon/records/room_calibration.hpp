@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Storage format of the room's calibration, which is made from check scans of the board.
 #pragma once
 
@@ -5,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "algo/comparison/marker_check.hpp"
 #include "algo/comparison/room_board.hpp"
 #include "web/model/wall_clock.hpp"
@@ -16,11 +18,9 @@ struct BoardScan {
   std::string check_id;
   WallClock::time_point time;
   std::string user;
-  std::string dictionary;
-  double marker_length_m = 0.0;
-  std::optional<int> reference_marker;  ///< Marker whose frame is used.
-  std::optional<RoomScan> scan;         ///< Not set: `fault` states why.
-  std::string fault;
+  RoomMarkers room_markers = RoomMarkers::Unknown();
+  std::optional<RoomScan> scan;  ///< Not set: `fault` states why.
+  Message fault;
 };
 
 /// Reads a text of CheckJson() for a sweep over the board; nothing if no marker of the board was
@@ -31,9 +31,9 @@ struct BoardScan {
 struct RoomCandidate {
   std::vector<BoardScan> scans;  ///< Newest first; the newest usable ones count.
   std::optional<RoomFit> fit = {};
-  std::string why_not = {};  ///< Why it may not be signed; empty if it may.
-  std::string json = {};     ///< Text to be stored; empty without a fit.
-  std::string digest = {};   ///< SHA-256 of it in hexadecimal: the data that a person signs.
+  Message why_not = {};     ///< Why it may not be signed; empty if it may.
+  std::string json = {};    ///< Text to be stored; empty without a fit.
+  std::string digest = {};  ///< SHA-256 of it in hexadecimal: the data that a person signs.
 };
 /// @param scans  Newest first.
 [[nodiscard]] RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans,
@@ -47,9 +47,7 @@ struct SignedRoom {
   std::string digest;
   RoomFit fit;
   std::vector<std::string> check_ids;
-  std::string dictionary;
-  double marker_length_m = 0.0;
-  int reference_marker = 0;  ///< Id.
+  RoomMarkers room_markers = RoomMarkers::Unknown();  ///< All three are set.
 };
 /// Parses a candidate's text; the caller adds version and signature.
 /// @throws DataError stating what is wrong with it.
@@ -57,8 +55,8 @@ struct SignedRoom {
 
 /// Why the markers that a check saw show that the room has changed since it was calibrated, as one
 /// sentence; empty if it has not. Nothing if it saw too little to decide.
-[[nodiscard]] std::optional<std::string> WhyRoomIsDue(const SignedRoom& room,
-                                                      const MarkerBaseline& seen,
-                                                      const MarkerCheckLimits& limits);
+[[nodiscard]] std::optional<Message> WhyRoomIsDue(const SignedRoom& room,
+                                                  const MarkerBaseline& seen,
+                                                  const MarkerCheckLimits& limits);
 
 }  // namespace plumb

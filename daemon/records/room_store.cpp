@@ -1,14 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/room_store.hpp"
 
 #include <algorithm>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/database/store_refusal.hpp"
+#include "daemon/database/stored_values.hpp"
 #include "daemon/records/check_json.hpp"
-#include "daemon/records/store_refusal.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -26,10 +26,7 @@ SignedRoom ReadRoom(const Statement& row) {
   SignedRoom room = SignedRoomIn(row.Text(4));
   room.version = static_cast<int>(row.Integer(0));
   if (room.digest != row.Text(3)) {
-    throw DataError(fmt::format(
-        "the stored calibration of the room, version {}, is not the one that was signed: calibrate "
-        "the room again",
-        room.version));
+    throw DataError(say::store::RoomNotAsSigned(room.version));
   }
   room.signed_at = FromStored(row.Integer(1));
   room.signed_by = row.Text(2);
@@ -101,30 +98,28 @@ std::string RoomStore::Sign(const Actor& actor, const std::string& sensor_serial
   const RoomCandidate candidate = ReadCandidate(*change, sensor_serial, ToStored(since));
   if (!candidate.why_not.empty()) throw StoreRefusal(ChangeResult::kConflict, candidate.why_not);
   if (candidate.digest != digest) {
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "the board has been scanned again since this was read: read it again");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::BoardScannedAgain());
   }
-  const std::string before =
+  const double shift_mm = candidate.fit->shift_m / kMillimetre,
+               turn_deg = candidate.fit->turn_rad / kDegree;
+  const Message described =
       change
           ->First("SELECT version, digest FROM room_calibrations ORDER BY version DESC LIMIT 1",
-                  [](const Statement& row) {
-                    return fmt::format("; before: version {}, sha256 {}", row.Integer(0),
-                                       row.Text(1));
+                  [&](const Statement& row) {
+                    return say::store::LogRoomChanged(shift_mm, turn_deg, candidate.digest,
+                                                      row.Integer(0), row.Text(1));
                   })
-          .value_or("");
+          .value_or(say::store::LogRoom(shift_mm, turn_deg, candidate.digest));
   change->Run(
       "INSERT INTO room_calibrations (signed_at, signed_by, digest, json) VALUES (?, ?, ?, ?)",
       StoredNow(), actor.user, candidate.digest, candidate.json);
   const std::string version = std::to_string(change->last_id());
-  change.Log(actor, "room.calibrate", version,
-             fmt::format("scans differ by {:.2f} mm and {:.2f} deg, sha256 {}{}",
-                         candidate.fit->shift_m / kMillimetre, candidate.fit->turn_rad / kDegree,
-                         candidate.digest, before));
+  change.Log(actor, "room.calibrate", version, described);
   change.Commit();
   return version;
 }
 
-std::string RoomStore::WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits) {
+Message RoomStore::WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits) {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare("SELECT json FROM checks WHERE id > ? ORDER BY id DESC LIMIT ?",
                                   LastCheckOf(room), kChecksSearched);

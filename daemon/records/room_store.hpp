@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The signed calibrations of the room, and the next one.
 #pragma once
 
@@ -5,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/database/store_database.hpp"
 #include "daemon/records/room_calibration.hpp"
-#include "daemon/records/store_database.hpp"
 
 namespace plumb {
 
@@ -28,7 +29,7 @@ class RoomStore {
                    WallClock::time_point since, const std::string& digest);
   /// Why a new calibration is due, by the newest check since the signature that saw enough of the
   /// room; empty if it is not due.
-  [[nodiscard]] std::string WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits);
+  [[nodiscard]] Message WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits);
 
  private:
   StoreDatabase& database_;

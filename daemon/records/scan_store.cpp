@@ -1,16 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/scan_store.hpp"
 
 #include <cerrno>
 #include <cstdio>
-
-#include <fmt/format.h>
+#include <utility>
 
 #include "algo/base/errors.hpp"
-#include "daemon/records/scan_digests.hpp"
-#include "daemon/records/store_json.hpp"
-#include "daemon/records/store_refusal.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "daemon/database/scan_digests.hpp"
+#include "daemon/database/store_json.hpp"
+#include "daemon/database/store_refusal.hpp"
+#include "daemon/database/stored_values.hpp"
+#include "daemon/state_folder/scan_numbers.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 
@@ -23,7 +25,10 @@ const std::string kScanColumns =
     "finished_at, accepted_by, has_folder, results.json, accepted_reason, session_id, "
     "(SELECT fraction FROM sessions WHERE sessions.id = session_id), sensor_on_s, check_overdue, "
     "unavailable, accepted_at, sensor_serial, (SELECT opened_by FROM sessions WHERE sessions.id = "
-    "session_id) FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
+    "session_id), failure_message, unavailable_message, (SELECT sha256 FROM scan_files WHERE "
+    "scan_files.scan_id = scans.id AND path = 'result/result.json') FROM scans LEFT JOIN results "
+    "ON "
+    "results.scan_id = scans.id ";
 
 /// The column check_overdue stores the value of the enum. Older versions read every value but 0 as
 /// overdue.
@@ -41,18 +46,28 @@ void Flush(const fs::path& folder, void (*sync)(const fs::path&)) {
   try {
     sync(folder);
   } catch (const IoError& error) {
-    throw DiskRefused(error.what());
+    throw DiskRefused(error.message());
   }
 }
 
-/// Verdict and numbers for the log: "move: vertical +1.2, ..., yaw -0.10".
-std::string Described(const ResultSummary& result) {
-  std::string text(Name(result.verdict));
+/// The result in the database is the text of result.json, whose digest is stored with the scan.
+/// @param sha256  Empty: the scan has no such file. @throws DataError
+ResultSummary ResultIn(const std::string& scan_id, const std::string& json,
+                       const std::string& sha256) {
+  if (!sha256.empty() && Sha256Of(json) != sha256)
+    throw DataError(say::store::ResultNotAsStored(scan_id));
+  return SummaryOf(json);
+}
+
+/// Verdict and numbers for the log: "move, vertical +1.20 mm, ..., yaw -0.10 deg".
+std::vector<Message> Described(const ResultSummary& result) {
+  std::vector<Message> words = {say::store::LogVerdict(Name(result.verdict))};
   for (const NumberAxis& axis : kNumberAxes) {
     if (const auto value = axis.In(result.correction))
-      text += fmt::format(", {} {:+.2f} {}", axis.name, *value, axis.unit);
+      words.push_back(axis.is_shift() ? say::store::LogNumberMm(axis.name, *value)
+                                      : say::store::LogNumberDeg(axis.name, *value));
   }
-  return text;
+  return words;
 }
 
 }  // namespace
@@ -64,7 +79,7 @@ Scan ScanStore::ReadScan(const Statement& row) const {
             .reference_id = row.Text(2),
             .purpose = ParseStored<ScanPurpose>("purpose", row.Text(3)),
             .outcome = ParseStored<ScanOutcome>("outcome", row.Text(4)),
-            .failure = row.Text(5),
+            .failure = MessageIn(row.Text(20), row.Text(5)),
             .started_at = FromStored(row.Integer(6)),
             .accepted_by = row.Text(8),
             .accepted_reason = row.Text(11),
@@ -77,11 +92,11 @@ Scan ScanStore::ReadScan(const Statement& row) const {
   if (!row.IsNull(17)) scan.accepted_at = FromStored(row.Integer(17));
   if (!row.IsNull(7)) scan.finished_at = FromStored(row.Integer(7));
   if (const std::string unavailable = row.Text(16); !unavailable.empty()) {
-    scan.failure = "its files cannot be used now: " + unavailable;
+    scan.failure = say::store::FilesUnusable(MessageIn(row.Text(21), unavailable));
   } else if (row.Integer(9) != 0) {
     scan.folder = folders_.Scan(scan.id);
   }
-  if (!row.IsNull(10)) scan.result = SummaryOf(row.Text(10));
+  if (!row.IsNull(10)) scan.result = ResultIn(scan.id, row.Text(10), row.Text(22));
   return scan;
 }
 
@@ -94,17 +109,18 @@ Scan ScanStore::ListScan(const Statement& row) const {
     scan.id = ScanId(row.Integer(0));
     if (row.Integer(1) != 0) scan.patient_id = row.Text(1);
     scan.outcome = ScanOutcome::kFailed;
-    scan.failure = error.what();
+    scan.failure = error.message();
     scan.started_at = FromStored(row.Integer(6));
     return scan;
   }
 }
 
 void FailInterruptedScans(Database& database) {
+  const Message why = say::store::Interrupted();
   database.Run(
-      "UPDATE scans SET outcome = 'failed', failure = ?, has_folder = 0 WHERE outcome = "
-      "'running'",
-      kInterrupted);
+      "UPDATE scans SET outcome = 'failed', failure = ?, failure_message = ?, has_folder = 0 WHERE "
+      "outcome = 'running'",
+      why.English(), MessageColumn(why));
 }
 
 std::vector<Scan> ScanStore::List(const std::string& patient_id, int limit) {
@@ -161,6 +177,7 @@ std::string ScanStore::Begin(const NewScan& scan) {
   fs::create_directory(folders_.Staging(id), error);
   if (error) throw DiskRefused(DescribeWriteError(folders_.Staging(id), error.value()));
   change.Commit();
+  NoteScanNumber(folders_.state(), number);
   running_ = number;
   return id;
 }
@@ -192,7 +209,8 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
   try {
     Flush(folders_.scans(), SyncToDisk);
     NoteEnd(*writer, scan_id, finished, is_kept, files);
-  } catch (...) {  // without its row a scan does not exist
+    (void)writer->Checkpoint();  // if this fails, a later change does it
+  } catch (...) {                // without its row a scan does not exist
     ::rename(folders_.Scan(scan_id).c_str(), staging.c_str());
     throw;
   }
@@ -204,10 +222,10 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
   const std::int64_t number = ParseId(scan_id).value_or(0);
   Transaction transaction(database);
   database.Run(
-      "UPDATE scans SET outcome = ?, failure = ?, finished_at = ?, swept_area_m2 = ?, "
-      "has_folder = ? WHERE id = ?",
-      Name(finished.outcome), finished.failure, StoredNow(), finished.swept_area_m2, has_folder,
-      number);
+      "UPDATE scans SET outcome = ?, failure = ?, failure_message = ?, finished_at = ?, "
+      "swept_area_m2 = ?, has_folder = ? WHERE id = ?",
+      Name(finished.outcome), finished.failure.English(), MessageColumn(finished.failure),
+      StoredNow(), finished.swept_area_m2, has_folder, number);
   if (finished.outcome == ScanOutcome::kDone && !finished.result_json.empty()) {
     database.Run("INSERT INTO results (scan_id, json) VALUES (?, ?)", number, finished.result_json);
   }
@@ -218,43 +236,39 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
 void ScanStore::Accept(const Actor& actor, const std::string& id, const std::string& reason) {
   const std::optional<std::int64_t> number = ParseId(id);
   StoreChange change(database_);
-  std::string described;
+  std::vector<Message> described;
   {
     Statement query = change->Prepare(
-        "SELECT outcome, accepted_by, (SELECT json FROM results WHERE scan_id = scans.id), "
+        "SELECT outcome, accepted_by, (SELECT json FROM results WHERE scan_id = scans.id), (SELECT "
+        "sha256 FROM scan_files WHERE scan_id = scans.id AND path = 'result/result.json'), "
         "EXISTS (SELECT 1 FROM scans AS newer WHERE newer.patient_id = scans.patient_id AND "
-        "newer.id > scans.id AND newer.outcome IN ('done', 'running')), reference_id = (SELECT id "
+        "newer.id > scans.id AND newer.outcome IN ('done', 'running')), reference_id = "
+        "ifnull((SELECT reference_id FROM sessions WHERE sessions.id = session_id), (SELECT id "
         "FROM refs WHERE refs.patient_id = scans.patient_id AND approved_by <> '' ORDER BY version "
-        "DESC LIMIT 1) FROM scans WHERE id = ?",
+        "DESC LIMIT 1)) FROM scans WHERE id = ?",
         number);
-    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoScan());
     if (query.Text(0) != "done" || query.IsNull(2)) {
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "this scan has no result: only a compared scan is accepted");
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ScanWithoutResult());
     }
-    const ResultSummary result = SummaryOf(query.Text(2));
+    const ResultSummary result = ResultIn(id, query.Text(2), query.Text(3));
     if (result.verdict == Verdict::kNoAnswer)
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "this scan gave no answer: there is nothing to accept");
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ScanWithoutAnswer());
     if (!query.Text(1).empty())
-      throw StoreRefusal(ChangeResult::kConflict, "this scan is accepted already");
-    if (query.Integer(3) != 0)
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "there is a newer scan of this patient: accept that one");
-    if (query.Integer(4) == 0)
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "another version of the reference has been approved since this scan: scan "
-                         "again, then accept");
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ScanAccepted());
+    if (query.Integer(4) != 0)
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ScanNotNewest());
+    if (query.Integer(5) == 0)
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ScanOfOtherReference());
     if (result.verdict != Verdict::kInTolerance && reason.empty())
-      throw StoreRefusal(ChangeResult::kConflict,
-                         "this result is not in tolerance: accepting it requires a reason and "
-                         "your password");
+      throw StoreRefusal(ChangeResult::kConflict, say::store::ScanNeedsReason());
     described = Described(result);
   }
   change->Run("UPDATE scans SET accepted_by = ?, accepted_reason = ?, accepted_at = ? WHERE id = ?",
               actor.user, reason, StoredNow(), number);
   change.Log(actor, reason.empty() ? "scan.accept" : "scan.accept_outside", id,
-             reason.empty() ? described : described + "; reason: " + reason);
+             reason.empty() ? say::store::LogAccepted(std::move(described))
+                            : say::store::LogAcceptedOutside(std::move(described), reason));
   change.Commit();
 }
 

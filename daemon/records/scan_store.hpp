@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The scans: how they begin, end and are accepted. StoreRemoval removes them.
 #pragma once
 
@@ -6,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/records/scan_files.hpp"
-#include "daemon/records/scan_folders.hpp"
-#include "daemon/records/store_database.hpp"
+#include "daemon/database/scan_folders.hpp"
+#include "daemon/database/store_database.hpp"
+#include "daemon/scan_files/scan_files.hpp"
 #include "web/model/account.hpp"
 #include "web/model/check.hpp"
 #include "web/model/scan.hpp"
@@ -31,15 +32,12 @@ struct NewScan {
 /// Outcome of a scan.
 struct FinishedScan {
   ScanOutcome outcome = ScanOutcome::kFailed;
-  std::string failure = {};
+  Message failure = {};
   std::string result_json = {};  ///< Empty if nothing was compared.
   double swept_area_m2 = 0.0;
 };
 
-/// Failure text for a scan whose end was never stored.
-inline constexpr std::string_view kInterrupted =
-    "interrupted: the appliance was switched off or its disk refused the scan";
-/// Ends the scans that have begun and not ended. Within a transaction.
+/// Ends the scans that have begun and not ended, as interrupted. Within a transaction.
 void FailInterruptedScans(Database& database);
 
 /// A scan's files are written to a hidden staging folder and appear under their id in one step; its

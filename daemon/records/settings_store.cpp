@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/settings_store.hpp"
 
-#include <fmt/format.h>
-
-#include "daemon/records/store_json.hpp"
-#include "daemon/records/store_refusal.hpp"
+#include "daemon/database/store_json.hpp"
+#include "daemon/database/store_refusal.hpp"
+#include "daemon/records/clock_doubt.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -27,18 +28,10 @@ void SettingsStore::Change(const Actor& actor, const Settings& settings) {
       "INSERT INTO settings (name, value) VALUES ('settings', ?1) ON CONFLICT (name) DO UPDATE "
       "SET value = ?1",
       text);
-  change.Log(actor, "settings.change", "", SettingsChanges(stored, settings));
+  TrustClock(*change);  // the person has seen the date
+  change.Log(actor, "settings.change", "", Message::Verbatim(SettingsChanges(stored, settings)));
   change.Commit();
 }
-
-namespace {
-
-std::string Described(double width_mm, double height_mm, double shift_mm, double rotation_deg) {
-  return fmt::format("region {:g} x {:g} mm, tolerance {:g} mm and {:g} degrees", width_mm,
-                     height_mm, shift_mm, rotation_deg);
-}
-
-}  // namespace
 
 std::vector<PlanTemplate> TemplateStore::List() {
   return database_.ForRows()->All(
@@ -58,17 +51,15 @@ void TemplateStore::Set(const Actor& actor, const PlanTemplate& wanted) {
   StoreChange change(database_);
   if (change->FirstInteger("SELECT count(*) FROM templates WHERE site <> ?", wanted.site) >=
       kMaxTemplates)
-    throw StoreRefusal(ChangeResult::kConflict,
-                       "there are templates of 100 sites already: remove one first");
-  const std::string before =
-      change
-          ->First(
-              "SELECT width_mm, height_mm, shift_mm, rotation_deg FROM templates WHERE site = ?",
-              [](const Statement& row) {
-                return "; before: " + Described(row.Real(0), row.Real(1), row.Real(2), row.Real(3));
-              },
-              wanted.site)
-          .value_or("");
+    throw StoreRefusal(ChangeResult::kConflict, say::store::TemplatesFull());
+  Message values = say::store::LogTemplateValues(
+      wanted.width_mm, wanted.height_mm, wanted.tolerance.shift_mm, wanted.tolerance.rotation_deg);
+  const std::optional<Message> before = change->First(
+      "SELECT width_mm, height_mm, shift_mm, rotation_deg FROM templates WHERE site = ?",
+      [](const Statement& row) {
+        return say::store::LogTemplateValues(row.Real(0), row.Real(1), row.Real(2), row.Real(3));
+      },
+      wanted.site);
   change->Run(
       "INSERT INTO templates (site, width_mm, height_mm, shift_mm, rotation_deg, changed_by) "
       "VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT (site) DO UPDATE SET site = ?1, width_mm = "
@@ -76,10 +67,8 @@ void TemplateStore::Set(const Actor& actor, const PlanTemplate& wanted) {
       wanted.site, wanted.width_mm, wanted.height_mm, wanted.tolerance.shift_mm,
       wanted.tolerance.rotation_deg, actor.user);
   change.Log(actor, "template.set", "",
-             fmt::format("{}: {}{}", wanted.site,
-                         Described(wanted.width_mm, wanted.height_mm, wanted.tolerance.shift_mm,
-                                   wanted.tolerance.rotation_deg),
-                         before));
+             before ? say::store::LogTemplateChanged(wanted.site, std::move(values), *before)
+                    : say::store::LogTemplate(wanted.site, std::move(values)));
   change.Commit();
 }
 
@@ -87,8 +76,8 @@ void TemplateStore::Remove(const Actor& actor, const std::string& site) {
   StoreChange change(database_);
   change->Run("DELETE FROM templates WHERE site = ?", site);
   if (change->num_changed() == 0)
-    throw StoreRefusal(ChangeResult::kNotFound, "there is no template of this site");
-  change.Log(actor, "template.remove", "", site);
+    throw StoreRefusal(ChangeResult::kNotFound, say::store::NoTemplate());
+  change.Log(actor, "template.remove", "", Message::Verbatim(site));
   change.Commit();
 }
 

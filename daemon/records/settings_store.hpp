@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The settings that a person changes on the page, and the templates of plans, one for each
 // treatment site.
 #pragma once
@@ -6,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/records/store_database.hpp"
+#include "daemon/database/store_database.hpp"
 #include "web/model/account.hpp"
 #include "web/model/patient.hpp"
 #include "web/model/settings.hpp"

@@ -1,25 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/store.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 
-#include <fmt/format.h>
-
-#include "daemon/records/backup.hpp"
-#include "daemon/records/retry_while_busy.hpp"
-#include "daemon/records/schema.hpp"
+#include "daemon/database/database_mark.hpp"
+#include "daemon/database/retry_while_busy.hpp"
+#include "daemon/database/schema.hpp"
+#include "daemon/records/clock_doubt.hpp"
+#include "daemon/state_folder/restore_note.hpp"
+#include "daemon/state_folder/scan_numbers.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+/// Prefix of folders in the state folder that keep the files of a damaged database.
+constexpr const char* kDamagedPrefix = "damaged-";
 
 FolderPlace PlaceOf(const fs::path& folder) {
   struct stat status {};
@@ -37,8 +45,7 @@ void RequireWritable(const fs::path& folder) {
   }
   if (reason == 0 || reason == ENOSPC || reason == EDQUOT || reason == EMFILE || reason == ENFILE)
     return;
-  throw DiskRefused(fmt::format("cannot write to {}: {}; check the disk and make it writable",
-                                folder.string(), std::strerror(reason)));
+  throw DiskRefused(say::store::NotWritable(folder.string(), std::strerror(reason)));
 }
 
 /// scans/ may be a disk of its own.
@@ -48,16 +55,63 @@ void RequireWritable(const ScanFolders& folders) {
   if (fs::is_directory(folders.scans(), ignored)) RequireWritable(folders.scans());
 }
 
+/// Keeps a copy of a damaged database's files before a restore or somebody's repair changes them.
+/// The same damage is copied only once, and only a few copies are kept.
+void KeepDamaged(const fs::path& state) {
+  constexpr std::size_t kLongest = std::size_t{1} << 28U;
+  constexpr int kMostKept = 3;
+  const std::array<std::string, 4> names = {kDatabaseFile, "plumb.db-wal", "plumb.db-shm",
+                                            std::string(kDatabaseFile) + kMarkSuffix};
+  try {
+    std::error_code error;
+    std::string sums;
+    for (const std::string& name : names) {
+      if (fs::exists(state / name, error))
+        sums += Sha256Of(ReadTextFile(state / name, kLongest)) + name;
+    }
+    constexpr std::size_t kNameLength = 12;
+    const fs::path kept =
+        state / (std::string(kDamagedPrefix) + Sha256Of(sums).substr(0, kNameLength));
+    int num_kept = 0;
+    for (const fs::directory_entry& entry : fs::directory_iterator(state))
+      num_kept += entry.path().filename().string().starts_with(kDamagedPrefix) ? 1 : 0;
+    if (fs::exists(kept, error) || num_kept >= kMostKept) return;
+    const fs::path copy = state / ".damaged";
+    fs::remove_all(copy);
+    fs::create_directory(copy);
+    for (const std::string& name : names) {
+      if (fs::exists(state / name, error)) fs::copy_file(state / name, copy / name);
+    }
+    SyncWholeDisk(state);
+    fs::rename(copy, kept);
+  } catch (const std::exception&) {  // the disk may be the reason for the damage
+  }
+}
+
 /// A program that copies the database holds it for a while; another plumbd does not release it.
 std::unique_ptr<Database> OpenChecked(const fs::path& state, const StoreOptions& options,
                                       bool& is_checked) {
   constexpr std::chrono::milliseconds kPause(500);
   return RetryWhileBusy(options.lock_wait, kPause, options.sleep, [&] {
-    auto database = std::make_unique<Database>(state / kDatabaseFile, Database::Access::kReadWrite,
-                                               options.busy_wait);
-    is_checked = database->CheckIntegrity(options.check_limit);
-    return database;
+    try {
+      auto database = std::make_unique<Database>(state / kDatabaseFile,
+                                                 Database::Access::kReadWrite, options.busy_wait);
+      is_checked = database->CheckIntegrity(options.check_limit);
+      return database;
+    } catch (const DatabaseCorrupt&) {
+      KeepDamaged(state);
+      throw;
+    }
   });
+}
+
+/// Accounts do not vanish by themselves, and where there is none, a stranger could create the
+/// first.
+void RefuseLostAccounts(Database& database, const fs::path& state) {
+  if (database.Has("SELECT 1 FROM users")) return;
+  if (database.Has("SELECT 1 FROM audit WHERE action = 'user.add' AND number > (SELECT "
+                   "ifnull(max(number), 0) FROM audit WHERE action = 'system.factory_reset')"))
+    throw DatabaseCorrupt(say::store::AccountsGone((state / kDatabaseFile).string()));
 }
 
 /// The connection for changes, to a database of this version that belongs to this folder's scans.
@@ -72,6 +126,9 @@ std::unique_ptr<Database> OpenForChanges(const ScanFolders& folders, const Store
       OpenChecked(folders.state(), options, recovery.checked_database);
   RefuseScansOfAnother(*database, folders);
   Migrate(*database);
+  RefuseLostAccounts(*database, folders.state());
+  DoubtAfterLeap(*database, WallClock::now());
+  (void)database->Checkpoint();  // so that the tables are not in the log of writes alone
   return database;
 }
 
@@ -97,7 +154,8 @@ int RestrictAccess(const fs::path& state) {
     for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error))
       if (!entry->is_symlink(ignored) && entry->path() != scans) restrict(entry->path());
   }
-  for (const char* name : {kDatabaseFile, "plumb.db-wal", "plumb.db-shm"}) restrict(state / name);
+  for (const char* name : {kDatabaseFile, "plumb.db-wal", "plumb.db-shm", "plumb.db-mark"})
+    restrict(state / name);
   restrict(scans);
   restrict(state);
   return num_changed;
@@ -109,11 +167,17 @@ FolderLock::~FolderLock() {
 
 void FolderLock::Take(const fs::path& folder) {
   fd_ = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd_ >= 0 && ::flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-    throw DatabaseBusy(
-        fmt::format("another plumbd uses the folder {}: stop one of them, or give "
-                    "each a state folder of its own",
-                    folder.string()));
+  if (fd_ >= 0 && ::flock(fd_, LOCK_EX | LOCK_NB) == 0) {
+    struct statfs disk {};
+    if (::fstatfs(fd_, &disk) == 0) {
+      if (const Message why = WhyNoPlaceForStore(folder, static_cast<unsigned long>(disk.f_type));
+          !why.empty())
+        throw DiskRefused(why);
+    }
+    return lease_.Take(folder);
+  }
+  if (errno == EWOULDBLOCK) throw DatabaseBusy(say::store::FolderInUse(folder.string()));
+  throw DiskRefused(say::store::FolderNotLocked(folder.string(), std::strerror(errno)));
 }
 
 Store::Store(const fs::path& folder, const StoreOptions& options)
@@ -124,6 +188,7 @@ Store::Store(const fs::path& folder, const StoreOptions& options)
       integrity(database_, folders, options.look) {
   RecoverStore(*database_.ForChanges(), folders, options.look, recovery_);
   NoteRestore(folders.state(), *database_.ForChanges());
+  NumberScansAbove(*database_.ForChanges(), LastScanNumber(folders));
   std::error_code error;
   fs::create_directories(folders.scans(), error);
   if (error) throw DiskRefused(DescribeWriteError(folders.scans(), error.value()));
@@ -145,12 +210,13 @@ std::unique_ptr<Store> Store::OpenReadable(const fs::path& folder, const Setting
 }
 
 void Store::CheckWritable() {
-  if (const std::string why = WhyOtherScans(); !why.empty()) throw DiskRefused(why);
+  if (const Message why = WhyOtherScans(); !why.empty()) throw DiskRefused(why);
   RequireWritable(folders);
+  lock_.Renew();
 }
 
 /// A disk may come back under another device number; it is recognised by the newest scan on it.
-std::string Store::WhyOtherScans() {
+Message Store::WhyOtherScans() {
   const FolderPlace now = PlaceOf(folders.scans());
   const std::lock_guard lock(place_mutex_);
   if (now == scans_place_) return {};
@@ -162,12 +228,9 @@ std::string Store::WhyOtherScans() {
       return {};
     }
   } catch (const IoError& error) {
-    return error.what();
+    return error.message();
   }
-  return fmt::format(
-      "the folder of the scans {} is not the one that was opened: if its disk is not mounted any "
-      "more, mount it again; if this is the right one, start plumbd again",
-      folders.scans().string());
+  return say::store::OtherScans(folders.scans().string());
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The store of the appliance: SQLite beside folders of files.
 #pragma once
 
@@ -10,8 +11,9 @@
 
 #include <sys/types.h>
 
+#include "daemon/database/audit_store.hpp"
+#include "daemon/database/store_refusal.hpp"
 #include "daemon/records/account_store.hpp"
-#include "daemon/records/audit_store.hpp"
 #include "daemon/records/check_store.hpp"
 #include "daemon/records/file_integrity.hpp"
 #include "daemon/records/patient_store.hpp"
@@ -19,25 +21,28 @@
 #include "daemon/records/room_store.hpp"
 #include "daemon/records/scan_store.hpp"
 #include "daemon/records/settings_store.hpp"
-#include "daemon/records/store_backup.hpp"
 #include "daemon/records/store_recovery.hpp"
-#include "daemon/records/store_refusal.hpp"
-#include "daemon/records/store_removal.hpp"
+#include "daemon/records/store_retention.hpp"
+#include "daemon/state_folder/store_lease.hpp"
 
 namespace plumb {
 
-/// Locks a folder for one store, against other processes.
+/// Locks a folder for one store, against other processes and machines.
 class FolderLock {
  public:
   FolderLock() = default;
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;
-  /// @throws DatabaseBusy if another process has it.
+  /// @throws DatabaseBusy if another process has it; DiskRefused if it cannot be locked, or lies on
+  ///         a disk that other machines share
   void Take(const std::filesystem::path& folder);
+  /// To be called every few minutes.
+  void Renew() { lease_.Renew(); }
 
  private:
   int fd_ = -1;
+  StoreLease lease_;
 };
 
 /// Denies other accounts access to a state folder and what it holds, and the group write access: an
@@ -84,10 +89,12 @@ class Store {
   /// Why the folder of the scans is no longer the one that was opened: its disk has probably been
   /// unmounted, and what is written would be hidden once it is mounted again. Empty if it is the
   /// same.
-  [[nodiscard]] std::string WhyOtherScans();
+  [[nodiscard]] Message WhyOtherScans();
   [[nodiscard]] const RecoveryReport& recovery() const { return recovery_; }
   /// For work on the rows of any table, such as the import of a patient.
   [[nodiscard]] StoreDatabase& database() { return database_; }
+  /// Keeps removals and backups apart.
+  [[nodiscard]] RemovalGate& gate() { return gate_; }
 
   const ScanFolders folders;
 
@@ -117,7 +124,6 @@ class Store {
   FileIntegrity integrity;
   ReferenceStore references{database_, integrity};
   StoreRemoval removal{database_, folders, scans, gate_};
-  StoreBackup backup{database_, folders, gate_};
 };
 
 }  // namespace plumb

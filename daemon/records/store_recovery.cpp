@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/store_recovery.hpp"
 
 #include <algorithm>
@@ -6,13 +7,16 @@
 
 #include <fmt/format.h>
 
-#include "daemon/records/audit_store.hpp"
-#include "daemon/records/backup.hpp"
-#include "daemon/records/file_copy.hpp"
-#include "daemon/records/scan_digests.hpp"
+#include "daemon/database/audit_store.hpp"
+#include "daemon/database/scan_digests.hpp"
+#include "daemon/database/stored_values.hpp"
 #include "daemon/records/scan_store.hpp"
-#include "daemon/records/stored_values.hpp"
+#include "daemon/scan_files/file_copy.hpp"
+#include "daemon/state_folder/restore_note.hpp"
+#include "daemon/state_folder/scan_bin.hpp"
+#include "daemon/state_folder/scan_numbers.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 
@@ -27,7 +31,8 @@ constexpr const char* kLostFile = "scans-are-lost";
 /// A finished scan and the result of examining its files.
 struct LookedAt {
   std::int64_t id = 0;
-  std::string before, now;  ///< Why its files cannot be used; empty if they can.
+  std::string before;  ///< Why its files could not be used, in English; empty if they could.
+  Message now;         ///< Why they cannot be used now; empty if they can.
   bool is_approved = false;
   fs::path aside = {};  ///< Where its files were set aside; empty if they are not to be moved back.
 };
@@ -37,7 +42,8 @@ bool HoldsNothing(const fs::path& folder) {
   std::error_code error;
   fs::directory_iterator entry(folder, error);
   for (const fs::directory_iterator end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().filename() != "lost+found") return false;
+    const fs::path name = entry->path().filename();
+    if (name != "lost+found" && name != ScanFolders::kBin) return false;
   }
   return !error || error == std::errc::no_such_file_or_directory;
 }
@@ -58,14 +64,14 @@ class Recovery {
   void MoveBack(std::vector<LookedAt>& scans);
   void NoteAvailability(const std::vector<LookedAt>& scans);
   void CollectOrphan(const fs::path& folder);
-  void Discard(const fs::path& folder, const std::string& why);
-  void SetAside(const fs::path& folder, const std::string& name, const std::string& why);
+  void Discard(const fs::path& folder, const Message& why);
+  void SetAside(const fs::path& folder, const std::string& name, const Message& why);
 
   Database& database_;
   const ScanFolders& folders_;
   const ExaminePath& look_;
   RecoveryReport& report_;
-  std::string confirmed_;  ///< Which scans a person has confirmed as lost, for the audit log.
+  Message confirmed_;  ///< Which scans a person has confirmed as lost, for the audit log.
 };
 
 void Recovery::Run() {
@@ -77,18 +83,18 @@ void Recovery::Run() {
   report_.interrupted_scans = database_.num_changed();
   if (report_.interrupted_scans > 0) {
     AppendAuditEntry(database_, kSelf, "scan.interrupted", "",
-                     fmt::format("{} scans had not ended", report_.interrupted_scans));
+                     say::store::LogInterrupted(report_.interrupted_scans));
   }
   if (!confirmed_.empty()) AppendAuditEntry(database_, kSelf, "scans.lost", "", confirmed_);
   for (const LookedAt& scan : scans) {
     if (!scan.aside.empty())
-      AppendAuditEntry(
-          database_, kSelf, "folder.return", ScanId(scan.id),
-          fmt::format("from {}, with the files that were stored", scan.aside.string()));
+      AppendAuditEntry(database_, kSelf, "folder.return", ScanId(scan.id),
+                       say::store::LogReturned(scan.aside.string()));
   }
   NoteAvailability(scans);
   transaction.Commit();
   for (const fs::path& folder : folders_.All()) CollectOrphan(folder);
+  NoteStrayInBin(database_, folders_);
   std::error_code ignored;
   fs::remove(folders_.state() / kLostFile, ignored);  // valid for this start only
 }
@@ -142,7 +148,7 @@ void Recovery::MoveBack(std::vector<LookedAt>& scans) {
     if (error) {
       scan.aside.clear();
     } else {
-      scan.now.clear();
+      scan.now = {};
     }
   }
 }
@@ -162,25 +168,23 @@ void Recovery::RefuseIfMostAreMissing(const std::vector<LookedAt>& scans) {
   const bool is_empty_disk = missing == seen_before && HoldsNothing(folders_.scans());
   if (missing == 0 || ((missing < 2 || 2 * missing < seen_before) && !is_empty_disk)) return;
   const fs::path file = folders_.state() / kLostFile;
-  std::string other;
+  std::string confirmed;
   if (look_(file).error == 0) {
     constexpr std::size_t kLongest = 64;
     std::string said = ReadTextFile(file, kLongest);
     while (!said.empty() && said.back() == '\n') said.pop_back();
     if (said.empty() || said == std::to_string(missing)) {
-      confirmed_ =
-          fmt::format("{} of {} stored scans were confirmed as lost", missing, seen_before);
+      confirmed_ = say::store::LogLost(missing, seen_before);
       return;
     }
-    other = fmt::format(" (not for {:?}, as it was confirmed)", said);
+    confirmed = fmt::format("{:?}", said);
   }
-  throw ScansMissing(fmt::format(
-      "{} of {} stored scans cannot be seen (of scan {}, {}): is the disk mounted at {}? Nothing "
-      "was changed. Mount the disk or put a backup in its place, and start plumbd again; if these "
-      "files are gone for good, confirm that{}: with lost_scans = {} in plumb-recovery.toml (field "
-      "guide, Recover a unit), or with an empty file {}",
-      missing, seen_before, ScanId(first->id), first->now, (folders_.scans()).string(), other,
-      missing, file.string()));
+  const std::string scan = ScanId(first->id), disk = folders_.scans().string();
+  throw ScansMissing(
+      confirmed.empty()
+          ? say::store::ScansMissing(missing, seen_before, scan, first->now, disk, file.string())
+          : say::store::ScansMissingNotAsConfirmed(missing, seen_before, scan, first->now, disk,
+                                                   confirmed, file.string()));
 }
 
 void Recovery::NoteAvailability(const std::vector<LookedAt>& scans) {
@@ -195,34 +199,38 @@ void Recovery::NoteAvailability(const std::vector<LookedAt>& scans) {
 
 /// Removes the remains of a crash or a removal; keeps folders that no row explains.
 void Recovery::CollectOrphan(const fs::path& folder) {
-  if (ScanFolders::IsStaging(folder)) return Discard(folder, "of a scan that had not ended");
+  if (ScanFolders::IsStaging(folder)) return Discard(folder, say::store::LogOfUnfinished());
   const std::string name = folder.filename().string();
   const std::int64_t id = ParseId(name).value_or(0);
-  std::string outcome, failure;
+  std::string outcome;
+  Message failure;
   {
-    Statement query =
-        database_.Prepare("SELECT outcome, has_folder, failure FROM scans WHERE id = ?", id);
+    Statement query = database_.Prepare(
+        "SELECT outcome, has_folder, failure, failure_message FROM scans WHERE id = ?", id);
     if (query.Step()) {
       if (query.Integer(1) != 0) return;
       outcome = query.Text(0);
-      failure = query.Text(2);
+      failure = MessageIn(query.Text(3), query.Text(2));
     }
   }
   if (outcome.empty()) {
+    if (database_.Has("SELECT 1 FROM bin WHERE scan_id = ?", id)) return MoveToBin(folders_, name);
     if (database_.Has("SELECT 1 FROM removed_scans WHERE id = ?", id))
-      return Discard(folder, "of a scan that was removed");
-    return SetAside(folder, name, "no scan of this number is known: is it of another database?");
+      return Discard(folder, say::store::LogOfRemoved());
+    return SetAside(folder, name, say::store::LogOfUnknown());
   }
-  if (failure == kInterrupted) {  // an older database may not know that the scan had ended
-    return SetAside(folder, name + ScanFolders::kInterruptedSuffix,
-                    "it is complete, but its scan was never recorded as finished");
+  // 0.2.0 stored the sentence only.
+  if (failure.Is(say::store::kInterrupted) ||
+      failure.English() ==
+          say::store::Interrupted()
+              .English()) {  // an older database may not know that the scan had ended
+    return SetAside(folder, name + ScanFolders::kInterruptedSuffix, say::store::LogOfUnrecorded());
   }
   if (outcome == "failed" || outcome == "cancelled")
-    Discard(folder,
-            fmt::format("of a scan that {}", outcome == "failed" ? "failed" : "was discarded"));
+    Discard(folder, outcome == "failed" ? say::store::LogOfFailed() : say::store::LogOfDiscarded());
 }
 
-void Recovery::Discard(const fs::path& folder, const std::string& why) {
+void Recovery::Discard(const fs::path& folder, const Message& why) {
   std::error_code error;
   fs::remove_all(folder, error);
   if (error) return;  // the next start tries again
@@ -233,7 +241,7 @@ void Recovery::Discard(const fs::path& folder, const std::string& why) {
 }
 
 /// Its number may be assigned to another scan. If scans/ is a separate disk, it stays on that disk.
-void Recovery::SetAside(const fs::path& folder, const std::string& name, const std::string& why) {
+void Recovery::SetAside(const fs::path& folder, const std::string& name, const Message& why) {
   std::error_code error;
   fs::path target;
   for (const fs::path& aside : folders_.SetAside()) {
@@ -255,21 +263,18 @@ void Recovery::SetAside(const fs::path& folder, const std::string& name, const s
 void RefuseScansOfAnother(Database& database, const ScanFolders& scans) {
   if (database.FirstInteger("PRAGMA user_version").value_or(0) != 0) return;
   if (IsRestoreInterrupted(scans.state()))
-    throw DatabaseCorrupt(fmt::format(
-        "restoring a backup into {} was interrupted: restore it again; what was stored before is "
-        "in the newest of the folders before-restore-N in there",
-        scans.state().string()));
+    throw DatabaseCorrupt(say::store::RestoreInterrupted(scans.state().string()));
   std::vector<fs::path> folders = scans.All();
   std::erase_if(folders, [](const fs::path& folder) {
     return ScanFolders::IsStaging(folder);
   });  // unfinished scans need not be kept
-  if (folders.empty()) return;
-  throw DatabaseCorrupt(
-      fmt::format("the database {} is empty or missing, but there are scans of another one ({} and "
-                  "{} more): put a backup of the database in "
-                  "its place, or move the folder {} away too to start over",
-                  (scans.state() / kDatabaseFile).string(), folders.front().string(),
-                  folders.size() - 1, (scans.scans()).string()));
+  if (folders.empty()) {
+    if (LastScanNumber(scans) == 0) return;
+    throw DatabaseCorrupt(say::store::DatabaseGone((scans.state() / kDatabaseFile).string()));
+  }
+  throw DatabaseCorrupt(say::store::ScansOfAnother((scans.state() / kDatabaseFile).string(),
+                                                   folders.front().string(), folders.size() - 1,
+                                                   scans.scans().string()));
 }
 
 void ConfirmLostScans(const fs::path& state, int num_lost) {

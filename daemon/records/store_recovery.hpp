@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // Recovery of the store at a start after a crash.
 #pragma once
 
-#include "daemon/records/database.hpp"
-#include "daemon/records/scan_files.hpp"
-#include "daemon/records/scan_folders.hpp"
+#include "daemon/database/database.hpp"
+#include "daemon/database/scan_folders.hpp"
+#include "daemon/scan_files/scan_files.hpp"
 
 namespace plumb {
 
@@ -29,7 +30,7 @@ struct RecoveryReport {
 };
 
 /// A lost database must not be replaced by a new one, to which every scan would be an orphan.
-/// @throws DatabaseCorrupt if the database is new and there are scans, or a restore was
+/// @throws DatabaseCorrupt if the database is new and there are or were scans, or a restore was
 /// interrupted.
 void RefuseScansOfAnother(Database& database, const ScanFolders& folders);
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/update/bundle_check.hpp"
 
 #include <fcntl.h>
@@ -12,7 +13,7 @@
 #include <iomanip>
 #include <string_view>
 
-#include <fmt/format.h>
+#include "words/update.hpp"
 
 namespace plumb {
 namespace {
@@ -27,8 +28,8 @@ bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
 }  // namespace
 
-std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes) {
-  const std::string name = file.filename().string();
+Message WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes,
+                    const std::string& name) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) {
     const int why = errno;
@@ -36,39 +37,37 @@ std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_byt
     if (why == EACCES && ::lstat(file.c_str(), &info) == 0 && S_ISREG(info.st_mode) &&
         info.st_uid == 0 && (info.st_mode & 077) == 0)
       return {};
-    return fmt::format("{} cannot be read: {}", name, std::strerror(why));
+    return say::update::Unreadable(name, std::strerror(why));
   }
-  const auto check = [&]() -> std::string {
+  const auto check = [&]() -> Message {
     struct stat info {};
-    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return name + " is not a regular file";
+    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return say::update::NoRegularFile(name);
     const auto size = static_cast<std::uint64_t>(info.st_size);
-    if (size < kLeastBundle)
-      return fmt::format("{} is too short for a bundle: {} bytes; copy it again", name, size);
+    if (size < kLeastBundle) return say::update::TooShort(name, static_cast<double>(size));
     if (size > max_bytes)
-      return fmt::format("{} is too large: {} MB, at most {} MB", name, size >> 20,
-                         max_bytes >> 20);
+      return say::update::TooLarge(name, WholeMegabytes(size), WholeMegabytes(max_bytes));
     std::array<char, 4> magic{};
     std::array<unsigned char, 8> tail{};
     if (::pread(fd, magic.data(), magic.size(), 0) != static_cast<ssize_t>(magic.size()) ||
         ::pread(fd, tail.data(), tail.size(), static_cast<off_t>(size - tail.size())) !=
             static_cast<ssize_t>(tail.size())) {
-      return fmt::format("{} cannot be read: {}", name, std::strerror(errno));
+      return say::update::Unreadable(name, std::strerror(errno));
     }
     std::uint64_t signature = 0;
     for (const unsigned char byte : tail) signature = signature << 8 | byte;
     if (std::string_view(magic.data(), magic.size()) != kSquashfs)
-      return name + " is not a bundle: expected a squashfs image";
+      return say::update::NoSquashfs(name);
     if (signature == 0 || signature > kMaxSignature || signature + tail.size() >= size) {
-      return name + " is not a complete bundle: no signature at its end; copy it again";
+      return say::update::NoSignature(name);
     }
     return {};
   };
-  std::string why = check();
+  Message why = check();
   ::close(fd);
   return why;
 }
 
-std::string WhyNoVersion(const std::string& version) {
+Message WhyNoVersion(const std::string& version) {
   bool is_number = false;
   for (const char c : version) {
     if (!IsDigit(c) && (c != '.' || !is_number)) {
@@ -78,10 +77,7 @@ std::string WhyNoVersion(const std::string& version) {
     is_number = IsDigit(c);
   }
   if (is_number) return {};
-  return fmt::format(
-      "this bundle holds version '{}': expected numbers separated by dots, such as 0.2.1; ask "
-      "who made it",
-      version);
+  return say::update::NoVersion(version);
 }
 
 bool IsOlder(const std::string& a, const std::string& b) {

@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks of a bundle that do not need RAUC.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <string>
+
+#include "algo/base/message.hpp"
 
 namespace plumb {
 
@@ -13,7 +16,14 @@ inline constexpr std::uint64_t kMaxSignature = 64 << 10;
 /// Empty, or why the file cannot be a bundle: not a regular file, empty, too large, not a squashfs
 /// followed by a signature. RAUC takes ownership of files that it has checked (owner root, readable
 /// by root only); such a file passes here, because nobody can have changed it since.
-[[nodiscard]] std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes);
+/// @param name  Of the bundle in the message: an upload has another one than its file.
+[[nodiscard]] Message WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes,
+                                  const std::string& name);
+
+/// As people read the size of a file, rounded down.
+[[nodiscard]] inline double WholeMegabytes(std::uint64_t bytes) {
+  return static_cast<double>(bytes >> 20);
+}
 
 enum class BundleState { kUnknown, kWhole, kDamaged };
 
@@ -23,9 +33,9 @@ enum class BundleState { kUnknown, kWhole, kDamaged };
 [[nodiscard]] BundleState LookForDamage(const std::filesystem::path& file);
 
 /// Empty if a version consists of numbers separated by dots, as toolchain/image and
-/// toolchain/bundle require; otherwise a sentence. Other versions cannot be compared: a release
+/// toolchain/bundle require; otherwise why not. Other versions cannot be compared: a release
 /// candidate, for example, would count as the release.
-[[nodiscard]] std::string WhyNoVersion(const std::string& version);
+[[nodiscard]] Message WhyNoVersion(const std::string& version);
 
 /// True if `a` is older than `b`. The numbers between the dots are compared one by one, up to the
 /// first other character: the version of the running system may have another form, and the system

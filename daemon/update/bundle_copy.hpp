@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Copies a bundle that was passed as an open file.
 #pragma once
 

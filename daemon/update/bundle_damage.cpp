@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether a bundle is still what was signed. A bundle is a squashfs, followed by a signature (CMS,
 // DER) and the signature's size in eight bytes. Signed attributes contain the SHA-256 of the signed
 // data: of the squashfs (plain format), or of the manifest, which is then part of the CMS (verity

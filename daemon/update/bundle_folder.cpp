@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/update/bundle_folder.hpp"
 
 #include <fcntl.h>
@@ -11,11 +12,10 @@
 #include <system_error>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
 #include "daemon/update/bundle_check.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/update.hpp"
 
 namespace plumb {
 
@@ -65,14 +65,12 @@ bool BundleFolder::Has(const std::string& name) const {
 }
 
 Change BundleFolder::Add(const std::filesystem::path& file, const std::string& name) const {
-  if (const std::string why = WhyNoBundle(file, max_bytes_); !why.empty()) {
-    return Refused(ChangeResult::kInvalid,
-                   name + why.substr(std::min(why.size(), file.filename().string().size())));
-  }
+  if (const Message why = WhyNoBundle(file, max_bytes_, name); !why.empty())
+    return RefusedBecause(ChangeResult::kInvalid, why);
   const std::vector<std::string> known = List();
   const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
   if (!is_known && known.size() >= kMaxKept)
-    return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
+    return RefusedBecause(ChangeResult::kConflict, say::update::TooMany());
   const DeferredClose replaced(folder_ / name, run_in_background_);
   // Otherwise a power cut soon after could leave the name without contents.
   try {
@@ -81,19 +79,18 @@ Change BundleFolder::Add(const std::filesystem::path& file, const std::string& n
       throw IoError(DescribeWriteError(name, errno));
     SyncToDisk(folder_);
   } catch (const std::exception& error) {
-    return Refused(ChangeResult::kNoSpace, error.what());
+    return RefusedBecause(ChangeResult::kNoSpace, MessageOf(error));
   }
   return {};
 }
 
 Change BundleFolder::Remove(const std::string& name) const {
-  if (!Has(name)) return Refused(ChangeResult::kNotFound, "there is no such bundle");
+  if (!Has(name)) return RefusedBecause(ChangeResult::kNotFound, say::update::NoSuchBundle());
   std::error_code error;
   const DeferredClose removed(folder_ / name, run_in_background_);
   std::filesystem::remove(folder_ / name, error);
   if (error)
-    return Refused(ChangeResult::kFailed,
-                   fmt::format("{} cannot be removed: {}", name, error.message()));
+    return RefusedBecause(ChangeResult::kFailed, say::update::NotRemoved(name, error.message()));
   return {};
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The folder of bundles that wait to be installed.
 #pragma once
 
@@ -7,9 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/model/change.hpp"
 
 namespace plumb {
+
+[[nodiscard]] inline Change RefusedBecause(ChangeResult result, const Message& why) {
+  return Refused(result, why.English());
+}
 
 inline constexpr std::size_t kMaxListedBundles = 32;
 

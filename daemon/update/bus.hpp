@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A connection to a message bus that the event loop serves.
 #pragma once
 

@@ -1,14 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/update/last_update.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/update.hpp"
 
 namespace plumb {
 namespace {
@@ -45,18 +46,15 @@ void WriteLastUpdate(const std::filesystem::path& folder, const LastUpdate& upda
 void RemoveLastUpdate(const std::filesystem::path& folder) {
   std::error_code error;
   const bool is_removed = std::filesystem::remove(folder / kFile, error);
-  if (error) throw IoError(fmt::format("{} cannot be removed: {}", kFile, error.message()));
+  if (error) throw IoError(say::update::NotRemoved(kFile, error.message()));
   if (is_removed) SyncToDisk(folder);
 }
 
-std::string WhyRolledBack(const LastUpdate& update, const std::string& slot,
-                          const std::string& boot, const std::string& version) {
+Message WhyRolledBack(const LastUpdate& update, const std::string& slot, const std::string& boot,
+                      const std::string& version) {
   if (slot.empty() || boot.empty() || update.boot.empty()) return {};
   if (update.boot == boot || update.from_slot != slot) return {};
-  return fmt::format(
-      "version {} was installed, but the machine has gone back to the previous system, {}: the "
-      "new one did not start or was not fit for work",
-      update.version, version);
+  return say::update::RolledBack(update.version, version);
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The last installed update, remembered across the restart, to detect whether the machine has kept
 // it.
 #pragma once
@@ -5,6 +6,8 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+
+#include "algo/base/message.hpp"
 
 namespace plumb {
 
@@ -22,9 +25,9 @@ void WriteLastUpdate(const std::filesystem::path& folder, const LastUpdate& upda
 /// Durably. That there is none is not an error. @throws IoError
 void RemoveLastUpdate(const std::filesystem::path& folder);
 
-/// Empty, or a sentence: the machine was restarted since, and the running system is the one that
+/// Empty, or that it was: the machine was restarted since, and the running system is the one that
 /// was to be replaced. Empty if a slot or a start is unknown.
-[[nodiscard]] std::string WhyRolledBack(const LastUpdate& update, const std::string& slot,
-                                        const std::string& boot, const std::string& version);
+[[nodiscard]] Message WhyRolledBack(const LastUpdate& update, const std::string& slot,
+                                    const std::string& boot, const std::string& version);
 
 }  // namespace plumb

@@ -1,11 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/update/system_restart.hpp"
 
 #include <chrono>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "daemon/update/bus.hpp"
+#include "words/update.hpp"
 
 namespace plumb {
 namespace {
@@ -15,11 +15,11 @@ constexpr std::chrono::seconds kRestartTimeout{20};
 class LogindRestart : public SystemRestart {
  public:
   LogindRestart(EventLoop& loop, std::string address)
-      : bus_(loop, "bus", [this] { Answer("the connection to the system's bus broke"); }),
+      : bus_(loop, "bus", [this] { Answer(say::update::RestartBusBroke()); }),
         address_(std::move(address)) {}
 
-  void Restart(std::function<void(const std::string&)> done) override {
-    if (done_) return done("the machine is being asked to restart already");
+  void Restart(std::function<void(const Message&)> done) override {
+    if (done_) return done(say::update::RestartAsked());
     done_ = std::move(done);
     constexpr int kNotInteractive = 0;  // no dialogue: nobody sits at this machine
     if (!bus_.Open(address_, kRestartTimeout) ||
@@ -28,7 +28,7 @@ class LogindRestart : public SystemRestart {
                                  "Reboot", &LogindRestart::OnAnswer, this, "b",
                                  kNotInteractive) < 0) {
       bus_.Close();
-      return Answer("this machine has no system bus");
+      return Answer(say::update::RestartNoBus());
     }
     bus_.Process();
   }
@@ -37,24 +37,22 @@ class LogindRestart : public SystemRestart {
   static int OnAnswer(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* restart = static_cast<LogindRestart*>(self);
     const sd_bus_error* error = sd_bus_message_get_error(message);
-    restart->Answer(error == nullptr            ? ""
-                    : error->message == nullptr ? error->name
-                                                : error->message);
+    const auto said = [&] {
+      return Message::Verbatim(error->message == nullptr ? error->name : error->message);
+    };
+    restart->Answer(error == nullptr ? Message() : said());
     return 0;
   }
 
-  void Answer(const std::string& why) {
+  void Answer(const Message& why) {
     auto done = std::exchange(done_, nullptr);
     if (!done) return;
-    done(why.empty() ? std::string()
-                     : fmt::format("the machine cannot be restarted from here: {}; restart it at "
-                                   "its console or its switch",
-                                   why));
+    done(why.empty() ? Message() : say::update::NoRestart(why));
   }
 
   Bus bus_;
   std::string address_;
-  std::function<void(const std::string&)> done_;
+  std::function<void(const Message&)> done_;
 };
 
 }  // namespace

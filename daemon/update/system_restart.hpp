@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Restarting the machine.
 #pragma once
 
@@ -6,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "algo/base/message.hpp"
 #include "daemon/loop/event_loop.hpp"
 
 namespace plumb {
@@ -14,9 +16,9 @@ namespace plumb {
 class SystemRestart {
  public:
   virtual ~SystemRestart() = default;
-  /// Calls `done` once, on the loop: with nothing once the machine goes down, otherwise with a
-  /// sentence that states why it does not.
-  virtual void Restart(std::function<void(const std::string& failure)> done) = 0;
+  /// Calls `done` once, on the loop: with nothing once the machine goes down, otherwise with why
+  /// it does not.
+  virtual void Restart(std::function<void(const Message& failure)> done) = 0;
   /// After this time, a machine that still runs is not going down any more.
   [[nodiscard]] virtual std::chrono::milliseconds limit() const { return std::chrono::minutes(5); }
 };

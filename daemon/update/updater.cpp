@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/update/updater.hpp"
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 #include "daemon/update/bundle_folder.hpp"
 #include "daemon/update/bus.hpp"
 #include "daemon/update/last_update.hpp"
+#include "words/update.hpp"
 
 namespace plumb {
 
@@ -67,10 +69,12 @@ struct Updater::Impl {
   std::chrono::steady_clock::time_point looked_at;
   bool is_there = false;
   bool is_installing = false;
-  std::string slot, compatible, step, last_error, outcome;
-  std::string version;  ///< Version of the installing or installed bundle.
+  std::string slot, compatible;
+  Message step, outcome;
+  std::string last_error;  ///< In RAUC's words.
+  std::string version;     ///< Version of the installing or installed bundle.
   /// Failure of the last attempt; empty if it succeeded or there was none.
-  std::string last_failure;
+  Message last_failure;
   /// State of the bundle that is being installed or examined.
   BundleState state = BundleState::kUnknown;
   std::map<std::string, BundleState> states;  ///< States of bundles examined before.
@@ -92,12 +96,10 @@ struct Updater::Impl {
   }
 
   void OnBroken() {
-    constexpr const char* kWhy =
-        "the connection to the installer broke: look at its log, then try again";
     if (is_installing && done) {
-      Refuse(ChangeResult::kFailed, kWhy);
+      Refuse(ChangeResult::kFailed, say::update::InstallerLost());
     } else if (is_installing) {
-      End(kWhy);
+      End(say::update::InstallerLost());
     }
     is_there = false;
     Notify();
@@ -143,25 +145,21 @@ struct Updater::Impl {
   void CheckProgress() {
     if (!is_installing) return;
     const std::chrono::minutes longest =
-        step.find("Copying") != std::string::npos ? kLongestCopy : kLongestOtherStep;
+        step.English().find("Copying") != std::string::npos ? kLongestCopy : kLongestOtherStep;
     if (options.now() - moved_at < longest) return watch.ArmAfter(options.look_every);
-    End(fmt::format(
-        "the installer has made no progress for {} minutes, at {:.0f} % of '{}': restart the "
-        "appliance, then try again",
-        longest.count(), 100.0 * fraction, step));
+    End(say::update::NoProgress(longest.count(), 100.0 * fraction, step));
     given_up = true;
   }
 
-  void End(const std::string& failure) {
+  void End(const Message& failure) {
     is_installing = given_up = false;
     watch.Disarm();
     last_failure = failure;
     if (failure.empty()) Remember();
     fraction = failure.empty() ? 1.0 : 0.0;
-    outcome = failure.empty()
-                  ? fmt::format("{} is installed: restart the appliance to use it", bundle)
-                  : fmt::format("{} was not installed: {}", bundle, failure);
-    Log(failure.empty() ? LogLevel::kNotice : LogLevel::kError, outcome);
+    outcome = failure.empty() ? say::update::Installed(bundle)
+                              : say::update::NotInstalled(bundle, failure);
+    Log(failure.empty() ? LogLevel::kNotice : LogLevel::kError, outcome.English());
     if (!copy.empty()) RemoveCopy(std::exchange(copy, {}));
     if (options.ended) options.ended(bundle, failure);
     Notify();
@@ -171,7 +169,7 @@ struct Updater::Impl {
   /// the contents remain.
   void RemoveCopy(const std::string& name) {
     const Change removed = folder.Remove(name);
-    if (removed.result == ChangeResult::kFailed) Log(LogLevel::kWarning, removed.message);
+    if (removed.result == ChangeResult::kFailed) Log(LogLevel::kWarning, removed.message.English());
     states.erase(name);
   }
 
@@ -198,17 +196,59 @@ struct Updater::Impl {
     }
   }
 
-  [[nodiscard]] std::string RolledBack() const {
-    return last && is_there ? WhyRolledBack(*last, slot, options.boot, options.version)
-                            : std::string();
+  [[nodiscard]] Message RolledBack() const {
+    return last && is_there ? WhyRolledBack(*last, slot, options.boot, options.version) : Message();
   }
 
+  void Install(const std::string& name, Done asked) {
+    if (bus.get() == nullptr || !is_there)
+      return asked(RefusedBecause(ChangeResult::kConflict, say::update::NoInstaller()));
+    if (is_installing)
+      return asked(RefusedBecause(ChangeResult::kConflict, say::update::InstallingThis(bundle)));
+    if (!folder.Has(name))
+      return asked(RefusedBecause(ChangeResult::kNotFound, say::update::NoSuchBundle()));
+    const std::filesystem::path file = options.folder / name;
+    if (const Message why = WhyNoBundle(file, options.max_bytes, name); !why.empty())
+      return asked(RefusedBecause(ChangeResult::kInvalid, why));
+    is_installing = true;
+    given_up = is_called = has_begun = false;
+    bundle = name;
+    fraction = 0.0;
+    step = say::update::CheckingSignature();
+    last_error.clear();
+    outcome = last_failure = {};
+    done = std::move(asked);
+    state = BundleState::kUnknown;
+    Notify();
+    const auto look = [this, file, is_alive = alive, &on = loop] {
+      const BundleState found = LookForDamage(file);
+      on.Post("bundle", [this, file, found, is_alive] {
+        if (*is_alive) Ask(file, found);
+      });
+    };
+    if (!options.run_in_background || !options.run_in_background(look)) look();
+  }
+
+  void InstallCopy(const std::string& name, Done asked) {
+    if (is_installing)
+      return Install(name, std::move(asked));  // refused; that installation may use the file
+    Install(name, [this, name, asked = std::move(asked)](const Change& change) {
+      if (change.result == ChangeResult::kDone) {
+        copy = name;
+      } else {
+        RemoveCopy(name);
+      }
+      asked(change);
+    });
+  }
+
+ private:
   void NoteRollBack() {
-    const std::string text = RolledBack();
-    if (text.empty() || roll_back_reported) return;
+    const Message why = RolledBack();
+    if (why.empty() || roll_back_reported) return;
     roll_back_reported = true;
-    Log(LogLevel::kError, text);
-    if (options.rolled_back) options.rolled_back(text);
+    Log(LogLevel::kError, why.English());
+    if (options.rolled_back) options.rolled_back(why);
   }
 
   /// Name and value of one property; unknown ones are skipped.
@@ -221,12 +261,13 @@ struct Updater::Impl {
       std::int32_t percent = 0, depth = 0;
       if (sd_bus_message_read(message, "v", "(isi)", &percent, &text, &depth) < 0) return;
       const double now_done = std::clamp(percent, 0, 100) / 100.0;
-      if (now_done != last_done || step != Shown(text)) moved_at = options.now();
+      const Message now_step = Message::Verbatim(Shown(text));
+      if (now_done != last_done || !(step == now_step)) moved_at = options.now();
       // Until the installation has begun, this is the progress of RAUC's look at the bundle.
       if (is_called && now_done < 1.0) has_begun = true;
       if (!given_up) fraction = has_begun ? now_done : 0.0;
       last_done = now_done;
-      step = Shown(text);
+      step = now_step;
     } else if (key == "BootSlot" || key == "Compatible" || key == "LastError" ||
                key == "Operation") {
       if (sd_bus_message_read(message, "v", "s", &text) < 0) return;
@@ -275,9 +316,9 @@ struct Updater::Impl {
     if (!(impl->is_installing || impl->given_up) || impl->done ||
         sd_bus_message_read_basic(message, 'i', &result) < 0)
       return 0;
-    impl->End(result == 0                ? ""
-              : impl->last_error.empty() ? "the installer does not say why"
-                                         : impl->last_error);
+    impl->End(result == 0                ? Message()
+              : impl->last_error.empty() ? say::update::InstallerSilent()
+                                         : Message::Verbatim(impl->last_error));
     return 0;
   }
 
@@ -290,36 +331,30 @@ struct Updater::Impl {
     impl->is_there = *now != '\0';
     impl->given_up = false;
     if (impl->is_installing && !impl->done) {
-      impl->End("the installer ended before it was done: look at its log, then try again");
+      impl->End(say::update::InstallerEnded());
     } else {
       impl->Notify();
     }
     return 0;
   }
 
-  static std::string ErrorOf(sd_bus_message* message) {
+  static Message ErrorOf(sd_bus_message* message) {
     const sd_bus_error* error = sd_bus_message_get_error(message);
     const std::string text = error != nullptr ? Shown(error->message) : "";
-    return text.empty() ? "the installer does not say why" : text;
+    return text.empty() ? say::update::InstallerSilent() : Message::Verbatim(text);
   }
 
   /// RAUC 1.8 gives no reason over the bus, so the findings about the bundle itself are added.
-  [[nodiscard]] std::string WhyRefused(const std::string& error) const {
+  [[nodiscard]] Message WhyRefused(const Message& error) const {
     switch (state) {
       case BundleState::kDamaged:
-        return fmt::format(
-            "the bundle was damaged on its way: its contents are not what was signed; copy it "
-            "again (the installer: {})",
-            error);
+        return say::update::Damaged(error);
       case BundleState::kWhole:
-        return fmt::format(
-            "the bundle is not signed by a key that this machine trusts: it came as it was made, "
-            "so ask who made it (the installer: {})",
-            error);
+        return say::update::Untrusted(error);
       case BundleState::kUnknown:
         break;
     }
-    return "the installer refuses this bundle: " + error;
+    return say::update::Refused(error);
   }
 
   /// RAUC has checked the bundle: its signature is valid, and these are its properties.
@@ -331,29 +366,27 @@ struct Updater::Impl {
     }
     const char *compatible = nullptr, *held = nullptr;
     if (sd_bus_message_read(message, "ss", &compatible, &held) < 0) {
-      impl->Refuse(ChangeResult::kFailed, "the installer's answer cannot be read: is it RAUC 1.8?");
+      impl->Refuse(ChangeResult::kFailed, say::update::AnswerUnreadable());
       return 0;
     }
     if (Shown(compatible) != impl->compatible) {
       impl->Refuse(ChangeResult::kConflict,
-                   fmt::format("this bundle is for another machine: it is for '{}', this is '{}'",
-                               Shown(compatible), impl->compatible));
+                   say::update::OtherMachine(Shown(compatible), impl->compatible));
       return 0;
     }
     impl->version = Shown(held);
-    if (const std::string why = WhyNoVersion(impl->version); !why.empty()) {
+    if (const Message why = WhyNoVersion(impl->version); !why.empty()) {
       impl->Refuse(ChangeResult::kInvalid, why);
       return 0;
     }
     if (IsOlder(impl->version, impl->options.version)) {
       impl->Refuse(ChangeResult::kConflict,
-                   fmt::format("this bundle holds version {}, older than {} which runs",
-                               impl->version, impl->options.version));
+                   say::update::Older(impl->version, impl->options.version));
       return 0;
     }
     // Examining a large bundle takes time.
-    if (const std::string why =
-            impl->options.blocking_reason ? impl->options.blocking_reason() : std::string();
+    if (const Message why =
+            impl->options.blocking_reason ? impl->options.blocking_reason() : Message();
         !why.empty()) {
       impl->Refuse(ChangeResult::kConflict, why);
       return 0;
@@ -362,10 +395,10 @@ struct Updater::Impl {
     return 0;
   }
 
-  void Refuse(ChangeResult result, const std::string& message) {
+  void Refuse(ChangeResult result, const Message& why) {
     is_installing = false;
-    outcome = last_failure = message;
-    Answer(Refused(result, message));
+    outcome = last_failure = why;
+    Answer(RefusedBecause(result, why));
     Notify();
   }
 
@@ -382,13 +415,13 @@ struct Updater::Impl {
     const int result =
         sd_bus_call_method_async(bus.get(), nullptr, kService, kPath, kInstaller, "InstallBundle",
                                  &Impl::OnBegun, this, "sa{sv}", path.c_str(), 0);
-    if (result < 0) Refuse(ChangeResult::kFailed, "the installer cannot be reached");
+    if (result < 0) Refuse(ChangeResult::kFailed, say::update::InstallerUnreachable());
   }
 
   static int OnBegun(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* impl = static_cast<Impl*>(self);
     if (sd_bus_message_is_method_error(message, nullptr) != 0) {
-      impl->Refuse(ChangeResult::kFailed, "the installer did not begin: " + ErrorOf(message));
+      impl->Refuse(ChangeResult::kFailed, say::update::NotBegun(ErrorOf(message)));
       return 0;
     }
     impl->moved_at = impl->options.now();
@@ -396,51 +429,6 @@ struct Updater::Impl {
     impl->Answer({});
     impl->Notify();
     return 0;
-  }
-
-  void Install(const std::string& name, Done asked) {
-    if (bus.get() == nullptr || !is_there)
-      return asked(
-          Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine"));
-    if (is_installing)
-      return asked(Refused(ChangeResult::kConflict,
-                           fmt::format("{} is being installed: wait until it is done", bundle)));
-    if (!folder.Has(name))
-      return asked(Refused(ChangeResult::kNotFound, "there is no such bundle"));
-    const std::filesystem::path file = options.folder / name;
-    if (const std::string why = WhyNoBundle(file, options.max_bytes); !why.empty())
-      return asked(Refused(ChangeResult::kInvalid, why));
-    is_installing = true;
-    given_up = is_called = has_begun = false;
-    bundle = name;
-    fraction = 0.0;
-    step = "checking the signature";
-    last_error.clear();
-    outcome.clear();
-    last_failure.clear();
-    done = std::move(asked);
-    state = BundleState::kUnknown;
-    Notify();
-    const auto look = [this, file, is_alive = alive, &on = loop] {
-      const BundleState found = LookForDamage(file);
-      on.Post("bundle", [this, file, found, is_alive] {
-        if (*is_alive) Ask(file, found);
-      });
-    };
-    if (!options.run_in_background || !options.run_in_background(look)) look();
-  }
-
-  void InstallCopy(const std::string& name, Done asked) {
-    if (is_installing)
-      return Install(name, std::move(asked));  // refused; that installation may use the file
-    Install(name, [this, name, asked = std::move(asked)](const Change& change) {
-      if (change.result == ChangeResult::kDone) {
-        copy = name;
-      } else {
-        RemoveCopy(name);
-      }
-      asked(change);
-    });
   }
 
   /// A file that RAUC took ownership of in an earlier attempt cannot be read again, but it cannot
@@ -457,7 +445,7 @@ struct Updater::Impl {
                                             : sd_bus_call_method_async(
                                                   bus.get(), nullptr, kService, kPath, kInstaller,
                                                   "Info", &Impl::OnInfo, this, "s", file.c_str());
-    if (result < 0) return Refuse(ChangeResult::kFailed, "the installer cannot be reached");
+    if (result < 0) return Refuse(ChangeResult::kFailed, say::update::InstallerUnreachable());
     bus.Process();
   }
 };
@@ -479,15 +467,12 @@ UpdateStatus Updater::status() {
   }
   UpdateStatus status;
   status.supported = impl_->is_there;
-  status.failure = impl_->is_installing ? std::string() : impl_->last_failure;
+  status.failure = impl_->is_installing ? Message() : impl_->last_failure;
   status.restart_needed =
       impl_->last && !impl_->is_installing && impl_->last->boot == impl_->options.boot;
   status.rolled_back = impl_->RolledBack();
   if (!status.supported) {
-    status.message =
-        impl_->outcome.empty()
-            ? "there is no installer (RAUC) on this machine; update its packages instead"
-            : impl_->outcome;
+    status.message = impl_->outcome.empty() ? say::update::NoInstallerPackages() : impl_->outcome;
     return status;
   }
   status.message = impl_->is_installing ? impl_->step : impl_->outcome;
@@ -499,10 +484,9 @@ UpdateStatus Updater::status() {
 }
 
 Change Updater::Add(const std::filesystem::path& file, const std::string& name) {
-  if (!impl_->is_there)
-    return Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine");
+  if (!impl_->is_there) return RefusedBecause(ChangeResult::kConflict, say::update::NoInstaller());
   if (impl_->is_installing)
-    return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
+    return RefusedBecause(ChangeResult::kConflict, say::update::InstallingOne());
   Change change = impl_->folder.Add(file, name);
   if (change.result == ChangeResult::kDone) impl_->ForgetBundle(name);
   return change;
@@ -510,7 +494,7 @@ Change Updater::Add(const std::filesystem::path& file, const std::string& name) 
 
 Change Updater::Remove(const std::string& name) {
   if (impl_->is_installing)
-    return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
+    return RefusedBecause(ChangeResult::kConflict, say::update::InstallingOne());
   Change change = impl_->folder.Remove(name);
   if (change.result == ChangeResult::kDone) impl_->ForgetBundle(name);
   return change;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // System updates through RAUC, the image's installer, over D-Bus (de.pengutronix.rauc.Installer).
 #pragma once
 
@@ -8,6 +9,7 @@
 #include <memory>
 #include <string>
 
+#include "algo/base/message.hpp"
 #include "daemon/loop/event_loop.hpp"
 #include "web/model/change.hpp"
 #include "web/model/status.hpp"
@@ -25,17 +27,17 @@ struct UpdaterOptions {
   std::string bus_address;                                  ///< Empty: the system bus.
   std::string version;    ///< Version that runs; an older bundle is refused.
   std::string boot = {};  ///< Unique for each start of the machine.
-  /// Called before an installation begins; returns why it may not begin now, or an empty text.
-  std::function<std::string()> blocking_reason;
+  /// Called before an installation begins; returns why it may not begin now, or nothing.
+  std::function<Message()> blocking_reason;
   std::function<void()> changed;  ///< Called on the loop when status() has changed.
   /// Runs slow work on another thread: reading a whole bundle, closing a large file without a name.
   /// False: it is too busy. Empty: everything is done immediately on the loop.
   std::function<bool(std::function<void()>)> run_in_background;
-  /// Called on the loop when an installation has ended; empty text: it succeeded.
-  std::function<void(const std::string& bundle, const std::string& failure)> ended;
+  /// Called on the loop when an installation has ended; no failure: it succeeded.
+  std::function<void(const std::string& bundle, const Message& failure)> ended;
   /// Called on the loop, once: the machine has started the system from before the last update, with
   /// the evidence.
-  std::function<void(const std::string& text)> rolled_back = {};
+  std::function<void(const Message& why)> rolled_back = {};
   /// Interval for checking whether there is progress.
   std::chrono::milliseconds look_every{10'000};
   /// For tests; empty: the steady clock.

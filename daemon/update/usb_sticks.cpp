@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/update/usb_sticks.hpp"
 
 #include <fcntl.h>

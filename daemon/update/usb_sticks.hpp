@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bundles on USB sticks, which an image mounts read-only (systemd/usb-stick). They are offered, and
 // never installed automatically.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Descriptors of open files.
 #pragma once
 
@@ -6,9 +7,7 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <span>
-#include <string_view>
 #include <utility>
 
 namespace plumb {
@@ -43,9 +42,5 @@ class Descriptor {
   }
   return static_cast<ssize_t>(done);
 }
-
-/// Writes all bytes, in as many calls as it takes. @param path  Named in the error.
-/// @throws IoError with the text of DescribeWriteError().
-void WriteAll(const Descriptor& file, std::string_view bytes, const std::filesystem::path& path);
 
 }  // namespace plumb

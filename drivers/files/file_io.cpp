@@ -1,7 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/files/file_io.hpp"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
-#include "drivers/files/descriptor.hpp"
+#include "words/file.hpp"
 
 namespace plumb {
 namespace {
@@ -33,32 +33,26 @@ Container ReadInto(const std::filesystem::path& path, std::size_t max_bytes) {
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.get() < 0) {
     const int error = errno;
-    if (error == ENOENT || error == ENOTDIR)
-      throw DataError(fmt::format("file {} is missing", path.string()));
+    if (error == ENOENT || error == ENOTDIR) throw DataError(say::file::Missing(path.string()));
     // not an error of the file, so the message must not ask to correct it
     if (error == EMFILE || error == ENFILE)
-      throw IoError(
-          fmt::format("cannot open {}: {}; close other files, or raise the limit (LimitNOFILE)",
-                      path.string(), ErrorText(error)));
-    throw DataError(fmt::format("cannot open {}: {}", path.string(), ErrorText(error)));
+      throw IoError(say::file::TooManyOpen(path.string(), ErrorText(error)));
+    throw DataError(say::file::CannotOpen(path.string(), ErrorText(error)));
   }
   struct stat status {};
   if (::fstat(file.get(), &status) != 0)
-    throw DataError(fmt::format("cannot stat {}: {}", path.string(), ErrorText(errno)));
-  if (!S_ISREG(status.st_mode))
-    throw DataError(fmt::format("{} is not a regular file", path.string()));
+    throw DataError(say::file::CannotStat(path.string(), ErrorText(errno)));
+  if (!S_ISREG(status.st_mode)) throw DataError(say::file::NotRegular(path.string()));
   const auto size = static_cast<std::size_t>(status.st_size);
   if (size > max_bytes) {
-    throw DataError(
-        fmt::format("file {} has {} bytes, at most {} are read", path.string(), size, max_bytes));
+    throw DataError(say::file::TooLarge(path.string(), size, max_bytes));
   }
   Container bytes(size, {});
   std::size_t done = 0;
   while (done < size) {
     const ssize_t got = ::read(file.get(), bytes.data() + done, size - done);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0)
-      throw DataError(fmt::format("cannot read {}: {}", path.string(), ErrorText(errno)));
+    if (got < 0) throw DataError(say::file::CannotRead(path.string(), ErrorText(errno)));
     if (got == 0) break;  // the file shrank meanwhile: its reader will find it truncated
     done += static_cast<std::size_t>(got);
   }
@@ -80,16 +74,23 @@ std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_byte
   return ReadInto<std::string>(path, max_bytes);
 }
 
-std::string DescribeWriteError(const std::filesystem::path& path, int error_number) {
-  std::string text = fmt::format("cannot write {}: {}", path.string(), ErrorText(error_number));
-  if (error_number == ENOSPC || error_number == EDQUOT)
-    text += "; free space on that disk or write elsewhere";
-  if (error_number == EFBIG)
-    text += "; raise the limit of file sizes (ulimit -f) or write elsewhere";
-  if (error_number == EACCES || error_number == EPERM || error_number == EROFS)
-    text += "; choose a folder that you may write to";
-  if (error_number == ENOENT) text += "; create the parent folder first";
-  return text;
+Message DescribeWriteError(const std::filesystem::path& path, int error_number) {
+  const std::string file = path.string(), why = ErrorText(error_number);
+  switch (error_number) {
+    case ENOSPC:
+    case EDQUOT:
+      return say::file::DiskFull(file, why);
+    case EFBIG:
+      return say::file::SizeLimit(file, why);
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return say::file::NotPermitted(file, why);
+    case ENOENT:
+      return say::file::NoFolder(file, why);
+    default:
+      return say::file::CannotWrite(file, why);
+  }
 }
 
 FileWriter::FileWriter(std::filesystem::path path) : path_(std::move(path)) {
@@ -158,5 +159,14 @@ void WriteWholeFile(const std::filesystem::path& path, std::string_view text) {
 void SyncToDisk(const std::filesystem::path& path) { SyncBy(::fsync, path); }
 
 void SyncWholeDisk(const std::filesystem::path& path) { SyncBy(::syncfs, path); }
+
+void WriteAll(const Descriptor& file, std::string_view bytes, const std::filesystem::path& path) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) throw IoError(DescribeWriteError(path, written < 0 ? errno : EIO));
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
 
 }  // namespace plumb

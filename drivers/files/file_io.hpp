@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads and writes whole files, with Plumb's exceptions.
 #pragma once
 
@@ -8,6 +9,9 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "algo/base/message.hpp"
+#include "drivers/files/descriptor.hpp"
 
 namespace plumb {
 
@@ -59,8 +63,12 @@ void SyncToDisk(const std::filesystem::path& path);
 /// The same for everything on the disk of a file or folder.
 void SyncWholeDisk(const std::filesystem::path& path);
 
+/// Writes all bytes, in as many calls as it takes. @param path  Named in the error.
+/// @throws IoError with the text of DescribeWriteError().
+void WriteAll(const Descriptor& file, std::string_view bytes, const std::filesystem::path& path);
+
 /// "cannot write FILE: REASON", with advice where it is known (ENOSPC, EDQUOT, EFBIG, EACCES,
 /// EROFS).
-[[nodiscard]] std::string DescribeWriteError(const std::filesystem::path& path, int error_number);
+[[nodiscard]] Message DescribeWriteError(const std::filesystem::path& path, int error_number);
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The decoders behind image_file.hpp, one file per library. Included by image_file.cpp only.
 //
 // libpng and libjpeg report errors by longjmp. A function that calls setjmp here holds no object

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Image files through libpng, libjpeg and libtiff directly: strict (a damaged image is never partly
 // accepted) and with limited sizes.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // jpeglib.h needs FILE and size_t to be declared before it.
 #include <cstddef>
 #include <cstdio>
@@ -15,6 +16,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/image_codecs.hpp"
 #include "drivers/files/image_file.hpp"
+#include "words/file.hpp"
 
 namespace plumb {
 namespace {
@@ -97,8 +99,7 @@ bool ReadRows(JpegReader& reader, std::uint8_t* pixels, std::size_t stride) {
 
 [[noreturn]] void ThrowDamaged(const std::string& name, const JpegReader& reader,
                                std::size_t size) {
-  throw DataError(fmt::format("image {} is damaged: {} (JPEG of {} bytes); copy or record it again",
-                              name, reader.error.text, size));
+  throw DataError(say::file::JpegDamaged(name, reader.error.text, size));
 }
 
 // ---- writing
@@ -146,10 +147,7 @@ cv::Mat codec::DecodeJpeg(std::span<const std::uint8_t> bytes, const std::string
                  static_cast<long>(reader.info.image_height), kMaxImageSide);
   const J_COLOR_SPACE space = reader.info.jpeg_color_space;
   if (space != JCS_GRAYSCALE && space != JCS_RGB && space != JCS_YCbCr) {
-    throw DataError(
-        fmt::format("image {} is a JPEG of {} colour components that are not RGB, YCbCr or grey; "
-                    "save it as RGB",
-                    name, reader.info.num_components));
+    throw DataError(say::file::JpegComponents(name, reader.info.num_components));
   }
   cv::Mat image(static_cast<int>(reader.info.image_height),
                 static_cast<int>(reader.info.image_width), CV_8UC3);

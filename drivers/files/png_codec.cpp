@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <png.h>
 
@@ -10,6 +11,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/image_codecs.hpp"
 #include "drivers/files/image_file.hpp"
+#include "words/file.hpp"
 
 namespace plumb {
 namespace {
@@ -91,18 +93,14 @@ bool ReadRows(PngReader& reader, png_bytepp rows) {
 
 [[noreturn]] void ThrowDamaged(const std::string& name, const PngReader& reader) {
   throw DataError(
-      fmt::format("image {} is damaged: {} ({} of {} bytes read); copy or record it again", name,
-                  reader.error.text, reader.offset, reader.bytes.size()));
+      say::file::PngDamaged(name, reader.error.text, reader.offset, reader.bytes.size()));
 }
 
 void CheckDepthFormat(const std::string& name, const PngReader& reader) {
   const int bits = png_get_bit_depth(reader.png, reader.info);
   const int channels = png_get_channels(reader.png, reader.info);
   if (bits == 16 && png_get_color_type(reader.png, reader.info) == PNG_COLOR_TYPE_GRAY) return;
-  throw DataError(
-      fmt::format("depth image {} has {} channel{} of {} bits, expected 1 channel of 16 bits; is "
-                  "it a colour image?",
-                  name, channels, channels == 1 ? "" : "s", bits));
+  throw DataError(say::file::DepthFormat(name, channels, bits));
 }
 
 // ---- writing
@@ -178,8 +176,7 @@ cv::Mat codec::DecodePng(std::span<const std::uint8_t> bytes, const std::string&
                 kind == PngKind::kDepth ? CV_16UC1 : CV_8UC3);
   if (png_get_rowbytes(reader.png, reader.info) !=
       image.elemSize() * static_cast<std::size_t>(image.cols)) {
-    throw DataError(
-        fmt::format("image {} has a pixel format that is not read; save it as 8-bit RGB", name));
+    throw DataError(say::file::PixelFormat(name));
   }
   std::vector<png_bytep> rows = RowPointers(image);
   if (!ReadRows(reader, rows.data())) ThrowDamaged(name, reader);

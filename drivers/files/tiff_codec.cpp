@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <tiffio.h>
 
@@ -10,6 +11,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/image_codecs.hpp"
 #include "drivers/files/image_file.hpp"
+#include "words/file.hpp"
 
 namespace plumb {
 namespace {
@@ -95,8 +97,7 @@ TiffHandle Open(Stream& stream, const char* mode) {
 }
 
 [[noreturn]] void ThrowDamaged(const std::string& name, const Stream& stream) {
-  throw DataError(fmt::format("TIFF {} of {} bytes is damaged or truncated: {}; make it again",
-                              name, stream.in.size(), stream.error));
+  throw DataError(say::file::TiffDamaged(name, stream.in.size(), stream.error));
 }
 
 }  // namespace
@@ -120,11 +121,9 @@ cv::Mat DecodeFloatTiff(std::span<const std::uint8_t> bytes, const std::string& 
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_SAMPLEFORMAT, &format);
   if (bits != 32 || channels != 1 || format != SAMPLEFORMAT_IEEEFP ||
       TIFFIsTiled(tiff.get()) != 0) {
-    throw DataError(
-        fmt::format("TIFF {} has {} channel{} of {} bits (sample format {}{}), expected 1 channel "
-                    "of 32-bit floats in strips",
-                    name, channels, channels == 1 ? "" : "s", bits, format,
-                    TIFFIsTiled(tiff.get()) != 0 ? ", tiled" : ""));
+    throw DataError(TIFFIsTiled(tiff.get()) != 0
+                        ? say::file::TiffTiled(name, channels, bits, format)
+                        : say::file::TiffFormat(name, channels, bits, format));
   }
   // Uncompressed pixels cannot be larger than the file, so a header with wrong sizes is found
   // before memory is allocated.
@@ -135,10 +134,7 @@ cv::Mat DecodeFloatTiff(std::span<const std::uint8_t> bytes, const std::string& 
                                     ? std::min(kMaxCells, bytes.size() / sizeof(float))
                                     : kMaxCells;
   if (num_cells > max_cells) {
-    throw DataError(
-        fmt::format("TIFF {} of {} bytes states {}x{} values, at most {} fit; it is truncated or "
-                    "damaged, make it again",
-                    name, bytes.size(), width, height, max_cells));
+    throw DataError(say::file::TiffTruncated(name, bytes.size(), width, height, max_cells));
   }
   cv::Mat values(static_cast<int>(height), static_cast<int>(width), CV_32FC1);
   if (TIFFScanlineSize(tiff.get()) != static_cast<tmsize_t>(width * sizeof(float)))

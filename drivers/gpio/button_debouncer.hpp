@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts the level of a bouncing contact into button presses.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The only file that uses libgpiod (version 1; version 2 has another interface).
 #include "drivers/gpio/gpio.hpp"
 
@@ -11,9 +12,8 @@
 #include <filesystem>
 #include <optional>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 
@@ -28,18 +28,16 @@ constexpr char kConsumer[] = "plumb";
 constexpr int kMaxEvents =
     64;  // per dispatch; a line that never stops bouncing must not block the loop
 
-std::string Reason(int error) {
-  if (error == EACCES || error == EPERM)
-    return "no permission; put the user into the group of /dev/gpiochip* (usually gpio)";
-  if (error == EBUSY) return "another program uses it";
-  if (error == ENOENT || error == ENODEV)
-    return "there is none; `plumb doctor` lists chips and lines";
-  return std::strerror(error);
+Message Reason(int error) {
+  if (error == EACCES || error == EPERM) return say::sensor::GpioPermission();
+  if (error == EBUSY) return say::sensor::GpioBusy();
+  if (error == ENOENT || error == ENODEV) return say::sensor::GpioNone();
+  return Message::Verbatim(std::strerror(error));
 }
 
 GpioChip OpenChip(const std::string& name) {
   GpioChip chip(gpiod_chip_open_lookup(name.c_str()));
-  if (!chip) throw DeviceError(fmt::format("GPIO chip {}: {}", name, Reason(errno)));
+  if (!chip) throw DeviceError(say::sensor::GpioChip(name, Reason(errno)));
   return chip;
 }
 
@@ -54,9 +52,7 @@ gpiod_line* FindLine(const GpioChip& chip, const GpioLineName& where) {
     line = gpiod_chip_find_line(chip.get(), where.line.c_str());
   }
   if (line == nullptr)
-    throw DeviceError(
-        fmt::format("GPIO line {} of chip {}: there is none; `plumb doctor` lists chips and lines",
-                    where.line, where.chip));
+    throw DeviceError(say::sensor::GpioLine(where.line, where.chip, say::sensor::GpioNone()));
   return line;
 }
 
@@ -65,7 +61,7 @@ gpiod_line* FindLine(const GpioChip& chip, const GpioLineName& where) {
 struct GpioButton::Impl {
   GpioChip chip;
   gpiod_line* line = nullptr;
-  std::string name;
+  Message name;
   std::optional<ButtonDebouncer> debouncer;
   std::function<void(ButtonPress)> pressed;
   Clock::time_point last;  ///< Last time passed to the debouncer.
@@ -86,8 +82,7 @@ struct GpioButton::Impl {
 };
 
 GpioButton::GpioButton(const GpioButtonOptions& options) : impl_(std::make_unique<Impl>()) {
-  impl_->name =
-      fmt::format("button on GPIO line {} of chip {}", options.where.line, options.where.chip);
+  impl_->name = say::sensor::ButtonName(options.where.line, options.where.chip);
   impl_->chip = OpenChip(options.where.chip);
   impl_->line = FindLine(impl_->chip, options.where);
   gpiod_line_request_config config{};
@@ -100,7 +95,7 @@ GpioButton::GpioButton(const GpioButtonOptions& options) : impl_(std::make_uniqu
     config.flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW
                                       : 0;  // a chip without internal pull resistors
     if (gpiod_line_request(impl_->line, &config, 0) != 0)
-      throw DeviceError(fmt::format("{}: {}", impl_->name, Reason(errno)));
+      throw DeviceError(say::sensor::ButtonFailed(impl_->name, Reason(errno)));
   }
   const int value = gpiod_line_get_value(impl_->line);
   impl_->last = Clock::now();
@@ -125,7 +120,7 @@ void GpioButton::Dispatch(Clock::time_point now) {
     if (::poll(&wait, 1, 0) <= 0) break;
     gpiod_line_event event{};
     if ((wait.revents & POLLIN) == 0 || gpiod_line_event_read(impl_->line, &event) != 0)
-      throw DeviceError(fmt::format("{} was removed", impl_->name));
+      throw DeviceError(say::sensor::ButtonRemoved(impl_->name));
     impl_->last = impl_->TimeOf(event, now);
     impl_->Notify(
         impl_->debouncer->OnEdge(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, impl_->last));
@@ -170,8 +165,7 @@ GpioIndicator::GpioIndicator(const GpioIndicatorOptions& options)
     gpiod_line* line = FindLine(impl_->chip, {options.chip, names[i]});
     const int flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
     if (gpiod_line_request_output_flags(line, kConsumer, flags, 0) != 0)
-      throw DeviceError(fmt::format("light on GPIO line {} of chip {}: {}", names[i], options.chip,
-                                    Reason(errno)));
+      throw DeviceError(say::sensor::LightFailed(names[i], options.chip, Reason(errno)));
     impl_->lines[i] = line;
     impl_->num_lights += i < options.lights.size() ? 1 : 0;
   }
@@ -191,6 +185,46 @@ std::optional<GpioIndicator::Clock::time_point> GpioIndicator::deadline() const 
 void GpioIndicator::Dispatch(Clock::time_point now) noexcept {
   impl_->player.OnTime(now);
   impl_->Write();
+}
+
+struct GpioGate::Impl {
+  GpioChip chip;
+  gpiod_line* line = nullptr;
+  std::optional<Clock::time_point> pulse_ends;
+
+  void Set(bool high) noexcept { (void)gpiod_line_set_value(line, high ? 1 : 0); }
+};
+
+GpioGate::GpioGate(const GpioGateOptions& options) : impl_(std::make_unique<Impl>()) {
+  impl_->chip = OpenChip(options.where.chip);
+  impl_->line = FindLine(impl_->chip, options.where);
+  const int flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
+  if (gpiod_line_request_output_flags(impl_->line, kConsumer, flags, 0) != 0)
+    throw DeviceError(
+        say::sensor::LightFailed(options.where.line, options.where.chip, Reason(errno)));
+}
+
+GpioGate::~GpioGate() { impl_->Set(false); }
+
+void GpioGate::Judge(bool is_in, Clock::time_point now) noexcept {
+  constexpr std::chrono::milliseconds kPulse{40};
+  if (is_in) {
+    if (impl_->pulse_ends) return;  // a rising edge needs a low level before it
+    impl_->Set(true);
+    impl_->pulse_ends = now + kPulse;
+    return;
+  }
+  if (!impl_->pulse_ends) return;
+  impl_->Set(false);
+  impl_->pulse_ends.reset();
+}
+
+std::optional<GpioGate::Clock::time_point> GpioGate::deadline() const { return impl_->pulse_ends; }
+
+void GpioGate::Dispatch(Clock::time_point now) noexcept {
+  if (!impl_->pulse_ends || now < *impl_->pulse_ends) return;
+  impl_->Set(false);
+  impl_->pulse_ends.reset();
 }
 
 std::vector<GpioChipDescription> ListGpioChips() {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Button and light on GPIO lines, identified by the names of chip and line. Everything here is used
 // on the event loop's thread only.
 #pragma once
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "drivers/button.hpp"
 #include "drivers/gpio/button_debouncer.hpp"
 #include "drivers/gpio/indicator_patterns.hpp"
@@ -70,11 +72,38 @@ class GpioIndicator : public Indicator {
   std::unique_ptr<Impl> impl_;
 };
 
+struct GpioGateOptions {
+  GpioLineName where;
+  bool active_low = false;
+};
+
+/// The line that says `in` to a retriggerable circuit, by edges only: a steady level of either kind
+/// means hold.
+class GpioGate {
+ public:
+  using Clock = IndicatorPlayer::Clock;
+  /// @throws DeviceError naming chip and line, with a remedy.
+  explicit GpioGate(const GpioGateOptions& options);
+  ~GpioGate();  ///< Leaves the line low.
+  GpioGate(const GpioGate&) = delete;
+  GpioGate& operator=(const GpioGate&) = delete;
+
+  /// One judged group of frames: a pulse of 40 ms if it is `in`, otherwise low at once.
+  void Judge(bool is_in, Clock::time_point now) noexcept;
+  /// End of the pulse.
+  [[nodiscard]] std::optional<Clock::time_point> deadline() const;
+  void Dispatch(Clock::time_point now) noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
 /// A chip that exists, for diagnosis.
 struct GpioChipDescription {
   std::string name, label;
   std::vector<std::string> lines;  ///< Names of the lines that have one.
-  std::string problem;             ///< Why the chip cannot be opened; empty if it can.
+  Message problem;                 ///< Why the chip cannot be opened; empty if it can.
 };
 /// @throws DeviceError if this build has no button and light.
 [[nodiscard]] std::vector<GpioChipDescription> ListGpioChips();

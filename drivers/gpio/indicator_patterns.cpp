@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/gpio/indicator_patterns.hpp"
 
 namespace plumb {
@@ -38,6 +39,12 @@ constexpr std::array kPrograms = {
     IndicatorProgram(kReadyRolledBack, {{kGreen, 1500ms}, {kRed, 300ms}}),
     IndicatorProgram(kReadyDiskNearlyFull,
                      {{kGreen, 1500ms}, {kYellow, 150ms}, {kGreen, 150ms}, {kYellow, 150ms}}),
+    IndicatorProgram(kReadyGuessed,
+                     {{kGreen, 1500ms}, {kRed, 100ms}, {kGreen, 100ms}, {kRed, 100ms}}),
+    IndicatorProgram(kMonitorStarting, {{kBlue, 200ms}, {0, 200ms}, {kBlue, 200ms}, {0, 900ms}}),
+    IndicatorProgram(kMonitorIn, {{kGreen, 900ms}, {0, 100ms}}),
+    IndicatorProgram(kMonitorOut, {{kYellow, 250ms}, {0, 250ms}}),
+    IndicatorProgram(kMonitorUnknown, {{kRed, 600ms}, {0, 150ms}, {kRed, 100ms}, {0, 150ms}}),
     // Slow, so that it is not mistaken for an error of a running service.
     IndicatorProgram(kStopped, {{kRed, 1000ms}, {0, 1000ms}}),
 };

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The patterns of light and beeper for each state, and their player.
 #pragma once
 

@@ -1,13 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 // Button and light in a build without libgpiod: there are none, and asking for one says so.
 #include "algo/base/errors.hpp"
 #include "drivers/gpio/gpio.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
 
-[[noreturn]] void Refuse() {
-  throw DeviceError("this build has no hardware button and light: build with PLUMB_WITH_GPIO");
-}
+[[noreturn]] void Refuse() { throw DeviceError(say::sensor::NoGpio()); }
 
 }  // namespace
 
@@ -29,6 +29,14 @@ std::optional<GpioIndicator::Clock::time_point> GpioIndicator::deadline() const 
   return std::nullopt;
 }
 void GpioIndicator::Dispatch(Clock::time_point) noexcept {}
+
+struct GpioGate::Impl {};
+
+GpioGate::GpioGate(const GpioGateOptions&) { Refuse(); }
+GpioGate::~GpioGate() = default;
+void GpioGate::Judge(bool, Clock::time_point) noexcept {}
+std::optional<GpioGate::Clock::time_point> GpioGate::deadline() const { return std::nullopt; }
+void GpioGate::Dispatch(Clock::time_point) noexcept {}
 
 std::vector<GpioChipDescription> ListGpioChips() { Refuse(); }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The part of a live sensor that all drivers share: pairs come from a FrameBox.
 #pragma once
 

@@ -1,10 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/live/frame_box.hpp"
 
 #include <algorithm>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
@@ -125,28 +125,21 @@ std::optional<FrameBox::Pair> FrameBox::Take() {
   for (;;) {
     NoteAbsence();
     if (interrupted_) return std::nullopt;
-    if (lost_) throw DeviceLost(fmt::format("sensor {} was unplugged; plug it in again", name_));
-    if (failed_)
-      throw DeviceError(fmt::format(
-          "the driver of sensor {} reports an error; unplug it and plug it in again", name_));
+    if (lost_) throw DeviceLost(say::sensor::Unplugged(name_));
+    if (failed_) throw DeviceError(say::sensor::DriverError(name_));
     if (std::min(absent_, std::max(longest_gap_, listened_ - last_arrival_)) >= stall_time_) {
       const auto absent = std::chrono::duration_cast<std::chrono::milliseconds>(
           std::exchange(absent_, Clock::duration::zero()));
       last_arrival_ = listened_;
       longest_gap_ = {};
       throw ProcessStalled(
-          fmt::format("this program could not read sensor {} for {:.1f} s: it was stopped, or "
-                      "the machine is overloaded; the sensor is not at fault",
-                      name_, 1e-3 * static_cast<double>(absent.count())));
+          say::sensor::ProcessStalled(name_, 1e-3 * static_cast<double>(absent.count())));
     }
     if (!pairs_.empty()) break;
     const Clock::time_point limit = last_arrival_ + stall_time_ + absent_;
     if (listened_ >= limit) {
-      throw DeviceError(
-          fmt::format("sensor {} delivered no pair of images for {} ms ({} unpaired, {} discarded "
-                      "so far); unplug it and plug it in again",
-                      name_, stall_time_.count(), pairing_.num_unpaired(),
-                      pairing_.num_discarded() + num_discarded_));
+      throw DeviceError(say::sensor::NoImages(name_, stall_time_.count(), pairing_.num_unpaired(),
+                                              pairing_.num_discarded() + num_discarded_));
     }
     changed_.wait_until(lock, std::min(limit, listened_ + kLook));
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Passes image pairs from the thread that reads a sensor to the thread that uses them.
 #pragma once
 

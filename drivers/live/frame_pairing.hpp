@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pairs colour and depth images by their stamps as they arrive.
 #pragma once
 

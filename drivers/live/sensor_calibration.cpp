@@ -1,6 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/live/sensor_calibration.hpp"
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
@@ -9,6 +8,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/replay/camera_file.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
@@ -19,13 +19,12 @@ CameraFile ParseCalibration(const std::string& text, const std::string& name, in
                             int height) {
   CameraFile camera = ParseCameraFile(text, name);
   if (camera.color.width * height != camera.color.height * width) {
-    throw DataError(fmt::format("{} is for images of {}x{}, expected {}x{} or a multiple", name,
-                                camera.color.width, camera.color.height, width, height));
+    throw DataError(
+        say::sensor::CalibrationSize(name, camera.color.width, camera.color.height, width, height));
   }
   if (camera.depth_camera) {
     camera.depth_camera.reset();
-    camera.warnings.push_back(fmt::format(
-        "depth_registered: 0 in {} is ignored, because the sensor registers depth itself", name));
+    camera.warnings.push_back(say::sensor::RegistersItself(name));
   }
   return camera;
 }
@@ -34,33 +33,33 @@ CameraFile ParseCalibration(const std::string& text, const std::string& name, in
 /// scale of everything, and the reference marker is the frame of every plan.
 void RefuseOtherMarkers(const SensorSettings& room, const CameraFile& camera,
                         const std::string& file) {
-  const auto refuse = [&](const char* key, const char* setting, const std::string& found,
-                          const std::string& expected) {
-    throw DeviceError(fmt::format(
-        "{}: {} is {}, but this room has {}; the markers are the room's, not the sensor's: remove "
-        "the key from the file, or correct {} in the configuration",
-        file, key, found, expected, setting));
+  const auto refuse = [&](const char* key, const char* setting, const Message& found,
+                          const Message& expected) {
+    throw DeviceError(say::sensor::OtherMarkers(file, key, found, expected, setting));
   };
-  if (camera.marker_dictionary && *camera.marker_dictionary != room.marker_dictionary)
-    refuse("marker_dictionary", "markers.dictionary", *camera.marker_dictionary,
-           room.marker_dictionary);
+  const auto length = [](double side_m) { return say::sensor::Length(side_m); };
+  const auto id = [](int marker) { return Message::Verbatim(std::to_string(marker)); };
+  if (camera.room_markers.dictionary &&
+      *camera.room_markers.dictionary != room.room_markers.dictionary)
+    refuse("marker_dictionary", "markers.dictionary",
+           Message::Verbatim(*camera.room_markers.dictionary),
+           Message::Verbatim(room.room_markers.dictionary));
   constexpr double kSame_m = 1e-9;
-  if (camera.marker_length_m &&
-      !(std::abs(*camera.marker_length_m - room.marker_length_m) < kSame_m))
-    refuse("marker_length", "markers.length_m", fmt::format("{} m", *camera.marker_length_m),
-           fmt::format("{} m", room.marker_length_m));
-  if (camera.reference_marker && camera.reference_marker != room.reference_marker)
-    refuse("reference_marker", "markers.reference", fmt::format("{}", *camera.reference_marker),
-           room.reference_marker ? fmt::format("{}", *room.reference_marker) : "none configured");
+  if (camera.room_markers.length_m &&
+      !(std::abs(*camera.room_markers.length_m - room.room_markers.length_m) < kSame_m))
+    refuse("marker_length", "markers.length_m", length(*camera.room_markers.length_m),
+           length(room.room_markers.length_m));
+  if (camera.room_markers.reference && camera.room_markers.reference != room.room_markers.reference)
+    refuse("reference_marker", "markers.reference", id(*camera.room_markers.reference),
+           room.room_markers.reference ? id(*room.room_markers.reference)
+                                       : say::sensor::NoneConfigured());
 }
 
 /// What holds where no calibration file states anything else.
 StreamInfo ConfiguredInfo(const SensorSettings& settings, const DepthNoise& depth_noise) {
   StreamInfo info;
   info.depth_noise = depth_noise;
-  info.marker_dictionary = settings.marker_dictionary;
-  info.marker_length_m = settings.marker_length_m;
-  info.reference_marker = settings.reference_marker;
+  info.room_markers = settings.room_markers;
   return info;
 }
 
@@ -69,9 +68,7 @@ template <typename Read>
 auto ForSensor(const std::string& serial, Read&& read) try {
   return read();
 } catch (const DataError& error) {
-  throw DeviceError(
-      fmt::format("the calibration of sensor {} cannot be used: {}; correct or remove the file",
-                  serial, error.what()));
+  throw DeviceError(say::sensor::CalibrationUnusable(serial, MessageOf(error)));
 }
 
 }  // namespace
@@ -114,10 +111,7 @@ StreamInfo LiveStreamInfo(const SensorSettings& settings, const std::string& ser
   if (horizontal_fov_rad > 0.2 && horizontal_fov_rad < 2.5)
     info.intrinsics.fx = info.intrinsics.fy = 0.5 * width / std::tan(0.5 * horizontal_fov_rad);
   info.intrinsics_assumed = true;
-  info.warnings.push_back(
-      fmt::format("sensor {} is not calibrated (no {}): nominal focal length of {:.1f} pixels and "
-                  "no distortion assumed",
-                  serial, file.string(), info.intrinsics.fx));
+  info.warnings.push_back(say::sensor::NotCalibrated(serial, file.string(), info.intrinsics.fx));
   return info;
 }
 

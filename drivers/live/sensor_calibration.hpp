@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the calibration of a live sensor's camera before its first frame.
 #pragma once
 

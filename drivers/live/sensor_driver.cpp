@@ -1,13 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/live/sensor_driver.hpp"
 
 #include <algorithm>
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "algo/base/errors.hpp"
 #include "algo/types/depth_noise.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
@@ -15,9 +16,7 @@ namespace {
 class NoSensors : public SensorSetup {
  public:
   [[nodiscard]] std::unique_ptr<SensorProvider> MakeProvider() const override {
-    throw DeviceError(
-        "this build has no driver of that kind of sensor: no sensor can be used; build with "
-        "PLUMB_WITH_OPENNI");
+    throw DeviceError(say::sensor::NoDriver());
   }
 };
 
@@ -33,16 +32,13 @@ const SensorDriver& NoDriver() {
 }  // namespace
 
 std::string SensorSetup::Command(const std::string& command) const {
-  throw DeviceError(
-      fmt::format("sim {}: there is no virtual sensor; start plumbd with --simulated", command));
+  throw DeviceError(say::sensor::NotSimulated(command));
 }
 
 std::unique_ptr<LiveSensor> OpenSensor(SensorProvider& provider, const std::string& serial) {
   std::unique_ptr<LiveSensor> sensor = provider.Open(serial);
-  if (const std::optional<std::string> fault = FaultOf(sensor->info().depth_noise)) {
-    throw DeviceError(fmt::format(
-        "the driver of sensor {} states a depth noise that cannot be used: {}; correct the driver",
-        sensor->description().serial, *fault));
+  if (const std::optional<Message> fault = FaultOf(sensor->info().depth_noise)) {
+    throw DeviceError(say::sensor::DriverStatesNoise(sensor->description().serial, *fault));
   }
   return sensor;
 }
@@ -71,24 +67,12 @@ const SensorDriver& SensorRegistry::Choose(const std::string& name, bool simulat
   if (name.empty()) return NoDriver();
   const bool is_other_kind = std::any_of(drivers_.begin(), drivers_.end(),
                                          [&](const auto& driver) { return driver.name == name; });
-  const std::string expected = known.empty() ? "none, this build has no such driver"
-                                             : fmt::format("{}", fmt::join(known, ", "));
-  if (is_other_kind && simulated) {
-    throw DataError(
-        fmt::format("[sensor] driver: \"{}\" reads real sensors, but a simulated one is requested; "
-                    "expected one of {}; remove the key or --simulated",
-                    name, expected));
-  }
-  if (is_other_kind) {
-    throw DataError(fmt::format(
-        "[sensor] driver: \"{}\" shows simulated images and is taken with --simulated only; "
-        "expected one of {}",
-        name, expected));
-  }
-  throw DataError(fmt::format(
-      "[sensor] driver: expected one of {}, found \"{}\"; correct the name, or build Plumb with "
-      "that driver",
-      expected, name));
+  const Message expected =
+      known.empty() ? say::sensor::NoSuchDriver() : say::sensor::Drivers(std::move(known));
+  if (is_other_kind)
+    throw DataError(simulated ? say::sensor::DriverOfReal(name, expected)
+                              : say::sensor::DriverOfSimulated(name, expected));
+  throw DataError(say::sensor::UnknownDriver(expected, name));
 }
 
 const RecordingKind* SensorRegistry::KindWithExtension(std::string_view extension) const {

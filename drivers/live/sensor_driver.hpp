@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The interface between sensor drivers and the programs, and the list of the drivers in this build.
 #pragma once
 
@@ -14,6 +15,7 @@
 
 #include <Eigen/Core>
 
+#include "algo/base/message.hpp"
 #include "algo/types/marker.hpp"
 #include "drivers/replay/tum_recording.hpp"
 #include "drivers/sensor.hpp"
@@ -26,11 +28,11 @@ struct SensorSettings {
   /// is ignored, because live depth is in millimetres. A unit without a file gets nominal
   /// intrinsics from its field of view, and a warning.
   std::filesystem::path calibration_folder = "/var/lib/plumb/calibration";
-  /// Used if the calibration file does not state it, like the next two.
-  std::string marker_dictionary = kDefaultMarkerDictionary;
-  double marker_length_m = kDefaultMarkerLength_m;
-  std::optional<int> reference_marker = {};
-  /// The three values above describe the room: a calibration file that states other markers is
+  /// Where the driver "stream" listens.
+  std::filesystem::path stream_socket = "/run/plumb/sensor.sock";
+  /// Used where the calibration file states nothing.
+  RoomMarkers room_markers = {};
+  /// The value above describes the room: a calibration file that states other markers is
   /// refused. Only drivers of simulated sensors switch this off: the file of such a unit is the
   /// only source for its markers.
   bool markers_are_the_rooms = true;
@@ -43,7 +45,10 @@ struct SimulatedSweeps {
   int frames = 300;               ///< Frames per sweep.
   int width = 640, height = 480;  ///< Or 320 x 240.
   std::size_t max_scenes = 0;     ///< Limit of the number of scenes; 0: all.
-  bool plugged = true;            ///< Whether the unit is attached at the start.
+  /// Also what a sensor at rest sees of the body of the last scene, while it breathes, and after it
+  /// was moved by 5 mm.
+  bool at_rest = false;
+  bool plugged = true;  ///< Whether the unit is attached at the start.
   /// Centres of the room calibration board's markers on its sheet, by id. If set, three scenes of
   /// the board come first.
   std::map<int, Eigen::Vector2d> board_centres_m = {};
@@ -65,8 +70,8 @@ class SensorSetup {
   /// Called before a scan starts. Only simulated sensors use it.
   virtual void BeforeScan() const {}
 
-  /// Controls a simulated sensor by the commands in drivers/virtual/README.md, and returns its
-  /// answer. Callable from any thread.
+  /// Controls a simulated sensor by the commands in drivers/simulator/player/README.md, and returns
+  /// its answer. Callable from any thread.
   /// @throws DeviceError if the command is refused.
   // NOLINTNEXTLINE(modernize-use-nodiscard)
   virtual std::string Command(const std::string& command) const;
@@ -75,7 +80,7 @@ class SensorSetup {
 /// A line of `plumb doctor` about a driver, in addition to its sensors.
 struct SensorFinding {
   enum class State { kGood, kNote, kBad } state = State::kGood;
-  std::string what, found, remedy;
+  Message what, found, remedy;
 };
 
 /// A driver of live sensors. To add one: drivers/README.md.
@@ -131,10 +136,11 @@ class RecordingKind {
   /// Files beside a recording that belong to it and are moved with it.
   [[nodiscard]] virtual std::filesystem::path SideCar(const std::filesystem::path& file) const = 0;
   /// Writes frames from any source into a new file.
-  /// @param each  Called after each frame.
+  /// @param each  Called after each frame. @param jpeg  Colour as JPEG, which is not lossless.
   /// @throws DataError, IoError, Interrupted
   virtual void Write(const std::filesystem::path& file, FrameSource& source,
-                     const std::stop_token& stop, const std::function<void()>& each) const = 0;
+                     const std::stop_token& stop, const std::function<void()>& each,
+                     bool jpeg) const = 0;
 };
 
 /// The drivers known to a program, in order of preference.

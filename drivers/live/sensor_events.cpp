@@ -1,10 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/live/sensor_events.hpp"
 
 #include <algorithm>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 
@@ -45,11 +45,9 @@ const SensorDescription& ChooseSensor(const std::vector<SensorDescription>& sens
     return serial.empty() || sensor.serial == serial;
   });
   if (found != sensors.end()) return *found;
-  throw DeviceError(
-      serial.empty()
-          ? "no sensor is attached; plug one in; `plumb doctor` lists the detected sensors"
-          : fmt::format("sensor {} is not attached, found {}; plug it in", serial,
-                        sensors.empty() ? "none" : sensors.front().serial));
+  if (serial.empty()) throw DeviceError(say::sensor::NoneAttached());
+  throw DeviceError(sensors.empty() ? say::sensor::NotAttached(serial)
+                                    : say::sensor::OtherAttached(serial, sensors.front().serial));
 }
 
 }  // namespace plumb

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Passes reports of a driver's threads about its units to the open sensors and to the listener.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/openni/oni_file.hpp"
 
 #include <fcntl.h>
@@ -15,6 +16,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/descriptor.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/recording.hpp"
 
 namespace plumb {
 namespace {
@@ -127,17 +129,13 @@ bool IsOniFile(const std::filesystem::path& file) {
 
 OniFileSummary TrimOniFile(const std::filesystem::path& file) {
   std::optional<OniFileSummary> found = SummariseOniFile(file);
-  if (!found)
-    throw IoError(
-        fmt::format("recording {} was not finished by OpenNI2 (no END record); is the disk full?",
-                    file.string()));
+  if (!found) throw IoError(say::recording::OniUnfinished(file.string()));
   const Descriptor descriptor = OpenedFor(O_WRONLY, file);
   struct stat status {};
   if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0)
     throw IoError(DescribeWriteError(file, errno));
   if (static_cast<std::uint64_t>(status.st_size) < found->end)
-    throw IoError(
-        fmt::format("recording {} ends before its END record; is the disk full?", file.string()));
+    throw IoError(say::recording::OniEndsEarly(file.string()));
   if (::ftruncate(descriptor.get(), static_cast<off_t>(found->end)) != 0 ||
       ::fsync(descriptor.get()) != 0)
     throw IoError(DescribeWriteError(file, errno));

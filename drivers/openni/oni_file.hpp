@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads the record structure of an .oni file, to check that it is complete.
 #pragma once
 

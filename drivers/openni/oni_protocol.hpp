@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The protocol on the standard output of plumb-oni-reader, the only process that opens .oni files.
 // Both ends are on the same machine and from the same build, so numbers are in memory
 // representation. The parent nevertheless validates everything.
@@ -8,7 +9,6 @@
 namespace plumb::oni {
 
 inline constexpr std::uint32_t kMagic = 0x31494e4f;
-inline constexpr std::uint32_t kMaxText = 1024;
 
 /// The first bytes.
 struct Header {

@@ -1,59 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
 // plumb-oni-reader FILE COLOR_BEGIN_US DEPTH_BEGIN_US: plays an .oni file with the system's OpenNI2
 // and writes its pairs of images to the standard output.
 //
-// A separate process, because the library crashes on damaged files. It has no rights beyond those
-// of its parent, little memory, and ends with its parent.
-#include <poll.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <unistd.h>
-
+// A separate process, because the library crashes on damaged files.
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
+#include "drivers/files/reader_program.hpp"
 #include "drivers/live/frame_pairing.hpp"
 #include "drivers/openni/oni_protocol.hpp"
 #include "drivers/openni/openni_library.hpp"
+#include "words/recording.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr rlim_t kMaxMemory = rlim_t{4} << 30;
 constexpr int kWait_ms = 200;
 constexpr int kMaxWaits = 50;         // waits without an image before the file is given up
 constexpr int kMaxWaitsAfterEnd = 3;  // waits after the player has reported the end
 constexpr std::int64_t kMaxGap_us = 16000;
 constexpr int kMaxSide = 4096;
 constexpr std::uint64_t kMaxStamp_us = std::uint64_t{1} << 53;
-
-void WriteAll(const void* data, std::size_t size) {
-  const auto* from = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t written = ::write(STDOUT_FILENO, from, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) throw IoError("the reader's parent is gone");
-    from += written;
-    size -= static_cast<std::size_t>(written);
-  }
-}
-
-template <typename Value>
-void Write(const Value& value) {
-  WriteAll(&value, sizeof value);
-}
 
 class Player {
  public:
@@ -68,29 +45,29 @@ class Player {
       if (state == ONI_DEVICE_STATE_EOF) static_cast<Player*>(self)->at_end_ = true;
     };
     callbacks_ = callbacks;
-    library_->Check("OpenNI2 does not report",
+    library_->Check(say::recording::OniNoEvents(),
                     library_->RegisterDeviceCallbacks(&callbacks_, this, &handle_));
-    library_->Check("OpenNI2 cannot open it", library_->DeviceOpen(file.c_str(), &device_));
-    library_->Check("it has no depth stream",
+    library_->Check(say::recording::OniCannotOpen(), library_->DeviceOpen(file.c_str(), &device_));
+    library_->Check(say::recording::OniNoDepth(),
                     library_->DeviceCreateStream(device_, ONI_SENSOR_DEPTH, &streams_[0]));
-    library_->Check("it has no colour stream",
+    library_->Check(say::recording::OniNoColor(),
                     library_->DeviceCreateStream(device_, ONI_SENSOR_COLOR, &streams_[1]));
     const float manual = -1.0F;  // every image, in order, as fast as it is read
     const OniBool once = FALSE;
-    library_->Check("it cannot be played",
+    library_->Check(say::recording::OniCannotPlay(),
                     library_->DeviceSetProperty(device_, ONI_DEVICE_PROPERTY_PLAYBACK_SPEED,
                                                 &manual, sizeof manual));
-    library_->Check("it cannot be played once",
+    library_->Check(say::recording::OniCannotPlayOnce(),
                     library_->DeviceSetProperty(
                         device_, ONI_DEVICE_PROPERTY_PLAYBACK_REPEAT_ENABLED, &once, sizeof once));
     ReadShape();
   }
 
-  void WriteHeader() const { Write(header_); }
+  void WriteHeader() const { WriteToParent(header_); }
 
   void Play() {
     for (OniStreamHandle stream : streams_)
-      library_->Check("it does not start", library_->StreamStart(stream));
+      library_->Check(say::recording::OniNoStart(), library_->StreamStart(stream));
     FramePairing<Image> pairing(kMaxGap_us);
     std::array<int, 2> taken{};
     int waits = 0;
@@ -100,13 +77,12 @@ class Player {
       if (status != ONI_STATUS_OK || index < 0 || index > 1) {
         if (++waits < (at_end_ ? kMaxWaitsAfterEnd : kMaxWaits)) continue;
         if (at_end_) break;
-        throw DataError(fmt::format(
-            "OpenNI2 gives nothing more after {} depth and {} colour images of {} and {}", taken[0],
-            taken[1], num_images_[0], num_images_[1]));
+        throw DataError(
+            say::recording::OniStopped(taken[0], taken[1], num_images_[0], num_images_[1]));
       }
       waits = 0;
       OniFrame* frame = nullptr;
-      library_->Check("an image cannot be read",
+      library_->Check(say::recording::OniImageUnreadable(),
                       library_->StreamReadFrame(streams_[static_cast<std::size_t>(index)], &frame));
       ++taken[static_cast<std::size_t>(index)];
       std::optional<Image> image = Copy(*frame, index == 0);
@@ -120,50 +96,48 @@ class Player {
       }
       if (const auto pair = pairing.Add(index == 0 ? StreamKind::kDepth : StreamKind::kColor, stamp,
                                         std::move(*image))) {
-        Write(oni::Kind::kFrame);
-        Write(oni::FrameStamps{pair->color_us, pair->depth_us});
-        WriteAll(pair->color.data(), pair->color.size());
-        WriteAll(pair->depth.data(), pair->depth.size());
+        WriteToParent(oni::Kind::kFrame);
+        WriteToParent(oni::FrameStamps{pair->color_us, pair->depth_us});
+        WriteToParent(pair->color.data(), pair->color.size());
+        WriteToParent(pair->depth.data(), pair->depth.size());
       }
     }
-    Write(oni::Kind::kEnd);
-    Write(oni::End{pairing.num_unpaired(), pairing.num_discarded() + num_damaged_});
+    WriteToParent(oni::Kind::kEnd);
+    WriteToParent(oni::End{pairing.num_unpaired(), pairing.num_discarded() + num_damaged_});
   }
 
  private:
   template <typename Value>
-  Value Get(OniStreamHandle stream, int property, const char* what) const {
+  Value Get(OniStreamHandle stream, int property, Message what) const {
     Value value{};
     int size = sizeof value;
-    library_->Check(what, library_->StreamGetProperty(stream, property, &value, &size));
+    library_->Check(std::move(what), library_->StreamGetProperty(stream, property, &value, &size));
     return value;
   }
 
   void ReadShape() {
-    const auto depth =
-        Get<OniVideoMode>(streams_[0], ONI_STREAM_PROPERTY_VIDEO_MODE, "its depth has no size");
-    const auto color =
-        Get<OniVideoMode>(streams_[1], ONI_STREAM_PROPERTY_VIDEO_MODE, "its colour has no size");
+    const auto depth = Get<OniVideoMode>(streams_[0], ONI_STREAM_PROPERTY_VIDEO_MODE,
+                                         say::recording::OniDepthSize());
+    const auto color = Get<OniVideoMode>(streams_[1], ONI_STREAM_PROPERTY_VIDEO_MODE,
+                                         say::recording::OniColorSize());
     if (depth.pixelFormat != ONI_PIXEL_FORMAT_DEPTH_1_MM ||
         color.pixelFormat != ONI_PIXEL_FORMAT_RGB888) {
-      throw DataError(
-          fmt::format("expected depth in millimetres and colour as RGB, found formats {} and {}",
-                      static_cast<int>(depth.pixelFormat), static_cast<int>(color.pixelFormat)));
+      throw DataError(say::recording::OniFormats(static_cast<int>(depth.pixelFormat),
+                                                 static_cast<int>(color.pixelFormat)));
     }
     const bool sane = depth.resolutionX == color.resolutionX &&
                       depth.resolutionY == color.resolutionY && depth.resolutionX > 0 &&
                       depth.resolutionX <= kMaxSide && depth.resolutionY > 0 &&
                       depth.resolutionY <= kMaxSide;
     if (!sane) {
-      throw DataError(fmt::format("expected depth and colour of one size, found {}x{} and {}x{}",
-                                  depth.resolutionX, depth.resolutionY, color.resolutionX,
-                                  color.resolutionY));
+      throw DataError(say::recording::OniSizes(depth.resolutionX, depth.resolutionY,
+                                               color.resolutionX, color.resolutionY));
     }
     header_.width = depth.resolutionX;
     header_.height = depth.resolutionY;
     for (std::size_t i = 0; i < 2; ++i)
-      num_images_[i] = std::max(
-          0, Get<int>(streams_[i], ONI_STREAM_PROPERTY_NUMBER_OF_FRAMES, "its length is unknown"));
+      num_images_[i] = std::max(0, Get<int>(streams_[i], ONI_STREAM_PROPERTY_NUMBER_OF_FRAMES,
+                                            say::recording::OniLength()));
     header_.num_frames = std::min(num_images_[0], num_images_[1]);
     int size = sizeof header_.horizontal_fov_rad;
     if (library_->StreamGetProperty(streams_[1], ONI_STREAM_PROPERTY_HORIZONTAL_FOV,
@@ -198,25 +172,13 @@ class Player {
   std::atomic<bool> at_end_{false};
 };
 
-void WriteError(const char* what, bool header_written) {
-  const auto length =
-      static_cast<std::uint32_t>(std::min<std::size_t>(std::strlen(what), oni::kMaxText));
-  if (!header_written) Write(oni::kMagic);
-  Write(oni::Kind::kError);
-  Write(length);
-  WriteAll(what, length);
-}
-
-/// The parent holds the other end of the pipe. Once that is closed, nobody needs this process,
-/// wherever the library hangs.
-void EndWithParent() {
-  ::signal(SIGPIPE, SIG_IGN);
-  std::thread([] {
-    pollfd pipe{STDOUT_FILENO, 0, 0};
-    while (::poll(&pipe, 1, -1) < 0 && errno == EINTR) {
-    }
-    ::_exit(1);
-  }).detach();
+void WriteError(const std::exception& error, bool header_written) {
+  const std::string text = ReaderErrorText(error);
+  const auto length = static_cast<std::uint32_t>(text.size());
+  if (!header_written) WriteToParent(oni::kMagic);
+  WriteToParent(oni::Kind::kError);
+  WriteToParent(length);
+  WriteToParent(text.data(), length);
 }
 
 int Main(const std::string& file, const std::array<std::int64_t, 2>& begin_us) {
@@ -230,7 +192,7 @@ int Main(const std::string& file, const std::array<std::int64_t, 2>& begin_us) {
   } catch (const IoError&) {
     return 1;
   } catch (const std::exception& error) {
-    WriteError(error.what(), header_written);
+    WriteError(error, header_written);
     return 3;
   }
 }
@@ -240,17 +202,7 @@ int Main(const std::string& file, const std::array<std::int64_t, 2>& begin_us) {
 
 int main(int argc, char** argv) {
   if (argc != 4) return 2;
-  plumb::EndWithParent();
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  const rlimit memory{plumb::kMaxMemory, plumb::kMaxMemory};
-  ::setrlimit(RLIMIT_AS, &memory);
-#endif
-  const rlimit no_core{0, 0};
-  ::setrlimit(RLIMIT_CORE, &no_core);
-  int code = 1;
-  try {
-    code = plumb::Main(argv[1], {std::atoll(argv[3]), std::atoll(argv[2])});
-  } catch (const std::exception&) {
-  }
-  ::_exit(code);
+  plumb::RunReaderProgram([&] {
+    return plumb::Main(argv[1], {std::atoll(argv[3]), std::atoll(argv[2])});
+  });
 }

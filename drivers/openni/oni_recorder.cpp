@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/openni/oni_recorder.hpp"
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include "drivers/openni/openni_library.hpp"
 #include "drivers/openni/openni_sensor.hpp"
 #include "drivers/replay/tum_writer.hpp"
+#include "words/recording.hpp"
 
 namespace plumb {
 namespace {
@@ -61,7 +63,7 @@ OniRecorder::OniRecorder(LiveSensor& sensor, std::filesystem::path file, const O
   WriteWholeFile(impl_->file, std::string_view());
   const OpenNiLibrary& library = *impl_->library;
   openni->box().KeepStamps(true);
-  const std::string what = fmt::format("cannot record to {}", impl_->file.string());
+  const Message what = say::recording::CannotRecord(impl_->file.string());
   library.Check(what, library.CreateRecorder(impl_->file.c_str(), &impl_->recorder));
   library.Check(what,
                 library.RecorderAttachStream(impl_->recorder, openni->streams().depth, FALSE));
@@ -71,8 +73,7 @@ OniRecorder::OniRecorder(LiveSensor& sensor, std::filesystem::path file, const O
   const auto limit = std::chrono::steady_clock::now() + kStartTime;
   while (!HasOniDataBegun(impl_->file, 2)) {
     if (std::chrono::steady_clock::now() > limit)
-      throw DeviceError(fmt::format("{}: OpenNI2 has not begun within {} s; is the disk too busy?",
-                                    what, kStartTime.count()));
+      throw DeviceError(say::recording::OniNotBegun(what, kStartTime.count()));
     std::this_thread::sleep_for(kPoll);
   }
 }
@@ -88,10 +89,8 @@ OniFileSummary OniRecorder::Finish(const std::optional<OniBegin>& begin) {
   const std::optional<std::int64_t> depth_us =
       begin ? begin->depth_us : FindOniBegin(summary.depth_us, box.StampsOf(StreamKind::kDepth));
   if (!color_us || !depth_us) {
-    throw IoError(
-        fmt::format("recording {} has stamps that the sensor did not give ({} colour, {} depth "
-                    "images); record again",
-                    impl_->file.string(), summary.color_us.size(), summary.depth_us.size()));
+    throw IoError(say::recording::OniOtherStamps(impl_->file.string(), summary.color_us.size(),
+                                                 summary.depth_us.size()));
   }
   WriteWholeFile(OniSideCar(impl_->file), impl_->side_car + OniBeginText({*color_us, *depth_us}));
   impl_->finished = true;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Records an open sensor into an .oni file.
 #pragma once
 

@@ -1,132 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/openni/oni_recording.hpp"
 
-#include <fcntl.h>
-#include <poll.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <fmt/format.h>
-
-#include <array>
-#include <cerrno>
-#include <chrono>
 #include <cmath>
-#include <cstring>
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
+#include "drivers/files/reader_process.hpp"
+#include "drivers/files/reader_program.hpp"
 #include "drivers/openni/oni_file.hpp"
 #include "drivers/openni/oni_protocol.hpp"
 #include "drivers/program_folders.hpp"
 #include "drivers/replay/camera_file.hpp"
-
-extern char** environ;
+#include "words/recording.hpp"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::seconds kPatience{30};  // timeout for a silent child
-constexpr int kPipeBytes = 1 << 20;
 constexpr std::size_t kMaxCameraBytes = std::size_t{1} << 16;
 
 fs::path ReaderProgram() {
   const std::optional<fs::path> program = FindBesideProgram("lib/plumb/plumb-oni-reader");
-  if (!program)
-    throw IoError(
-        "plumb-oni-reader is missing: expected lib/plumb/plumb-oni-reader in a folder above this "
-        "program");
+  if (!program) throw IoError(say::recording::ReaderMissing());
   return *program;
 }
 
-/// The child process and the end of its pipe.
-class Reader {
- public:
-  Reader(const fs::path& program, const fs::path& file, const OniBegin& begin) {
-    std::array<int, 2> ends{};
-    if (::pipe2(ends.data(), O_CLOEXEC) != 0)
-      throw IoError(fmt::format("no pipe: {}", std::strerror(errno)));
-    (void)::fcntl(ends[0], F_SETPIPE_SZ, kPipeBytes);
-    posix_spawn_file_actions_t actions;
-    posix_spawnattr_t attributes;
-    ::posix_spawn_file_actions_init(&actions);
-    ::posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-    ::posix_spawnattr_init(&attributes);
-    sigset_t none;
-    sigset_t defaults;
-    ::sigemptyset(&none);
-    ::sigemptyset(&defaults);
-    ::sigaddset(&defaults, SIGPIPE);
-    ::posix_spawnattr_setsigmask(&attributes, &none);
-    ::posix_spawnattr_setsigdefault(&attributes, &defaults);
-    // In its own process group: Ctrl-C at the terminal reaches the parent only, which ends the
-    // child.
-    ::posix_spawnattr_setflags(
-        &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-    std::string name = program.string(), argument = file.string();
-    std::string color = std::to_string(begin.color_us), depth = std::to_string(begin.depth_us);
-    std::array<char*, 5> arguments{name.data(), argument.data(), color.data(), depth.data(),
-                                   nullptr};
-    const int error =
-        ::posix_spawn(&pid_, name.c_str(), &actions, &attributes, arguments.data(), environ);
-    ::posix_spawn_file_actions_destroy(&actions);
-    ::posix_spawnattr_destroy(&attributes);
-    ::close(ends[1]);
-    descriptor_ = ends[0];
-    if (error != 0) {
-      pid_ = -1;
-      ::close(descriptor_);
-      throw IoError(fmt::format("cannot run {}: {}", name, std::strerror(error)));
-    }
-  }
-  ~Reader() {
-    ::close(descriptor_);
-    if (pid_ < 0) return;
-    ::kill(pid_, SIGKILL);
-    (void)Reap();
-  }
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
+std::vector<std::string> Arguments(const fs::path& file, const OniBegin& begin) {
+  return {file.string(), std::to_string(begin.color_us), std::to_string(begin.depth_us)};
+}
 
-  enum class Got { kAll, kEnd, kSilence };
-  Got Read(void* data, std::size_t size) {
-    auto* to = static_cast<char*>(data);
-    while (size > 0) {
-      pollfd wait{descriptor_, POLLIN, 0};
-      const int ready =
-          ::poll(&wait, 1, static_cast<int>(std::chrono::milliseconds(kPatience).count()));
-      if (ready < 0 && errno == EINTR) continue;
-      if (ready <= 0) return Got::kSilence;
-      const ssize_t got = ::read(descriptor_, to, size);
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0) return Got::kEnd;
-      to += got;
-      size -= static_cast<std::size_t>(got);
-    }
-    return Got::kAll;
-  }
-
-  /// How the child ended, once its pipe is closed.
-  std::string Reap() {
-    int status = 0;
-    while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
-    }
-    pid_ = -1;
-    if (WIFSIGNALED(status))
-      return fmt::format("OpenNI2 crashed on it (signal {})", WTERMSIG(status));
-    return fmt::format("its reader ended early (exit code {})", WEXITSTATUS(status));
-  }
-
- private:
-  pid_t pid_ = -1;
-  int descriptor_ = -1;
-};
+Message HowItEnded(const ReaderProcess::End& end) {
+  return end.crashed ? say::recording::OniCrashed(end.code) : say::recording::ReaderEnded(end.code);
+}
 
 class OniRecording : public FrameSource {
  public:
@@ -134,28 +45,26 @@ class OniRecording : public FrameSource {
                const RecordingDefaults& defaults)
       : file_(std::move(file)),
         side_car_(side_car),
-        reader_(ReaderProgram(), file_, ParseOniBegin(side_car_.value_or(""))) {
+        reader_(ReaderProgram(), Arguments(file_, ParseOniBegin(side_car_.value_or("")))) {
     ReadCamera(ReadHeader(), defaults);
   }
   [[nodiscard]] const StreamInfo& info() const override { return info_; }
   [[nodiscard]] std::optional<Frame> Next() override;
 
  private:
-  [[noreturn]] void Fail(const std::string& why) {
+  [[noreturn]] void Fail(const Message& why) {
     finished_ = true;
-    throw DataError(
-        fmt::format("recording {} is damaged or not an .oni recording that Plumb can use: {}",
-                    file_.string(), why));
+    throw DataError(say::recording::OniDamaged(file_.string(), why));
   }
 
   void Read(void* data, std::size_t size) {
     switch (reader_.Read(data, size)) {
-      case Reader::Got::kAll:
+      case ReaderProcess::Got::kAll:
         return;
-      case Reader::Got::kEnd:
-        Fail(reader_.Reap());
-      case Reader::Got::kSilence:
-        Fail(fmt::format("OpenNI2 delivered nothing for {} s", kPatience.count()));
+      case ReaderProcess::Got::kEnd:
+        Fail(HowItEnded(reader_.Reap()));
+      case ReaderProcess::Got::kSilence:
+        Fail(say::recording::OniSilent(kReaderPatience.count()));
     }
   }
   template <typename Value>
@@ -166,22 +75,22 @@ class OniRecording : public FrameSource {
   }
 
   [[noreturn]] void FailWithReaderError() {
-    std::string text(std::min(Read<std::uint32_t>(), oni::kMaxText), ' ');
+    std::string text(std::min<std::size_t>(Read<std::uint32_t>(), kMaxReaderError), ' ');
     Read(text.data(), text.size());
-    Fail(text);
+    Fail(ReaderErrorOf(text));
   }
 
   oni::Header ReadHeader() {
     oni::Header header;
     header.magic = Read<std::uint32_t>();
-    if (header.magic != oni::kMagic) Fail("its reader has another version");
+    if (header.magic != oni::kMagic) Fail(say::recording::ReaderVersion());
     header.width = Read<std::int32_t>();
     if (header.width == static_cast<std::int32_t>(oni::Kind::kError))
       FailWithReaderError();  // no image is 3 pixels wide
     Read(&header.height, sizeof header - offsetof(oni::Header, height));
     if (header.width < 4 || header.width > kMaxImageSide || header.height < 4 ||
         header.height > kMaxImageSide)
-      Fail(fmt::format("its images are {}x{}", header.width, header.height));
+      Fail(say::recording::OniImageSize(header.width, header.height));
     return header;
   }
 
@@ -190,7 +99,7 @@ class OniRecording : public FrameSource {
 
   fs::path file_;
   std::optional<std::string> side_car_;  ///< Text of the side-car.
-  Reader reader_;
+  ReaderProcess reader_;
   StreamInfo info_;
   std::int64_t next_index_ = 0;
   double last_color_s_ = -1.0;
@@ -199,21 +108,19 @@ class OniRecording : public FrameSource {
 };
 
 void OniRecording::ReadCamera(const oni::Header& header, const RecordingDefaults& defaults) {
-  info_.marker_dictionary = defaults.marker_dictionary;
-  info_.marker_length_m = defaults.marker_length_m;
-  info_.reference_marker = defaults.reference_marker;
+  info_.room_markers = defaults.room_markers;
   info_.num_frames = header.num_frames;
   const fs::path side_car_file = OniSideCar(file_);
   bool markers_known = false;
   if (side_car_) {
     const CameraFile camera = ParseCameraFile(*side_car_, side_car_file.string());
     if (camera.color.width != header.width || camera.color.height != header.height) {
-      throw DataError(fmt::format("{} is for images of {}x{}, the recording has {}x{}",
-                                  side_car_file.string(), camera.color.width, camera.color.height,
-                                  header.width, header.height));
+      throw DataError(say::recording::SideCarSize(side_car_file.string(), camera.color.width,
+                                                  camera.color.height, header.width,
+                                                  header.height));
     }
     TakeOver(camera, info_);
-    markers_known = camera.marker_dictionary && camera.marker_length_m;
+    markers_known = camera.room_markers.dictionary && camera.room_markers.length_m;
   } else {
     info_.intrinsics = Resized(Intrinsics{}, header.width, header.height);
     if (header.horizontal_fov_rad > 0.2F && header.horizontal_fov_rad < 2.5F)
@@ -221,14 +128,11 @@ void OniRecording::ReadCamera(const oni::Header& header, const RecordingDefaults
           0.5 * header.width / std::tan(0.5 * header.horizontal_fov_rad);
     info_.intrinsics_assumed = true;
     info_.warnings.push_back(
-        fmt::format("no {}: nominal focal length of {:.1f} pixels, no distortion and depth "
-                    "registered to colour assumed",
-                    side_car_file.filename().string(), info_.intrinsics.fx));
+        say::recording::SideCarMissing(side_car_file.filename().string(), info_.intrinsics.fx));
   }
   if (!markers_known) {
     info_.warnings.push_back(
-        fmt::format("the recording does not state its markers: assumed {} with a side of {} m",
-                    info_.marker_dictionary, info_.marker_length_m));
+        say::recording::MarkersAssumed(info_.room_markers.dictionary, info_.room_markers.length_m));
   }
 }
 
@@ -239,7 +143,7 @@ Frame OniRecording::ReadFrame() {
   frame.color_time_s = 1e-6 * static_cast<double>(stamps.color_us);
   frame.depth_time_s = 1e-6 * static_cast<double>(stamps.depth_us);
   if (frame.color_time_s <= last_color_s_ || frame.depth_time_s <= last_depth_s_)
-    Fail("its stamps do not increase");
+    Fail(say::recording::OniStamps());
   last_color_s_ = frame.color_time_s;
   last_depth_s_ = frame.depth_time_s;
   frame.color_rgb.create(info_.intrinsics.height, info_.intrinsics.width, CV_8UC3);
@@ -261,7 +165,7 @@ std::optional<Frame> OniRecording::Next() {
     case oni::Kind::kError:
       FailWithReaderError();
   }
-  Fail("its reader has another version");
+  Fail(say::recording::ReaderVersion());
 }
 
 }  // namespace
@@ -269,13 +173,10 @@ std::optional<Frame> OniRecording::Next() {
 std::unique_ptr<FrameSource> OpenOniRecording(const fs::path& file,
                                               const RecordingDefaults& defaults) {
   std::error_code error;
-  if (!fs::exists(file, error))
-    throw DataError(
-        fmt::format("no recording at '{}': expected an .oni file, found nothing", file.string()));
-  if (!IsOniFile(file))
-    throw DataError(fmt::format(
-        "{} is not an .oni recording of OpenNI2: it does not begin with NI10", file.string()));
-  if (!(defaults.marker_length_m > 0 && MarkerDictionary::Find(defaults.marker_dictionary)))
+  if (!fs::exists(file, error)) throw DataError(say::recording::OniMissing(file.string()));
+  if (!IsOniFile(file)) throw DataError(say::recording::NotOni(file.string()));
+  if (!(defaults.room_markers.length_m > 0 &&
+        MarkerDictionary::Find(defaults.room_markers.dictionary)))
     throw std::invalid_argument("RecordingDefaults: marker length or dictionary out of range");
   std::optional<std::string> side_car;
   if (const fs::path name = OniSideCar(file); fs::exists(fs::symlink_status(name, error)))

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An .oni recording as a stream of frames.
 #pragma once
 

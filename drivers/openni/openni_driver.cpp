@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/openni/openni_driver.hpp"
 
 #include <memory>
@@ -10,6 +11,8 @@
 #include "drivers/program_folders.hpp"
 #ifdef PLUMB_WITH_USB
 #include "drivers/usb/usb_sensors.hpp"
+#include "words/sensor.hpp"
+#include "words/stream.hpp"
 #endif
 
 namespace plumb {
@@ -33,30 +36,35 @@ void ExamineUsb(std::vector<SensorFinding>& findings) {
   try {
     const std::vector<UsbSensor> sensors = ListUsbSensors();
     if (sensors.empty()) {
-      findings.push_back({State::kNote, "USB", "no sensor that OpenNI2 has a driver for",
-                          "plug one in; its own lamp must light up"});
+      findings.push_back(
+          {State::kNote, say::sensor::Usb(), say::sensor::UsbNone(), say::sensor::UsbPlugIn()});
     }
     for (const UsbSensor& sensor : sensors) {
-      const std::string found = fmt::format(
-          "{} {:04x}:{:04x} at bus {} address {}{}{}", sensor.model, sensor.vendor, sensor.product,
-          sensor.bus, sensor.address, sensor.speed.empty() ? "" : ", ", sensor.speed);
-      if (NeedsForeignDriver(sensor.vendor)) {
-        findings.push_back({State::kNote, "USB", found,
-                            "it needs its maker's driver for OpenNI2, in the folder of the drivers "
-                            "below; not tried with Plumb"});
+      const Message found = [&] {
+        const std::string id = fmt::format("{:04x}:{:04x}", sensor.vendor, sensor.product);
+        return sensor.speed.empty()
+                   ? say::sensor::UsbSensorAt(sensor.model, id, sensor.bus, sensor.address)
+                   : say::sensor::UsbSensorWithSpeed(sensor.model, id, sensor.bus, sensor.address,
+                                                     sensor.speed);
+      }();
+      if (const std::string sdk = SdkOf(sensor.vendor, sensor.product); !sdk.empty()) {
+        findings.push_back({State::kNote, say::sensor::Usb(), found, say::stream::Deliver(sdk)});
+      } else if (NeedsForeignDriver(sensor.vendor)) {
+        findings.push_back({State::kNote, say::sensor::Usb(), found, say::sensor::ForeignDriver()});
       } else if (sensor.problems.empty()) {
-        findings.push_back({State::kGood, "USB", found, {}});
+        findings.push_back({State::kGood, say::sensor::Usb(), found, {}});
       }
-      for (const std::string& problem : sensor.problems)
-        findings.push_back({sensor.permitted ? State::kNote : State::kBad, "USB", found, problem});
+      for (const Message& problem : sensor.problems)
+        findings.push_back(
+            {sensor.permitted ? State::kNote : State::kBad, say::sensor::Usb(), found, problem});
     }
   } catch (const DeviceError& error) {
     findings.push_back(
-        {State::kNote, "USB", error.what(), "sensors are found through OpenNI2 all the same"});
+        {State::kNote, say::sensor::Usb(), error.message(), say::sensor::UsbNotNeeded()});
   }
 #else
-  findings.push_back({State::kNote, "USB", "this build cannot examine the bus",
-                      "build with PLUMB_WITH_USB for permissions and speeds"});
+  findings.push_back(
+      {State::kNote, say::sensor::Usb(), say::sensor::UsbNotBuilt(), say::sensor::UsbBuild()});
 #endif
 }
 
@@ -64,15 +72,14 @@ void ExamineDrivers(std::vector<SensorFinding>& findings) {
   const auto folder = OpenNiDriverFolder();
   if (!folder) return;  // the error of loading OpenNI2 states why
   for (const OpenNiDriverFile& driver : FindOpenNiDrivers(*folder)) {
-    const std::string found = fmt::format("{}: {}", driver.file.string(), driver.serves);
+    const Message found = say::sensor::DriverFile(driver.file.string(), driver.serves);
     if (!driver.problem.empty())
-      findings.push_back({State::kBad, "OpenNI2 driver", found, driver.problem});
+      findings.push_back({State::kBad, say::sensor::OpenniDriver(), found, driver.problem});
     else if (driver.is_debians)
-      findings.push_back({State::kGood, "OpenNI2 driver", found, {}});
+      findings.push_back({State::kGood, say::sensor::OpenniDriver(), found, {}});
     else
-      findings.push_back({State::kNote, "OpenNI2 driver", found,
-                          "not tried with Plumb: calibrate the sensor, and check a known motion "
-                          "before it is used"});
+      findings.push_back(
+          {State::kNote, say::sensor::OpenniDriver(), found, say::sensor::DriverUntried()});
   }
 }
 
@@ -81,11 +88,11 @@ std::vector<SensorFinding> Examine() {
   ExamineUsb(findings);
   ExamineDrivers(findings);
   if (const auto reader = FindBesideProgram("lib/plumb/plumb-oni-reader")) {
-    findings.push_back({State::kGood, ".oni files", reader->string(), {}});
+    findings.push_back(
+        {State::kGood, say::sensor::OniFiles(), Message::Verbatim(reader->string()), {}});
   } else {
-    findings.push_back({State::kNote, ".oni files",
-                        "plumb-oni-reader is missing: recordings of OpenNI2 cannot be read",
-                        "install Plumb again"});
+    findings.push_back({State::kNote, say::sensor::OniFiles(), say::sensor::OniReaderMissing(),
+                        say::sensor::InstallAgain()});
   }
   return findings;
 }

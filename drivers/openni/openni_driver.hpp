@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The driver "openni", and the drivers that OpenNI2 finds beside its library: Debian's, and those
 // for sensors of other makes. OpenNI2 silently skips a driver that it cannot use; the functions
 // here state why.
@@ -17,9 +18,9 @@ void AddOpenNiDriver(SensorRegistry& registry);
 
 struct OpenNiDriverFile {
   std::filesystem::path file;
-  std::string serves;       ///< The sensors that it supports, in words.
+  Message serves;           ///< The sensors that it supports, in words.
   bool is_debians = false;  ///< Part of Debian's package libopenni2-0.
-  std::string problem;      ///< Why OpenNI2 does not use it, with a remedy; empty if it does.
+  Message problem;          ///< Why OpenNI2 does not use it, with a remedy; empty if it does.
 };
 
 /// Where OpenNI2 looks for drivers: `OpenNI2/Drivers` beside the library that this program loads;

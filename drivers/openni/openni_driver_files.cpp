@@ -1,4 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/openni/openni_driver.hpp"
+#include "words/sensor.hpp"
 
 #include <dlfcn.h>
 
@@ -7,8 +9,6 @@
 #include <string_view>
 #include <system_error>
 
-#include <fmt/format.h>
-
 namespace plumb {
 namespace {
 
@@ -16,17 +16,16 @@ namespace fs = std::filesystem;
 
 struct Known {
   std::string_view name;  // of the file, between "lib" and ".so"
-  std::string_view serves;
+  Message (*serves)();
   bool is_debians;
 };
-constexpr std::array kKnown{
-    Known{"PS1080", "Xtion, Carmine and relatives (1d27:0500 to 0609)", true},
-    Known{"PSLink", "PSLink sensors (1d27:1250 to 1280)", true},
-    Known{"OniFile", ".oni files", true},
-    Known{"DummyDevice", "no sensor, an example", true},
-    Known{"orbbec", "sensors of Orbbec (2bc5:*), from its OpenNI2 package", false},
-    Known{"FreenectDriver", "Kinect for Xbox 360 (045e:02ae), from libfreenect", false},
-    Known{"freenect2-openni2", "Kinect 2 (045e:02c4, 02d8), from libfreenect2", false}};
+constexpr std::array kKnown{Known{"PS1080", say::sensor::ServesXtion, true},
+                            Known{"PSLink", say::sensor::ServesPslink, true},
+                            Known{"OniFile", say::sensor::ServesOniFiles, true},
+                            Known{"DummyDevice", say::sensor::ServesNothing, true},
+                            Known{"orbbec", say::sensor::ServesOrbbec, false},
+                            Known{"FreenectDriver", say::sensor::ServesKinect, false},
+                            Known{"freenect2-openni2", say::sensor::ServesKinect2, false}};
 
 constexpr std::string_view kEnding = ".so.0";
 
@@ -36,22 +35,19 @@ std::string NameOf(const std::string& file) {
   return file.starts_with("lib") && end != std::string::npos ? file.substr(3, end - 3) : "";
 }
 
-std::string WhyNotUsed(const fs::path& file) {
+Message WhyNotUsed(const fs::path& file) {
   if (!file.string().ends_with(kEnding)) {
-    return fmt::format(
-        "Debian's OpenNI2 uses names that end in {0} only: ln -s {1} lib{2}{0} in that folder",
-        kEnding, file.filename().string(), NameOf(file.filename().string()));
+    return say::sensor::DriverFileName(kEnding, file.filename().string(),
+                                       NameOf(file.filename().string()));
   }
   void* handle = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) {
     const char* why = ::dlerror();
-    return fmt::format(
-        "it cannot be loaded: {}; install the libraries it depends on, for this architecture",
-        why == nullptr ? "no reason given" : why);
+    return why == nullptr ? say::sensor::DriverFileNotLoaded()
+                          : say::sensor::DriverFileUnloadable(why);
   }
   // It stays loaded, as OpenNI2 would leave it: drivers do not survive being unloaded.
-  if (::dlsym(handle, "oniDriverCreate") == nullptr)
-    return "not an OpenNI 2 driver (no oniDriverCreate): remove it";
+  if (::dlsym(handle, "oniDriverCreate") == nullptr) return say::sensor::NotADriver();
   return {};
 }
 
@@ -79,8 +75,7 @@ std::vector<OpenNiDriverFile> FindOpenNiDrivers(const fs::path& folder) {
                                     [&](const Known& one) { return one.name == name; });
     drivers.push_back(
         {.file = file,
-         .serves = std::string(known == kKnown.end() ? "sensors that Plumb does not know"
-                                                     : known->serves),
+         .serves = known == kKnown.end() ? say::sensor::ServesUnknown() : known->serves(),
          .is_debians = known != kKnown.end() && known->is_debians,
          .problem = WhyNotUsed(file)});
   }

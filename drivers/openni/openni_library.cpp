@@ -1,35 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/openni/openni_library.hpp"
 
 #include <dlfcn.h>
-#include <fmt/format.h>
+
+#include <utility>
 
 #include "algo/base/errors.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr int kApiVersion = 2 * 1000 + 2;  // of the headers: major * 1000 + minor
 
-const char* StatusName(OniStatus status) {
+Message StatusName(OniStatus status) {
   switch (status) {
     case ONI_STATUS_OK:
-      return "ok";
+      return say::sensor::StatusOk();
     case ONI_STATUS_NOT_IMPLEMENTED:
-      return "not implemented";
+      return say::sensor::StatusNotImplemented();
     case ONI_STATUS_NOT_SUPPORTED:
-      return "not supported";
+      return say::sensor::StatusNotSupported();
     case ONI_STATUS_BAD_PARAMETER:
-      return "bad parameter";
+      return say::sensor::StatusBadParameter();
     case ONI_STATUS_OUT_OF_FLOW:
-      return "not in this state";
+      return say::sensor::StatusOutOfFlow();
     case ONI_STATUS_NO_DEVICE:
-      return "no device";
+      return say::sensor::StatusNoDevice();
     case ONI_STATUS_TIME_OUT:
-      return "time out";
+      return say::sensor::StatusTimeOut();
     case ONI_STATUS_ERROR:
       break;
   }
-  return "error";
+  return say::sensor::StatusError();
 }
 
 }  // namespace
@@ -39,9 +42,7 @@ const char* StatusName(OniStatus status) {
 void OpenNiLibrary::Resolve(void* handle, const std::string& name) {
 #define PLUMB_ONI_RESOLVE(function)                                                  \
   function = reinterpret_cast<decltype(function)>(::dlsym(handle, "oni" #function)); \
-  if (function == nullptr)                                                           \
-    throw DeviceError(                                                               \
-        fmt::format("{} has no function oni" #function "; expected OpenNI2 2.2", name));
+  if (function == nullptr) throw DeviceError(say::sensor::OpenniFunction(name, "oni" #function));
   PLUMB_ONI_FUNCTIONS(PLUMB_ONI_RESOLVE)
 #undef PLUMB_ONI_RESOLVE
 }
@@ -50,14 +51,12 @@ std::shared_ptr<const OpenNiLibrary> OpenNiLibrary::Load(const std::filesystem::
   const std::string name =
       file.empty() ? "libOpenNI2.so.0" : std::filesystem::absolute(file).string();
   void* handle = ::dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr)
-    throw DeviceError(
-        fmt::format("OpenNI2 cannot be loaded: {}; install the package libopenni2-0", ::dlerror()));
+  if (handle == nullptr) throw DeviceError(say::sensor::OpenniMissing(::dlerror()));
   std::shared_ptr<OpenNiLibrary> library(new OpenNiLibrary);
   library->Resolve(handle, name);
   const OniStatus status = library->Initialize(kApiVersion);
   library->started_ = status == ONI_STATUS_OK;
-  library->Check("OpenNI2 does not start with the drivers of " + name, status);
+  library->Check(say::sensor::OpenniStart(name), status);
   return library;
 }
 
@@ -65,14 +64,16 @@ OpenNiLibrary::~OpenNiLibrary() {
   if (started_) Shutdown();
 }
 
-std::string OpenNiLibrary::Describe(const std::string& what, OniStatus status) const {
+Message OpenNiLibrary::Describe(Message what, OniStatus status) const {
   std::string details = GetExtendedError();
   while (!details.empty() && static_cast<unsigned char>(details.back()) <= ' ') details.pop_back();
-  return fmt::format("{}: {}{}{}", what, StatusName(status), details.empty() ? "" : ", ", details);
+  return details.empty()
+             ? say::sensor::OpenniFailed(std::move(what), StatusName(status))
+             : say::sensor::OpenniFailedWith(std::move(what), StatusName(status), details);
 }
 
-void OpenNiLibrary::Check(const std::string& what, OniStatus status) const {
-  if (status != ONI_STATUS_OK) throw DeviceError(Describe(what, status));
+void OpenNiLibrary::Check(Message what, OniStatus status) const {
+  if (status != ONI_STATUS_OK) throw DeviceError(Describe(std::move(what), status));
 }
 
 }  // namespace plumb

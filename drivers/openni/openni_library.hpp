@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 // OpenNI2, loaded at run time: the system's library, or the private copy of the virtual sensor.
 #pragma once
 
 #include <filesystem>
 #include <memory>
 #include <string>
+
+#include "algo/base/message.hpp"
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wshadow"
@@ -25,9 +28,9 @@ class OpenNiLibrary {
   OpenNiLibrary& operator=(const OpenNiLibrary&) = delete;
 
   /// "what: status" with the library's last error of this thread.
-  [[nodiscard]] std::string Describe(const std::string& what, OniStatus status) const;
+  [[nodiscard]] Message Describe(Message what, OniStatus status) const;
   /// @throws DeviceError with Describe() unless the status is ok.
-  void Check(const std::string& what, OniStatus status) const;
+  void Check(Message what, OniStatus status) const;
 
 // clang-format off
 #define PLUMB_ONI_FUNCTIONS(X)                                                                                          \

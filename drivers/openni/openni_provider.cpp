@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/openni/openni_provider.hpp"
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include "drivers/live/sensor_events.hpp"
 #include "drivers/openni/openni_library.hpp"
 #include "drivers/openni/openni_sensor.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 
@@ -30,7 +32,7 @@ struct OpenNiProvider::Impl {
     callbacks.deviceStateChanged = [](const OniDeviceInfo* info, OniDeviceState state, void* self) {
       static_cast<Impl*>(self)->OnState(*info, state);
     };
-    library->Check("OpenNI2 refuses to report what is plugged in",
+    library->Check(say::sensor::OpenniNoEvents(),
                    library->RegisterDeviceCallbacks(&callbacks, this, &handle));
   }
   ~Impl() {
@@ -87,7 +89,7 @@ struct OpenNiProvider::Impl {
   std::vector<SensorDescription> List() {
     OniDeviceInfo* infos = nullptr;
     int count = 0;
-    library->Check("OpenNI2 does not list the sensors", library->GetDeviceList(&infos, &count));
+    library->Check(say::sensor::OpenniNoList(), library->GetDeviceList(&infos, &count));
     const std::vector<OniDeviceInfo> found(infos, infos + std::max(count, 0));
     library->ReleaseDeviceList(infos);
     std::vector<SensorDescription> sensors;
@@ -136,8 +138,7 @@ std::unique_ptr<LiveSensor> OpenNiProvider::Open(const std::string& serial) {
   auto streams = std::make_unique<OpenNiStreams>(impl_->library, found);
   // The box is notified about unplugging from here on, so no event is missed between the listing
   // and the first image.
-  if (box->lost())
-    throw DeviceLost(fmt::format("sensor {} was unplugged while it was opened", found.serial));
+  if (box->lost()) throw DeviceLost(say::sensor::UnpluggedWhileOpened(found.serial));
   return std::make_unique<OpenNiSensor>(std::move(streams), std::move(box), impl_, found,
                                         impl_->options);
 }

@@ -1,10 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/openni/openni_sensor.hpp"
-
-#include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
 #include "drivers/live/sensor_calibration.hpp"
 #include "drivers/openni/stream_waiter.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
@@ -28,11 +28,7 @@ OpenNiStreams::OpenNiStreams(std::shared_ptr<const OpenNiLibrary> loaded,
     : library(std::move(loaded)), name_(description.serial) {
   const OniStatus status = library->DeviceOpen(description.uri.c_str(), &device);
   if (status != ONI_STATUS_OK) {
-    throw DeviceError(library->Describe(fmt::format("cannot open sensor {} ({}); `plumb doctor` "
-                                                    "says whether it is attached and permitted, "
-                                                    "or unplug it and plug it in again",
-                                                    name_, description.name),
-                                        status));
+    throw DeviceError(library->Describe(say::sensor::CannotOpen(name_, description.name), status));
   }
   try {
     Create();
@@ -46,9 +42,9 @@ OpenNiStreams::OpenNiStreams(std::shared_ptr<const OpenNiLibrary> loaded,
 OpenNiStreams::~OpenNiStreams() { Close(); }
 
 void OpenNiStreams::Create() {
-  library->Check(fmt::format("cannot use the depth stream of sensor {}", name_),
+  library->Check(say::sensor::NoDepthStream(name_),
                  library->DeviceCreateStream(device, ONI_SENSOR_DEPTH, &depth));
-  library->Check(fmt::format("cannot use the colour stream of sensor {}", name_),
+  library->Check(say::sensor::NoColorStream(name_),
                  library->DeviceCreateStream(device, ONI_SENSOR_COLOR, &color));
 }
 
@@ -68,14 +64,11 @@ void OpenNiStreams::SetModes() {
     height = h;
     break;
   }
-  library->Check(fmt::format("sensor {} supports neither 640x480 nor 320x240 at {} Hz with depth "
-                             "in mm and colour as RGB",
-                             name_, kFps),
-                 status);
+  library->Check(say::sensor::NoMode(name_, kFps), status);
   for (OniStreamHandle stream : {depth, color}) {
     const OniBool off = FALSE;
     library->Check(
-        fmt::format("cannot switch off the mirroring of sensor {}", name_),
+        say::sensor::Mirroring(name_),
         library->StreamSetProperty(stream, ONI_STREAM_PROPERTY_MIRRORING, &off, sizeof off));
   }
   (void)library->DeviceEnableDepthColorSync(
@@ -84,13 +77,11 @@ void OpenNiStreams::SetModes() {
 
 void OpenNiStreams::Start() {
   started_ = true;
-  library->Check(fmt::format("cannot start the depth stream of sensor {}", name_),
-                 library->StreamStart(depth));
-  library->Check(fmt::format("cannot start the colour stream of sensor {}", name_),
-                 library->StreamStart(color));
+  library->Check(say::sensor::DepthStart(name_), library->StreamStart(depth));
+  library->Check(say::sensor::ColorStart(name_), library->StreamStart(color));
   // must be set after the start, because units forget it
   const int mode = ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR;
-  library->Check(fmt::format("cannot register depth to colour on sensor {}", name_),
+  library->Check(say::sensor::CannotRegister(name_),
                  library->DeviceSetProperty(device, ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION, &mode,
                                             sizeof mode));
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One open sensor of OpenNI2, created by OpenNiProvider.
 #pragma once
 
@@ -7,7 +8,7 @@
 
 #include "drivers/live/boxed_sensor.hpp"
 #include "drivers/openni/openni_library.hpp"
-#include "drivers/openni/openni_provider.hpp"
+#include "drivers/openni/openni_options.hpp"
 
 namespace plumb {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The one thread of a process that waits for images from OpenNI2.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/camera_file.hpp"
 
 #include <fmt/format.h>
@@ -10,8 +11,11 @@
 #include <cmath>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/nearest_name.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "drivers/files/image_file.hpp"
+#include "drivers/replay/lens_model.hpp"
+#include "words/recording.hpp"
 
 namespace plumb {
 namespace {
@@ -25,13 +29,82 @@ constexpr double kMaxDepthScale = 1e6;
 constexpr double kMaxBaseline_m = 1.0;
 constexpr int kMaxMarkerId = 65535;
 
+constexpr std::array kKnownKeys = {
+    "image_width",         "image_height",      "camera_matrix",
+    "distortion_model",    "depth_scale",       "distortion_coefficients",
+    "depth_registered",    "depth_image_width", "depth_image_height",
+    "depth_camera_matrix", "depth_noise",       "depth_distortion_coefficients",
+    "T_color_depth",       "marker_dictionary", "marker_length",
+    "reference_marker",    "sensor_serial",     "color_begin_us",
+    "depth_begin_us",      "depth_sensor",      "depth_range"};
+// What OpenCV's calibration program, ROS (camera_info) and RTAB-Map write beside the keys that are
+// read. It says nothing that Plumb would need.
+constexpr std::array kOfCalibrators = {"camera_name",
+                                       "rectification_matrix",
+                                       "projection_matrix",
+                                       "local_transform",
+                                       "calibration_time",
+                                       "nr_of_frames",
+                                       "nframes",
+                                       "board_width",
+                                       "board_height",
+                                       "square_size",
+                                       "marker_size_of_board",
+                                       "aspectRatio",
+                                       "fix_aspect_ratio",
+                                       "flags",
+                                       "avg_reprojection_error",
+                                       "fisheye_model",
+                                       "per_view_reprojection_errors",
+                                       "extrinsic_parameters",
+                                       "image_points",
+                                       "grid_points",
+                                       "model_version"};
+// A key that tells the file of another program, with the program's name.
+constexpr std::array<std::pair<const char*, const char*>, 7> kForeignKeys = {{
+    {"Camera.fx", "ORB-SLAM"},
+    {"Camera1.fx", "ORB-SLAM3"},
+    {"Camera.type", "ORB-SLAM"},
+    {"intrinsic_matrix", "Open3D"},
+    {"cam0", "Kalibr"},
+    {"T_BS", "EuRoC"},
+    {"camera_model", "camodocal"},
+}};
+
+// What other programs call a key of this file. By its letters, "depth_factor" is nearer to
+// "depth_sensor" than to the key that is meant.
+constexpr std::array<std::pair<const char*, const char*>, 16> kOtherNames = {{
+    {"depth_factor", "depth_scale"},
+    {"depth_map_factor", "depth_scale"},
+    {"DepthMapFactor", "depth_scale"},
+    {"depth_units", "depth_scale"},
+    {"png_depth_scale", "depth_scale"},
+    {"scale", "depth_scale"},
+    {"marker_size", "marker_length"},
+    {"marker_side", "marker_length"},
+    {"tag_size", "marker_length"},
+    {"dictionary", "marker_dictionary"},
+    {"K", "camera_matrix"},
+    {"intrinsics", "camera_matrix"},
+    {"D", "distortion_coefficients"},
+    {"dist_coeffs", "distortion_coefficients"},
+    {"width", "image_width"},
+    {"height", "image_height"},
+}};
+
+/// The key that was meant by one that is not known.
+std::string KeyMeantBy(const std::string& key) {
+  for (const auto& [other, meant] : kOtherNames)
+    if (key == other) return meant;
+  return NearestName(key, kKnownKeys);
+}
+
 /// Refuses texts whose nesting would exhaust the parser's stack.
 void CheckText(std::string_view text, const std::string& name) {
   if (text.size() > kMaxText)
-    throw DataError(
-        fmt::format("{} has {} bytes, at most {} are read", name, text.size(), kMaxText));
+    throw DataError(say::recording::CameraTooLong(name, text.size(), kMaxText));
   if (text.find('\0') != std::string_view::npos)
-    throw DataError(fmt::format("{} holds zero bytes: it is not text", name));
+    throw DataError(say::recording::CameraZeroBytes(name));
   int depth = 0;
   int dashes = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -44,7 +117,7 @@ void CheckText(std::string_view text, const std::string& name) {
       dashes = 0;
     }
     if (depth > kMaxNesting || dashes > kMaxNesting)
-      throw DataError(fmt::format("{} nests deeper than {} levels", name, kMaxNesting));
+      throw DataError(say::recording::CameraNesting(name, kMaxNesting));
   }
 }
 
@@ -62,15 +135,28 @@ class Keys {
  public:
   Keys(std::string_view text, std::string name) : name_(std::move(name)) {
     CheckText(text, name_);
+    if (const std::size_t begin = text.find_first_not_of(" \t\r\n");
+        begin != std::string_view::npos && text[begin] == '<')
+      throw DataError(say::recording::CameraXml(name_));
     try {
       root_ = YAML::Load(WithoutHeader(text));
     } catch (const YAML::Exception& error) {
-      throw DataError(
-          fmt::format("{} cannot be parsed as YAML: {}", name_, FirstLine(error.what())));
+      throw DataError(say::recording::CameraNotYaml(name_, FirstLine(error.what())));
     }
-    if (!root_.IsMap())
-      throw DataError(fmt::format(
-          "{} holds no keys; expected OpenCV YAML as its FileStorage writes it", name_));
+    if (!root_.IsMap()) throw DataError(say::recording::CameraNoKeys(name_));
+  }
+
+  /// @throws DataError for a file of another program, and for a key that nobody reads.
+  void CheckNames() const {
+    for (const auto& [key, program] : kForeignKeys)
+      if (has(key)) throw DataError(say::recording::CameraForeign(name_, program, key));
+    for (const auto& entry : root_) {
+      const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
+      const auto is_key = [&](const char* known) { return key == known; };
+      if (std::ranges::any_of(kKnownKeys, is_key) || std::ranges::any_of(kOfCalibrators, is_key))
+        continue;
+      throw DataError(say::recording::UnknownKey(name_, key.substr(0, 60), KeyMeantBy(key)));
+    }
   }
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -86,15 +172,25 @@ class Keys {
   [[nodiscard]] int Integer(const char* key) const {
     const double value = Number(key);
     if (value != std::floor(value) || std::abs(value) > 1e9) {
-      throw DataError(fmt::format("{} is {}, expected a whole number", Where(key), value));
+      throw DataError(say::recording::WholeNumber(Where(key), value));
     }
     return static_cast<int>(value);
   }
 
   [[nodiscard]] std::string Text(const char* key) const {
     const YAML::Node node = Required(key);
-    if (!node.IsScalar()) throw DataError(fmt::format("{} is not text", Where(key)));
+    if (!node.IsScalar()) throw DataError(say::recording::NotText(Where(key)));
     return node.Scalar();
+  }
+
+  /// 0 or 1, or as YAML has it, true or false.
+  [[nodiscard]] bool Flag(const char* key) const {
+    const std::string text = Text(key);
+    if (text == "true" || text == "True") return true;
+    if (text == "false" || text == "False") return false;
+    const int value = Integer(key);
+    if (value != 0 && value != 1) throw DataError(say::recording::ZeroOrOne(Where(key), value));
+    return value == 1;
   }
 
   /// The elements of a matrix, row by row: an !!opencv-matrix, or a plain list.
@@ -102,7 +198,7 @@ class Keys {
     const YAML::Node node = Required(key);
     const YAML::Node data = node.IsMap() ? node["data"] : node;
     if (!data.IsDefined() || !data.IsSequence() || data.size() > 64)
-      throw DataError(fmt::format("{} is not a matrix of numbers", Where(key)));
+      throw DataError(say::recording::NotMatrix(Where(key)));
     std::vector<double> values;
     for (const YAML::Node& element : data) values.push_back(Number(element, key));
     return values;
@@ -116,8 +212,8 @@ class Keys {
     bool fits = node.IsMap() && node.size() == N;
     for (const char* name : names) fits = fits && node[name].IsDefined();
     if (!fits)
-      throw DataError(fmt::format("{} does not hold what is expected: the keys {}, one number each",
-                                  Where(key), fmt::join(names, ", ")));
+      throw DataError(say::recording::OtherKeys(
+          Where(key), std::vector<std::string>(names.begin(), names.end())));
     std::array<double, N> values{};
     for (std::size_t i = 0; i < N; ++i)
       values[i] = Number(node[names[i]], fmt::format("{}: {}", key, names[i]).c_str());
@@ -130,7 +226,7 @@ class Keys {
   }
 
   [[nodiscard]] YAML::Node Required(const char* key) const {
-    if (!has(key)) throw DataError(fmt::format("{} is missing", Where(key)));
+    if (!has(key)) throw DataError(say::recording::KeyMissing(Where(key)));
     return root_[key];
   }
 
@@ -141,9 +237,9 @@ class Keys {
     double value = 0;
     const auto [stop, error] = std::from_chars(begin, end, value);
     if (begin == end || stop != end || error != std::errc() || !std::isfinite(value)) {
-      throw DataError(
-          fmt::format("{} holds {}, expected finite numbers", Where(key),
-                      text.empty() ? "something else" : '"' + text.substr(0, 60) + '"'));
+      throw DataError(text.empty()
+                          ? say::recording::NotNumbers(Where(key))
+                          : say::recording::OtherThanNumbers(Where(key), text.substr(0, 60)));
     }
     return value;
   }
@@ -154,16 +250,13 @@ class Keys {
 
 void ReadCameraMatrix(const Keys& keys, const char* key, Intrinsics& intrinsics) {
   const std::vector<double> k = keys.Matrix(key);
-  if (k.size() != 9)
-    throw DataError(fmt::format("{} has {} elements, expected 3x3", keys.Where(key), k.size()));
+  if (k.size() != 9) throw DataError(say::recording::Matrix3x3(keys.Where(key), k.size()));
   if (!(k[0] > 0 && k[4] > 0)) {
-    throw DataError(fmt::format(
-        "{} has focal lengths {} and {}, expected both > 0 pixels; calibrate the camera",
-        keys.Where(key), k[0], k[4]));
+    throw DataError(say::recording::FocalLengths(keys.Where(key), k[0], k[4]));
   }
   if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
-    throw DataError(fmt::format("{} is [{}], expected [fx 0 cx, 0 fy cy, 0 0 1]", keys.Where(key),
-                                fmt::join(k, " ")));
+    throw DataError(
+        say::recording::CameraMatrix(keys.Where(key), fmt::format("{}", fmt::join(k, " "))));
   }
   intrinsics.fx = k[0];
   intrinsics.fy = k[4];
@@ -175,28 +268,36 @@ void ReadCameraMatrix(const Keys& keys, const char* key, Intrinsics& intrinsics)
     return c > 0 && c < size && f > size * 0.13 && f < size * 12.0;
   };
   if (!fits(k[0], k[2], intrinsics.width) || !fits(k[4], k[5], intrinsics.height)) {
-    throw DataError(
-        fmt::format("{} (fx {} fy {} cx {} cy {}) does not fit an image of {}x{}; was it "
-                    "calibrated at another size?",
-                    keys.Where(key), k[0], k[4], k[2], k[5], intrinsics.width, intrinsics.height));
+    throw DataError(say::recording::OtherImageSize(keys.Where(key), k[0], k[4], k[2], k[5],
+                                                   intrinsics.width, intrinsics.height));
   }
 }
 
-void ReadDistortion(const Keys& keys, const char* key, Intrinsics& intrinsics) {
-  const std::vector<double> d = keys.Matrix(key);
-  const bool only_five =
-      d.size() >= 4 && std::all_of(d.begin() + std::min<std::ptrdiff_t>(5, std::ssize(d)), d.end(),
-                                   [](double value) { return value == 0; });
-  if (!only_five) {
-    throw DataError(fmt::format(
-        "{} has {} elements, expected the five k1 k2 p1 p2 k3 of OpenCV's plain lens model",
-        keys.Where(key), d.size()));
+/// The lens by its coefficients: 4 (an equidistant lens, or the plain model without k3), 5, 8 or
+/// more, of which those behind the eighth must be 0.
+void ReadDistortion(const Keys& keys, const char* key, bool is_equidistant,
+                    Intrinsics& intrinsics) {
+  constexpr std::size_t kRational = 8;
+  std::vector<double> d = keys.Matrix(key);
+  const auto is_zero = [](double value) { return value == 0; };
+  const bool is_read =
+      d.size() == 4 || d.size() == 5 ||
+      (d.size() >= 5 && std::all_of(d.begin() + 5, d.end(), is_zero)) ||
+      (d.size() >= kRational && std::all_of(d.begin() + kRational, d.end(), is_zero));
+  if (!is_read || (is_equidistant && d.size() != 4))
+    throw DataError(is_equidistant ? say::recording::LensEquidistant(keys.Where(key), d.size())
+                                   : say::recording::LensElements(keys.Where(key), d.size()));
+  for (const double value : d) {
+    if (std::abs(value) > kMaxDistortion)
+      throw DataError(say::recording::LensImplausible(keys.Where(key), value));
   }
-  for (std::size_t i = 0; i < std::min<std::size_t>(5, d.size()); ++i) {
-    if (std::abs(d[i]) > kMaxDistortion)
-      throw DataError(fmt::format("{} holds {}, which is not a plausible lens coefficient",
-                                  keys.Where(key), d[i]));
-    intrinsics.distortion[i] = d[i];
+  if (is_equidistant) {
+    const auto lens = RationalOfEquidistant({d[0], d[1], d[2], d[3]}, intrinsics);
+    if (!lens) throw DataError(say::recording::LensTooWide(keys.Where(key)));
+    intrinsics.distortion = *lens;
+  } else {
+    d.resize(kRational);
+    (void)SetLensCoefficients(d, intrinsics);
   }
   // A lens model must be one-to-one over the whole image, or pixels cannot be converted to rays.
   for (const double x : {0.0, 0.25, 0.75, 1.0}) {
@@ -205,27 +306,56 @@ void ReadDistortion(const Keys& keys, const char* key, Intrinsics& intrinsics) {
       const Eigen::Vector2d ray = Undistort(intrinsics, pixel);
       const double error_px = (Project(intrinsics, ray.homogeneous()) - pixel).norm();
       if (!(error_px < 0.5)) {
-        throw DataError(fmt::format(
-            "{} cannot be undone at pixel ({:.0f}, {:.0f}); is it for this camera and image size?",
-            keys.Where(key), pixel.x(), pixel.y()));
+        throw DataError(say::recording::LensNotInvertible(keys.Where(key), pixel.x(), pixel.y()));
       }
     }
   }
 }
 
-void CheckSize(const Keys& keys, const Intrinsics& intrinsics, const char* what) {
+// Whether the lens is equidistant. By the model that the coefficients belong to, as ROS names it,
+// or by OpenCV's calibration program; a wide lens of another model read as OpenCV's plain one gives
+// rays that are off by degrees.
+bool IsEquidistant(const Keys& keys) {
+  if (constexpr const char* kKey = "fisheye_model"; keys.has(kKey) && keys.Flag(kKey)) return true;
+  constexpr const char* kKey = "distortion_model";
+  if (!keys.has(kKey)) return false;
+  const std::vector<std::string> equidistant = {"equidistant", "fisheye", "kannala_brandt"};
+  const std::vector<std::string> plain = {"plumb_bob", "radtan", "brown_conrady"};
+  const std::vector<std::string> none = {"none", "pinhole"};
+  const std::string model = keys.Text(kKey);
+  const auto is_in = [&](const auto& names) {
+    return std::ranges::find(names, model) != names.end();
+  };
+  if (is_in(equidistant)) return true;
+  if (model == "rational_polynomial") return false;
+  if (!is_in(plain) && !is_in(none)) {
+    std::vector<std::string> known = plain;
+    known.insert(known.end(), none.begin(), none.end());
+    known.push_back("rational_polynomial");
+    known.push_back("equidistant");
+    throw DataError(say::recording::LensModel(keys.Where(kKey), model.substr(0, 60), known));
+  }
+  constexpr const char* kLens = "distortion_coefficients";
+  if (!keys.has(kLens)) return false;
+  const std::vector<double> d = keys.Matrix(kLens);
+  const std::size_t most = is_in(none) ? 0 : 5;
+  if (d.size() > most && std::any_of(d.begin() + static_cast<std::ptrdiff_t>(most), d.end(),
+                                     [](double value) { return value != 0; }))
+    throw DataError(say::recording::LensContradicts(keys.Where(kKey), model, most, kLens));
+  return false;
+}
+
+void CheckSize(const Keys& keys, const Intrinsics& intrinsics, const Message& what) {
   if (intrinsics.width >= 1 && intrinsics.height >= 1 && intrinsics.width <= kMaxImageSide &&
       intrinsics.height <= kMaxImageSide)
     return;
-  throw DataError(fmt::format("{}: the {} image is {}x{} pixels, expected 1 to {} pixels per side",
-                              keys.name(), what, intrinsics.width, intrinsics.height,
-                              kMaxImageSide));
+  throw DataError(say::recording::CameraImageSize(keys.name(), what, intrinsics.width,
+                                                  intrinsics.height, kMaxImageSide));
 }
 
 Pose ReadRigid(const Keys& keys, const char* key) {
   const std::vector<double> m = keys.Matrix(key);
-  if (m.size() != 16)
-    throw DataError(fmt::format("{} has {} elements, expected 4x4", keys.Where(key), m.size()));
+  if (m.size() != 16) throw DataError(say::recording::Matrix4x4(keys.Where(key), m.size()));
   const Eigen::Matrix4d matrix =
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
@@ -236,9 +366,7 @@ Pose ReadRigid(const Keys& keys, const char* key) {
       matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), kTolerance);
   const Eigen::Vector3d translation_m = matrix.topRightCorner<3, 1>();
   if (!rigid || translation_m.norm() > kMaxBaseline_m) {
-    throw DataError(fmt::format(
-        "{} is not a rigid transform of less than {} m; expected [R t; 0 0 0 1] in metres",
-        keys.Where(key), kMaxBaseline_m));
+    throw DataError(say::recording::NotRigid(keys.Where(key), kMaxBaseline_m));
   }
   Pose T = Pose::Identity();
   T.linear() = rotation;
@@ -248,19 +376,10 @@ Pose ReadRigid(const Keys& keys, const char* key) {
 
 void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
   if (!keys.has("depth_registered")) return;
-  const int registered = keys.Integer("depth_registered");
-  if (registered != 0 && registered != 1) {
-    throw DataError(
-        fmt::format("{} is {}, expected 0 or 1", keys.Where("depth_registered"), registered));
-  }
-  if (registered == 1) return;
+  if (keys.Flag("depth_registered")) return;
   if (!keys.has("depth_camera_matrix") || !keys.has("depth_distortion_coefficients") ||
       !keys.has("T_color_depth")) {
-    camera.warnings.push_back(
-        fmt::format("{}: depth_registered is 0 but depth_camera_matrix, "
-                    "depth_distortion_coefficients and T_color_depth are not all given; "
-                    "depth is taken as registered to colour, unless the images show otherwise",
-                    keys.name()));
+    camera.warnings.push_back(say::recording::DepthCameraUnknown(keys.name()));
     camera.depth_camera_unknown = true;
     return;
   }
@@ -269,9 +388,9 @@ void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
       keys.has("depth_image_width") ? keys.Integer("depth_image_width") : camera.color.width;
   depth.intrinsics.height =
       keys.has("depth_image_height") ? keys.Integer("depth_image_height") : camera.color.height;
-  CheckSize(keys, depth.intrinsics, "depth");
+  CheckSize(keys, depth.intrinsics, say::recording::Depth());
   ReadCameraMatrix(keys, "depth_camera_matrix", depth.intrinsics);
-  ReadDistortion(keys, "depth_distortion_coefficients", depth.intrinsics);
+  ReadDistortion(keys, "depth_distortion_coefficients", false, depth.intrinsics);
   depth.T_color_depth = ReadRigid(keys, "T_color_depth");
   camera.depth_camera = depth;
 }
@@ -287,13 +406,30 @@ void ReadDepthNoise(const Keys& keys, CameraFile& camera) {
                             .quadratic_m_per_m2 = values[2],
                             .origin_m = values[3],
                             .grazing_m = values[4]};
-  if (const std::optional<std::string> fault = FaultOf(noise)) {
-    throw DataError(fmt::format(
-        "{}: {}; state one standard deviation of the depth in metres, or remove the key for the "
-        "noise of structured light",
-        keys.Where(kKey), *fault));
+  if (const std::optional<Message> fault = FaultOf(noise)) {
+    throw DataError(say::recording::Noise(keys.Where(kKey), *fault));
   }
   camera.depth_noise = noise;
+}
+
+void ReadDepthSensor(const Keys& keys, CameraFile& camera) {
+  if (constexpr const char* kKey = "depth_sensor"; keys.has(kKey)) {
+    const std::string name = keys.Text(kKey);
+    camera.depth_sensor = Named<DepthSensor>(name);
+    if (!camera.depth_sensor)
+      throw DataError(say::recording::DepthSensor(
+          keys.Where(kKey), name.substr(0, 60),
+          {kNamesOf<DepthSensor>.begin(), kNamesOf<DepthSensor>.end()}));
+  }
+  if (constexpr const char* kKey = "depth_range"; keys.has(kKey)) {
+    const std::vector<double> range = keys.Matrix(kKey);
+    // Nearer than 1 cm or farther than 100 m no depth camera measures; units are metres.
+    if (range.size() != 2 || !(range[0] >= 0.01 && range[0] < range[1] && range[1] <= 100))
+      throw DataError(
+          say::recording::DepthRange(keys.Where(kKey), fmt::format("{}", fmt::join(range, " "))));
+    camera.usable_depth = UsableDepth{.nearest_m = range[0], .farthest_m = range[1]};
+  }
+  ReadDepthNoise(keys, camera);
 }
 
 void ReadMarkers(const Keys& keys, CameraFile& camera) {
@@ -301,26 +437,24 @@ void ReadMarkers(const Keys& keys, CameraFile& camera) {
     const std::string name = keys.Text("marker_dictionary");
     const std::optional<MarkerDictionary> dictionary = MarkerDictionary::Find(name);
     if (!dictionary) {
-      throw DataError(fmt::format("{} is \"{}\", expected one of {}",
-                                  keys.Where("marker_dictionary"), name.substr(0, 60),
-                                  fmt::join(MarkerDictionary::KnownNames(), ", ")));
+      throw DataError(say::recording::Dictionary(
+          keys.Where("marker_dictionary"), name.substr(0, 60), MarkerDictionary::KnownNames()));
     }
-    camera.marker_dictionary = dictionary->name();
+    camera.room_markers.dictionary = dictionary->name();
   }
   if (keys.has("marker_length")) {
-    camera.marker_length_m = keys.Number("marker_length");
-    if (!(*camera.marker_length_m > 0 && *camera.marker_length_m < kMaxMarkerLength_m)) {
-      throw DataError(fmt::format(
-          "{} is {} m, expected more than 0 and less than {} m (the side of the black square)",
-          keys.Where("marker_length"), *camera.marker_length_m, kMaxMarkerLength_m));
+    camera.room_markers.length_m = keys.Number("marker_length");
+    if (!(*camera.room_markers.length_m > 0 &&
+          *camera.room_markers.length_m < kMaxMarkerLength_m)) {
+      throw DataError(say::recording::MarkerLength(
+          keys.Where("marker_length"), *camera.room_markers.length_m, kMaxMarkerLength_m));
     }
   }
   if (keys.has("reference_marker")) {
-    camera.reference_marker = keys.Integer("reference_marker");
-    if (*camera.reference_marker < 0 || *camera.reference_marker > kMaxMarkerId) {
-      throw DataError(fmt::format("{} is {}, expected a marker id from 0 to {}",
-                                  keys.Where("reference_marker"), *camera.reference_marker,
-                                  kMaxMarkerId));
+    camera.room_markers.reference = keys.Integer("reference_marker");
+    if (*camera.room_markers.reference < 0 || *camera.room_markers.reference > kMaxMarkerId) {
+      throw DataError(say::recording::MarkerId(keys.Where("reference_marker"),
+                                               *camera.room_markers.reference, kMaxMarkerId));
     }
   }
 }
@@ -329,40 +463,44 @@ void ReadMarkers(const Keys& keys, CameraFile& camera) {
 
 CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
   const Keys keys(text, name);
+  keys.CheckNames();
+  const bool is_equidistant = IsEquidistant(keys);
   CameraFile camera;
   camera.color.width = keys.Integer("image_width");
   camera.color.height = keys.Integer("image_height");
-  CheckSize(keys, camera.color, "colour");
+  CheckSize(keys, camera.color, say::recording::Colour());
   ReadCameraMatrix(keys, "camera_matrix", camera.color);
   if (keys.has("distortion_coefficients")) {
-    ReadDistortion(keys, "distortion_coefficients", camera.color);
+    ReadDistortion(keys, "distortion_coefficients", is_equidistant, camera.color);
   } else {
-    camera.warnings.push_back(fmt::format(
-        "{} has no distortion_coefficients: the lens is assumed to be free of distortion", name));
+    camera.warnings.push_back(say::recording::NoDistortion(name));
   }
   if (keys.has("depth_scale")) {
-    camera.depth_scale = keys.Number("depth_scale");
-    if (!(camera.depth_scale >= kMinDepthScale && camera.depth_scale <= kMaxDepthScale)) {
-      throw DataError(fmt::format(
-          "{} is {}, expected units per metre from {} to {} (1000 for millimetres)",
-          keys.Where("depth_scale"), camera.depth_scale, kMinDepthScale, kMaxDepthScale));
+    const double scale = keys.Number("depth_scale");
+    if (!(scale >= kMinDepthScale && scale <= kMaxDepthScale)) {
+      throw DataError(say::recording::DepthScale(keys.Where("depth_scale"), scale, kMinDepthScale,
+                                                 kMaxDepthScale));
     }
+    camera.depth_scale = scale;
   }
   ReadDepthCamera(keys, camera);
-  ReadDepthNoise(keys, camera);
+  ReadDepthSensor(keys, camera);
   ReadMarkers(keys, camera);
   return camera;
 } catch (const YAML::Exception& error) {
-  throw DataError(
-      fmt::format("{} cannot be read as YAML: {}", name, std::string(error.what()).substr(0, 200)));
+  throw DataError(say::recording::CameraUnreadable(name, std::string(error.what()).substr(0, 200)));
 }
 
 void TakeOver(const CameraFile& camera, StreamInfo& info) {
   info.intrinsics = camera.color;
+  if (camera.depth_sensor) {
+    info.depth_sensor = *camera.depth_sensor;
+    info.depth_noise = ClassOf(info.depth_sensor).noise;
+    info.usable_depth = ClassOf(info.depth_sensor).range;
+  }
   if (camera.depth_noise) info.depth_noise = *camera.depth_noise;
-  if (camera.marker_dictionary) info.marker_dictionary = *camera.marker_dictionary;
-  if (camera.marker_length_m) info.marker_length_m = *camera.marker_length_m;
-  if (camera.reference_marker) info.reference_marker = camera.reference_marker;
+  if (camera.usable_depth) info.usable_depth = *camera.usable_depth;
+  info.room_markers = camera.room_markers.Or(info.room_markers);
   info.warnings.insert(info.warnings.end(), camera.warnings.begin(), camera.warnings.end());
 }
 

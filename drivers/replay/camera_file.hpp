@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // camera.yaml of a recording: the camera and the markers of the scene.
 #pragma once
 
@@ -10,6 +11,7 @@
 #include "algo/base/pose.hpp"
 #include "algo/types/depth_noise.hpp"
 #include "algo/types/frame.hpp"
+#include "algo/types/marker.hpp"
 
 namespace plumb {
 
@@ -22,23 +24,26 @@ struct DepthCamera {
 /// The validated contents of camera.yaml.
 struct CameraFile {
   Intrinsics color;
-  double depth_scale = 5000.0;  ///< Units of a depth image per metre; TUM's 5000 by default.
+  std::optional<double> depth_scale;        ///< Units of a depth image per metre.
   std::optional<DepthCamera> depth_camera;  ///< Set only if the depth is not registered.
   bool depth_camera_unknown =
       false;  ///< Depth is not registered, and the file does not state the depth camera.
-  std::optional<std::string> marker_dictionary;
-  std::optional<double> marker_length_m;
-  std::optional<int> reference_marker;
+  StatedMarkers room_markers = {};
+  std::optional<DepthSensor> depth_sensor;
   std::optional<DepthNoise> depth_noise;
-  std::vector<std::string> warnings;
+  std::optional<UsableDepth> usable_depth;
+  std::vector<Message> warnings;
 };
 
-/// Reads OpenCV's FileStorage YAML. Keys: image_width, image_height, camera_matrix,
-/// distortion_coefficients, depth_scale, depth_registered, marker_dictionary, marker_length
-/// (metres), reference_marker, depth_noise (a map with each member of DepthNoise); for
-/// depth_registered 0 also depth_camera_matrix, depth_distortion_coefficients, T_color_depth (4x4)
-/// and, if they differ from the colour image's, depth_image_width and depth_image_height. Without
-/// the first three of these the depth camera is unknown, with a warning.
+/// Reads OpenCV's FileStorage YAML. A key that is not read is refused with the nearest known one,
+/// but for those that calibration programs write beside them. Keys: image_width, image_height,
+/// camera_matrix, distortion_coefficients, distortion_model (ROS's name), depth_scale,
+/// depth_registered, marker_dictionary, marker_length (metres), reference_marker,
+/// depth_sensor (a class of DepthSensor), depth_noise (a map with each member of DepthNoise),
+/// depth_range (nearest and farthest usable depth, metres); for depth_registered 0 also
+/// depth_camera_matrix, depth_distortion_coefficients, T_color_depth (4x4) and, if they differ from
+/// the colour image's, depth_image_width and depth_image_height. Without the first three of these
+/// the depth camera is unknown, with a warning.
 /// @param name  Name of the file for messages.
 /// @throws DataError naming file, key, what was found and what is expected.
 [[nodiscard]] CameraFile ParseCameraFile(std::string_view text, const std::string& name);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Estimates the depth camera from the images, for recordings whose depth is not registered to
 // colour and that do not state the depth camera.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Registers depth images of a separate depth camera to the colour image's pixel grid.
 #pragma once
 

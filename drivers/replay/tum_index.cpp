@@ -1,6 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/tum_index.hpp"
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,8 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
+#include "algo/base/statistics.hpp"
+#include "words/recording.hpp"
 
 namespace plumb {
 namespace {
@@ -36,30 +37,36 @@ std::string Quoted(std::string_view text) {
   return quoted + (text.size() > kMax ? "...\"" : "\"");
 }
 
-double ParseStamp(std::string_view token, const std::string& where) {
+double ParseStamp(std::string_view token, const Message& where) {
   const std::optional<double> time_s = ParseNumber<double>(token);
   if (!time_s || !std::isfinite(*time_s) || *time_s < 0) {
-    throw DataError(
-        fmt::format("{}: {} is not a time stamp, expected seconds", where, Quoted(token)));
+    throw DataError(say::recording::NotAStamp(where, Quoted(token)));
   }
   if (*time_s > kMaxTime_s) {
-    throw DataError(fmt::format(
-        "{}: time stamp {} is too large for seconds; convert milli- or nanoseconds to seconds",
-        where, Quoted(token)));
+    throw DataError(say::recording::StampTooLarge(where, Quoted(token)));
   }
   return *time_s;
 }
 
-void CheckFileName(std::string_view file, const std::string& where) {
+/// A name as programs of other systems write it: in quotes, with backslashes.
+std::string PlainName(std::string_view text) {
+  if (text.size() >= 2 && (text.front() == '"' || text.front() == '\'') &&
+      text.back() == text.front())
+    text = text.substr(1, text.size() - 2);
+  std::string name(text);
+  std::ranges::replace(name, '\\', '/');
+  return name;
+}
+
+void CheckFileName(std::string_view file, const Message& where) {
   if (file.find('\0') != std::string_view::npos)
-    throw DataError(fmt::format("{}: the file name contains a zero byte", where));
+    throw DataError(say::recording::FileNameZero(where));
   const std::filesystem::path path(file);
   const bool climbs = std::any_of(path.begin(), path.end(),
                                   [](const std::filesystem::path& part) { return part == ".."; });
-  if (path.is_absolute() || climbs) {
-    throw DataError(fmt::format(
-        "{}: file name {} leaves the recording's folder; list files inside it, relative to it",
-        where, Quoted(file)));
+  const bool has_drive = file.size() > 2 && file[1] == ':' && file[2] == '/';  // As C:/rgb/a.png.
+  if (path.is_absolute() || climbs || has_drive) {
+    throw DataError(say::recording::FileNameLeaves(where, Quoted(file)));
   }
 }
 
@@ -103,38 +110,51 @@ class BestChain {
 std::vector<IndexEntry> ParseIndex(std::string_view text, const std::string& name) {
   std::vector<IndexEntry> entries;
   std::size_t line_number = 0;
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
+    throw DataError(say::recording::ListUtf16(name));
+  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // What Windows' editors put first.
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
     std::string_view line = text.substr(0, end);
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     ++line_number;
-    const std::string where = fmt::format("{} line {}", name, line_number);
+    const Message where = say::recording::Line(name, line_number);
     if (line.size() > kMaxLine)
-      throw DataError(
-          fmt::format("{} has {} characters, at most {} are read", where, line.size(), kMaxLine));
+      throw DataError(say::recording::LineTooLong(where, line.size(), kMaxLine));
     line = Trimmed(line);
     if (line.empty() || line.front() == '#') continue;
 
     const auto blank = std::find_if(line.begin(), line.end(), IsBlank);
     const auto length = static_cast<std::size_t>(blank - line.begin());
     const double time_s = ParseStamp(line.substr(0, length), where);
-    const std::string_view file = Trimmed(line.substr(length));
-    if (file.empty())
-      throw DataError(
-          fmt::format("{}: the file name is missing, expected \"timestamp filename\"", where));
+    const std::string file = PlainName(Trimmed(line.substr(length)));
+    if (file.empty()) throw DataError(say::recording::FileNameMissing(where));
     CheckFileName(file, where);
     if (!entries.empty() && !(time_s > entries.back().time_s)) {
-      throw DataError(fmt::format(
-          "{}: time stamp {:.6f} {} the one before ({:.6f}); the list must rise strictly: sort it "
-          "and remove duplicates",
-          where, time_s, time_s == entries.back().time_s ? "repeats" : "is earlier than",
-          entries.back().time_s));
+      const double before_s = entries.back().time_s;
+      throw DataError(time_s == before_s ? say::recording::StampRepeats(where, time_s, before_s)
+                                         : say::recording::StampEarlier(where, time_s, before_s));
     }
     if (entries.size() == kMaxEntries)
-      throw DataError(fmt::format("{} lists more than {} images", name, kMaxEntries));
-    entries.push_back({time_s, std::string(file)});
+      throw DataError(say::recording::TooManyImages(name, kMaxEntries));
+    entries.push_back({time_s, file});
   }
   return entries;
+}
+
+double MedianPeriod(std::span<const IndexEntry> entries) {
+  std::vector<double> periods_s;
+  for (std::size_t i = 1; i < entries.size(); ++i)
+    periods_s.push_back(entries[i].time_s - entries[i - 1].time_s);
+  if (periods_s.empty()) return 0.0;
+  return TakeMedian(periods_s);
+}
+
+double LargestGap(std::span<const IndexEntry> color, std::span<const IndexEntry> depth,
+                  double least_s) {
+  // The nearest partner is at most half a period away; a tenth of that is added for jitter.
+  constexpr double kMaxGapPeriods = 0.55;
+  return std::max(least_s, kMaxGapPeriods * std::max(MedianPeriod(color), MedianPeriod(depth)));
 }
 
 std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color,

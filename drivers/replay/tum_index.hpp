@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The index files of a TUM RGB-D recording (rgb.txt, depth.txt) and the pairing of their colour and
 // depth images.
 #pragma once
@@ -9,6 +10,10 @@
 #include <vector>
 
 namespace plumb {
+
+/// A recording's list of the depth images, each a line of depth.txt, whose frames the computer
+/// followed with fewer keypoints (Frame::fewer_keypoints), so that they are computed again alike.
+inline constexpr const char* kFewerKeypointsFile = "fewer_keypoints.txt";
 
 /// One line of an index.
 struct IndexEntry {
@@ -25,6 +30,13 @@ struct IndexEntry {
 /// @throws DataError for anything else, for paths that are absolute or contain "..", and for more
 ///         than 1,000,000 entries.
 [[nodiscard]] std::vector<IndexEntry> ParseIndex(std::string_view text, const std::string& name);
+
+/// Typical time from one image to the next; 0 if there is only one.
+[[nodiscard]] double MedianPeriod(std::span<const IndexEntry> entries);
+
+/// How far apart the stamps of a pair may be: at least `least_s`, and more for slow streams.
+[[nodiscard]] double LargestGap(std::span<const IndexEntry> color,
+                                std::span<const IndexEntry> depth, double least_s);
 
 /// Positions of one colour and one depth image that belong together.
 struct IndexPair {

@@ -1,8 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/tum_recording.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
+#include <array>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -20,15 +20,17 @@
 #include "drivers/files/image_file.hpp"
 #include "drivers/replay/camera_file.hpp"
 #include "drivers/replay/depth_camera_search.hpp"
+#include "drivers/replay/foreign_calibration.hpp"
 #include "drivers/replay/registration.hpp"
 #include "drivers/replay/tum_index.hpp"
+#include "words/foreign.hpp"
+#include "words/recording.hpp"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxGapPeriods = 0.55;
 constexpr std::size_t kMaxIndexBytes = std::size_t{64} << 20;
 constexpr std::size_t kMaxCameraBytes = std::size_t{1} << 16;
 constexpr std::size_t kReadAhead = 3;
@@ -42,6 +44,7 @@ struct FramePlan {
   fs::path depth_file;
   double color_time_s = 0.0;
   double depth_time_s = 0.0;
+  bool fewer_keypoints = false;
 };
 
 /// A decoded frame, or the error that prevented it.
@@ -50,19 +53,79 @@ struct Decoded {
   std::exception_ptr error;
 };
 
+/// Names of what lies in the folder and is no recording of Plumb, but of another program.
+std::vector<std::string> ForeignNames(const fs::path& folder) {
+  constexpr std::array kNames = {
+      "associations.txt",      "color",          "depth",           "rgb",
+      "camera_intrinsic.json", "intrinsic.json", "transforms.json", "camera_matrix.csv",
+      "odometry.csv",          "metadata"};
+  constexpr std::array kEndings = {".bag",  ".mcap",      ".mkv",       ".db3", ".db", ".r3d",
+                                   ".sens", ".color.png", ".color.jpg", ".klg", ".oni"};
+  std::vector<std::string> found;
+  std::error_code ignored;
+  for (fs::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored)) {
+    const std::string name = entry->path().filename().string();
+    if (std::ranges::find(kNames, name) != kNames.end() ||
+        std::ranges::any_of(kEndings, [&](const char* e) { return name.ends_with(e); }))
+      found.push_back(name);
+  }
+  std::ranges::sort(found);  // Some are enough to know what it is.
+  if (found.size() > 4) found.resize(4);
+  return found;
+}
+
 std::vector<IndexEntry> ReadIndex(const fs::path& file) {
+  std::error_code ignored;
+  if (!fs::exists(file, ignored)) {
+    std::vector<std::string> names = ForeignNames(file.parent_path());
+    if (!names.empty())
+      throw DataError(say::recording::ListMissing(file.string(), std::move(names)));
+  }
   std::vector<IndexEntry> entries = ParseIndex(ReadTextFile(file, kMaxIndexBytes), file.string());
-  if (entries.empty()) throw DataError(fmt::format("{} lists no image", file.string()));
+  if (entries.empty()) throw DataError(say::recording::NoImages(file.string()));
   return entries;
 }
 
-/// Typical time from one image to the next; 0 if there is only one.
-double MedianPeriod(const std::vector<IndexEntry>& entries) {
-  std::vector<double> periods_s;
-  for (std::size_t i = 1; i < entries.size(); ++i)
-    periods_s.push_back(entries[i].time_s - entries[i - 1].time_s);
-  if (periods_s.empty()) return 0.0;
-  return TakeMedian(periods_s);
+/// Refuses stamps that cannot be seconds of a sweep, and warns of those that hardly can.
+void CheckPeriod(double period_s, const fs::path& list, std::vector<Message>& warnings) {
+  // Sensors deliver 5 to 90 images a second.
+  constexpr double kLeast_s = 0.001, kSlow_s = 0.5, kMost_s = 5.0;
+  if (period_s <= 0) return;
+  if (period_s < kLeast_s || period_s > kMost_s)
+    throw DataError(say::recording::StampsNotSeconds(list.string(), period_s));
+  if (period_s > kSlow_s) warnings.push_back(say::recording::StampsSlow(list.string(), period_s));
+}
+
+/// Names of files that may hold the calibration under another name.
+std::vector<std::string> CalibrationLikeNames(const fs::path& folder) {
+  std::vector<std::string> found;
+  std::error_code ignored;
+  for (fs::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored)) {
+    const std::string name = entry->path().filename().string();
+    const auto ends = [&](const char* ending) { return name.ends_with(ending); };
+    if (ends(".yaml") || ends(".yml") || ends(".xml") || ends(".json") || ends(".toml") ||
+        (ends(".txt") &&
+         (name.find("camera") != std::string::npos || name.find("calib") != std::string::npos ||
+          name.find("intrinsic") != std::string::npos)))
+      found.push_back(name);
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+/// Units per metre from the images themselves, where nothing states them: the two units in use
+/// differ by five, and a sensor that is held by hand looks at things 0.3 to 4 m away.
+double DepthUnitsByMedian(const std::vector<fs::path>& images) {
+  std::vector<double> values;
+  for (const fs::path& image : images) {
+    const cv::Mat units = ReadDepthImage(image);
+    for (int r = 4; r < units.rows; r += 8)
+      for (int c = 4; c < units.cols; c += 8)
+        if (const std::uint16_t z = units.at<std::uint16_t>(r, c); z > 0 && z != kSaturated)
+          values.push_back(z);
+  }
+  constexpr double kMillimetres = 1000.0, kTum = 5000.0, kFarthest_m = 4.0;
+  return !values.empty() && TakeMedian(values) > kFarthest_m * kMillimetres ? kTum : kMillimetres;
 }
 
 /// The real path of an image, which must be inside the recording's folder even through links.
@@ -71,34 +134,24 @@ fs::path Resolve(const fs::path& canonical_folder, const fs::path& index, const 
   fs::path file = fs::canonical(canonical_folder / entry.file, error);
   if (error) {
     throw DataError(
-        fmt::format("image {} of {} (stamp {:.6f}) cannot be found: {}; copy the recording again "
-                    "or remove the line",
-                    entry.file, index.string(), entry.time_s, error.message()));
+        say::recording::ImageMissing(entry.file, index.string(), entry.time_s, error.message()));
   }
   if (std::mismatch(canonical_folder.begin(), canonical_folder.end(), file.begin(), file.end())
           .first != canonical_folder.end()) {
-    throw DataError(fmt::format(
-        "image {} of {} is outside the recording's folder, at {}; copy it into the folder",
-        entry.file, index.string(), file.string()));
+    throw DataError(say::recording::ImageOutside(entry.file, index.string(), file.string()));
   }
   return file;
 }
 
 /// TUM's published nominal camera, for recordings without calibration.
-CameraFile AssumedCamera(const fs::path& first_image) {
-  const cv::Mat image = ReadColorImage(first_image);
-  if (image.cols * 3 != image.rows * 4) {
-    throw DataError(
-        fmt::format("the recording has no camera.yaml and its images are {}x{}: nominal intrinsics "
-                    "are known only for 4:3 "
-                    "(640x480, 320x240); add camera.yaml",
-                    image.cols, image.rows));
-  }
+CameraFile AssumedCamera(const fs::path& folder, int width, int height) {
+  if (width * 3 != height * 4) throw DataError(say::recording::NoNominalCamera(width, height));
   CameraFile camera;
-  camera.color = Resized(Intrinsics{}, image.cols, image.rows);
-  camera.warnings.push_back(fmt::format(
-      "no camera.yaml: assumed fx {} fy {} cx {} cy {}, no distortion and {} depth units per metre",
-      camera.color.fx, camera.color.fy, camera.color.cx, camera.color.cy, camera.depth_scale));
+  camera.color = Resized(Intrinsics{}, width, height);
+  camera.warnings.push_back(say::recording::CameraAssumed(camera.color.fx, camera.color.fy,
+                                                          camera.color.cx, camera.color.cy));
+  if (std::vector<std::string> names = CalibrationLikeNames(folder); !names.empty())
+    camera.warnings.push_back(say::recording::CameraOtherName(std::move(names)));
   return camera;
 }
 
@@ -110,30 +163,30 @@ cv::Mat ToMetres(const cv::Mat& depth_units, double units_per_metre) {
 }
 
 void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics& camera,
-                    const char* what) {
+                    const Message& what) {
   if (image.cols == camera.width && image.rows == camera.height) return;
-  throw DataError(
-      fmt::format("{} image {} has {}x{} pixels, expected {}x{} as the camera states; use the "
-                  "calibration of this image size",
-                  what, file.string(), image.cols, image.rows, camera.width, camera.height));
+  throw DataError(say::recording::ImageSize(what, file.string(), image.cols, image.rows,
+                                            camera.width, camera.height));
 }
 
 class TumRecording : public FrameSource {
  public:
   TumRecording(const fs::path& folder, const RecordingDefaults& defaults);
+  TumRecording(const ImageFolder& contents, const RecordingDefaults& defaults);
   [[nodiscard]] const StreamInfo& info() const override { return info_; }
   [[nodiscard]] std::optional<Frame> Next() override;
 
  private:
-  void FindFrames(const fs::path& folder, double least_max_gap_s);
+  void FindFrames(const ImageFolder& contents, double least_max_gap_s);
   void ReadCamera(const fs::path& folder, const RecordingDefaults& defaults);
+  void SetCamera(const CameraFile& camera, const RecordingDefaults& defaults);
   void SearchDepthCamera();
   [[nodiscard]] Decoded Decode(std::size_t i) const;
   void DecodeAll(const std::stop_token& stop);
 
   StreamInfo info_;
   std::vector<FramePlan> plans_;
-  double depth_scale_ = 5000.0;
+  double depth_scale_ = 0.0;  ///< Units per metre.
   Intrinsics depth_intrinsics_;
   std::optional<DepthRegistration> registration_;
 
@@ -145,37 +198,32 @@ class TumRecording : public FrameSource {
   std::jthread thread_;    ///< Last member: joined before the others are destroyed.
 };
 
-void TumRecording::FindFrames(const fs::path& folder, double least_max_gap_s) {
-  const fs::path color_index = folder / "rgb.txt";
-  const fs::path depth_index = folder / "depth.txt";
-  const std::vector<IndexEntry> color = ReadIndex(color_index);
-  const std::vector<IndexEntry> depth = ReadIndex(depth_index);
-  // The nearest partner is at most half a period away; a tenth of that is added for jitter.
-  const double max_gap_s = std::max(
-      least_max_gap_s, kMaxGapPeriods * std::max(MedianPeriod(color), MedianPeriod(depth)));
+void TumRecording::FindFrames(const ImageFolder& contents, double least_max_gap_s) {
+  const fs::path& folder = contents.folder;
+  const std::vector<IndexEntry>& color = contents.color;
+  const std::vector<IndexEntry>& depth = contents.depth;
+  CheckPeriod(MedianPeriod(color), contents.color_list, info_.warnings);
+  CheckPeriod(MedianPeriod(depth), contents.depth_list, info_.warnings);
+  const double max_gap_s = LargestGap(color, depth, least_max_gap_s);
   const std::vector<IndexPair> pairs = AssociateByTime(color, depth, max_gap_s);
   if (pairs.size() < kMinFrames) {
-    throw DataError(
-        fmt::format("recording {} has {} frame{} ({} colour and {} depth images, stamps at most "
-                    "{:.0f} ms apart), expected at "
-                    "least {}; are both lists of the same sweep and clock?",
-                    folder.string(), pairs.size(), pairs.size() == 1 ? "" : "s", color.size(),
-                    depth.size(), max_gap_s * 1e3, kMinFrames));
+    throw DataError(say::recording::FewFrames(folder.string(), pairs.size(), color.size(),
+                                              depth.size(), max_gap_s * 1e3, kMinFrames));
   }
   const fs::path canonical_folder = fs::canonical(folder);
   plans_.reserve(pairs.size());
   for (const IndexPair& pair : pairs) {
     const IndexEntry& c = color[pair.color];
     const IndexEntry& d = depth[pair.depth];
-    plans_.push_back({Resolve(canonical_folder, color_index, c),
-                      Resolve(canonical_folder, depth_index, d), c.time_s, d.time_s});
+    plans_.push_back(
+        {Resolve(canonical_folder, contents.color_list, c),
+         Resolve(canonical_folder, contents.depth_list, d), c.time_s, d.time_s,
+         std::ranges::binary_search(contents.fewer_keypoints, d.time_s, {}, &IndexEntry::time_s)});
   }
   const auto num_unmatched_color = std::ssize(color) - std::ssize(pairs);
   const auto num_unmatched_depth = std::ssize(depth) - std::ssize(pairs);
   if (num_unmatched_color > 0 || num_unmatched_depth > 0) {
-    info_.warnings.push_back(fmt::format(
-        "{} of {} colour and {} of {} depth images have no partner within {:.0f} ms "
-        "and are left out",
+    info_.warnings.push_back(say::recording::Unpaired(
         num_unmatched_color, color.size(), num_unmatched_depth, depth.size(), max_gap_s * 1e3));
   }
   info_.num_frames = std::ssize(plans_);
@@ -183,21 +231,34 @@ void TumRecording::FindFrames(const fs::path& folder, double least_max_gap_s) {
 
 void TumRecording::ReadCamera(const fs::path& folder, const RecordingDefaults& defaults) {
   const fs::path file = folder / "camera.yaml";
-  const bool given = fs::exists(fs::symlink_status(file));
-  const CameraFile camera =
-      given ? ParseCameraFile(ReadTextFile(file, kMaxCameraBytes), file.string())
-            : AssumedCamera(plans_.front().color_file);
-  info_.intrinsics_assumed = !given;
-  info_.marker_dictionary = defaults.marker_dictionary;
-  info_.marker_length_m = defaults.marker_length_m;
-  info_.reference_marker = defaults.reference_marker;
-  TakeOver(camera, info_);
-  if (!camera.marker_dictionary || !camera.marker_length_m) {
-    info_.warnings.push_back(
-        fmt::format("the recording does not state its markers: assumed {} with a side of {} m",
-                    info_.marker_dictionary, info_.marker_length_m));
+  if (fs::exists(fs::symlink_status(file)))
+    return SetCamera(ParseCameraFile(ReadTextFile(file, kMaxCameraBytes), file.string()), defaults);
+  const cv::Mat image = ReadColorImage(plans_.front().color_file);
+  if (auto found = FindForeignCalibration(folder, image.cols, image.rows)) {
+    info_.warnings.push_back(say::foreign::CalibrationUsed(found->file, found->camera.color.fx));
+    return SetCamera(found->camera, defaults);
   }
-  depth_scale_ = camera.depth_scale;
+  info_.intrinsics_assumed = true;
+  SetCamera(AssumedCamera(folder, image.cols, image.rows), defaults);
+}
+
+void TumRecording::SetCamera(const CameraFile& camera, const RecordingDefaults& defaults) {
+  info_.room_markers = defaults.room_markers;
+  TakeOver(camera, info_);
+  if (!camera.room_markers.dictionary || !camera.room_markers.length_m) {
+    info_.warnings.push_back(
+        say::recording::MarkersAssumed(info_.room_markers.dictionary, info_.room_markers.length_m));
+  }
+  if (camera.depth_scale) {
+    depth_scale_ = *camera.depth_scale;
+  } else {
+    std::vector<fs::path> images;
+    for (std::size_t i = 0; i < plans_.size(); i += plans_.size() / kSearchedPairs + 1)
+      images.push_back(plans_[i].depth_file);
+    depth_scale_ = DepthUnitsByMedian(images);
+    info_.depth_unit_assumed = true;
+    info_.warnings.push_back(say::recording::DepthScaleAssumed(depth_scale_));
+  }
   depth_intrinsics_ = camera.depth_camera ? camera.depth_camera->intrinsics : camera.color;
   if (camera.depth_camera)
     registration_.emplace(depth_intrinsics_, camera.color, camera.depth_camera->T_color_depth);
@@ -215,11 +276,7 @@ void TumRecording::SearchDepthCamera() {
   if (!found) return;
   const DepthCamera& depth = found->camera;
   registration_.emplace(depth.intrinsics, info_.intrinsics, depth.T_color_depth);
-  info_.warnings.push_back(fmt::format(
-      "edges of the depth images lie on those of the colour images if they are from a camera of "
-      "focal length {:.0f} px, {:.0f} mm beside the colour camera: depth is registered with that "
-      "estimate; state depth_camera_matrix, depth_distortion_coefficients and T_color_depth in "
-      "camera.yaml to be exact",
+  info_.warnings.push_back(say::recording::DepthCameraFound(
       depth.intrinsics.fx, 1e3 * depth.T_color_depth.translation().x()));
 }
 
@@ -229,10 +286,12 @@ Decoded TumRecording::Decode(std::size_t i) const {
   decoded.frame.index = static_cast<std::int64_t>(i);
   decoded.frame.color_time_s = plan.color_time_s;
   decoded.frame.depth_time_s = plan.depth_time_s;
+  decoded.frame.fewer_keypoints = plan.fewer_keypoints;
   decoded.frame.color_rgb = ReadColorImage(plan.color_file);
-  CheckImageSize(plan.color_file, decoded.frame.color_rgb, info_.intrinsics, "colour");
+  CheckImageSize(plan.color_file, decoded.frame.color_rgb, info_.intrinsics,
+                 say::recording::Colour());
   const cv::Mat depth_units = ReadDepthImage(plan.depth_file);
-  CheckImageSize(plan.depth_file, depth_units, depth_intrinsics_, "depth");
+  CheckImageSize(plan.depth_file, depth_units, depth_intrinsics_, say::recording::Depth());
   decoded.frame.depth_m = ToMetres(depth_units, depth_scale_);
   if (registration_) decoded.frame.depth_m = registration_->Register(decoded.frame.depth_m);
   return decoded;
@@ -257,14 +316,33 @@ void TumRecording::DecodeAll(const std::stop_token& stop) {
   }
 }
 
-TumRecording::TumRecording(const fs::path& folder, const RecordingDefaults& defaults) {
-  try {
-    FindFrames(folder, defaults.max_stamp_gap_s);
-    ReadCamera(folder, defaults);
-  } catch (const fs::filesystem_error& failure) {
-    throw DataError(
-        fmt::format("recording {} cannot be read: {}", folder.string(), failure.what()));
-  }
+/// The contents of a folder in TUM's layout, without its camera.
+ImageFolder TumContents(const fs::path& folder) {
+  ImageFolder contents;
+  contents.folder = folder;
+  contents.color_list = folder / "rgb.txt";
+  contents.depth_list = folder / "depth.txt";
+  contents.color = ReadIndex(contents.color_list);
+  contents.depth = ReadIndex(contents.depth_list);
+  const fs::path fewer = folder / kFewerKeypointsFile;
+  if (fs::exists(fs::symlink_status(fewer))) contents.fewer_keypoints = ReadIndex(fewer);
+  return contents;
+}
+
+TumRecording::TumRecording(const fs::path& folder, const RecordingDefaults& defaults) try {
+  FindFrames(TumContents(folder), defaults.max_stamp_gap_s);
+  ReadCamera(folder, defaults);
+} catch (const fs::filesystem_error& failure) {
+  throw DataError(say::recording::Unreadable(folder.string(), failure.what()));
+}
+
+TumRecording::TumRecording(const ImageFolder& contents, const RecordingDefaults& defaults) try {
+  info_.warnings = contents.warnings;
+  info_.intrinsics_assumed = contents.intrinsics_assumed;
+  FindFrames(contents, defaults.max_stamp_gap_s);
+  SetCamera(contents.camera, defaults);
+} catch (const fs::filesystem_error& failure) {
+  throw DataError(say::recording::Unreadable(contents.folder.string(), failure.what()));
 }
 
 std::optional<Frame> TumRecording::Next() {
@@ -281,21 +359,30 @@ std::optional<Frame> TumRecording::Next() {
   return std::move(decoded.frame);
 }
 
+void CheckDefaults(const RecordingDefaults& defaults) {
+  if (!(defaults.max_stamp_gap_s > 0 && defaults.room_markers.length_m > 0 &&
+        MarkerDictionary::Find(defaults.room_markers.dictionary))) {
+    throw std::invalid_argument("RecordingDefaults: gap, marker length or dictionary out of range");
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<FrameSource> OpenTumRecording(const fs::path& folder,
                                               const RecordingDefaults& defaults) {
-  if (!(defaults.max_stamp_gap_s > 0 && defaults.marker_length_m > 0 &&
-        MarkerDictionary::Find(defaults.marker_dictionary))) {
-    throw std::invalid_argument("RecordingDefaults: gap, marker length or dictionary out of range");
-  }
+  CheckDefaults(defaults);
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    throw DataError(fmt::format("recording {} is {}; expected a folder with rgb.txt and depth.txt",
-                                folder.string(),
-                                fs::exists(folder, error) ? "no folder" : "missing"));
+    throw DataError(fs::exists(folder, error) ? say::recording::NoFolder(folder.string())
+                                              : say::recording::Missing(folder.string()));
   }
   return std::make_unique<TumRecording>(folder, defaults);
+}
+
+std::unique_ptr<FrameSource> OpenImageFolder(ImageFolder contents,
+                                             const RecordingDefaults& defaults) {
+  CheckDefaults(defaults);
+  return std::make_unique<TumRecording>(contents, defaults);
 }
 
 bool IsTumRecording(const fs::path& folder) {

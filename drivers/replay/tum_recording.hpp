@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Streams a recording in the TUM RGB-D layout: a folder with rgb.txt, depth.txt, their images and
 // usually camera.yaml.
 #pragma once
@@ -7,21 +8,24 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "algo/types/frame.hpp"
 #include "algo/types/marker.hpp"
+#include "drivers/replay/camera_file.hpp"
+#include "drivers/replay/tum_index.hpp"
 
 namespace plumb {
 
 /// Defaults for everything that a recording does not state.
 struct RecordingDefaults {
-  std::string marker_dictionary = kDefaultMarkerDictionary;
-  double marker_length_m = kDefaultMarkerLength_m;
-  std::optional<int> reference_marker;
+  RoomMarkers room_markers = {};
   /// Largest difference between the stamps of a colour image and its depth image; 0.55 periods of
   /// the slower stream, if that is more, so that streams of a low rate that are half a period apart
   /// still pair.
   double max_stamp_gap_s = 0.020;
+  /// Images a second, for folders of images without time stamps.
+  std::optional<double> rate_hz = {};
 };
 
 /// Streams a recording. A separate thread decodes up to three frames ahead, in order, so that
@@ -32,14 +36,30 @@ struct RecordingDefaults {
 /// registered here, see DepthRegistration.
 ///
 /// Opening reads the index and camera.yaml and finds every image, without decoding any (except the
-/// first colour image if camera.yaml is missing; TUM's published intrinsics are then assumed,
-/// scaled to its size). Next() throws DataError for an image that is damaged or of another size
+/// first colour image if camera.yaml is missing: a calibration of another program in the folder is
+/// then taken, see FindForeignCalibration(), or TUM's published intrinsics are assumed, scaled to
+/// its size). Next() throws DataError for an image that is damaged or of another size
 /// than the camera; no frames follow.
 /// @throws DataError if anything is missing, damaged or contradictory, or there are fewer than two
 ///         frames.
 /// @throws std::invalid_argument if the defaults are invalid.
 [[nodiscard]] std::unique_ptr<FrameSource> OpenTumRecording(const std::filesystem::path& folder,
                                                             const RecordingDefaults& defaults = {});
+
+/// A recording in another layout, whose lists and camera its reader has found.
+struct ImageFolder {
+  std::filesystem::path folder;
+  std::filesystem::path color_list, depth_list;  ///< Where the entries are from, for messages.
+  std::vector<IndexEntry> color, depth;
+  std::vector<IndexEntry> fewer_keypoints;  ///< Of `depth`, see kFewerKeypointsFile.
+  CameraFile camera;
+  bool intrinsics_assumed = false;
+  std::vector<Message> warnings;
+};
+
+/// The same for a recording in another layout.
+[[nodiscard]] std::unique_ptr<FrameSource> OpenImageFolder(ImageFolder contents,
+                                                           const RecordingDefaults& defaults = {});
 
 /// True if the folder looks like a recording: it contains rgb.txt or depth.txt.
 [[nodiscard]] bool IsTumRecording(const std::filesystem::path& folder);

@@ -1,6 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/tum_writer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <opencv2/core.hpp>
@@ -9,6 +11,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
+#include "drivers/replay/tum_index.hpp"
 
 namespace plumb {
 namespace {
@@ -68,26 +71,34 @@ EncodedFrame EncodeFrame(const Frame& frame, const TumWriterOptions& options) {
   encoded.depth_time_s = frame.depth_time_s;
   encoded.color_file = options.jpeg_quality > 0 ? EncodeJpeg(frame.color_rgb, options.jpeg_quality)
                                                 : EncodePng(frame.color_rgb);
+  encoded.fewer_keypoints = frame.fewer_keypoints;
   encoded.depth_file = EncodePng(ToUnits(frame.depth_m, options.depth_scale));
   return encoded;
 }
 
 std::string CameraFileText(const StreamInfo& info, double depth_scale) {
   const Intrinsics& camera = info.intrinsics;
-  const auto& d = camera.distortion;
+  std::vector<std::string> lens;
+  for (const double coefficient : LensCoefficients(camera)) lens.push_back(Real(coefficient));
   std::string text = fmt::format(
       "%YAML:1.0\n---\n"
       "image_width: {}\nimage_height: {}\n"
       "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ {}, 0., {}, "
       "0., {}, {}, 0., 0., 1. ]\n"
-      "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ {}, "
-      "{}, {}, {}, {} ]\n"
+      "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: {}\n   dt: d\n   data: [ {} "
+      "]\n"
       "depth_scale: {}\ndepth_registered: 1\nmarker_dictionary: \"{}\"\nmarker_length: {}\n",
       camera.width, camera.height, Real(camera.fx), Real(camera.cx), Real(camera.fy),
-      Real(camera.cy), Real(d[0]), Real(d[1]), Real(d[2]), Real(d[3]), Real(d[4]),
-      Real(depth_scale), info.marker_dictionary, Real(info.marker_length_m));
-  if (info.reference_marker) text += fmt::format("reference_marker: {}\n", *info.reference_marker);
-  if (const DepthNoise& noise = info.depth_noise; noise != DepthNoise()) {
+      Real(camera.cy), lens.size(), fmt::join(lens, ", "), Real(depth_scale),
+      info.room_markers.dictionary, Real(info.room_markers.length_m));
+  if (info.room_markers.reference)
+    text += fmt::format("reference_marker: {}\n", *info.room_markers.reference);
+  const DepthSensorClass& of_class = ClassOf(info.depth_sensor);
+  if (info.depth_sensor != DepthSensor::kStructuredLight)
+    text += fmt::format("depth_sensor: {}\n", Name(info.depth_sensor));
+  if (const UsableDepth& range = info.usable_depth; range != of_class.range)
+    text += fmt::format("depth_range: [ {}, {} ]\n", Real(range.nearest_m), Real(range.farthest_m));
+  if (const DepthNoise& noise = info.depth_noise; noise != of_class.noise) {
     text += fmt::format(
         "depth_noise:\n   constant_m: {}\n   linear_m_per_m: {}\n   quadratic_m_per_m2: {}\n"
         "   origin_m: {}\n   grazing_m: {}\n",
@@ -117,11 +128,17 @@ void TumWriter::Add(const EncodedFrame& frame) {
   WriteWholeFile(folder_ / color_name, frame.color_file);
   WriteWholeFile(folder_ / depth_name, frame.depth_file);
   color_index_ += fmt::format("{:.6f} {}\n", frame.color_time_s, color_name);
-  depth_index_ += fmt::format("{:.6f} {}\n", frame.depth_time_s, depth_name);
+  const std::string line = fmt::format("{:.6f} {}\n", frame.depth_time_s, depth_name);
+  depth_index_ += line;
+  if (frame.fewer_keypoints) fewer_keypoints_ += line;
 }
 
 void TumWriter::Finish() {
   WriteWholeFile(folder_ / "camera.yaml", CameraFileText(info_, options_.depth_scale));
+  if (!fewer_keypoints_.empty())
+    WriteWholeFile(
+        folder_ / kFewerKeypointsFile,
+        "# depth maps of the frames that were followed with fewer keypoints\n" + fewer_keypoints_);
   WriteWholeFile(folder_ / "depth.txt", depth_index_);
   WriteWholeFile(folder_ / "rgb.txt", color_index_);
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes recordings in the TUM RGB-D layout that OpenTumRecording() reads.
 #pragma once
 
@@ -23,6 +24,7 @@ struct EncodedFrame {
   double depth_time_s = 0.0;
   std::vector<std::uint8_t> color_file;
   std::vector<std::uint8_t> depth_file;
+  bool fewer_keypoints = false;  ///< As in the frame.
 };
 
 /// Compresses one pair. Thread-safe: frames can be encoded in parallel and added in order.
@@ -55,6 +57,7 @@ class TumWriter {
   TumWriterOptions options_;
   std::string color_index_;
   std::string depth_index_;
+  std::string fewer_keypoints_;         ///< The lines of `depth_index_` whose frames are marked.
   std::optional<double> last_color_s_;  // Of the last pair.
   std::optional<double> last_depth_s_;
 };

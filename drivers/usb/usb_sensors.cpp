@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/usb/usb_sensors.hpp"
 
 #include <libusb.h>
@@ -11,12 +12,16 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "words/sensor.hpp"
+#include "words/stream.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr std::uint16_t kPrimeSense = 0x1d27;
 constexpr std::uint16_t kOrbbec = 0x2bc5;
+constexpr std::uint16_t kMicrosoft = 0x045e;
+constexpr std::uint16_t kIntel = 0x8086;
 
 struct Model {
   std::uint16_t vendor, product;
@@ -31,10 +36,17 @@ constexpr std::array kModels{Model{kPrimeSense, 0x0200, "PrimeSense device"},
                              Model{kPrimeSense, 0x1260, "PSLink sensor"},
                              Model{kPrimeSense, 0x1270, "PSLink sensor"},
                              Model{kPrimeSense, 0x1280, "PSLink sensor"},
-                             Model{0x045e, 0x02ae, "Kinect for Xbox 360"},
-                             Model{0x045e, 0x02bf, "Kinect for Windows"},
-                             Model{0x045e, 0x02c4, "Kinect 2"},
-                             Model{0x045e, 0x02d8, "Kinect 2"}};
+                             Model{kMicrosoft, 0x02ae, "Kinect for Xbox 360"},
+                             Model{kMicrosoft, 0x02bf, "Kinect for Windows"},
+                             Model{kMicrosoft, 0x02c4, "Kinect 2"},
+                             Model{kMicrosoft, 0x02d8, "Kinect 2"},
+                             Model{kMicrosoft, 0x097c, "Azure Kinect (depth)"},
+                             Model{kIntel, 0x0ad3, "RealSense D415"},
+                             Model{kIntel, 0x0b07, "RealSense D435"},
+                             Model{kIntel, 0x0b3a, "RealSense D435i"},
+                             Model{kIntel, 0x0b5b, "RealSense D405"},
+                             Model{kIntel, 0x0b5c, "RealSense D455"},
+                             Model{kIntel, 0x0b64, "RealSense L515"}};
 
 std::string SpeedText(int speed) {
   switch (speed) {
@@ -77,21 +89,16 @@ UsbSensor Describe(libusb_device* device, const libusb_device_descriptor& descri
   const std::string node = fmt::format("/dev/bus/usb/{:03}/{:03}", sensor.bus, sensor.address);
   sensor.permitted = ::access(node.c_str(), R_OK | W_OK) == 0;
   if (!sensor.permitted) {
-    sensor.problems.push_back(
-        fmt::format("no permission for {}: install Plumb's udev rule (or the package "
-                    "libopenni2-0), put the user into the group plumb, and plug the "
-                    "sensor in again",
-                    node));
+    sensor.problems.push_back(say::sensor::UsbPermission(node));
   }
   if (speed == LIBUSB_SPEED_LOW || speed == LIBUSB_SPEED_FULL) {
-    sensor.problems.push_back(fmt::format(
-        "it runs at {} only, too slow for images: use another port or cable, without a hub",
-        sensor.speed));
+    sensor.problems.push_back(say::sensor::UsbSlow(sensor.speed));
   }
-  if (BehindUsb3(device)) {
-    sensor.problems.push_back(
-        "it is on a USB 3 controller: old Xtion firmware fails there (no device, or set_interface "
-        "errors); if so use a USB 2 port, or update the firmware");
+  const bool needs_usb3 = !SdkOf(sensor.vendor, sensor.product).empty();
+  if (needs_usb3 && speed == LIBUSB_SPEED_HIGH)
+    sensor.problems.push_back(say::stream::Usb2(sensor.speed));
+  if (!needs_usb3 && BehindUsb3(device)) {
+    sensor.problems.push_back(say::sensor::Usb3());
   }
   return sensor;
 }
@@ -108,12 +115,18 @@ std::optional<std::string> UsbSensorModel(std::uint16_t vendor, std::uint16_t pr
   return std::nullopt;
 }
 
+std::string SdkOf(std::uint16_t vendor, std::uint16_t product) {
+  if (vendor == kIntel) return "librealsense2";
+  if (vendor == kMicrosoft && product == 0x097c) return "libk4a";
+  return {};
+}
+
 bool NeedsForeignDriver(std::uint16_t vendor) { return vendor != kPrimeSense; }
 
 std::vector<UsbSensor> ListUsbSensors() {
   libusb_context* context = nullptr;
   if (const int status = libusb_init(&context); status != 0)
-    throw DeviceError(fmt::format("libusb does not start: {}", libusb_error_name(status)));
+    throw DeviceError(say::sensor::UsbStart(libusb_error_name(status)));
   libusb_device** devices = nullptr;
   const ssize_t count = libusb_get_device_list(context, &devices);
   std::vector<UsbSensor> sensors;
@@ -126,8 +139,7 @@ std::vector<UsbSensor> ListUsbSensors() {
   if (count >= 0) libusb_free_device_list(devices, /*unref_devices=*/1);
   libusb_exit(context);
   if (count < 0) {
-    throw DeviceError(
-        fmt::format("libusb cannot list the bus: {}", libusb_error_name(static_cast<int>(count))));
+    throw DeviceError(say::sensor::UsbList(libusb_error_name(static_cast<int>(count))));
   }
   std::sort(sensors.begin(), sensors.end(), [](const UsbSensor& a, const UsbSensor& b) {
     return std::tie(a.bus, a.address) < std::tie(b.bus, b.address);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lists the depth cameras on the USB bus, and whether this user may open them. Their images,
 // plugging and unplugging are handled by the sensor drivers.
 #pragma once
@@ -7,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
+
 namespace plumb {
 
 struct UsbSensor {
@@ -14,16 +17,19 @@ struct UsbSensor {
   int address = 0;
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
-  std::string model;                  ///< For example "Xtion Pro Live".
-  std::string speed;                  ///< For example "480 Mbit/s"; empty if unknown.
-  bool permitted = true;              ///< This user may open it.
-  std::vector<std::string> problems;  ///< Actual and possible obstacles, each with a remedy.
+  std::string model;              ///< For example "Xtion Pro Live".
+  std::string speed;              ///< For example "480 Mbit/s"; empty if unknown.
+  bool permitted = true;          ///< This user may open it.
+  std::vector<Message> problems;  ///< Actual and possible obstacles, each with a remedy.
   bool operator==(const UsbSensor&) const = default;
 };
 
-/// Depth cameras that have a driver of OpenNI2, by USB id; nothing for other devices.
+/// Depth cameras that Plumb can use, by USB id; nothing for other devices.
 [[nodiscard]] std::optional<std::string> UsbSensorModel(std::uint16_t vendor,
                                                         std::uint16_t product);
+/// The maker's library by which a program delivers the frames of such a sensor to the driver
+/// "stream"; empty for sensors that have a driver of OpenNI2.
+[[nodiscard]] std::string SdkOf(std::uint16_t vendor, std::uint16_t product);
 /// Debian's OpenNI2 has no driver for sensors of this vendor: it comes from their maker.
 [[nodiscard]] bool NeedsForeignDriver(std::uint16_t vendor);
 

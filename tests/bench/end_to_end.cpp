@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The end-to-end table: what one scan and one comparison cost, with the accuracy they gave, beside
 // the paper and its peers.
 //
@@ -21,13 +22,13 @@
 #include <unistd.h>
 
 #include "algo/comparison/comparison.hpp"
-#include "algo/reconstruction/global_icp.hpp"
-#include "algo/reconstruction/paper_reconstruction.hpp"
+#include "algo/published/global_icp.hpp"
+#include "algo/published/paper_reconstruction.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "daemon/evaluation/evaluation.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
-#include "drivers/simulated/suite.hpp"
+#include "drivers/simulator/suites/suite.hpp"
 #include "tests/bench/measured_run.hpp"
 
 namespace plumb {

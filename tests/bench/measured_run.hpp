@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the benchmark programs share: the cost of a piece of work, and a recording in memory.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Plumb's joint registration beside Open3D's and PCL's, on the same keyframes.
 //
 //   plumb_bench_peers SUITE [SCENE...]     the first scene if none is named
@@ -30,12 +31,12 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/geometry/back_projection.hpp"
-#include "algo/reconstruction/global_icp.hpp"
-#include "algo/reconstruction/height_maps.hpp"
-#include "algo/reconstruction/joint_registration.hpp"
-#include "algo/reconstruction/paper_reconstruction.hpp"
+#include "algo/published/global_icp.hpp"
+#include "algo/published/paper_reconstruction.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/reconstruction/trajectory.hpp"
+#include "algo/registration/joint_registration.hpp"
+#include "algo/surface/height_maps.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "daemon/evaluation/evaluation.hpp"
 #include "tests/bench/measured_run.hpp"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How plumb_bench_peers calls other libraries: one row of its table for each method.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Open3D's multiway registration, as in its tutorial of that name: ICP of pairs, their information
 // matrices, then a pose graph. The tutorial's coarse ICP is left out, because the tracker's poses
 // replace it. Started from the true poses, or from poses that were 10 mm off, its error was within

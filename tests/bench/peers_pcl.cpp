@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // PCL's generalised ICP of each view against the map of the views before it. Started from the true
 // poses, or from poses that were 10 mm off, its error was within 1.3 mm of the one that it has from
 // the tracker's poses (placement_1 of the suite nine, seed 41), so the start is not what limits it.

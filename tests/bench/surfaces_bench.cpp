@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The stages after the sweep, at the paper's size: 15 keyframes of 640x480. Each line shows the
 // paper's seconds for the same work (its table of computing times, i7-4700HQ laptop) and the
 // accuracy on exact truth beside the time.
@@ -7,13 +8,13 @@
 #include <cmath>
 #include <random>
 
-#include "algo/geometry/poisson_disk.hpp"
 #include "algo/geometry/rigid_fit.hpp"
-#include "algo/reconstruction/global_icp.hpp"
-#include "algo/reconstruction/height_maps.hpp"
-#include "algo/reconstruction/paper_reconstruction.hpp"
-#include "algo/reconstruction/surface_cloud.hpp"
-#include "algo/reconstruction/surface_mesh.hpp"
+#include "algo/published/global_icp.hpp"
+#include "algo/published/paper_reconstruction.hpp"
+#include "algo/published/poisson_disk.hpp"
+#include "algo/surface/height_maps.hpp"
+#include "algo/surface/surface_cloud.hpp"
+#include "algo/surface/surface_mesh.hpp"
 #include "tests/support/analytic_scene.hpp"
 
 namespace plumb {

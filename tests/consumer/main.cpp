@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Uses the method as another project would: a rigid fit, comparisons of two empty scenes and of a
 // body that has moved, and a reconstructor that rejects bad input.
 #include <cmath>
@@ -28,7 +29,8 @@ plumb::Scene Torso(unsigned seed, double up_m) {
 /// Whether a body that has risen by 8 mm is to be moved down by as much.
 bool FindsTheCorrection() {
   const plumb::Comparison comparison = plumb::Compare(Torso(10, 0.0), Torso(17, 0.008));
-  for (const std::string& reason : comparison.reasons) std::puts(reason.c_str());
+  for (const std::string& reason : plumb::EnglishTexts(comparison.reasons))
+    std::puts(reason.c_str());
   if (comparison.verdict != plumb::Verdict::kMove || !comparison.correction) return false;
   const plumb::CouchNumbers& numbers = comparison.correction->value;
   std::printf("vertical %.2f mm, longitudinal %.2f mm, lateral %.2f mm, yaw %.3f deg\n",
@@ -56,13 +58,13 @@ int main() {
     std::puts("two empty scenes were given an answer");
     return 1;
   }
-  std::puts(comparison.reasons.front().c_str());
+  std::puts(comparison.reasons.front().English().c_str());
   if (!FindsTheCorrection()) {
     std::puts("the correction of a body that has moved was not found");
     return 1;
   }
   plumb::StreamInfo info;
-  info.marker_dictionary = "NO_SUCH_DICTIONARY";
+  info.room_markers.dictionary = "NO_SUCH_DICTIONARY";
   try {
     const plumb::Reconstructor reconstructor(info, {});
     std::puts("an unknown dictionary was accepted");

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Installs the library into a folder of its own, builds a project against it and runs that.
 file(REMOVE_RECURSE ${WORK})
 file(COPY ${SOURCE}/../support/synthetic_scene.cpp ${SOURCE}/../support/synthetic_scene.hpp

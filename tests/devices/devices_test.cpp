@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The commands around sensors and prints, through the real binary: record, .oni files, markers,
 // doctor.
 #include <fstream>
@@ -157,19 +158,20 @@ TEST_F(DevicesTest, ABurnInWithoutADiskToWriteToIsAFault) {
 }
 
 TEST(BurnInTest, AResultThatDiffersIsFound) {
-  EXPECT_EQ(FirstDifference("same", "same"), "");
-  EXPECT_THAT(FirstDifference("same", "samy"), HasSubstr("byte 3"));
-  EXPECT_THAT(FirstDifference("same", "sam"), HasSubstr("3 bytes instead of 4"));
+  EXPECT_TRUE(FirstDifference("same", "same").empty());
+  EXPECT_THAT(FirstDifference("same", "samy").English(), HasSubstr("byte 3"));
+  EXPECT_THAT(FirstDifference("same", "sam").English(), HasSubstr("3 bytes instead of 4"));
 }
 
 TEST(BurnInTest, AFlippedBitInMemoryIsFound) {
   constexpr std::size_t kBytes = 1 << 16;
-  EXPECT_EQ(TestMemory(kBytes, 1), "");
+  EXPECT_TRUE(TestMemory(kBytes, 1).empty());
   for (const int bit : {0, 63}) {
     EXPECT_THAT(TestMemory(kBytes, 1,
                            [bit](std::uint64_t* words, std::size_t count) {
                              words[count - 1] ^= std::uint64_t{1} << bit;
-                           }),
+                           })
+                    .English(),
                 HasSubstr("wrote"));
   }
 }
@@ -177,20 +179,22 @@ TEST(BurnInTest, AFlippedBitInMemoryIsFound) {
 TEST(BurnInTest, AByteThatTheDiskChangesOrLosesIsFound) {
   const testing::TempFolder folder;
   constexpr std::size_t kBytes = 1 << 16;
-  EXPECT_EQ(TestDisk(folder.path(), kBytes, 1), "");
+  EXPECT_TRUE(TestDisk(folder.path(), kBytes, 1).empty());
   EXPECT_THAT(TestDisk(folder.path(), kBytes, 1,
                        [](const std::filesystem::path& file) {
                          std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
                          out.seekp(kBytes - 1);
                          out.put('\0').put('\1');
-                       }),
+                       })
+                  .English(),
               ::testing::Not(IsEmpty()));
   EXPECT_THAT(TestDisk(folder.path(), kBytes, 1,
                        [](const std::filesystem::path& file) {
                          std::filesystem::resize_file(file, kBytes - 1);
-                       }),
+                       })
+                  .English(),
               HasSubstr("does not hold what was written"));
-  EXPECT_THAT(TestDisk(folder / "none", kBytes, 1), HasSubstr("cannot write"));
+  EXPECT_THAT(TestDisk(folder / "none", kBytes, 1).English(), HasSubstr("cannot write"));
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any text as camera.yaml.
 #include "drivers/replay/camera_file.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any line at the control socket; what is understood must read back the same.
 #include "daemon/control/control_protocol.hpp"
 

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // What plumbd and the command line read beside recordings and scenes. The first byte chooses the
 // reader: configuration, region, sensor profile, stored result.
 #include <string>
 
 #include "daemon/config/config.hpp"
+#include "daemon/database/store_json.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
-#include "daemon/records/store_json.hpp"
 #include "tests/fuzz/fuzz_one.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What every fuzz target does with one input: the reader may refuse it with DataError; anything
 // else is a finding.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any text as an index; where it is one, it is paired with itself, which must find every image.
 #include <cstdlib>
 

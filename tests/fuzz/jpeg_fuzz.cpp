@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any bytes as a colour image (JPEG by the seeds).
 #include "drivers/files/image_file.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any bytes as an .oni file, and as the file beside it.
 #include <algorithm>
 

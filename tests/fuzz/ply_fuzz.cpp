@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any bytes as a PLY, cloud and mesh.
 #include "daemon/files/ply_file.hpp"
 

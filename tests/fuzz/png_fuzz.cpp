@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any bytes as a PNG, read as colour and as depth. Check sums are set right first: a mutation would
 // hardly ever pass them.
 #include <zlib.h>

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any text as scene.json and as sensitivity.json.
-#include "daemon/files/scene_json.hpp"
 #include "daemon/files/sensitivity_json.hpp"
+#include "daemon/files/stored_scene.hpp"
 
 #include "tests/fuzz/fuzz_one.hpp"
 

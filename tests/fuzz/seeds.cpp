@@ -1,14 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes small good inputs for each fuzz target: plumb_fuzz_seeds FOLDER makes FOLDER/png,
 // FOLDER/jpeg and so on.
 #include <filesystem>
 #include <opencv2/core.hpp>
 
 #include "daemon/files/ply_file.hpp"
-#include "daemon/files/scene_json.hpp"
+#include "daemon/files/stored_scene.hpp"
 #include "daemon/files/trajectory_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 #include "drivers/replay/tum_writer.hpp"
+#include "tests/support/result_with.hpp"
+#include "tests/unit/importers/bag_writer.hpp"
+#ifdef PLUMB_WITH_DICOM
+#include "tests/unit/dicom/small_files.hpp"
+#endif
 
 namespace plumb {
 namespace {
@@ -54,9 +60,43 @@ void WriteOni(const fs::path& root) {
                  std::string_view("a: 1\ncolor_begin_us: 17\ndepth_begin_us: 18\n"));
 }
 
+#ifdef PLUMB_WITH_DICOM
+void WriteDicom(const fs::path& root) {
+  const auto [structures, plan] =
+      SmallCt({.quirks = {simulated::CtQuirk::kPoints, simulated::CtQuirk::kHoles}});
+  WriteWholeFile(Folder(root / "dicom") / "structures", std::string_view(DicomBytes(structures)));
+  WriteWholeFile(root / "dicom/plan", std::string_view(DicomBytes(plan)));
+}
+#endif
+
+void WriteRecorded(const fs::path& root) {
+  testing::BagWriter bag(testing::BagWriter::Packing::kLz4);
+  for (const bool is_depth : {true, false}) {
+    const char* const topic =
+        is_depth ? "/device_0/sensor_0/Depth_0" : "/device_0/sensor_1/Color_0";
+    const char* const encoding = is_depth ? "mono16" : "rgb8";
+    const int bytes = is_depth ? 2 : 3;
+    const testing::BagStreamTruth stream = {
+        .topic = topic, .width = 4, .height = 4, .encoding = encoding, .f = 4, .cx = 2, .cy = 2};
+    bag.Camera(stream);
+    bag.Pose(stream, {0.01, 0, 0});
+    bag.Image(stream, std::string(static_cast<std::size_t>(16 * bytes), 'a'), 1.0, 1.0);
+    bag.KeyValue(stream.topic + "/image/metadata", "Sensor Timestamp", "1000000", 1.0);
+  }
+  WriteWholeFile(Folder(root / "bag") / "lz4", bag.Finish());
+  const fs::path stream = Folder(root / "stream");
+  const std::vector<std::string> texts = {
+      R"({"fx": 600, "fy": 600, "cx": 320, "cy": 240, "depth_scale": 1000})",
+      "Camera.fx: 517.3\nCamera.fy: 516.5\nCamera.cx: 318.6\nCamera.cy: 255.3\n",
+      "585.5 0 320\n0 586 240\n0 0 1\n",
+      R"({"protocol":"plumb stream","version":1,"serial":"a","camera":{"image_width":640,"image_height":480,"camera_matrix":[600,0,320,0,600,240,0,0,1],"distortion_coefficients":[0,0,0,0,0],"depth_scale":1000}})"};
+  for (std::size_t i = 0; i < texts.size(); ++i)
+    WriteWholeFile(stream / std::to_string(i), static_cast<char>(i) + texts[i]);
+}
+
 void WriteTexts(const fs::path& root) {
   StreamInfo info;
-  info.reference_marker = 3;
+  info.room_markers.reference = 3;
   const std::string camera = CameraFileText(info, 5000);
   WriteWholeFile(Folder(root / "camera") / "registered", camera);
   info.depth_noise.constant_m = 0.003;
@@ -68,20 +108,26 @@ void WriteTexts(const fs::path& root) {
       "depth_distortion_coefficients: [ 0.1, 0., 0., 0., 0. ]\n"
       "T_color_depth: [ 1., 0., 0., 0.02, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1. ]");
   WriteWholeFile(root / "camera/unregistered", depth_camera);
+  info.intrinsics.distortion = {0.51, -2.74, 0.0006, -0.0002, 1.64, 0.39, -2.55, 1.56};
+  WriteWholeFile(root / "camera/rational", CameraFileText(info, 5000));
+  WriteWholeFile(root / "camera/equidistant",
+                 "image_width: 640\nimage_height: 480\ndistortion_model: equidistant\n"
+                 "camera_matrix: [ 600., 0., 320., 0., 600., 240., 0., 0., 1. ]\n"
+                 "distortion_coefficients: [ -0.012, 0.031, -0.022, 0.004 ]\n");
   WriteWholeFile(
       Folder(root / "index") / "rgb",
       std::string_view("# c\n1.0 rgb/1.png\n1.033 rgb/2.png\r\n1305031102.175304 a b.png\n"));
 
   Scene scene;
   scene.frame = SceneFrame::kReferenceMarker;
-  scene.marker_dictionary = "DICT_6X6_250";
-  scene.marker_length_m = 0.104;
-  scene.reference_marker = 5;
+  scene.room_markers.dictionary = "DICT_6X6_250";
+  scene.room_markers.length_m = 0.104;
+  scene.room_markers.reference = 5;
   scene.markers[5] = {CornersInMarkerFrame(0.104), 4, 0.001};
   scene.height_map.emplace(GridShape{0, 0, 0.0015, 4, 3});
   scene.keyframes = {{1.0, Pose::Identity()}, {2.0, Pose::Identity()}};
   scene.timings_s["mesh"] = 0.1;
-  scene.warnings = {"w"};
+  scene.warnings = {Message::Verbatim("w")};
   WriteWholeFile(Folder(root / "scene") / "scene", SceneJson(scene));
   WriteWholeFile(Folder(root / "trajectory") / "two", TrajectoryText(scene.keyframes));
 
@@ -128,7 +174,7 @@ void WriteDaemon(const fs::path& root) {
       "[reconstruct]\nuse_row_motion = false\n[compare]\nmin_coverage = 0.8\n",
       R"({"format":1,"frame":"reference_marker","polygon_m":[[0,0],[1,0],[1,1]]})",
       R"({"format":"plumb sensor profile","version":1,"sweeps":1,"stated_intrinsics":{},"mean":[]})",
-      R"({"verdict":"move","reasons":["a"],"correction":{"vertical_mm":1,"uncertainty":{}}})"};
+      testing::ResultWith(R"({"verdict":"move","reasons":["a"]})")};
   for (std::size_t i = 0; i < texts.size(); ++i)
     WriteWholeFile(daemon / std::to_string(i), static_cast<char>(i) + texts[i]);
 }
@@ -141,6 +187,10 @@ int main(int argc, char** argv) {
   const std::filesystem::path root = argv[1];
   plumb::WriteImages(root);
   plumb::WriteOni(root);
+  plumb::WriteRecorded(root);
+#ifdef PLUMB_WITH_DICOM
+  plumb::WriteDicom(root);
+#endif
   plumb::WriteTexts(root);
   plumb::WriteWeb(root);
   plumb::WriteDaemon(root);

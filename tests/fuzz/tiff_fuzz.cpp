@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any bytes as a float TIFF.
 #include "drivers/files/image_file.hpp"
 

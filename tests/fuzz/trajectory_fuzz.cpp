@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any text as a trajectory.
 #include "daemon/files/trajectory_file.hpp"
 

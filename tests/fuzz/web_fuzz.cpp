@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // What browsers send: bodies, headers, paths. The first byte chooses the reader; each either takes
 // the text or refuses it.
 #include <cstdlib>
 
 #include "tests/fuzz/fuzz_one.hpp"
-#include "web/api/json.hpp"
+#include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/router.hpp"
 

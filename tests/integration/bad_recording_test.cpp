@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Damaged and contradictory recordings: exit 3, a message that names the trouble, nothing left
 // behind.
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/integration/command_line.hpp"
 
 #include <algorithm>
@@ -62,6 +63,24 @@ const fs::path& SmallSuite() {
   return suite;
 }
 
+const fs::path& SmallLiveSuite() {
+  static const fs::path suite = [] {
+    const fs::path target = fs::path(PLUMB_INTEGRATION_DATA) / "live-suite";
+    MakeOnce(target, {"simulate", "--suite", "live", "--live", "live_steps", "live_two_left",
+                      "live_two_right", "--live-seconds", "20", "--frames", "60", "--rate", "8",
+                      "--size", "320x240", "--seed", "5", "--out", target});
+    return target;
+  }();
+  return suite;
+}
+
+fs::path SmallLiveScene() {
+  const fs::path target = fs::path(PLUMB_INTEGRATION_DATA) / "live-scene";
+  const fs::path recording = SmallLiveSuite() / "recordings" / "moved";
+  MakeOnce(target, {"reconstruct", recording, "--out", target});
+  return target;
+}
+
 const std::vector<std::string>& SmallNames() {
   static const auto names = nlohmann::json::parse(ReadText(SmallSuite() / "suite.json"))
                                 .at("scenes")
@@ -79,8 +98,11 @@ fs::path SmallScene(const std::string& name) {
 }
 
 fs::path SharedData(const std::string& name) {
-  const fs::path folder = fs::path(PLUMB_SOURCE_DIR) / ".." / "shared" / "data" / name;
-  return fs::is_directory(folder) ? fs::canonical(folder) : fs::path();
+  const fs::path data = fs::path(PLUMB_SOURCE_DIR) / ".." / "shared" / "data";
+  if (!fs::is_directory(data)) return {};
+  if (!fs::is_directory(data / name))
+    throw std::runtime_error("no folder " + name + " in " + fs::canonical(data).string());
+  return fs::canonical(data / name);
 }
 
 std::string ReadText(const fs::path& file) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What all tests of the real binary share: running it, and small simulated recordings made once.
 #pragma once
 
@@ -25,10 +26,18 @@ namespace fs = std::filesystem;
 [[nodiscard]] fs::path SmallRecording(const std::string& name);
 [[nodiscard]] fs::path SmallScene(const std::string& name);
 
+/// A small suite of a sensor at rest: two sweeps, and 20 s in which the body breathes and, after
+/// 13 s, is moved by 2 mm, after 17 s by 3 mm across.
+[[nodiscard]] const fs::path& SmallLiveSuite();
+/// The scene of the body that it is over.
+[[nodiscard]] fs::path SmallLiveScene();
+
 /// Names of the suite's scenes in order: the reference first.
 [[nodiscard]] const std::vector<std::string>& SmallNames();
 
-/// The recordings of ../shared/data, or an empty path where they are not there.
+/// A folder of ../shared/data, which is beside the repository, not in it. Empty where there is no
+/// such data at all. Where there is some, one that is missing is a test that must not be left out.
+/// @throws std::runtime_error
 [[nodiscard]] fs::path SharedData(const std::string& name);
 
 [[nodiscard]] std::string ReadText(const fs::path& file);
@@ -49,3 +58,9 @@ class CommandLineTest : public testing::Test {
 };
 
 }  // namespace plumb
+
+/// Defines `folder` as SharedData(name), in the body of a test; leaves the test out without the
+/// data.
+#define PLUMB_SHARED_DATA(folder, name)                           \
+  const std::filesystem::path folder = ::plumb::SharedData(name); \
+  if (folder.empty()) GTEST_SKIP() << "../shared/data is not there: " << (name)

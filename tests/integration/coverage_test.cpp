@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether the stated intervals and verdicts are honest, on units of the simulator that nothing was
 // chosen on. Takes minutes: ctest --test-dir build/release -C Long -L long -R Coverage
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A backup of many scans while a real plumbd scans: the sweep is not disturbed, and what is
 // restored is what was stored.
 #include <atomic>
@@ -8,10 +9,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/records/backup.hpp"
+#include "daemon/archive/backup.hpp"
 #include "daemon/records/store.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/result_with.hpp"
 #include "tests/support/sanitized.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/records/scan_folder.hpp"
@@ -39,7 +41,7 @@ TEST(DaemonBackupTest, ABackupOf200ScansDisturbsNoSweepAndIsRestoredByteIdentica
       WriteWholeFile(store.folders.Staging(id) / "scene" / "cloud.ply",
                      std::string(std::size_t{200} << 10, static_cast<char>('a' + i % 26)) + id);
       store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
-                              .result_json = R"({"verdict":"in_tolerance"})",
+                              .result_json = testing::ResultWith(R"({"verdict":"in_tolerance"})"),
                               .swept_area_m2 = 1.0});
     }
   }

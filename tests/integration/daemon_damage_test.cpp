@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // State folders that a disk, a person or another program has damaged, under a real plumbd: it
 // starts each time, its page says what is wrong, and nothing that it does not understand is
 // deleted.
@@ -104,13 +105,7 @@ class DaemonDamageTest : public ::testing::Test {
     Plumbd plumbd(folder);
     ASSERT_TRUE(plumbd.WaitUntilUp()) << plumbd.log();
     plumbd.WaitForState("ready");
-    HttpClient client(plumbd.port());
-    ASSERT_EQ(
-        client
-            .Post("/api/v1/setup",
-                  {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}})
-            .status,
-        200);
+    (void)plumbd.MakeFirstAccount();
     plumbd.ScanOnce();
     ASSERT_EQ(plumbd.Stop(), 0);
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Disks that become or are read-only under a real plumbd. Mounting needs root; without it,
 // these tests are skipped.
 #include <algorithm>
@@ -110,13 +111,7 @@ class DaemonDiskTest : public ::testing::Test {
   /// The first account, and a reference of the demo's patient.
   static void Fill(Plumbd& plumbd) {
     plumbd.WaitForState("ready");
-    HttpClient client(plumbd.port());
-    ASSERT_EQ(
-        client
-            .Post("/api/v1/setup",
-                  {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}})
-            .status,
-        200);
+    (void)plumbd.MakeFirstAccount();
     plumbd.ScanOnce();
   }
 
@@ -175,19 +170,28 @@ TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskItSaysSoAndReferencesCanBeRead) {
 
 TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskAfterAPowerCutItReadsTheLogToo) {
   MountMemory();
+  int newest = 0;
   {
     Plumbd plumbd(folder_.path());
     ASSERT_TRUE(plumbd.WaitUntilUp());
     Fill(plumbd);
+    HttpClient client(plumbd.port());
+    ASSERT_EQ(client.LogIn("engineer", kPassword), 200);
+    newest = client.Get("/api/v1/audit").json()["entries"].at(0)["number"].get<int>();
     plumbd.Signal(SIGKILL);
     plumbd.Wait();
   }
-  ASSERT_GT(fs::file_size(state() / "plumb.db-wal"), 0U) << "the reference is in the log only";
+  ASSERT_GT(fs::file_size(state() / "plumb.db-wal"), 0U)
+      << "the login is in the log of writes only";
   SetReadOnly(true);
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("fault");
   ExpectReadable(plumbd);
+  HttpClient client(plumbd.port());
+  ASSERT_EQ(client.LogIn("engineer", kPassword), 200);
+  // That the log was looked at was written down, too.
+  EXPECT_GE(client.Get("/api/v1/audit").json()["entries"].at(0)["number"].get<int>(), newest);
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What goes wrong around a real plumbd: sensors that go and stall, signals, power cuts, full and
 // broken disks.
 #include <chrono>
@@ -11,8 +12,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "daemon/control/unix_socket.hpp"
 #include "daemon/records/store.hpp"
+#include "drivers/files/unix_socket.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/sanitized.hpp"
@@ -121,7 +122,7 @@ TEST_F(DaemonFaultTest, AProcessThatWasStoppedFailsTheSweepWithoutBlamingTheSens
   plumbd.WaitForState("ready");
   const auto stop_for = [&](std::chrono::milliseconds time) {
     plumbd.Signal(SIGSTOP);
-    std::this_thread::sleep_for(time);
+    std::this_thread::sleep_for(time);  // how long it stood still is tested
     plumbd.Signal(SIGCONT);
   };
   plumbd.Press();

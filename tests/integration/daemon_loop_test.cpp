@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 // Nothing on plumbd's event loop takes over 10 ms: the real process measures it itself, over
 // a day's typical use.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 
 #include <cstdio>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -21,10 +24,13 @@ using test::kPassword;
 using testing::Plumbd;
 
 constexpr bool kJudges = !testing::kIsSanitized;  // several times slower: only reported
-/// Seen by hand on a busy machine (load 8 to 10): 5 of 470 000 turns, all of them moving bytes
-/// only, with 10 to 14 ms of own time; probably interrupts, which the kernel charges to the
-/// running process. Work that takes too long does so every time.
+/// Work that takes too long does so nearly every time. What hits one turn of many is not the
+/// loop's: by hand on a busy machine (load 8 to 10), 5 of 470 000 turns that move bytes only had 10
+/// to 14 ms of own time, since the kernel charges an interrupt to the running process, and a
+/// virtual machine what its host takes away. A kind of turn is judged slow if it is over the limit
+/// in every attempt and more often than this.
 constexpr int kAttempts = 2;
+constexpr double kAccidents = 1e-3;
 constexpr std::size_t kBundleMiB = 320;  // removed on the loop it would cost 17 to 50 ms
 
 class DaemonLoopTest : public ::testing::Test {
@@ -86,14 +92,7 @@ json WorkflowFigures() {
   Plumbd plumbd(folder.path(), {.scenes = 2});
   EXPECT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
-  HttpClient engineer(plumbd.port()), physicist(plumbd.port());
-  EXPECT_EQ(
-      engineer
-          .Post("/api/v1/setup",
-                {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}})
-          .status,
-      200);
-  engineer.FetchToken();
+  HttpClient engineer = plumbd.MakeFirstAccount(), physicist(plumbd.port());
   EXPECT_TRUE(test::AddAccount(plumbd.port(), engineer, "physicist", "physicist"));
   EXPECT_EQ(physicist.LogIn("physicist", kPassword), 200);
   std::vector<std::string> scans;
@@ -119,21 +118,29 @@ json WorkflowFigures() {
   return loop;
 }
 
+/// The kinds of turns that were slow more often than by accident.
+std::set<std::string> SlowKinds(const json& loop) {
+  std::set<std::string> kinds;
+  for (const auto& [what, turns] : loop["slow"].items()) {
+    if (turns["times"].get<double>() > kAccidents * turns["of"].get<double>()) kinds.insert(what);
+  }
+  return kinds;
+}
+
 TEST_F(DaemonLoopTest, NothingTakesOver10MsOfTheLoopsOwnTime) {
-  json loop;
+  std::set<std::string> slow;
   for (int attempt = 0; attempt < kAttempts && !HasFailure(); ++attempt) {
-    loop = WorkflowFigures();
-    std::printf(
-        "%d turns; longest by its own time: %s; longest in wall time: %s; over 10 ms in wall time: "
-        "%d\n",
-        loop.value("turns", 0), loop["longest_cpu"].dump().c_str(), loop["longest"].dump().c_str(),
-        loop.value("over_10_ms", -1));
+    const json loop = WorkflowFigures();
+    std::printf("%s\n", loop.dump().c_str());
     std::fflush(stdout);
     EXPECT_GT(loop.value("turns", 0), 1000);
-    if (!kJudges || loop["cpu_over_10_ms"] == 0) return;
+    const std::set<std::string> kinds = SlowKinds(loop);
+    if (attempt == 0) slow = kinds;
+    std::erase_if(slow, [&](const std::string& kind) { return !kinds.contains(kind); });
+    if (!kJudges || slow.empty()) return;
   }
-  ADD_FAILURE() << "in each of " << kAttempts
-                << " runs a turn took over 10 ms of the loop's own time: " << loop.dump();
+  EXPECT_THAT(slow, ::testing::IsEmpty())
+      << "in each of " << kAttempts << " runs over 10 ms of the loop's own time";
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Start button and light of a real plumbd: its GPIO library is replaced by one of files, and its
 // disk has room, regardless of the machine's. Everything above them is the product's.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The approved plan of a reference, from the page to the verdict of a live scan: a real plumbd.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,14 +26,7 @@ class DaemonPlanTest : public ::testing::Test {
     const std::uint16_t port = plumbd_->port();
     planner_ = std::make_unique<HttpClient>(port);
     approver_ = std::make_unique<HttpClient>(port);
-    HttpClient engineer(port);
-    ASSERT_EQ(
-        engineer
-            .Post("/api/v1/setup",
-                  {{"code", plumbd_->setup_code()}, {"name", "engineer"}, {"password", kPassword}})
-            .status,
-        200);
-    engineer.FetchToken();
+    HttpClient engineer = plumbd_->MakeFirstAccount();
     for (const char* name : {"planner", "approver"})
       ASSERT_TRUE(test::AddAccount(port, engineer, name, "physicist")) << name;
     ASSERT_EQ(planner_->LogIn("planner", kPassword), 200);
@@ -69,12 +63,17 @@ class DaemonPlanTest : public ::testing::Test {
     EXPECT_EQ(approver_
                   ->Post(path + reference_ + "/approve", {{"revision", draft["revision"]},
                                                           {"digest", draft["digest"]},
+                                                          {"reason", "there is no check here"},
                                                           {"password", kPassword}})
                   .status,
               200);
     Open("fraction");
     const std::string scan = plumbd_->ScanOnce()["last_result"]["scan"];
     const json result = planner_->Get("/api/v1/results/" + scan).json();
+    // An open session would keep the version that it was opened with.
+    const json session = planner_->Get("/api/v1/status").json()["session"];
+    EXPECT_EQ(planner_->Post("/api/v1/treatment/close", {{"session_id", session["id"]}}).status,
+              200);
     RecordProperty("result", result.value("reasons", json::array()).dump());
     return result;
   }

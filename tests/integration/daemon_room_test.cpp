@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The room's calibration, from three scans of the board to the axes of a comparison: a real plumbd,
 // whose simulated room has a board at a known place.
 #include <gmock/gmock.h>
@@ -6,7 +7,7 @@
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
 #include "algo/comparison/correction.hpp"
-#include "drivers/simulated/board_scenes.hpp"
+#include "drivers/simulator/suites/board_scenes.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 
@@ -47,15 +48,8 @@ class DaemonRoomTest : public ::testing::Test {
     }
     plumbd_->WaitForState("ready");
     const std::uint16_t port = plumbd_->port();
-    engineer_ = std::make_unique<HttpClient>(port);
+    engineer_ = std::make_unique<HttpClient>(plumbd_->MakeFirstAccount());
     physicist_ = std::make_unique<HttpClient>(port);
-    ASSERT_EQ(
-        engineer_
-            ->Post("/api/v1/setup",
-                   {{"code", plumbd_->setup_code()}, {"name", "engineer"}, {"password", kPassword}})
-            .status,
-        200);
-    engineer_->FetchToken();
     ASSERT_TRUE(test::AddAccount(port, *engineer_, "physicist", "physicist"));
     ASSERT_EQ(physicist_->LogIn("physicist", kPassword), 200);
   }

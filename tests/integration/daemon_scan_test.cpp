@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scans of a real plumbd: from the press to the six numbers, against the truth and against their
 // own recordings.
 #include <csignal>

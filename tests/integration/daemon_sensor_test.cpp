@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sensors that are not as they were: another unit, several at once, images that come late, twice,
 // out of order or of a wrong size.
 #include <csignal>
@@ -13,8 +14,8 @@
 #include <unistd.h>
 
 #include "algo/base/units.hpp"
-#include "daemon/control/unix_socket.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/files/unix_socket.hpp"
 #include "drivers/replay/camera_file.hpp"
 #include "tests/support/demo_truth.hpp"
 #include "tests/support/plumbd.hpp"
@@ -42,7 +43,8 @@ class DaemonSensorTest : public ::testing::Test {
                                                int scenes = 1, const std::string& more = {}) const {
     std::ofstream(folder_ / "plumb.toml") << "[sensor]\ndriver = \"virtual-openni\"\n" << more;
     fs::create_directories(folder_ / "tmp");
-    return {.arguments = {"--config", folder_ / "plumb.toml"},
+    return {.program = PLUMBD_OPENNI_BINARY,
+            .arguments = {"--config", folder_ / "plumb.toml"},
             .environment = {{"TMPDIR", folder_ / "tmp"}},
             .scenes = scenes,
             .settings = [auto_stop_s](Settings& settings) {
@@ -246,7 +248,7 @@ TEST_F(DaemonSensorTest, UnpluggedWhileItIsClosedPlumbdEndsOrGoesOn) {
   WaitForSensor(plumbd, kFirst);
   for (int round = 0; round < 8; ++round) {
     TellDriver("error");
-    std::this_thread::sleep_for(std::chrono::microseconds(random() % 20'000));
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 20'000));  // likewise
     TellDriver("unplug");
     plumbd.WaitForState("no_sensor");
     plumbd.Sim("plug");

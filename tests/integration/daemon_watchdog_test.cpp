@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // systemd's watchdog is fed while the workers work, and not while one hangs.
 #include <sys/ptrace.h>
 #include <sys/wait.h>
@@ -68,7 +69,7 @@ TEST_F(DaemonWatchdogTest, ItIsNotFedWhileAWorkerHangsAndFedAgainAfter) {
     ASSERT_GT(held.count(), 0U) << "threads can be held by ptrace here";
     plumbd.WaitForLog("the watchdog is not fed");  // after sensor_silence_s, half a minute
     const int before = TimesFed(plumbd);
-    std::this_thread::sleep_for(std::chrono::seconds(1));  // ten periods of feeding
+    std::this_thread::sleep_for(std::chrono::seconds(1));  // the time of ten feedings is tested
     EXPECT_EQ(TimesFed(plumbd), before) << "the loop goes on, but it must not feed";
   }
   const int after = TimesFed(plumbd);

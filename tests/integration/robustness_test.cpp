@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Interruptions, full disks, foreign folders, damaged scenes, and the same bytes every time.
 #include <sys/stat.h>
 

@@ -1,7 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 // What `plumb` says about itself and about a wrong command line.
+#include <cstdlib>
+
 #include <gmock/gmock.h>
 
+#include "algo/base/message.hpp"
 #include "tests/integration/command_line.hpp"
+#include "words/cli.hpp"
+#include "words/scene_file.hpp"
 
 namespace plumb {
 namespace {
@@ -18,7 +24,8 @@ TEST(UsageTest, TellsItsVersion) {
 TEST(UsageTest, HelpListsEveryCommandAndCarriesTheNotice) {
   const RunResult result = Plumb({"--help"});
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* command : {"simulate", "reconstruct", "compare", "mesh", "info", "evaluate"}) {
+  for (const char* command : {"simulate", "reconstruct", "compare", "mesh", "info", "import-dicom",
+                              "evaluate", "monitor"}) {
     EXPECT_THAT(result.out, HasSubstr(command));
     const RunResult help = Plumb({command, "--help"});
     EXPECT_EQ(help.exit_code, 0);
@@ -40,7 +47,12 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
       {"simulate", "--suite", "ten", "--out", "x"},
       {"simulate", "--suite", "demo", "--out", "x", "--noise", "none"},
       {"simulate", "--suite", "demo", "--out", "x", "--frames", "-3"},
+      {"monitor", "a"},
+      {"monitor", "a", "--scene", "b"},
       {"mesh", "a"},
+      {"import-dicom", "structures.dcm", "--out", "x"},
+      {"import-dicom", "structures.dcm", "plan.dcm"},
+      {"simulate", "--suite", "ct", "--out", "x", "--ct-quirk", "fax"},
       {"info"},
       {"info", "a", "--verbose"}};
   for (const auto& line : lines) {
@@ -48,6 +60,58 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
     EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(line);
     EXPECT_FALSE(result.err.empty()) << testing::PrintToString(line);
     EXPECT_EQ(result.out, "") << testing::PrintToString(line);
+  }
+}
+
+TEST(UsageTest, SpeaksEachLanguage) {
+  for (const Catalogue* language : Catalogues()) {
+    const std::string code(language->code);
+    const RunResult refusal = Plumb({"--language", code, "mesh", "/no/scene", "--out", "x.ply"});
+    EXPECT_EQ(refusal.exit_code, 3);
+    EXPECT_EQ(refusal.err,
+              "plumb mesh: " + Text(say::scene_file::Missing("/no/scene"), *language) + "\n");
+    const RunResult sheet = Plumb({"--language", code, "markers", "--out", "/no/folder/s.pdf"});
+    EXPECT_EQ(sheet.exit_code, 1) << code;
+    const RunResult usage = Plumb({"--language", code, "update"});
+    EXPECT_EQ(usage.exit_code, 2);
+    EXPECT_EQ(usage.err, "plumb update: " + Text(say::cli::NameABundle(), *language) + "\n");
+  }
+}
+
+TEST(UsageTest, JsonIsTheSameInEachLanguage) {
+  const std::string scene = SmallScene(SmallNames()[0]);
+  const RunResult english = Plumb({"--language", "en", "info", scene, "--json"});
+  EXPECT_EQ(english.exit_code, 0);
+  for (const Catalogue* language : Catalogues()) {
+    const RunResult other =
+        Plumb({"--language", std::string(language->code), "info", scene, "--json"});
+    EXPECT_EQ(other.out, english.out) << language->code;
+  }
+}
+
+TEST(UsageTest, TheEnvironmentNamesTheLanguageWithoutTheOption) {
+  const char* const set = std::getenv("LC_ALL");
+  const std::string before = set != nullptr ? set : "";
+  for (const Catalogue* language : Catalogues()) {
+    ::setenv("LC_ALL", (std::string(language->code) + "_XX.UTF-8").c_str(), 1);
+    EXPECT_THAT(Plumb({"update"}).err, HasSubstr(Text(say::cli::NameABundle(), *language)));
+    EXPECT_THAT(Plumb({"--language", "en", "update"}).err,
+                HasSubstr(say::cli::NameABundle().English()));
+  }
+  if (set != nullptr)
+    ::setenv("LC_ALL", before.c_str(), 1);
+  else
+    ::unsetenv("LC_ALL");
+}
+
+TEST(UsageTest, AnUnknownLanguageIsRefusedWithThoseThatThereAre) {
+  for (const char* code : {"xx", "", "EN", "english"}) {
+    const RunResult result = Plumb({"--language", code, "update"});
+    EXPECT_EQ(result.exit_code, 2) << code;
+    EXPECT_EQ(result.out, "");
+    for (const Catalogue* language : Catalogues())
+      EXPECT_THAT(result.err, HasSubstr(std::string(language->code) + " (" +
+                                        std::string(language->name) + ")"));
   }
 }
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """The boot menu of the image in GRUB's own interpreter (grub-emu): which system is started in every
 state of the boot counter, and what is counted.
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The list of known vulnerabilities: from the list of packages of a root file system, and a small
 # export of the tracker with every state that it knows.
 set -euo pipefail

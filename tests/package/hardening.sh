@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Reads back from every ELF file below FOLDER what the build asked for. One line a file; exit code 1
 # if anything is missing.
 #   hardening.sh FOLDER

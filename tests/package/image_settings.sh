@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # What toolchain/image.overlay puts into a root file system, read by systemd's own tools: mounts and
 # units. Needs neither root nor a Debian: the root is a few empty files. Exit code 77: it
 # cannot run here, and the last line says why.

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Runs inside the container that install_in_container.sh boots: the life of the packages under apt
 # and dpkg. One line a check; then off.
 exec >/checks/log 2>&1 </dev/null
@@ -74,5 +75,9 @@ echo "CHECKS DONE"
 # The real logind and polkit, with the rule of the package: install_in_container.sh sees whether the
 # machine restarts.
 plumb update --restart
-sleep 30
-systemctl poweroff --force
+left=300
+until [ "$(systemctl is-system-running)" = stopping ] || [ "$left" = 0 ]; do
+  left=$((left - 1))
+  sleep 0.1
+done
+[ "$left" -gt 0 ] || systemctl poweroff --force

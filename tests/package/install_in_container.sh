@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Installs the packages with apt into a clean Debian that runs in systemd-nspawn, changes the
 # configuration, upgrades, removes and purges them.
 #   install_in_container.sh MADE WORK_FOLDER      MADE: by make_packages.sh

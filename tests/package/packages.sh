@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Makes the packages of a build once more and looks into them.
 #   packages.sh BUILD_FOLDER MADE WORK_FOLDER      MADE: by make_packages.sh
 # Packages for another processor are checked too; their programs run in QEMU. Exit code 77: it
@@ -40,7 +41,7 @@ check "lintian finds no error" lintian --allow-root --fail-on error \
   --suppress-tags debug-file-with-no-debug-symbols "$once"/*.deb
 
 mkdir tree
-for package in plumb plumbd plumb-virtual-sensor libplumb-dev; do
+for package in plumb plumbd plumb-dicom plumb-virtual-sensor libplumb-dev; do
   dpkg-deb -x "$once/${package}"_*.deb "tree/$package"
 done
 check "binaries are hardened" "$here/hardening.sh" tree
@@ -48,7 +49,7 @@ cat check.log
 
 every_library_is_depended_upon() {
   local package file library owner bad=0
-  for package in plumb plumbd plumb-virtual-sensor; do
+  for package in plumb plumbd plumb-dicom plumb-virtual-sensor; do
     depends=" $(dpkg-deb -f "$once/${package}"_*.deb Depends) "
     while IFS= read -r file; do
       case "$file" in *libOpenNI2.so* | *libOniFile.so*) continue ;; esac
@@ -142,7 +143,7 @@ every_key_is_in_the_manual() {
 check "every key of the configuration is in the manual" every_key_is_in_the_manual
 man_pages_are_well_formed() {
   local page text=
-  for page in "$source"/toolchain/man/*; do
+  for page in tree/plumb*/usr/share/man/man*/*; do
     text+=$(LC_ALL=C.UTF-8 man --warnings -l -Tutf8 "$page" 2>&1 >/dev/null)
   done
   echo "$text"

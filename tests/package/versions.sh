@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Which versions toolchain/image and toolchain/bundle accept. Nothing is built: each call has
 # another mistake, which is found after that of the version.
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """The Python module on a small simulated suite: arrays, errors, types (plumb.pyi), the example.
 
 Usage: module_test.py PLUMB_BINARY EXAMPLE FOLDER, with the module's folder in PYTHONPATH.

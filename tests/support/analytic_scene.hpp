@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Depth images of a smooth analytic surface on a floor: exact truth for surfaces, heights and
 // normals.
 #pragma once

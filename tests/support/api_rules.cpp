@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/api_rules.hpp"
 
 #include <gmock/gmock.h>
@@ -81,6 +82,8 @@ TEST_F(ApiRules, CodesDifferByMoreThanCase) {
   HttpClient technician = LoggedIn("technician");
   EXPECT_NE(AddPatient(technician, "PX-17"), "");
   EXPECT_EQ(technician.Post("/api/v1/patients", {{"code", "px-17"}, {"site", ""}}).status, 409);
+  EXPECT_EQ(technician.Post("/api/v1/patients", {{"code", "Px1-7"}, {"site", ""}}).status, 409)
+      << "hyphens do not matter";
   EXPECT_EQ(technician.Post("/api/v1/patients", {{"code", "PX-18"}, {"site", ""}}).status, 201);
   EXPECT_EQ(technician.Get("/api/v1/patients").json()["patients"].size(), 2U);
 }
@@ -286,12 +289,16 @@ TEST_F(ApiRules, ABaselineIsSetByAnotherPersonThanTheOneWhoTookTheCheck) {
   const std::string own = appliance_->PassDailyCheck("physicist");
   HttpClient physicist = LoggedIn("physicist"), second = LoggedIn("second");
   const std::string path = "/api/v1/checks/" + own + "/baseline";
-  EXPECT_EQ(LoggedIn("technician").Post(path).status, 403);
-  EXPECT_EQ(physicist.Post(path).status, 403);
+  const json signed_for = {{"reason", "the markers are in place"}, {"password", kPassword}};
+  EXPECT_EQ(LoggedIn("technician").Post(path, signed_for).status, 403);
+  EXPECT_EQ(physicist.Post(path, signed_for).status, 403);
+  EXPECT_EQ(second.Post(path, {{"reason", "x"}, {"password", kPassword}}).status, 400);
+  EXPECT_EQ(second.Post(path, {{"password", kPassword}}).status, 400) << "no reason";
+  EXPECT_EQ(second.Post(path, {{"reason", "in place"}, {"password", "not this one"}}).status, 403);
   EXPECT_TRUE(physicist.Get("/api/v1/checks").json()["baseline"].is_null());
-  EXPECT_EQ(second.Post(path).status, 200);
+  EXPECT_EQ(second.Post(path, signed_for).status, 200);
   EXPECT_EQ(physicist.Get("/api/v1/checks").json()["baseline"]["set_by"], "second");
-  EXPECT_EQ(second.Post("/api/v1/checks/none/baseline").status, 404);
+  EXPECT_EQ(second.Post("/api/v1/checks/none/baseline", signed_for).status, 404);
 }
 
 TEST_F(ApiRules, SettingsAreKeptAsTheyWereWrittenAndBounded) {
@@ -404,14 +411,27 @@ TEST_F(ApiRules, AWipedPatientIsGoneWithEverythingThatBelongsToThem) {
 
 TEST_F(ApiRules, AccountsAreOfOneNameAndTheLastEngineerStays) {
   HttpClient engineer = LoggedIn("engineer"), technician = LoggedIn("technician");
-  const json new_account = {
-      {"name", "technician"}, {"role", "physicist"}, {"password", kFirstPassword}};
+  const json new_account = {{"name", "technician"},
+                            {"role", "physicist"},
+                            {"password", kFirstPassword},
+                            {"own_password", kPassword}};
   EXPECT_EQ(technician.Post("/api/v1/users", new_account).status, 403);
   EXPECT_EQ(engineer.Post("/api/v1/users", new_account).status, 409);
-  EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"disabled", true}}).status, 409);
-  EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"role", "technician"}}).status, 409);
-  EXPECT_EQ(engineer.Put("/api/v1/users/none", {{"disabled", true}}).status, 404);
-  EXPECT_EQ(engineer.Put("/api/v1/users/technician", {{"disabled", true}}).status, 200);
+  EXPECT_EQ(
+      engineer.Put("/api/v1/users/engineer", {{"disabled", true}, {"own_password", kPassword}})
+          .status,
+      409);
+  EXPECT_EQ(
+      engineer.Put("/api/v1/users/engineer", {{"role", "technician"}, {"own_password", kPassword}})
+          .status,
+      409);
+  EXPECT_EQ(
+      engineer.Put("/api/v1/users/none", {{"disabled", true}, {"own_password", kPassword}}).status,
+      404);
+  EXPECT_EQ(
+      engineer.Put("/api/v1/users/technician", {{"disabled", true}, {"own_password", kPassword}})
+          .status,
+      200);
   EXPECT_EQ(technician.Get("/api/v1/status").status, 401) << "its sessions have ended";
   EXPECT_EQ(technician.LogIn("technician", kPassword), 403);
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the page may ask of the appliance and what it is refused, as tests over HTTP that run on the
 // real services with their store and on the fake that other tests of the page use: so the fake
 // keeps to the same rules. Each program that has these tests says which it is by

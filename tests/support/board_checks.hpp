@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks that saw the board of the room's calibration, as a scan would store them.
 #pragma once
 

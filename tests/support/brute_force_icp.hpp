@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Algorithm 1 written down as it stands in the paper, with no data structure at all: the reference
 // for RefinePoses().
 #pragma once

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # For test scripts to source: one line for each check. The script ends with `exit $failed`.
 failed=0
 check() { # NAME EXPECTED-REGEX FOUND

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A library to be loaded before the others: the wall clock goes wrong by as many seconds as the
 // file of PLUMB_CLOCK_OFFSET says.
 #include <dlfcn.h>

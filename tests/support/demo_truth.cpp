@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/demo_truth.hpp"
 
 #include "algo/base/pose.hpp"
-#include "drivers/simulated/suite_plan.hpp"
+#include "drivers/simulator/suites/suite_plan.hpp"
 
 namespace plumb::testing {
 namespace {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the virtual sensor of the tests really shows.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A library to be preloaded: every disk has 100 GB and is as full as PLUMB_DISK_USED_PERCENT says,
 // regardless of the machine's disks.
 #include <dlfcn.h>

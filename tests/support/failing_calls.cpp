@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A library to be loaded before the others: the n-th open, write, sync, rename or mkdir below a
 // folder fails. See failing_calls.hpp.
 #include <dlfcn.h>

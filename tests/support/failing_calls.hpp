@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lets the n-th call of a kind fail, in a program that tests/support/failing_calls.cpp was loaded
 // into before its other libraries.
 #pragma once

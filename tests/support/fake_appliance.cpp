@@ -1,4 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/fake_appliance.hpp"
+#include "words/check.hpp"
+#include "words/scan.hpp"
 
 #include <fmt/format.h>
 #include <strings.h>
@@ -16,7 +19,7 @@ FakeAppliance::FakeAppliance() {
   status.storage = {std::int64_t{182} << 30, std::int64_t{238} << 30, true};
   status.light = "ready";
   status.version = "0.1.0-test";
-  update.message = "updates need the appliance image";
+  update.message = Message::Verbatim("updates need the appliance image");
 }
 
 Status FakeAppliance::GetStatus() {
@@ -41,7 +44,7 @@ void FakeAppliance::Finish(const Done& done, Change change) {
 
 void FakeAppliance::Did(const Actor& actor, const std::string& action, const std::string& subject,
                         const Done& done, const std::string& id) {
-  Log(actor, action, subject, "");
+  Log(actor, action, subject, {});
   Notify(EventKind::kData);
   Finish(done, DoneWith(id));
 }
@@ -58,14 +61,39 @@ void FakeAppliance::EndSweep(const Actor& actor, Done done) {
   Finish(done, Refused(ChangeResult::kConflict, "no scan is running"));
 }
 
+void FakeAppliance::StartMonitor(const Actor& actor, Done done) {
+  if (status.state != ApplianceState::kReady && status.state != ApplianceState::kResult)
+    return Finish(done, Refused(ChangeResult::kConflict, "a scan is running"));
+  status.state = ApplianceState::kMonitoring;
+  status.light = "monitor_starting";
+  monitor = {.active = true, .scan_id = scans.empty() ? "" : scans.back().id, .state = "mounting"};
+  monitor.has_record = true;
+  monitor.shift_tolerance_mm = 3.0;
+  monitor.rotation_tolerance_deg = 1.0;
+  Notify(EventKind::kStatus);
+  Notify(EventKind::kMonitor);
+  Did(actor, "monitor.start", monitor.scan_id, done);
+}
+
+void FakeAppliance::StopMonitor(const Actor& actor, Done done) {
+  if (!monitor.active)
+    return Finish(done, Refused(ChangeResult::kConflict, "nothing is being monitored"));
+  status.state = ApplianceState::kReady;
+  status.light = "ready";
+  monitor = {.scan_id = monitor.scan_id, .has_record = true};
+  Notify(EventKind::kStatus);
+  Notify(EventKind::kMonitor);
+  Did(actor, "monitor.stop", monitor.scan_id, done);
+}
+
 void FakeAppliance::Fail(const std::string& reason) {
   if (status.scan && !is_check_) {
     scans.back().outcome = ScanOutcome::kFailed;
-    scans.back().failure = reason;
+    scans.back().failure = Message::Verbatim(reason);
   }
   status.scan.reset();
   status.state = ApplianceState::kFault;
-  status.fault = reason;
+  status.fault = Message::Verbatim(reason);
   status.fault_kind = FaultKind::kScan;
   status.light = "fault";
   Notify(EventKind::kResult);
@@ -73,7 +101,7 @@ void FakeAppliance::Fail(const std::string& reason) {
 
 void FakeAppliance::Press(const Actor& actor, Done done) {
   if (status.fault_kind == FaultKind::kScan) {
-    status.fault.clear();
+    status.fault = {};
     status.fault_kind = FaultKind::kNone;
     status.state = ApplianceState::kReady;
     status.light = "ready";
@@ -84,7 +112,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
     phase_begun_.reset();
     status.state = ApplianceState::kWorking;
     status.light = "working";
-    status.scan->step = "surface";
+    status.scan->step = Message::Verbatim("surface");
     Notify(EventKind::kStatus);
     return Did(actor, "scan.end", status.scan->id, done);
   }
@@ -97,10 +125,9 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
   scan.id = fmt::format("s{:04}", next_id_++);
   scan.patient_id = status.patient_id;
   scan.purpose = status.next_purpose;
-  if (const Patient* patient = PatientOf(status.patient_id);
-      patient != nullptr && scan.purpose == ScanPurpose::kFraction) {
-    scan.reference_id = patient->approved_reference_id;
-  }
+  if (status.session && status.session->reference && scan.purpose == ScanPurpose::kFraction &&
+      !status.patient_id.empty())
+    scan.reference_id = status.session->reference->id;
   scan.started_at = WallClock::now();
   if (status.session) {
     scan.session_id = status.session->id;
@@ -114,7 +141,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
       .patient_id = scan.patient_id,
       .purpose = scan.purpose,
       .coverage = scan.purpose == ScanPurpose::kFraction ? std::optional(0.0) : std::nullopt,
-      .step = "tracking"};
+      .step = Message::Verbatim("tracking")};
   status.state = ApplianceState::kScanning;
   status.light = "scanning";
   phase_begun_.reset();
@@ -128,7 +155,7 @@ void FakeAppliance::Cancel(const Actor& actor, Done done) {
         done, Refused(ChangeResult::kConflict,
                       "in this state there is nothing to cancel; it requires scanning or working"));
   if (!is_check_) scans.back().outcome = ScanOutcome::kCancelled;
-  if (!is_check_) scans.back().failure = "cancelled";
+  if (!is_check_) scans.back().failure = Message::Verbatim("cancelled");
   CloseCheck();
   const std::string id = status.scan->id;
   status.scan.reset();
@@ -160,7 +187,7 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
       phase_begun_ = now;
       status.state = ApplianceState::kWorking;
       status.light = "working";
-      scan.step = "surface";
+      scan.step = Message::Verbatim("surface");
       scan.guidance = SweepAdvice::kNone;
     }
     Notify(EventKind::kProgress);
@@ -184,14 +211,16 @@ void FakeAppliance::EndCheck() {
   check.id = fmt::format("{}", next_id_++);
   check.status = checks.baseline ? MarkerCheckStatus::kPassed : MarkerCheckStatus::kNoBaseline;
   check.num_markers = 12;
-  check.items = {
-      {"markers_seen", 12, 12, "", true, ""},    {"misfit", 0.84, 3, "mm", true, ""},
-      {"moved", 1.6, 5, "mm", true, "marker 4"}, {"scale", 0.08, 0.5, "%", true, ""},
-      {"side", -0.4, 3, "%", true, "marker 9"},  {"depth_scale", 0.62, 3, "%", true, ""}};
+  check.items = {{"markers_seen", 12, 12, "", true, {}},
+                 {"misfit", 0.84, 3, "mm", true, {}},
+                 {"moved", 1.6, 5, "mm", true, say::check::Marker(4)},
+                 {"scale", 0.08, 0.5, "%", true, {}},
+                 {"side", -0.4, 3, "%", true, say::check::Marker(9)},
+                 {"depth_scale", 0.62, 3, "%", true, {}}};
   if (!checks.baseline)
-    check.reasons = {
+    check.reasons = {Message::Verbatim(
         "there is no baseline yet: if the markers are known to be in place, set this check as the "
-        "baseline"};
+        "baseline")};
   if (next_check) {
     const std::string id = check.id;
     check = *next_check;
@@ -204,12 +233,16 @@ void FakeAppliance::EndCheck() {
   checks.checks.insert(checks.checks.begin(), check);
   if (check.status == MarkerCheckStatus::kPassed) {
     checks.today = DailyCheck::kPassed;
-    status.reference_block.clear();
+    status.reference_block = {};
   } else if (check.status == MarkerCheckStatus::kFailed) {
     checks.today = DailyCheck::kFailed;
-    status.reference_block =
-        "the daily check has failed, and references need one that has passed since: open Daily "
-        "check, find out why it failed, sweep over all markers of the room, then go on here";
+    status.reference_block = say::scan::CheckFailed();
+  }
+  checks.changes.clear();
+  if (checks.baseline) {
+    checks.changes.push_back(check.status == MarkerCheckStatus::kFailed
+                                 ? say::check::BaselineMoved(7, 12)
+                                 : say::check::BaselineSame());
   }
   status.last_check = check;
   status.daily_check = checks.today;
@@ -238,11 +271,11 @@ void FakeAppliance::SeeBoard(const CheckRecord& check) {
   room.max_turn_deg = 0.2;
   room.digest = std::string(63, 'a') + std::to_string(room.scans.size() % 10);
   room.why_not_sign = room.scans.size() < room.num_wanted
-                          ? fmt::format(
+                          ? Message::Verbatim(fmt::format(
                                 "{} of {} scans of the board have been made: scan again, without "
                                 "touching it",
-                                room.scans.size(), room.num_wanted)
-                          : "";
+                                room.scans.size(), room.num_wanted))
+                          : Message();
 }
 
 void FakeAppliance::SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) {
@@ -267,15 +300,15 @@ void FakeAppliance::SignRoomCalibration(const Actor& actor, const std::string& d
   room.shift_mm.reset();
   room.turn_deg.reset();
   room.digest.clear();
-  room.due.clear();
-  room.why_not_sign = "the board has not been scanned yet";
+  room.due = {};
+  room.why_not_sign = Message::Verbatim("the board has not been scanned yet");
   status.room.is_known = true;
   Did(actor, "room.calibrate", std::to_string(version), done, std::to_string(version));
 }
 
-std::optional<std::string> FakeAppliance::RoomBoardPdf(std::string& why_not) {
+std::optional<std::string> FakeAppliance::RoomBoardPdf(Message& why_not) {
   if (!status.sensor.present) {
-    why_not = "no sensor is attached";
+    why_not = Message::Verbatim("no sensor is attached");
     return std::nullopt;
   }
   return "%PDF-1.5 of a test";
@@ -292,7 +325,8 @@ void FakeAppliance::OpenCheck(const Actor& actor, Done done) {
   Did(actor, "check.open", "", done);
 }
 
-void FakeAppliance::SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) {
+void FakeAppliance::SetCheckBaseline(const Actor& actor, const std::string& check_id,
+                                     const std::string&, Done done) {
   const auto found = std::find_if(checks.checks.begin(), checks.checks.end(),
                                   [&](const CheckRecord& check) { return check.id == check_id; });
   if (found == checks.checks.end())
@@ -300,6 +334,7 @@ void FakeAppliance::SetCheckBaseline(const Actor& actor, const std::string& chec
   if (found->user == actor.user)
     return Finish(done, Refused(ChangeResult::kRefused, "another person sets it as the baseline"));
   checks.baseline = CheckBaseline{check_id, WallClock::now(), actor.user, found->num_markers};
+  checks.changes = {say::check::BaselineSame()};
   Did(actor, "check.baseline", check_id, done);
 }
 
@@ -355,7 +390,10 @@ void FakeAppliance::EndScan() {
                  : scan.result->verdict == Verdict::kUnsure      ? "result_unsure"
                                                                  : "no_answer";
   status.last_result = scan;
-  if (status.session) ++status.session->num_scans;
+  if (status.session) {
+    ++status.session->num_scans;
+    status.session->has_unaccepted = scan.result.has_value();
+  }
   ++status.scans_today;
   if (Patient* patient = PatientOf(scan.patient_id)) {
     ++patient->num_scans;
@@ -371,7 +409,7 @@ void FakeAppliance::Unplug() {
   if (status.scan) {
     if (!is_check_) {
       scans.back().outcome = ScanOutcome::kFailed;
-      scans.back().failure = "the sensor was unplugged; the scan is discarded";
+      scans.back().failure = Message::Verbatim("the sensor was unplugged; the scan is discarded");
     }
     CloseCheck();
     status.scan.reset();
@@ -402,175 +440,6 @@ void FakeAppliance::RemoveTemplate(const Actor& actor, const std::string& site, 
       }) == 0)
     return Finish(done, Refused(ChangeResult::kNotFound, "there is no template of this site"));
   Did(actor, "template.remove", "", done);
-}
-
-void FakeAppliance::AddDisplay(const Actor& actor, const Display& display, Done done) {
-  displays.push_back(display);
-  displays.back().id = fmt::format("d{:04}", next_id_++);
-  Did(actor, "display.pair", display.name, done, displays.back().id);
-}
-
-void FakeAppliance::RemoveDisplay(const Actor& actor, const std::string& id, Done done) {
-  const auto found = std::ranges::find(displays, id, &Display::id);
-  if (found == displays.end())
-    return Finish(done, Refused(ChangeResult::kNotFound, "no such display"));
-  const std::string name = found->name;
-  displays.erase(found);
-  Did(actor, "display.remove", name, done);
-}
-
-void FakeAppliance::MakeBackup(const Actor& actor, Done done) {
-  if (!backup_fault.empty()) return Finish(done, Refused(ChangeResult::kInvalid, backup_fault));
-  Did(actor, "backup.make", "", done);
-}
-
-std::optional<User> FakeAppliance::FindUser(const std::string& name) {
-  const auto found =
-      std::find_if(users.begin(), users.end(), [&](const User& user) { return user.name == name; });
-  return found == users.end() ? std::nullopt : std::optional(*found);
-}
-
-void FakeAppliance::AddUser(const Actor& actor, const User& user, Done done) {
-  if (FindUser(user.name))
-    return Finish(done, Refused(ChangeResult::kConflict, "this name is taken"));
-  users.push_back(user);
-  Did(actor, "user.add", user.name, done);
-}
-
-void FakeAppliance::SetPreferences(const Actor& actor, const Preferences& preferences, Done done) {
-  preferences_[actor.user] = preferences;
-  Finish(done, {});
-}
-
-void FakeAppliance::ChangeUser(const Actor& actor, const UserChange& change, Done done) {
-  const auto found = std::find_if(users.begin(), users.end(),
-                                  [&](const User& other) { return other.name == change.name; });
-  if (found == users.end()) return Finish(done, Refused(ChangeResult::kNotFound, "no such user"));
-  if (change.expected_hash && (found->disabled || found->password_hash != *change.expected_hash))
-    return Finish(done, Refused(ChangeResult::kConflict,
-                                "the account has been changed by somebody else meanwhile"));
-  User user = *found;
-  user.role = change.role.value_or(user.role);
-  user.disabled = change.disabled.value_or(user.disabled);
-  user.password_hash = change.password_hash.value_or(user.password_hash);
-  const bool engineer_left = std::any_of(users.begin(), users.end(), [&](const User& other) {
-    const User& after = other.name == user.name ? user : other;
-    return after.role == Role::kEngineer && !after.disabled;
-  });
-  if (!engineer_left)
-    return Finish(done, Refused(ChangeResult::kConflict, "one engineer must remain"));
-  *found = user;
-  Did(actor, "user.change", user.name, done);
-}
-
-void FakeAppliance::Log(const Actor& actor, const std::string& action, const std::string& subject,
-                        const std::string& detail) {
-  audit.push_back({static_cast<std::int64_t>(audit.size()) + 1, WallClock::now(), actor.user,
-                   actor.address, action, subject, detail});
-}
-
-std::vector<AuditEntry> FakeAppliance::Audit(const AuditQuery& query) {
-  std::vector<AuditEntry> found;
-  for (auto entry = audit.rbegin();
-       entry != audit.rend() && found.size() < static_cast<std::size_t>(query.limit); ++entry) {
-    const bool is_view = entry->action.starts_with("view.");
-    if ((query.before == 0 || entry->number < query.before) && (query.views || !is_view) &&
-        entry->action.starts_with(query.actions)) {
-      found.push_back(*entry);
-      found.back().about = SubjectOf(*entry);
-    }
-  }
-  return found;
-}
-
-void FakeAppliance::ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) {
-  settings = change.AppliedTo(settings);
-  Did(actor, "settings.change", "", done);
-}
-
-bool FakeAppliance::RunInBackground(web::BackgroundPool, std::function<void()> job,
-                                    std::function<void()> done) {
-  if (refuse_background_work) return false;
-  const auto both = [job = std::move(job), done = std::move(done)] {
-    job();
-    done();
-  };
-  if (hold_background_work) {
-    held_background_work.push_back(both);
-  } else {
-    both();
-  }
-  return true;
-}
-
-void FakeAppliance::AddBundle(const Actor& actor, const std::filesystem::path& file,
-                              const std::string& name, Done done) {
-  std::ifstream in(file, std::ios::binary);
-  std::string magic(4, ' ');
-  in.read(magic.data(), 4);
-  if (magic != "hsqs")
-    return Finish(done, Refused(ChangeResult::kInvalid,
-                                name + " is not a bundle: expected a squashfs image"));
-  uploaded_bytes = std::filesystem::file_size(file);
-  update.bundles.push_back(name);
-  Notify(EventKind::kUpdate);
-  Did(actor, "update.upload", name, done);
-}
-
-void FakeAppliance::RemoveBundle(const Actor& actor, const std::string& name, Done done) {
-  if (std::erase(update.bundles, name) == 0)
-    return Finish(done, Refused(ChangeResult::kNotFound, "there is no such bundle"));
-  Notify(EventKind::kUpdate);
-  Did(actor, "update.remove", name, done);
-}
-
-void FakeAppliance::InstallUpdate(const Actor& actor, const std::string& bundle, Done done) {
-  if (status.scan)
-    return Finish(done, Refused(ChangeResult::kConflict, "a scan is running; update after it"));
-  if (!update.supported) return Finish(done, Refused(ChangeResult::kConflict, update.message));
-  update.installing = true;
-  update.fraction = 0.4;
-  update.message = "Copying image to rootfs.1";
-  Notify(EventKind::kUpdate);
-  Did(actor, "update.install", bundle, done);
-}
-
-void FakeAppliance::InstallFromStick(const Actor& actor, const std::string& bundle, Done done) {
-  if (std::find(stick.begin(), stick.end(), bundle) == stick.end())
-    return Finish(done, Refused(ChangeResult::kNotFound, "no USB stick with it is plugged in"));
-  if (std::find(update.bundles.begin(), update.bundles.end(), bundle) == update.bundles.end())
-    update.bundles.push_back(bundle);
-  InstallUpdate(actor, bundle, done);
-}
-
-void FakeAppliance::RestartSystem(const Actor& actor, Done done) {
-  const auto refuse = [&](const char* why) { Finish(done, Refused(ChangeResult::kConflict, why)); };
-  if (update.installing) return refuse("a system update is being installed: wait until it is done");
-  if (status.scan) return refuse("a scan is running: wait for its result");
-  if (status.session) return refuse("the session of a patient is open: close it first");
-  ++num_restarts;
-  Did(actor, "system.restart", "", done);
-}
-
-void FakeAppliance::ResetToFactory(const Actor& actor, FactoryReset kind, Done done) {
-  if (status.session)
-    return Finish(done, Refused(ChangeResult::kConflict,
-                                "the session of a patient is open: close it first, then restart"));
-  factory_reset = kind;
-  Did(actor, "system.factory_reset_request", "", done);
-}
-
-void FakeAppliance::ForgetRollBack(const Actor& actor, Done done) {
-  status.rolled_back.clear();
-  update.rolled_back.clear();
-  Notify(EventKind::kUpdate);
-  Notify(EventKind::kStatus);
-  Did(actor, "update.seen", "", done);
-}
-
-void FakeAppliance::WriteDiagnostics(const Actor& actor, Done done) {
-  Log(actor, "diagnostics.write", "", "");
-  Finish(done, {ChangeResult::kDone, "", "", diagnostics_file});
 }
 
 }  // namespace plumb::test

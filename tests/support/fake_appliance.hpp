@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The appliance without a sensor, for tests of the web: everything in memory, a scan goes as its
 // Tick() goes.
 #pragma once
@@ -58,7 +59,7 @@ class FakeAppliance : public web::BackgroundWork,
       make_map;
   std::vector<Display> displays;
   std::vector<User> users;
-  std::string accounts_fault;     ///< Why none of them can be looked up; empty: they can.
+  Message accounts_fault;         ///< Why none of them can be looked up; empty: they can.
   std::vector<AuditEntry> audit;  ///< Oldest first.
   std::string ExportAudit() override { return "{\"number\":1}\n"; }
   std::shared_ptr<const std::string> preview, surface;
@@ -114,6 +115,13 @@ class FakeAppliance : public web::BackgroundWork,
   void StartSweep(const Actor& actor, Done done) override;
   void EndSweep(const Actor& actor, Done done) override;
   void Cancel(const Actor& actor, Done done) override;
+  MonitorStatus GetMonitor() override { return monitor; }
+  void StartMonitor(const Actor& actor, Done done) override;
+  void StopMonitor(const Actor& actor, Done done) override;
+  std::string MonitorRecord() override {
+    return monitor.has_record ? "time_s,state,advice\n" : std::string();
+  }
+  MonitorStatus monitor;
   void SetListener(std::function<void(web::EventKind)> listener) override {
     listener_ = std::move(listener);
   }
@@ -122,7 +130,7 @@ class FakeAppliance : public web::BackgroundWork,
   void AddPatient(const Actor& actor, const std::string& code, const std::string& site,
                   Done done) override;
   /// No check has passed today; `block` as in Status::reference_block. Empty: one has.
-  void SetOverdue(const std::string& block) {
+  void SetOverdue(const Message& block) {
     checks.today = status.daily_check = block.empty() ? DailyCheck::kPassed : DailyCheck::kOverdue;
     status.reference_block = block;
     Notify(web::EventKind::kStatus);
@@ -137,6 +145,12 @@ class FakeAppliance : public web::BackgroundWork,
   void WipePatient(const Actor& actor, const std::string& id, Done done) override;
   void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
                    const std::string& reason, const std::string& replaces, Done done) override;
+  void ResumeSession(const Actor& actor, const std::string& session_id, const std::string& replaces,
+                     Done done) override;
+  void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
+                       const std::string& reason, Done done) override;
+  void UseReference(const Actor& actor, const std::string& session_id,
+                    const std::string& reference_id, Done done) override;
   void CloseSession(const Actor& actor, const std::string& session_id, Done done) override;
   std::vector<Reference> References(const std::string& patient_id) override;
   std::optional<Reference> FindReference(const std::string& id) override;
@@ -145,8 +159,9 @@ class FakeAppliance : public web::BackgroundWork,
                     Done done) override;
   void PlanReference(const Actor& actor, const std::string& id, int revision,
                      const ReferencePlan& plan, Done done) override;
+  /// Cautions are asked for where a test judges the quality.
   void ApproveReference(const Actor& actor, const std::string& id, int revision,
-                        const std::string& digest, Done done) override;
+                        const std::string& digest, const std::string& reason, Done done) override;
   std::vector<Scan> Scans(const std::string& patient_id, int limit) override;
   std::optional<Scan> FindScan(const std::string& id) override;
   void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
@@ -159,45 +174,41 @@ class FakeAppliance : public web::BackgroundWork,
     const auto scan = FindScan(scan_id);
     return scan && make_map ? make_map(scan->folder, name) : std::nullopt;
   }
-  web::ResultNotes Notes(const std::string& scan_id, web::Language language) override {
+  web::ScanQuality QualityOf(const std::string& scan_id) override {
     const auto scan = FindScan(scan_id);
-    const bool is_spanish = language == web::Language::kSpanish;
-    const web::ResultTerms& terms = is_spanish ? web::kSpanishTerms : web::kEnglishTerms;
-    const std::string said(
-        web::DailyCheckCaution(scan ? scan->daily_check : DailyCheck::kPassed, terms));
-    web::ResultNotes notes{.axes = axis_names, .cautions = {}};
-    if (is_spanish) std::ranges::copy(terms.axes, notes.axes.begin());
-    if (!said.empty()) notes.cautions.push_back(said);
-    return notes;
+    if (scan && judge_quality) return judge_quality(*scan);
+    web::ScanQuality quality;
+    const Message caution = web::DailyCheckCaution(scan ? scan->daily_check : DailyCheck::kPassed);
+    if (!caution.empty()) quality.cautions.push_back(caution);
+    return quality;
   }
-  /// In English.
-  std::array<std::string, 6> axis_names = {"Vertical", "Longitudinal", "Lateral",
-                                           "Pitch",    "Roll",         "Yaw"};
+  std::function<web::ScanQuality(const Scan&)> judge_quality;  ///< As the real one does, if set.
   std::optional<std::string> PictureOf(const std::string&, web::ComparisonPicture picture,
-                                       web::Language language) override {
+                                       const Catalogue& language) override {
     if (!draws_pictures) return std::nullopt;
     return std::string(picture == web::ComparisonPicture::kOverlay ? "overlay" : "error map") +
-           (language == web::Language::kSpanish ? " in Spanish" : " in English");
+           " in " + std::string(language.name);
   }
   bool draws_pictures = false;
   bool is_unreadable = false;  ///< Signed acts on references throw, as those of the real store.
   std::optional<std::string> ScanReport(const std::string& scan_id,
-                                        web::Language language) override {
-    report_language = language;
+                                        const Catalogue& language) override {
+    report_language = language.code;
     return FindScan(scan_id) ? std::optional<std::string>("%PDF-1.5 a scan") : std::nullopt;
   }
   std::optional<std::string> CourseReport(const std::string& patient_id,
-                                          web::Language language) override {
-    report_language = language;
+                                          const Catalogue& language) override {
+    report_language = language.code;
     return FindPatient(patient_id) ? std::optional<std::string>("%PDF-1.5 a course") : std::nullopt;
   }
-  web::Language report_language = web::Language::kEnglish;  ///< Of the last report.
+  std::string report_language = "en";  ///< Of the last report.
   CheckStatus GetChecks() override { return checks; }
   void OpenCheck(const Actor& actor, Done done) override;
-  void SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) override;
+  void SetCheckBaseline(const Actor& actor, const std::string& check_id, const std::string& reason,
+                        Done done) override;
   web::RoomCalibrationStatus GetRoomCalibration() override { return room; }
   void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) override;
-  std::optional<std::string> RoomBoardPdf(std::string& why_not) override;
+  std::optional<std::string> RoomBoardPdf(Message& why_not) override;
   SensorProfiles GetSensorProfiles() override { return profiles; }
   std::optional<std::string> SensorProfileFile(int version) override;
   void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) override;
@@ -206,15 +217,24 @@ class FakeAppliance : public web::BackgroundWork,
   std::vector<Display> Displays() override { return displays; }
   void AddDisplay(const Actor& actor, const Display& display, Done done) override;
   void RemoveDisplay(const Actor& actor, const std::string& id, Done done) override;
-  std::string WhyUnreadable() override { return accounts_fault; }
+  Message WhyUnreadable() override { return accounts_fault; }
   std::vector<User> Users() override { return users; }
   std::optional<User> FindUser(const std::string& name) override;
   void AddUser(const Actor& actor, const User& user, Done done) override;
   void ChangeUser(const Actor& actor, const UserChange& change, Done done) override;
+  std::map<std::string, SecondFactor> second_factors;
+  std::optional<SecondFactor> FindSecondFactor(const std::string& name) override {
+    const auto found = second_factors.find(name);
+    return found == second_factors.end() ? std::nullopt : std::optional(found->second);
+  }
+  void SetSecondFactor(const Actor& actor, const std::string& name,
+                       const std::optional<SecondFactor>& expected,
+                       const std::optional<SecondFactor>& wanted, const std::string& action,
+                       Done done) override;
   Preferences PreferencesOf(const std::string& name) override { return preferences_[name]; }
   void SetPreferences(const Actor& actor, const Preferences& preferences, Done done) override;
   void Log(const Actor& actor, const std::string& action, const std::string& subject,
-           const std::string& detail) override;
+           const Message& detail) override;
   std::vector<AuditEntry> Audit(const AuditQuery& query) override;
   Settings GetSettings() override { return settings; }
   void ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) override;
@@ -241,6 +261,8 @@ class FakeAppliance : public web::BackgroundWork,
            const Done& done, const std::string& id = "");
   void EndScan();
   void TellWaiting();
+  void TellNewerReference();
+  void EndSession();
   [[nodiscard]] bool IsOld(const Scan& scan) const;
   void EndCheck();
   void CloseCheck();

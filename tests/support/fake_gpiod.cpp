@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A library to be loaded before libgpiod (version 1): button and lights of the unmodified program
 // are files in the folder PLUMB_FAKE_GPIO. `button` is a FIFO of edges, '1' pressed, '0' released,
 // 'x' the line is gone; `held` exists: it is pressed at the start. `lights` gets a line for each

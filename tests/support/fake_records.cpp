@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The patients, references and scans of the appliance without a sensor.
 #include "tests/support/fake_appliance.hpp"
 
@@ -7,6 +8,7 @@
 #include <algorithm>
 
 #include "algo/base/errors.hpp"
+#include "words/store.hpp"
 
 namespace plumb::test {
 
@@ -38,7 +40,7 @@ Reference& FakeAppliance::MakeReference(const Scan& scan, const std::string& by,
   reference.scan_id = scan.id;
   reference.created_at = WallClock::now();
   reference.created_by = by;
-  reference.reason = reason;
+  reference.reason = reason.empty() ? Message() : Message::Verbatim(reason);
   reference.plan.tolerance = settings.tolerance;
   reference.digest = "digest of " + reference.id + " 1";
   references.push_back(reference);
@@ -52,8 +54,12 @@ std::optional<Patient> FakeAppliance::FindPatient(const std::string& id) {
 
 void FakeAppliance::AddPatient(const Actor& actor, const std::string& code, const std::string& site,
                                Done done) {
+  const auto plain = [](std::string text) {
+    std::erase(text, '-');
+    return text;
+  };
   if (std::any_of(patients.begin(), patients.end(), [&](const Patient& patient) {
-        return strcasecmp(patient.code.c_str(), code.c_str()) == 0;
+        return strcasecmp(plain(patient.code).c_str(), plain(code).c_str()) == 0;
       })) {
     return Finish(done, Refused(ChangeResult::kConflict, "there is a patient of this code"));
   }
@@ -131,6 +137,8 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
                                       "first",
                                       status.session->patient_code, status.session->opened_by)));
   }
+  if (status.session) EndSession();
+  if (purpose == ScanPurpose::kFraction) PatientOf(id)->last_session.reset();
   status.patient_id = id;
   status.next_purpose = purpose;
   status.scans_today = 0;
@@ -143,9 +151,86 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
                                     .num_scans = 0,
                                     .opened_by = actor.user,
                                     .opened_at = WallClock::now()};
+  if (const auto approved = FindReference(patient->approved_reference_id);
+      approved && purpose == ScanPurpose::kFraction)
+    status.session->reference = {.id = approved->id, .version = approved->version};
   sessions_[status.session->id] = *status.session;
   Notify(EventKind::kStatus);
   Did(actor, "session.open", status.session->id, done, status.session->id);
+}
+
+void FakeAppliance::TellNewerReference() {
+  if (!status.session || !status.session->reference) return;
+  status.session->newer_reference.reset();
+  const Patient* patient = PatientOf(status.session->patient_id);
+  if (patient == nullptr || patient->approved_reference_id == status.session->reference->id) return;
+  if (const auto newer = FindReference(patient->approved_reference_id))
+    status.session->newer_reference = {.id = newer->id, .version = newer->version};
+}
+
+void FakeAppliance::ResumeSession(const Actor& actor, const std::string& session_id,
+                                  const std::string& replaces, Done done) {
+  const auto found = sessions_.find(session_id);
+  if (found == sessions_.end())
+    return Finish(done, Refused(ChangeResult::kNotFound, "there is no such session for fractions"));
+  Patient* patient = PatientOf(found->second.patient_id);
+  if (patient == nullptr || !patient->last_session || patient->last_session->id != session_id)
+    return Finish(done, Refused(ChangeResult::kConflict, "only the newest session goes on"));
+  if (status.session && status.session->id != replaces)
+    return Finish(done, Refused(ChangeResult::kConflict, "another session is open"));
+  CloseCheck();
+  patient->last_session.reset();
+  status.session = found->second;
+  status.session->opened_by = actor.user;
+  status.patient_id = patient->id;
+  status.next_purpose = ScanPurpose::kFraction;
+  TellNewerReference();
+  Notify(EventKind::kStatus);
+  Did(actor, "session.resume", session_id, done, session_id);
+}
+
+void FakeAppliance::CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
+                                    const std::string&, Done done) {
+  const auto found = sessions_.find(session_id);
+  if (found == sessions_.end() || found->second.purpose != ScanPurpose::kFraction)
+    return Finish(done, Refused(ChangeResult::kNotFound, "there is no such session for fractions"));
+  found->second.fraction = fraction;
+  num_fractions_[found->second.patient_id] = fraction;
+  for (Scan& scan : scans)
+    if (scan.session_id == session_id) scan.fraction = fraction;
+  if (status.session && status.session->id == session_id) status.session->fraction = fraction;
+  if (Patient* patient = PatientOf(found->second.patient_id);
+      patient != nullptr && patient->last_session && patient->last_session->id == session_id)
+    patient->last_session->fraction = fraction;
+  Notify(EventKind::kStatus);
+  Did(actor, "session.fraction", session_id, done);
+}
+
+void FakeAppliance::EndSession() {
+  Patient* patient = PatientOf(status.session->patient_id);
+  sessions_[status.session->id] = *status.session;
+  const bool is_resumable =
+      status.session->purpose == ScanPurpose::kFraction && status.session->num_scans > 0;
+  if (patient != nullptr && is_resumable)
+    patient->last_session = {.id = status.session->id,
+                             .fraction = status.session->fraction,
+                             .num_scans = status.session->num_scans,
+                             .closed_at = WallClock::now()};
+  status.session.reset();
+}
+
+void FakeAppliance::UseReference(const Actor& actor, const std::string& session_id,
+                                 const std::string& reference_id, Done done) {
+  TellNewerReference();
+  if (status.scan) return Finish(done, Refused(ChangeResult::kConflict, "a scan is running"));
+  if (!status.session || status.session->id != session_id)
+    return Finish(done, Refused(ChangeResult::kConflict, "this session is closed already"));
+  if (!status.session->newer_reference || status.session->newer_reference->id != reference_id)
+    return Finish(done, Refused(ChangeResult::kConflict, "another version is approved by now"));
+  status.session->reference = status.session->newer_reference;
+  status.session->newer_reference.reset();
+  Notify(EventKind::kStatus);
+  Did(actor, "session.reference", session_id, done);
 }
 
 void FakeAppliance::CloseSession(const Actor& actor, const std::string& session_id, Done done) {
@@ -153,7 +238,7 @@ void FakeAppliance::CloseSession(const Actor& actor, const std::string& session_
   if (!status.session || (!session_id.empty() && status.session->id != session_id))
     return Finish(done, Refused(ChangeResult::kConflict, "this session is closed already"));
   const std::string id = status.session->id;
-  status.session.reset();
+  EndSession();
   status.patient_id.clear();
   status.next_purpose = ScanPurpose::kFraction;
   Notify(EventKind::kStatus);
@@ -269,7 +354,8 @@ void FakeAppliance::PlanReference(const Actor& actor, const std::string& id, int
 }
 
 void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, int revision,
-                                     const std::string& digest, Done done) {
+                                     const std::string& digest, const std::string& reason,
+                                     Done done) {
   if (is_unreadable) throw IoError("version 2 of the reference: its plan cannot be read");
   const auto found = std::find_if(references.begin(), references.end(),
                                   [&](const Reference& reference) { return reference.id == id; });
@@ -292,10 +378,15 @@ void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, 
                   Refused(ChangeResult::kRefused,
                           "a second person must approve: you made or planned this reference"));
   }
+  if (const auto scan = FindScan(found->scan_id);
+      scan && judge_quality && reason.empty() && !judge_quality(*scan).cautions.empty())
+    return Finish(done, Refused(ChangeResult::kConflict, say::store::ReferenceNeedsReason()));
   found->approved_by = actor.user;
   found->approved_at = WallClock::now();
   if (Patient* patient = PatientOf(found->patient_id)) patient->approved_reference_id = id;
   TellWaiting();
+  TellNewerReference();
+  Notify(EventKind::kStatus);
   Did(actor, "reference.approve", id, done);
 }
 
@@ -333,6 +424,8 @@ void FakeAppliance::AcceptScan(const Actor& actor, const std::string& id, const 
   if (!found->result || found->result->verdict == Verdict::kNoAnswer)
     return refuse("there is nothing to accept");
   if (IsOld(*found)) return refuse("this result is older than 2 minutes: scan again");
+  if (!found->session_id.empty() && (!status.session || status.session->id != found->session_id))
+    return refuse("only the newest result of the open session can be accepted");
   if (std::any_of(found + 1, scans.end(), [&](const Scan& scan) {
         return scan.patient_id == found->patient_id && scan.outcome == ScanOutcome::kDone;
       }))
@@ -342,6 +435,8 @@ void FakeAppliance::AcceptScan(const Actor& actor, const std::string& id, const 
   found->accepted_by = actor.user;
   found->accepted_reason = reason;
   found->accepted_at = WallClock::now();
+  if (status.session && status.session->id == found->session_id)
+    status.session->has_unaccepted = false;
   if (status.last_result && status.last_result->id == id) status.last_result = *found;
   Did(actor, reason.empty() ? "scan.accept" : "scan.accept_outside", id, done);
 }

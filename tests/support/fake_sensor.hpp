@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A sensor and its provider that do what a test says: frames of a wall, unplugging, stalls, failing
 // drivers.
 #pragma once

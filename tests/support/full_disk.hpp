@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A disk that fills up, for tests of what is left behind.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/http_client.hpp"
 
 #include <arpa/inet.h>
@@ -178,9 +179,12 @@ int HttpClient::LogIn(const std::string& name, const std::string& password) {
 
 bool AddAccount(std::uint16_t port, HttpClient& engineer, const std::string& name,
                 const std::string& role) {
-  const int added =
-      engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kFirstPassword}})
-          .status;
+  const int added = engineer
+                        .Post("/api/v1/users", {{"name", name},
+                                                {"role", role},
+                                                {"password", kFirstPassword},
+                                                {"own_password", kPassword}})
+                        .status;
   HttpClient person(port);
   return added == 201 && person.LogIn(name, kFirstPassword) == 200 &&
          person.Post("/api/v1/session/password",

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A plain socket that says what a test wants said, and a loop that serves meanwhile.
 #pragma once
 

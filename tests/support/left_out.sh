@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # For test scripts to source: how a test says that it cannot run here. ctest counts 77 as skipped,
 # and toolchain/test lists the reasons at its end.
 

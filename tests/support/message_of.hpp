@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Messages of expected exceptions: EXPECT_THAT(MessageOf<DataError>(call), HasSubstr("what a person
 // needs to see")).
 #pragma once

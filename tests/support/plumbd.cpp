@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/plumbd.hpp"
 
 #include <fcntl.h>
@@ -23,8 +24,8 @@
 #include <stdexcept>
 #include <thread>
 
-#include "daemon/control/unix_socket.hpp"
 #include "daemon/records/store.hpp"
+#include "drivers/files/unix_socket.hpp"
 #include "tests/support/sanitized.hpp"
 
 namespace plumb::testing {
@@ -84,21 +85,22 @@ Plumbd::Plumbd(const fs::path& folder, PlumbdOptions options)
     store.settings.Change({.user = "test", .address = ""}, settings);
   }
   notify_fd_ = MakeNotifySocket(folder_ / "notify.sock");
-  std::vector<std::string> arguments = {PLUMBD_BINARY,
-                                        "--simulated",
-                                        "demo",
-                                        "--sim-size",
-                                        "320x240",
-                                        "--sim-frames",
-                                        std::to_string(options.sweep_frames),
-                                        "--sim-scenes",
-                                        std::to_string(options.scenes),
-                                        "--state",
-                                        state_.string(),
-                                        "--control",
-                                        socket().string(),
-                                        "--listen",
-                                        options.listen};
+  std::vector<std::string> arguments = {
+      options.program.empty() ? PLUMBD_BINARY : options.program.string(),
+      "--simulated",
+      "demo",
+      "--sim-size",
+      "320x240",
+      "--sim-frames",
+      std::to_string(options.sweep_frames),
+      "--sim-scenes",
+      std::to_string(options.scenes),
+      "--state",
+      state_.string(),
+      "--control",
+      socket().string(),
+      "--listen",
+      options.listen};
   arguments.insert(arguments.end(), options.arguments.begin(), options.arguments.end());
   options.environment["XDG_CACHE_HOME"] = FrameFolder().string();
   options.environment["NOTIFY_SOCKET"] = (folder_ / "notify.sock").string();
@@ -271,6 +273,15 @@ std::string Plumbd::setup_code() const {
   const std::string text = log(), marker = "setup code: ";
   const std::size_t at = text.rfind(marker);
   return at == std::string::npos ? std::string() : text.substr(at + marker.size(), 9);
+}
+
+test::HttpClient Plumbd::MakeFirstAccount() const {
+  test::HttpClient engineer(port());
+  const json account = {
+      {"code", setup_code()}, {"name", "engineer"}, {"password", test::kPassword}};
+  EXPECT_EQ(engineer.Post("/api/v1/setup", account).status, 200);
+  engineer.FetchToken();
+  return engineer;
 }
 
 std::string Plumbd::notifications() const {

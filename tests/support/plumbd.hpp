@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A real plumbd with the virtual sensor, as its own process, and what a person at the control
 // socket does with it.
 #pragma once
@@ -14,12 +15,14 @@
 #include <sys/types.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/http_client.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "web/model/settings.hpp"
 
 namespace plumb::testing {
 
 struct PlumbdOptions {
+  std::filesystem::path program = {};       ///< Empty: plumbd as it is installed.
   std::vector<std::string> arguments = {};  ///< Beside those that every test needs.
   std::map<std::string, std::string> environment = {};
   int sweep_frames = 120;
@@ -81,6 +84,9 @@ class Plumbd {
   [[nodiscard]] std::string setup_code() const;
   [[nodiscard]] const std::filesystem::path& state() const { return state_; }
   [[nodiscard]] std::filesystem::path socket() const { return folder_ / "control.sock"; }
+  /// Makes the first account, "engineer" with test::kPassword, by the setup code: logged in. A
+  /// failure of the test if it is refused.
+  [[nodiscard]] test::HttpClient MakeFirstAccount() const;
   /// The messages sent to systemd, one per line.
   [[nodiscard]] std::string notifications() const;
 

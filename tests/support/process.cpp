@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/process.hpp"
 
 #include <array>
@@ -15,6 +16,10 @@
 
 namespace plumb {
 namespace {
+
+/// Programs speak English, whatever language the developer's machine has, unless a test sets
+/// another.
+[[maybe_unused]] const int kEnglish = ::setenv("LC_ALL", "C.UTF-8", /*overwrite=*/1);
 
 void PrepareChild(const ProcessOptions& options) {
   if (options.num_cpus > 0) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs a program as a user does: its exit code, what it prints, signals on the way.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a sanitizer changes for tests of whole programs: everything takes several times as long, so
 // they wait longer, and figures of time and memory say nothing of the product. The work itself is
 // the same.

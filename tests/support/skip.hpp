@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Leaving out a test that this machine cannot run.
 #pragma once
 

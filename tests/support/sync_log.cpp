@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A library to be loaded before the others: writes to the file of PLUMB_SYNC_LOG, in their order,
 // what was put onto the disk and what was renamed: `fsync INODE SIZE`, `fdatasync FILE`, `syncfs`,
 // `rename FROM TO`.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/synthetic_scene.hpp"
 
 #include <algorithm>
@@ -394,9 +395,9 @@ Scene MakeSyntheticScene(const SyntheticOptions& options) {
   Scene scene;
   const bool own_frame = options.T_scene_reference.matrix() != Pose::Identity().matrix();
   scene.frame = own_frame ? SceneFrame::kFirstKeyframe : SceneFrame::kReferenceMarker;
-  scene.marker_dictionary = "DICT_6X6_250";
-  scene.marker_length_m = 0.104;
-  scene.reference_marker = 0;
+  scene.room_markers.dictionary = "DICT_6X6_250";
+  scene.room_markers.length_m = 0.104;
+  scene.room_markers.reference = 0;
   scene.markers = MakeMarkers(options, grid);
   if (options.with_cloud) scene.cloud = scanner.cloud().Take(options.T_scene_reference);
   if (!own_frame) scene.height_map = scanner.map();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes made from formulas, for tests of what works on scenes: a body on a floor or couch with
 // markers, sampled as a scan would.
 #pragma once

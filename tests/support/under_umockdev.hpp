@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether emulated devices are possible in this run.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An updater on its loop, asked from the thread of a test.
 #pragma once
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # A factory reset outside the image: the command line asks for it, the unit's script and plumbd
 # carry it out at the next start.
 #   factory_reset.sh BUILD_FOLDER
@@ -72,7 +73,7 @@ check "the configuration is the delivered one" '^same # changed secret$' \
   "$(cmp etc/plumb.toml "$PLUMB_DELIVERED" && echo same) $(cat etc/plumb.toml.before-reset \
     etc/backup.key | xargs -d '\n')"
 check "the accounts are gone" 'setup code: ....-....' "$(cat log)"
-check "it is logged" 'factory reset: records kept; 1 accounts' "$(cat log)"
+check "it is logged" 'factory reset: records kept; 1 account,' "$(cat log)"
 check "the journal is kept" '^$' "$(cat journalctl.calls)"
 check "what belongs to the sensor stays" '^data$' "$(cat state/calibration/S1.yaml)"
 check "the request is done" '^missing$' "$([ -e state/factory-reset.json ] || echo missing)"

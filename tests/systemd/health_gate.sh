@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The health gate with programs of the test's own around it: only a healthy system is marked, each
 # fault has its sentence, and only a release that has never been good is left.
 #   health_gate.sh BUILD_FOLDER      plumb of the build does the self test

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Runs inside the container that unit_in_container.sh boots: the installed service from its start to
 # its stop. One line a check; then off.
 exec >/checks/log 2>&1  # of the machine outside; the console is hung up when somebody may log in

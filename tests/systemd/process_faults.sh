@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The real plumbd, without a sensor: a configuration with a mistake, a crash, a limit of the size of
 # files.
 #   process_faults.sh BUILD_FOLDER

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # What happens around plumbd's lives, with programs of the test's own in place of systemctl,
 # systemd-run and sleep: pauses, counting, restarts of the machine, the light.
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Installs a build into a small Debian and boots it in systemd-nspawn: plumbd.service with its whole
 # sandbox, on the virtual sensor.
 #   unit_in_container.sh BUILD_FOLDER WORK_FOLDER

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # A unit's provisioning file, from the data partition and from a stick, through plumbd --provision
 # to what systemd reads; its recovery; and the appliance's screen.
 #   unit_settings.sh BUILD_FOLDER

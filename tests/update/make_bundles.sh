@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # A machine for RAUC made of files, its certificate authority, the one that takes over from it and a
 # stranger's, and bundles good and bad. Keys live in FOLDER alone.
 #   make_bundles.sh FOLDER

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bundles through RAUC itself, on a bus and a machine made of files. plumbd's part runs as the user
 // nobody, without rights, as plumbd does: it cannot read files any more once RAUC owns them.
 #include <signal.h>
@@ -161,9 +162,9 @@ class RaucTest : public testing::UpdaterOnLoop {
                                 .blocking_reason = {},
                                 .changed = {},
                                 .run_in_background = {},
-                                .ended = [this](const std::string&, const std::string& failure) {
+                                .ended = [this](const std::string&, const Message& failure) {
                                   ++num_ended_;
-                                  failure_ = failure;
+                                  failure_ = failure.English();
                                 }});
     });
   }
@@ -181,7 +182,7 @@ class RaucTest : public testing::UpdaterOnLoop {
   std::string InstallToTheEnd(const std::string& name) {
     const int before = num_ended_;
     const Change change = Install(name + ".raucb");
-    if (change.result != ChangeResult::kDone) return change.message;
+    if (change.result != ChangeResult::kDone) return change.message.English();
     if (!Becomes([&] { return num_ended_ > before; })) return "it does not end";
     return failure_;
   }
@@ -215,7 +216,7 @@ TEST_F(RaucTest, AGoodBundleFillsTheOtherSlotAndIsStartedNext) {
     EXPECT_TRUE(SlotHolds("b", "good"));
     EXPECT_FALSE(SlotHolds("a", "good"));
     EXPECT_EQ(Bytes(*made_ / "state" / "primary"), "B\n");
-    EXPECT_THAT(StatusNow().message, HasSubstr("restart the appliance to use it"));
+    EXPECT_THAT(StatusNow().message.English(), HasSubstr("restart the appliance to use it"));
     EXPECT_EQ(StatusNow().fraction, 1.0);
   });
 }
@@ -259,7 +260,7 @@ TEST_F(RaucTest, ASecondAttemptOnARefusedBundleGivesTheSameReason) {
               0);
     Change change;
     On([&] { change = updater_->Add(folder_ / "updates" / ".upload-1", "stranger.raucb"); });
-    EXPECT_EQ(change.result, ChangeResult::kDone) << change.message;
+    EXPECT_EQ(change.result, ChangeResult::kDone) << change.message.English();
     EXPECT_EQ(InstallToTheEnd("stranger"), "");
     EXPECT_TRUE(SlotHolds("b", "good"));
   });
@@ -271,7 +272,7 @@ TEST_F(RaucTest, ABundleCanBeRemovedAfterRaucHasTakenItOver) {
     EXPECT_EQ(InstallToTheEnd("good"), "");
     Change change;
     On([&] { change = updater_->Remove("good.raucb"); });
-    EXPECT_EQ(change.result, ChangeResult::kDone) << change.message;
+    EXPECT_EQ(change.result, ChangeResult::kDone) << change.message.English();
     EXPECT_TRUE(StatusNow().bundles.empty());
   });
 }

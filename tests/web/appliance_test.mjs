@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page on the real appliance with its virtual sensor: appliance_test.mjs NODE_MODULES PLUMBD
 // PLUMB OUT_FOLDER CHROMIUM
 import { execFile } from 'node:child_process';
@@ -115,6 +116,14 @@ await h.step('a third sweep, watched by five and with a download, makes a trend'
   console.log(`    ${bytes} bytes downloaded meanwhile; plumbd says: `
     + `${h.log.filter((line) => line.includes('frames,')).at(-1)}`);
   for (const viewer of viewers) await viewer.context().close();
+  // A loaded machine drops so many frames that the sweep has no answer, and so no place in a trend.
+  for (let tries = 0; tries < 3; ++tries) {
+    const status = await page.evaluate(() =>
+      fetch('/api/v1/status').then((response) => response.json()));
+    if (status.last_result.result.numbers.length > 0) break;
+    console.log(`    scan ${status.last_result.id} has no numbers: another sweep`);
+    await scan();
+  }
   await page.locator('.trend').first().waitFor();
   equal(await page.locator('.trend').count(), 6, 'six trends');
 });
@@ -154,13 +163,24 @@ await h.step('a physicist plans a new version, a second one approves', async () 
 await h.step('the daily check of the real markers: no baseline, then passed', async () => {
   const bob = await h.person('checker');
   await h.logIn(bob, 'bob');
-  const takeCheck = async (verdict) => {
+  const takeCheck = async (verdict, tries = 3) => {
     await bob.goto(`${h.url}#/check`);
     await bob.getByRole('button', { name: 'Start a check' }).click();
     await bob.getByRole('button', { name: /Start sweep|Scan again/ }).click(kSlow);
     await endSweep(bob);
     await bob.waitForURL(/#\/check/, kSlow);
-    await bob.locator('.verdict', { hasText: verdict }).waitFor(kSlow);
+    try {
+      await bob.locator('.verdict', { hasText: verdict }).waitFor();
+    } catch (error) {
+      // The check asks for every marker of its baseline. A sweep may miss one at the edge of its
+      // way, more so on a loaded machine, and is repeated then, as a person would.
+      const said = await bob.locator('tbody tr').allInnerTexts();
+      console.log(`    ${said.slice(0, 6).join(' | ').replace(/\s+/g, ' ')}`);
+      const missed = said.some((row) => /Markers seen/.test(row) && !/within/.test(row));
+      if (!missed || tries === 1) throw error;
+      await takeCheck(verdict, tries - 1);
+      return;
+    }
     const rows = await bob.locator('tbody tr').allInnerTexts();
     console.log(`    ${rows.slice(0, 6).join(' | ').replace(/\s+/g, ' ')}`);
   };
@@ -169,6 +189,9 @@ await h.step('the daily check of the real markers: no baseline, then passed', as
   const second = await h.person('second');
   await h.logIn(second, 'clara');
   await second.goto(`${h.url}#/check`);
+  await second.getByText('Set as baseline…').click();
+  await second.getByLabel('Reason for the new baseline').fill('first of this room');
+  await second.locator('.take-baseline').getByLabel('Your password').fill(h.password);
   await second.getByRole('button', { name: 'Set as baseline' }).click();
   await bob.getByText('set by clara').waitFor();
   await takeCheck('PASSED');

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page over TLS, and its certificate replaced on the page: certificate_test.mjs NODE_MODULES
 // SERVER OUT_FOLDER CHROMIUM
 import { execFileSync } from 'node:child_process';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A whole day on the real appliance with its virtual sensor, as people work through it: the room's
 // calibration, the daily check, a reference, its plan, the approval by a second person, three
 // fractions with moves and accepts, and the report.
@@ -67,6 +68,8 @@ await h.step('first start, three accounts, and the screen in the room', async ()
   await engineer.getByLabel('Code on the screen')
     .fill(await room.locator('.pair-code').innerText());
   await engineer.getByLabel('Name of the screen').fill('couch side');
+  await engineer.locator('form', { hasText: 'Name of the screen' }).getByLabel('Your password')
+    .fill(h.password);
   await engineer.getByRole('button', { name: 'Pair the screen' }).click();
   await room.locator('.room-code').waitFor(kSlow);
   await engineer.goto(`${h.url}#/settings`);
@@ -116,6 +119,9 @@ await h.step('the daily check: another person sets the baseline, the next one pa
   await takeCheck('NO BASELINE');
   await room.locator('.verdict', { hasText: 'NO BASELINE' }).waitFor(kSlow);
   await clara.goto(`${h.url}#/check`);
+  await clara.getByText('Set as baseline…').click();
+  await clara.getByLabel('Reason for the new baseline').fill('first of this room');
+  await clara.locator('.take-baseline').getByLabel('Your password').fill(h.password);
   await clara.getByRole('button', { name: 'Set as baseline' }).click();
   await clara.getByText('set by clara').waitFor();
   await takeCheck('PASSED');
@@ -157,12 +163,15 @@ await h.step('one physicist plans, a second one approves', async () => {
 async function openSession(fraction) {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0100', exact: true }).click();
-  await anna.getByRole('button', { name: 'Start treatment session' }).click();
+  await anna.getByRole('button', { name: /^Start (treatment session|a new fraction)$/ }).click();
   await anna.locator('.who-line', { hasText: `Fraction ${fraction}` }).waitFor();
 }
 async function closeSession() {
   await anna.goto(`${h.url}#/scan`);
   await anna.getByRole('button', { name: 'Close session' }).click();
+  const anyway = anna.getByRole('button', { name: 'Close without acceptance' });
+  await anna.getByText('No session open').or(anyway).first().waitFor();
+  if (await anyway.count()) await anyway.click();
   await anna.getByText('No session open').first().waitFor();
 }
 const verdict = (page, kind) => page.locator(`.verdict.${kind}`).waitFor(kSlow);

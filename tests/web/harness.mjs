@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Server, browser, screenshots, accessibility, and the list of what went wrong.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
@@ -35,6 +36,30 @@ function switchOffAntialiasing() {
   prototype.getContext = function get(kind, attributes) {
     return getContext.call(this, kind,
       kind.startsWith('webgl') ? { ...attributes, antialias: false } : attributes);
+  };
+}
+
+/// Runs in the page: counts how often each of its clocks has ticked.
+function countTicks() {
+  const ticks = new Map();
+  const [begin, end] = [window.setInterval, window.clearInterval];
+  window.setInterval = (work, every_ms, ...rest) => {
+    const id = begin.call(window, () => {
+      work(...rest);
+      ticks.set(id, ticks.get(id) + 1);
+    }, every_ms);
+    if (every_ms <= 1000) ticks.set(id, 0);
+    return id;
+  };
+  window.clearInterval = (id) => {
+    ticks.delete(id);
+    end.call(window, id);
+  };
+  window.allHaveTicked = async () => {
+    const before = new Map(ticks);
+    while ([...ticks].some(([id, count]) => count === before.get(id))) {
+      await new Promise((ready) => { setTimeout(ready, 20); });
+    }
   };
 }
 
@@ -99,6 +124,7 @@ export class Harness {
       ignoreHTTPSErrors: this.url.startsWith('https'), ...options });
     await context.addInitScript(definePixelsOf);
     await context.addInitScript(switchOffAntialiasing);
+    await context.addInitScript(countTicks);
     const page = await context.newPage();
     page.setDefaultTimeout(kPatience_ms);
     page.on('pageerror', (error) => this.failures.push(`${name}: script error: ${error.message}`));
@@ -124,8 +150,11 @@ export class Harness {
 
   /// Below what is to be approved.
   async sign(page, password = kPassword) {
-    await page.getByRole('region', { name: 'You are signing exactly this' })
-      .getByLabel('Your password').fill(password);
+    const signed = page.getByRole('region', { name: 'You are signing exactly this' });
+    await signed.getByLabel('Your password').fill(password);
+    // Where there are cautions.
+    const reason = signed.getByLabel('Why it becomes the reference nevertheless');
+    if (await reason.count()) await reason.fill('no better one is possible');
     await page.getByRole('button', { name: 'Sign and approve' }).click();
   }
 
@@ -152,7 +181,8 @@ export class Harness {
       { has: page.getByRole('heading', { name: 'Add an account' }) });
     await card.getByLabel('Name').fill(name);
     await card.getByLabel('Role').selectOption(role);
-    await card.getByLabel('Password').fill(kFirstPassword);
+    await card.getByLabel('Password', { exact: true }).fill(kFirstPassword);
+    await card.getByLabel('Your password').fill(this.password);
     await card.getByRole('button', { name: 'Add' }).click();
     await page.getByRole('cell', { name, exact: true }).waitFor();
     this.fresh.add(name);
@@ -181,7 +211,7 @@ export class Harness {
   /// Like addAccount(), through the interface.
   async addAccountByApi(page, name, role) {
     const { status } = await this.api(page, 'users', 'POST',
-      { name, role, password: kFirstPassword });
+      { name, role, password: kFirstPassword, own_password: this.password });
     this.equal(status, 201, `the account ${name}`);
     this.fresh.add(name);
   }
@@ -228,6 +258,9 @@ export class Harness {
       Date.now = () => now() + 1000 * s;
     }, seconds);
   }
+
+  /// Until whatever the page does each second has been done once more.
+  ticks(page) { return page.evaluate(() => window.allHaveTicked()); }
 
   /// What has the focus, by its text.
   focused(page) { return page.evaluate(() => document.activeElement.textContent); }

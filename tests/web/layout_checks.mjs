@@ -1,31 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
 // What can be wrong with a screen that is drawn, found by measuring it in the browser; and which
-// words a Spanish screen must not show.
+// words a screen in another language must not show.
 
-/// What differs between the catalogues: whole English texts, and the pieces of those that are
-/// filled in. Words that are also Spanish are left out.
+/// What differs between the page's texts of two languages: whole English texts, and the pieces of
+/// those that are filled in. Words that are the same in the other language are left out.
 export function englishTexts(en, es) {
-  const leaves = (of) => Object.entries(of).flatMap(([key, value]) =>
-    (key === 'languageName' || key === 'translate' ? []
-      : typeof value === 'object' ? leaves(value) : [value]));
-  const spanish = leaves(es).map(String);
+  const ofPage = ({ texts }) =>
+    Object.entries(texts).filter(([id]) => id.startsWith('page.')).map(([, text]) => text);
+  const spanish = ofPage(es);
   const all = new Set(spanish);
-  const texts = leaves(en).filter((one) => typeof one === 'string');
-  // Of a function the quoted parts, without what is filled in.
-  const pieces = leaves(en).filter((one) => typeof one === 'function').flatMap((one) =>
-    [...`${one}`.matchAll(/'([^']*)'|`([^`]*)`/g)]
-      .flatMap(([, a, b]) => (a ?? b).split(/\$\{[^}]*\}/)));
+  const texts = ofPage(en);
   const isTelling = (text) =>
     /[a-z]{2,} [a-z]{2,}/i.test(text) && !spanish.some((one) => one.includes(text));
   return {
-    whole: texts.filter((text) => /[a-z]{2}/i.test(text) && !all.has(text)),
-    parts: [...texts, ...pieces].map((text) => text.trim()).filter(isTelling),
+    whole: texts.filter((text) => !text.includes('{') && /[a-z]{2}/i.test(text) && !all.has(text)),
+    parts: texts.flatMap((text) => text.split(/[{}]/)).map((text) => text.trim()).filter(isTelling),
   };
 }
 
 /// Runs in the page. Returns what is wrong, each with its kind in front.
 /// @param touched  Whether this is a touch screen, where controls need 24 px.
 /// @param wall     Whether this is the screen on the room's wall, which nobody scrolls.
-/// @param english  What englishTexts() found, on a Spanish screen; else null.
+/// @param english  What englishTexts() found, on a screen in another language; else null.
 export function faultsOfLayout({ touched, wall, english }) {
   const found = new Set();
   const shorten = (text) => text.trim().replace(/\s+/g, ' ').slice(0, 60);
@@ -166,7 +162,7 @@ export function faultsOfLayout({ touched, wall, english }) {
   const whole = new Set(english?.whole);
   for (const [raw, owner] of said) {
     const text = raw.trim().replace(/\s+/g, ' ');
-    if (/\{\w*\}|\$\{|\bundefined\b|\bNaN\b|\bnull\b|\bInfinity\b|\[object |=>/.test(text)) {
+    if (/\{[\w:.+!]*\}|\$\{|\bundefined\b|\bNaN\b|\bnull\b|\bInfinity\b|\[object |=>/.test(text)) {
       add('raw', owner, `: ${shorten(text)}`);
     }
     const isQuoted = owner.closest('code, [lang=en], .bundle');
@@ -175,7 +171,7 @@ export function faultsOfLayout({ touched, wall, english }) {
     }
     if (!english || isQuoted) continue;
     if (whole.has(text) || english.parts.some((part) => text.includes(part))
-      || /\b(the|of|and|is|are|was|were|with|this|not|by|for|from|to|it)\b/i.test(text)) {
+      || /\b(the|of|and|is|are|were|with|this|not|by|for|from|to|it)\b/i.test(text)) {
       add('English', owner, `: ${shorten(text)}`);
     }
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page's and its tests' JavaScript by ESLint, its style sheets by stylelint: lint.mjs
 // NODE_MODULES SOURCE_FOLDER
 import { createRequire } from 'node:module';
@@ -58,13 +59,15 @@ const eslint = new ESLint({
   overrideConfigFile: true,
   overrideConfig: [
     { linterOptions: { reportUnusedDisableDirectives: 'error', noInlineConfig: true }, rules },
-    { files: ['web/assets/**/*.js'], languageOptions: language(['browser']) },
+    { files: ['web/page/**/*.js'], languageOptions: language(['browser']) },
+    { files: ['web/page/language.js'],
+      languageOptions: { globals: { PLUMB_LANGUAGES: 'readonly' } } },
     // Tests hold functions that run in the browser.
     { files: ['**/*.mjs'], languageOptions: language(['node', 'browser']) },
   ],
 });
 const results = await eslint.lintFiles(
-  ['web/assets/**/*.js', 'web/assets/*.mjs', 'tests/web/*.mjs']);
+  ['web/page/**/*.js', 'web/page/*.mjs', 'tests/web/*.mjs']);
 const { format } = await eslint.loadFormatter('stylish');
 const text = await format(results);
 console.log(text || `all well: ${results.length} files`);
@@ -73,7 +76,7 @@ const flags = (names) => Object.fromEntries(names.map((name) => [name, true]));
 const { default: stylelint } = await import(
   pathToFileURL(join(modules, 'stylelint/lib/index.mjs')));
 const styles = await stylelint.lint({
-  files: join(source, 'web/assets/**/*.css'),
+  files: join(source, 'web/page/**/*.css'),
   formatter: 'string',
   config: {
     reportInvalidScopeDisables: true, reportNeedlessDisables: true,

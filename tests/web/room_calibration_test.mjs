@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The room's calibration on the page: room_calibration_test.mjs NODE_MODULES SERVER OUT_FOLDER
 // CHROMIUM
 import { Harness } from './harness.mjs';

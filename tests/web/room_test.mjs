@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The room and the treatment session: room_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
 // Who is on the couch, what may be acted on, who follows the button, and many screens at once.
 import { Harness } from './harness.mjs';
@@ -66,15 +67,17 @@ async function approvedPatient(code) {
   await h.acknowledge(anna, bob, clara);
   return id;
 }
-const openOnPage = async (page, code) => {
+const openOnPage = async (page, code,
+  button = /^Start (treatment session|a new fraction)$/) => {
   await page.goto(`${h.url}#/patients`);
   await page.getByRole('link', { name: code, exact: true }).click();
-  await page.getByRole('button', { name: 'Start treatment session' }).click();
+  await page.getByRole('button', { name: button }).click();
 };
 
 let patient;
 await h.step('accounts, and a patient with an approved reference', async () => {
   await h.firstStart(engineer);
+  h.tell('checked');  // today, so that nothing is doubtful about a reference
   for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'],
     ['clara', 'physicist']]) {
     await h.addAccountByApi(engineer, name, role);
@@ -85,6 +88,14 @@ await h.step('accounts, and a patient with an approved reference', async () => {
 });
 
 const room = await h.person('room', { width: 1920, height: 1080 });
+/// Asks for the password again, as every change of accounts and screens does.
+async function removeScreen(name) {
+  const row = engineer.getByRole('row', { name });
+  await row.getByLabel(`Remove ${name}`).click();
+  await row.getByLabel('Your password').fill(h.password);
+  await row.getByRole('button', { name: 'Remove', exact: true }).click();
+}
+
 await h.step('the room display is paired by the code that it shows, and changes nothing',
   async () => {
   await room.goto(`${h.url}room`);
@@ -94,9 +105,12 @@ await h.step('the room display is paired by the code that it shows, and changes 
   await engineer.goto(`${h.url}#/users`);
   await engineer.getByLabel('Code on the screen').fill('ZZZ-ZZZ');
   await engineer.getByLabel('Name of the screen').fill('couch side');
+  const pair = engineer.locator('form', { hasText: 'Name of the screen' });
+  await pair.getByLabel('Your password').fill(h.password);
   await engineer.getByRole('button', { name: 'Pair the screen' }).click();
   await engineer.getByRole('alert').getByText('no screen shows this code').waitFor();
   await engineer.getByLabel('Code on the screen').fill(code.toLowerCase());
+  await pair.getByLabel('Your password').fill(h.password);
   await engineer.getByRole('button', { name: 'Pair the screen' }).click();
   await engineer.getByRole('cell', { name: 'couch side', exact: true }).waitFor();
   await h.look(engineer, 'displays');
@@ -117,7 +131,7 @@ await h.step('a link with the key pairs a display without a code, and does not k
   await wall.goto(`${h.url}room#key=${secret}`);
   await wall.locator('.pair-code').waitFor();
   equal(new URL(wall.url()).hash, '', 'a key that is not paired is not kept either');
-  await ok(engineer, 'displays', 'POST', { code, name: 'wall' });
+  await ok(engineer, 'displays', 'POST', { code, name: 'wall', password: h.password });
   await wall.goto(`${h.url}room?theme=light#key=${secret}`);
   await wall.locator('.room-code').waitFor();
   equal(new URL(wall.url()).search + new URL(wall.url()).hash, '?theme=light',
@@ -125,7 +139,7 @@ await h.step('a link with the key pairs a display without a code, and does not k
   equal((await h.api(wall, 'press', 'POST')).status, 403, 'it changes nothing');
   await engineer.goto(`${h.url}#/users`);
   await engineer.reload();
-  await engineer.getByRole('button', { name: 'Remove wall' }).click();
+  await removeScreen('wall');
   await wall.locator('.pair-code').waitFor(kSlow);
   await wall.context().close();
 });
@@ -359,11 +373,7 @@ await h.step('three words: within, not surely within, outside; no digits below t
   }
   const lowest = await anna.locator('.number').last().evaluate((element) => {
     window.scrollTo(0, 0);
-    const flags = document.querySelector('.flags');
-    flags.hidden = true;
-    const { bottom } = element.getBoundingClientRect();
-    flags.hidden = false;
-    return bottom;
+    return element.getBoundingClientRect().bottom;
   });
   check(lowest <= 800, `six numbers in view, down to ${lowest}`);
   await h.look(anna, 'result-unsure', { axe: false });
@@ -388,6 +398,34 @@ await h.step('the room display says in large letters that the room is not calibr
   check(lowest <= 1080, `six numbers in view, down to ${lowest}`);
 });
 
+await h.step('after 6 s of silence nobody knows whether a result holds, on page and room display',
+  async () => {
+  await press();
+  await anna.goto(`${h.url}#/result`);
+  const held = [anna.locator('.old-note', { hasText: 'NO CONNECTION' }),
+    room.locator('.old-note', { hasText: 'NO CONNECTION' })];
+  await room.locator('.room-result .verdict').waitFor();
+  // The result of this sweep, not the one before it that the page may still be replacing.
+  const { id } = (await state()).last_result;
+  await anna.locator(`a[href^="/result?scan=${id}&"]`).first().waitFor({ state: 'attached' });
+  await anna.locator('.old-note[data-shown=""]').waitFor({ state: 'attached' });
+  for (const note of held) equal(await note.count(), 0, 'valid');
+  h.server.kill('SIGSTOP');
+  const begun = Date.now();
+  try {
+    for (const note of held) await note.waitFor({ timeout: 15000 });
+    const seconds = (Date.now() - begun) / 1000;
+    check(seconds < 12, `known after ${seconds} s`);
+    for (const page of [anna, room]) {
+      equal(await page.locator('.number .arrow').count(), 0, 'no arrow to follow');
+    }
+    await h.look(room, 'room-silent', { axe: false, fullPage: false });
+  } finally {
+    h.server.kill('SIGCONT');
+  }
+  for (const note of held) await note.waitFor({ state: 'detached' });
+});
+
 await h.step('fraction numbers count sessions, not scans', async () => {
   const { scans } = await ok(anna, `patients/${patient}/scans`, 'GET');
   const fractions = scans.filter(({ purpose }) => purpose === 'fraction');
@@ -395,13 +433,31 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   equal(new Set(fractions.map(({ fraction }) => fraction)).size, 1, 'of one fraction');
   await anna.goto(`${h.url}#/scan`);
   await anna.getByRole('button', { name: 'Close session' }).click();
+  const asked = anna.getByRole('dialog', { name: 'Not accepted' });
+  await asked.getByText('Nobody has accepted the newest result of P-0042, Fraction 1').waitFor();
+  await h.look(anna, 'close-question', { fullPage: false });
+  await asked.getByRole('button', { name: 'Keep it open' }).click();
+  equal((await state()).session.fraction, 1, 'still open');
+  await anna.getByRole('button', { name: 'Close session' }).click();
+  await asked.getByRole('button', { name: 'Close without acceptance' }).click();
+  await anna.getByText('No session open').first().waitFor();
+  // What was closed can go on: the same fraction, not the next one.
+  await anna.goto(`${h.url}#/patient/${patient}`);
+  await anna.getByRole('button', { name: /^Resume fraction 1 \(closed \d+ \w+ ago\)$/ }).click();
+  await anna.locator('.who-line', { hasText: 'Fraction 1' }).waitFor();
+  equal((await state()).session.id, scans.find(({ purpose }) => purpose === 'fraction').session_id,
+    'the same session');
+  await anna.getByRole('button', { name: 'Close session' }).click();
+  await asked.getByRole('button', { name: 'Close without acceptance' }).click();
   await anna.getByText('No session open').first().waitFor();
   // A failed daily check stays in the corner, and the display is ready for the next session.
   await ok(anna, 'checks/open', 'POST');
   h.tell('markermoved');
   h.tell('press');
   await room.locator('.verdict.move', { hasText: 'DAILY CHECK: FAILED' }).waitFor(kSlow);
-  await openOnPage(anna, 'P-0042');
+  // Her page goes there by itself: only then can she leave it.
+  await anna.getByText('Marker 7 moved').first().waitFor(kSlow);
+  await openOnPage(anna, 'P-0042', 'Start a new fraction');
   await anna.locator('.who-line', { hasText: 'Fraction 2' }).waitFor();
   await room.locator('.room-word', { hasText: 'READY' }).waitFor();
   await room.locator('.room-marks .bad', { hasText: 'Daily check failed' }).waitFor();
@@ -410,11 +466,61 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   // The next thing to press is the scan, not another session.
   await anna.goto(`${h.url}#/patient/${patient}`);
   await anna.locator('a.primary', { hasText: 'Go to scan' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Start treatment session' }).count(), 0,
+  equal(await anna.getByRole('button', { name: /^(Start|Resume)/ }).count(), 0,
     'what is open is not offered again');
   equal(await anna.getByText('Confirm: P-0042 is on the couch').isVisible(), false, 'nor asked');
   equal(await anna.getByRole('button', { name: 'Scan a new reference' }).count(), 1,
     'another purpose is');
+  await anna.goto(`${h.url}#/scan`);
+});
+
+await h.step('a fraction number is corrected with a reason and the password', async () => {
+  await anna.goto(`${h.url}#/patient/${patient}`);
+  await anna.getByText('Correct a fraction number').click();
+  const form = anna.locator('details', { hasText: 'Correct a fraction number' });
+  await form.getByLabel('Session').selectOption({ index: 0 });
+  await form.getByLabel('Right number').fill('3');
+  await form.getByLabel('Reason for the correction').fill('two were given elsewhere');
+  await form.getByLabel('Your password').fill('not this one at all');
+  await form.getByRole('button', { name: 'Sign and correct' }).click();
+  await anna.getByRole('alert').getByText('password').waitFor();
+  await form.getByLabel('Your password').fill(h.password);
+  await form.getByRole('button', { name: 'Sign and correct' }).click();
+  await anna.getByRole('cell', { name: '3', exact: true }).first().waitFor();
+  const { scans } = await ok(anna, `patients/${patient}/scans`, 'GET');
+  equal(new Set(scans.map(({ fraction }) => fraction).filter(Boolean)).size, 1, 'one fraction');
+  equal(scans.find(({ fraction }) => fraction).fraction, 3, 'the corrected one');
+  await anna.goto(`${h.url}#/scan`);
+});
+
+await h.step('a version that is approved meanwhile is a question, and changes nothing by itself',
+  async () => {
+  const [first] = (await ok(bob, `patients/${patient}/references`, 'GET')).references;
+  const { id } = await ok(bob, `references/${first.id}/plan`, 'PUT', {
+    revision: first.revision, region_m: first.plan.region_m, isocentre_m: first.plan.isocentre_m,
+    shift_tolerance_mm: 3, rotation_tolerance_deg: 1, posture: 'HFS', couch_markers: false,
+  });
+  const draft = await ok(clara, `references/${id}`, 'GET');
+  await ok(clara, `references/${id}/approve`, 'POST',
+    { revision: draft.revision, digest: draft.digest, password: h.password });
+  const asked = anna.getByRole('dialog', { name: 'A newer reference is approved' });
+  await asked.getByText(/version 2 \(±3 mm, ±1°/).waitFor();
+  await room.locator('.room-newer', { hasText: 'Version 2 is approved by now' }).waitFor();
+  await h.look(anna, 'reference-question', { fullPage: false });
+  await h.look(room, 'room-newer-reference', { axe: false, fullPage: false });
+  await asked.getByRole('button', { name: 'Keep version 1 for this session' }).click();
+  await asked.waitFor({ state: 'detached' });
+  equal((await state()).session.reference.version, 1, 'kept');
+  await press();
+  equal((await state()).last_result.reference_id, first.id, 'compared with the version of before');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.locator('.who-line', { hasText: 'Reference version 1' }).waitFor();
+  equal(await asked.count(), 0, 'asked once');
+  await anna.locator('.who-line').getByRole('button', { name: 'Use version 2' }).click();
+  await anna.locator('.who-line', { hasText: 'Reference version 2' }).waitFor();
+  await room.locator('.room-newer').waitFor({ state: 'detached' });
+  await press();
+  equal((await state()).last_result.reference_id, id, 'compared with the one that was chosen');
   await anna.goto(`${h.url}#/scan`);
 });
 
@@ -470,7 +576,7 @@ await h.step('codes are unique without regard to case, and a wristband opens', a
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'P-0050' }).waitFor();
   // The field has the focus: a scanner types at once.
-  await anna.keyboard.type('P-005');
+  await anna.keyboard.type('P-005', { delay: 60 });  // a person
   await anna.keyboard.press('Enter');
   await anna.locator('.caution', { hasText: 'No patient with this code: P-005.' }).waitFor();
   await anna.getByRole('status')
@@ -481,6 +587,46 @@ await h.step('codes are unique without regard to case, and a wristband opens', a
   await anna.getByLabel('Find a code').fill('p-0050');
   await anna.getByLabel('Find a code').press('Enter');
   await anna.getByRole('heading', { name: 'P-0050' }).waitFor();
+});
+
+/// What a scanner types on that page, at once; returns whether its Enter was swallowed.
+const wristband = (page, code) => page.evaluate((text) => {
+  const type = (key) => (document.activeElement ?? document.body).dispatchEvent(
+    new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true }));
+  for (const key of text) type(key);
+  return !type('Enter');
+}, code);
+
+await h.step('a wristband is answered on every screen, and its Enter presses no button',
+  async () => {
+  const { session } = await state();
+  equal(session.patient_code, 'P-0042', 'who is open');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.locator('.giant').focus();
+  const asked = anna.getByRole('dialog', { name: 'This wristband is another patient’s' });
+  check(await wristband(anna, 'p 0042'), 'swallowed on the large button');
+  await anna.getByRole('status').getByText('✓ P-0042 is the open patient.').waitFor();
+  check(await wristband(anna, 'P0050'), 'without its hyphen');
+  await asked.getByText('Scanned: P-0050. The session of P-0042 is open.').waitFor();
+  await h.look(anna, 'wristband-other', { fullPage: false });
+  await asked.getByRole('button', { name: 'P-0042 is on the couch' }).click();
+  await asked.waitFor({ state: 'detached' });
+  check(await wristband(anna, 'P-9999'), 'swallowed');
+  await anna.getByRole('alert').getByText('Scanned: P-9999. No patient has this code.').waitFor();
+  check(await wristband(anna, 'P-0050'), 'swallowed');
+  await asked.getByRole('button', { name: 'Go to P-0050' }).click();
+  await anna.getByRole('heading', { name: 'P-0050' }).waitFor();
+  const after = await state();
+  equal(after.session.id, session.id, 'no session was opened or closed');
+  check(!['scanning', 'working'].includes(after.state), 'no sweep was started');
+  // Three characters are no burst, and people are slower: their Enter is theirs.
+  check(!await wristband(anna, 'P-0'), 'not swallowed');
+  // Codes that look alike are asked about.
+  await h.addPatient(anna, 'P-OO50');
+  await anna.getByRole('alert').getByText('P-OO50 looks like P-0050').waitFor();
+  equal((await ok(anna, 'patients', 'GET')).patients.length, 2, 'not added');
+  await h.addPatient(anna, 'P'.repeat(33));
+  await anna.getByRole('alert').getByText('at most 32 characters; this one has 33').waitFor();
 });
 
 await h.step('without a session the button makes an unassigned scan that says so', async () => {
@@ -539,7 +685,7 @@ await h.step('eight tabs of one browser and three browsers: every one live, one 
 await h.step('disconnected: states and buttons are off, and say how old they are', async () => {
   await bob.goto(`${h.url}#/status`);
   await clara.goto(`${h.url}#/patient/${patient}`);
-  const open = clara.getByRole('button', { name: 'Start treatment session' });
+  const open = clara.getByRole('button', { name: /^Start (treatment session|a new fraction)$/ });
   await open.waitFor();
   equal(await open.getAttribute('aria-disabled'), null, 'a session can be opened');
   h.server.kill('SIGSTOP');
@@ -642,7 +788,7 @@ await h.step('the numbers of a patient as CSV, JSON and PDF', async () => {
 
 await h.step('an unpaired display is out at once', async () => {
   await engineer.goto(`${h.url}#/users`);
-  await engineer.getByRole('button', { name: 'Remove couch side' }).click();
+  await removeScreen('couch side');
   await engineer.getByText('No screen is paired.').waitFor();
   await room.locator('.pair-code').waitFor(kSlow);
 });

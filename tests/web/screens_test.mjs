@@ -1,15 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every screen in every size, theme and language: screens_test.mjs NODE_MODULES SERVER OUT_FOLDER
 // CHROMIUM
 // A screen is loaded once and switched in place, by what a person would use: the window, the theme
 // and the language. Layout, words and touch are measured in every size and language (colours change
-// neither); axe runs on a phone and at 1280 px, at each in both languages and both themes. With
-// PLUMB_PICTURES=1 one picture of each screen in each size is kept, in themes and languages that
-// take turns; without it, the pages are painted at a tenth of their size, which changes no layout.
+// neither); axe runs on a phone and at 1280 px, at each in both languages and both themes. The
+// languages are English and PLUMB_OTHER_LANGUAGE: German by default, whose words are the longest.
+// With PLUMB_PICTURES=1 one picture of each screen in each size is kept, in themes and languages
+// that take turns; without it, the pages are painted at a tenth of their size, which changes no
+// layout.
 import { readFileSync } from 'node:fs';
-import { en } from '../../web/assets/strings/en.js';
-import { es } from '../../web/assets/strings/es.js';
 import { Harness, keepsPictures } from './harness.mjs';
 import { englishTexts, faultsOfLayout } from './layout_checks.mjs';
+import { readCatalogues, wordsBeside, wordsIn } from './page_words.mjs';
 
 // The fifth shows only the screens whose names it matches.
 const [modules, server, folder, chromium, only] = process.argv.slice(2);
@@ -19,14 +21,15 @@ const kTags = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-pra
 /// `full`: where axe runs with all of its rules, `contrast`: with the one of colours, which are the
 /// same in both languages, as all else is in both themes. `open`: whether all that unfolds is
 /// unfolded. `wall`: the screen on the room's wall.
+const other = process.env.PLUMB_OTHER_LANGUAGE || 'de';
 const kSizes = [
-  { width: 360, height: 740, full: 'es light', contrast: 'en dark', open: true, touched: true,
-    picture: 'es light' },
+  { width: 360, height: 740, full: `${other} light`, contrast: 'en dark', open: true, touched: true,
+    picture: `${other} light` },
   { width: 390, height: 844, touched: true, picture: 'en dark' },
-  { width: 1280, height: 800, full: 'en dark', contrast: 'es light', open: true,
+  { width: 1280, height: 800, full: 'en dark', contrast: `${other} light`, open: true,
     picture: 'en light' },
-  { width: 1920, height: 1080, wall: true, picture: 'es dark' },
-  { width: 3840, height: 2160, wall: true, open: true, picture: 'es light' },
+  { width: 1920, height: 1080, wall: true, picture: `${other} dark` },
+  { width: 3840, height: 2160, wall: true, open: true, picture: `${other} light` },
 ];
 const kThemes = ['dark', 'light'];
 const spent = {};
@@ -36,7 +39,10 @@ async function timed(what, work) {
   spent[what] = (spent[what] ?? 0) + Date.now() - begun;
   return answer;
 }
-const english = englishTexts(en, es);
+const catalogues = readCatalogues(wordsBeside(modules));
+const english = englishTexts(catalogues.en, catalogues[other]);
+const [en, others] = await Promise.all(['en', other].map(
+  async (code) => (await wordsIn(code, catalogues[code])).S));
 check(english.whole.length > 300 && english.parts.length > 200, 'texts to look for');
 
 // --- one screen
@@ -75,8 +81,14 @@ async function settle(page) {
   }
   await page.waitForFunction(
     ([a, b]) => ![a, b].some((text) => document.querySelector('main')?.innerText.includes(text)),
-    [en.loading, es.loading]);
+    [en.loading, others.loading]);
   await drawn(page);
+}
+/// Until the page is in its person's language again: a page that begins is in that of the browser.
+async function reload(page, ready) {
+  await page.reload();
+  await page.locator(ready).first().waitFor({ timeout: 60000 });
+  await settle(page);
 }
 /// Sets the size of the window. Unless pictures are kept, the page is painted at a tenth of it,
 /// which is faster and changes no layout.
@@ -111,7 +123,7 @@ async function axe(page, where, rules) {
 
 async function measure(page, name, language, { touched = false, wall = false, width }) {
   const faults = await page.evaluate(faultsOfLayout,
-    { touched, wall, english: language === 'es' ? english : null });
+    { touched, wall, english: language === other ? english : null });
   for (const fault of faults) h.failures.push(`${name}, ${width} px, ${language}: ${fault}`);
 }
 
@@ -164,15 +176,15 @@ async function show(page, one, language) {
     await page.goto(`${h.url}${one.url(language)}`);
   } else {
     const isOther = await page.evaluate(([hash, wanted]) => {
-      const other = document.documentElement.lang !== wanted;
-      if (location.hash !== hash || !other) location.hash = hash;
-      return other;
+      const differs = document.documentElement.lang !== wanted;
+      if (location.hash !== hash || !differs) location.hash = hash;
+      return differs;
     }, [`#/${one.hash}`, language]);
     if (isOther) await page.evaluate(() => window.dispatchEvent(new Event('plumb-language')));
   }
   await page.locator(one.ready).first().waitFor({ timeout: 60000 });
   await settle(page);
-  await one.prepare?.(page, language === 'es' ? es : en);
+  await one.prepare?.(page, language === other ? others : en);
   await settle(page);
   equal(await page.evaluate(() => document.documentElement.lang), language,
     `${one.name}: language`);
@@ -188,12 +200,12 @@ async function look(one) {
   const now = await page.evaluate(() => document.documentElement.lang);
   await restore(page);
   await one.before?.(page);
-  for (const language of now === 'es' ? ['es', 'en'] : ['en', 'es']) {
+  for (const language of now === other ? [other, 'en'] : ['en', other]) {
     if (language !== now) await one.between?.(page);
     await timed('show', () => show(page, one, language));
     await lookAt(page, one, language);
     await restore(page);
-    await one.also?.(page, language, language === 'es' ? es : en);
+    await one.also?.(page, language, language === other ? others : en);
   }
   await one.leave?.(page);
   shown.add(one.route);
@@ -270,7 +282,7 @@ async function plannedPatient(code, site) {
   return { id, draft, scan };
 }
 
-const app = readFileSync(new URL('../../web/assets/app.js', import.meta.url), 'utf8');
+const app = readFileSync(new URL('../../web/page/app.js', import.meta.url), 'utf8');
 const routes = [...app.matchAll(/^ {2}(\w+): \{ show: /gm)].map(([, name]) => name);
 check(routes.length >= 11, `routes of app.js: ${routes}`);
 
@@ -280,6 +292,7 @@ await h.step('before anybody has an account', async () => {
   await lookAll(
     { name: 'first-start', who: 'visitor', account: 'login', url, ready: 'input.code' });
   await h.firstStart(engineer);
+  h.tell('checked');  // today, so that nothing is doubtful about a reference
   for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist'],
     ['dora', 'technician']]) {
     await h.addAccountByApi(engineer, name, role);
@@ -289,8 +302,12 @@ await h.step('before anybody has an account', async () => {
   }
 });
 
-const kFault = 'the database /state/plumb.db is damaged (malformed): put a backup in its place, or '
-  + 'move it and the folder scans away to start over';
+const kFault = {
+  fault: 'the database /state/plumb.db is damaged (malformed): put a backup in its place, or '
+    + 'move it and the folder scans away to start over',
+  fault_message: {
+    id: 'store.database_damaged', arguments: { file: '/state/plumb.db', why: 'malformed' } },
+};
 await h.step('while nothing was scanned, and for who has not come in', async () => {
   const url = () => '';
   const session = '**/api/v1/session';
@@ -300,6 +317,7 @@ await h.step('while nothing was scanned, and for who has not come in', async () 
     { name: 'patients-empty', route: 'patients', who: 'anna', hash: 'patients', ready: 'form' },
     { name: 'result-none', route: 'result', who: 'anna', hash: 'result', ready: '.result h1' },
     { name: 'check-none', route: 'check', who: 'anna', hash: 'check', ready: '.verdict.none' },
+    { name: 'monitor-off', route: 'monitor', who: 'anna', hash: 'monitor', ready: '.live-advice' },
     { name: 'scan-no-session', route: 'scan', who: 'anna', hash: 'scan', ready: '.giant' },
     { name: 'users-own', route: 'users', who: 'anna', hash: 'users', ready: 'form' },
     { name: 'not-allowed', route: 'audit', who: 'anna', hash: 'audit', ready: '.screen > .card' },
@@ -315,7 +333,7 @@ await h.step('while nothing was scanned, and for who has not come in', async () 
     },
   );
   await visitor.route(session, (route) => route.fulfill({ status: 401,
-    json: { error: 'log in first', setup_required: false, fault: kFault, certificate: '' } }));
+    json: { error: 'log in first', setup_required: false, ...kFault, certificate: '' } }));
   await lookAll({ name: 'out-of-order', who: 'visitor', account: 'login', url, ready: '.caution' });
   await visitor.unroute(session);
   await visitor.route(session, (route) => route.abort());
@@ -392,7 +410,7 @@ await h.step('patients, plans, the check, and what engineers see', async () => {
     { name: 'patient', route: 'patient', who: 'bob', hash: `patient/${first.id}`,
       ready: '.digits' },
     { name: 'plan', route: 'plan', who: 'bob', hash: `plan/${second.draft}`,
-      ready: '.plan-grid .ways', leave: (page) => page.reload() },
+      ready: '.plan-grid .ways', leave: (page) => reload(page, '.plan-grid .ways') },
     { name: 'audit', route: 'audit', who: 'bob', hash: 'audit', ready: 'tbody tr' },
     { name: 'settings-read', route: 'settings', who: 'bob', hash: 'settings',
       ready: '.sensor-profile tbody tr' },
@@ -435,7 +453,7 @@ await h.step('the room’s display, and the scan from the start to the result an
   await room.goto(`${h.url}room`);
   await look({ ...inRoom('pairing', '.pair-code'), state: false });
   await ok(engineer, 'displays', 'POST',
-    { code: await room.locator('.pair-code').innerText(), name: 'camilla' });
+    { code: await room.locator('.pair-code').innerText(), name: 'camilla', password: h.password });
   await room.locator('.room-code').waitFor();
   await openPatient(first.id, 'fraction');
   await sweep('moved z 8 HFS');
@@ -529,7 +547,7 @@ await h.step(
         await page.locator('.tile').first().waitFor();
         await h.setClockOn(page, 13.2 * 60);
         await page.locator('#idle button').waitFor();
-      }, leave: (page) => page.reload() },
+      }, leave: (page) => reload(page, '.tile') },
     { ...atScan('disconnected', '.headline'), before: offline, leave: (page) => h.wake(page) },
   );
   h.tell('checked');
@@ -539,7 +557,8 @@ await h.step('the daily check and the room’s calibration, passed and failed; u
   + 'that cannot be read', async () => {
   await sweepOfCheck();
   const { checks } = await ok(bob, 'checks', 'GET');
-  await ok(bob, `checks/${checks[0].id}/baseline`, 'POST');
+  await ok(bob, `checks/${checks[0].id}/baseline`, 'POST',
+    { reason: 'first of this room', password: h.password });
   await sweepOfCheck();
   h.tell('board');
   for (let i = 0; i < 3; ++i) await sweepOfCheck();
@@ -576,7 +595,8 @@ await h.step('the daily check and the room’s calibration, passed and failed; u
 await h.step('each check finds what it is for', async () => {
   const page = bob;
   await resize(page, kSizes[0]);
-  await page.evaluate((name) => localStorage.setItem(`plumb-language-${name}`, 'es'), 'bob');
+  await page.evaluate(([name, code]) => localStorage.setItem(`plumb-language-${name}`, code),
+    ['bob', other]);
   await page.goto(`${h.url}#/status`);
   await page.reload();
   await page.locator('.tile').first().waitFor();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The parts of the 3-D view that need no browser: reading packed surfaces, whole and damaged, and
 // the motion that a correction is shown as: surface_test.mjs NODE_MODULES SOURCE_FOLDER
 import {
@@ -14,7 +15,7 @@ const folder = mkdtempSync(join(tmpdir(), 'plumb-surface-'));
 writeFileSync(join(folder, 'package.json'), '{"type": "module"}');
 symlinkSync(modules, join(folder, 'node_modules'));
 for (const name of ['inflate', 'packed_mesh', 'mesh_motion']) {
-  copyFileSync(join(source, 'web/assets', `${name}.js`), join(folder, `${name}.js`));
+  copyFileSync(join(source, 'web/page/drawings', `${name}.js`), join(folder, `${name}.js`));
 }
 const load = (file) => import(pathToFileURL(file).href);
 const { readMesh } = await load(join(folder, 'packed_mesh.js'));
@@ -94,7 +95,7 @@ for (const [what, bytes, expected] of [
 // What the appliance packs, a browser reads.
 const bound = (file, pattern) =>
   Number(pattern.exec(readFileSync(join(source, file), 'utf8'))?.[1]);
-check(bound('web/assets/packed_mesh.js', /kMost = 2 \*\* (\d+);/) === 25,
+check(bound('web/page/drawings/packed_mesh.js', /kMost = 2 \*\* (\d+);/) === 25,
   'the most parts that are read');
 check(bound('daemon/files/compact_map.cpp', /kMostParts = std::size_t\{1\} << (\d+);/) === 25,
   'the most parts that are packed');

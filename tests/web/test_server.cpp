@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The real HTTP server over a fake appliance whose scans show real results: for tests of the page
 // in a browser. plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its
 // address and "setup code: XXXX-XXXX", obeys lines on stdin: unplug, plug, fail (of the running
@@ -8,9 +9,9 @@
 // markermoved (a check), stranger (another body), shoulder (lifted), across (the body lies across
 // the room's axes), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by
 // pitch, roll, yaw by degrees); hole (in the region), shifted (one marker, by 12 mm), weak (roll is
-// not well seen), hurried (a third of the frames lost); "room known", "room unknown": what the
-// status says; "moved z 8 HFS bare": as compared where the room is not known; cold, warm (the
-// sensor); full, emptied (the disk).
+// not well seen), hurried (a third of the frames lost); "room known", "room unknown", "room
+// lasers": what the status says; "moved z 8 HFS bare": as compared where the room is not known;
+// cold, warm (the sensor); full, emptied (the disk).
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -29,14 +30,21 @@
 
 #include "algo/base/units.hpp"
 #include "algo/comparison/comparison.hpp"
-#include "algo/reconstruction/surface_mesh.hpp"
+#include "algo/surface/surface_mesh.hpp"
+#include "daemon/database/store_json.hpp"
 #include "daemon/files/compact_map.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/records/store_json.hpp"
+#include "daemon/result/scan_quality.hpp"
 #include "tests/support/fake_appliance.hpp"
+#include "tests/support/result_with.hpp"
 #include "tests/support/synthetic_scene.hpp"
 #include "web/api/http_server.hpp"
+#include "words/check.hpp"
+#include "words/scan.hpp"
+#include "words/store.hpp"
+#include "words/update.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb::test {
 namespace {
@@ -188,8 +196,11 @@ class Recorder {
                      is_room_known ? std::optional(kT_iec_reference) : std::nullopt,
                      MarkerKind::kRoom, posture, comparison.body_parts->patient);
     if (!is_room_known) comparison.body_parts->room.reset();
-    comparison.verdict = Verdict::kMove;
-    comparison.reasons = {"known motion"};
+    comparison.judgements = testing::JudgementsOf(Stored(comparison));
+    std::array<bool, 6> all{};
+    all.fill(true);
+    comparison.verdict = VerdictOf(comparison.judgements, all);
+    comparison.reasons = {Message::Verbatim("known motion")};
     const fs::path folder = NewFolder();
     fs::create_directory_symlink(root_ / "sweep_0" / "scene", folder / "scene");
     return Write(folder, comparison);
@@ -204,7 +215,7 @@ class Recorder {
 
   FakeAppliance::Recorded Write(const fs::path& folder, const Comparison& comparison) {
     WriteResult(comparison, DrawResult(comparison, &*reference_->height_map), folder / "result");
-    return {folder, SummaryOf(ResultJson(comparison))};
+    return {folder, SummaryOf(ResultText(Stored(comparison)))};
   }
 
   fs::path root_;
@@ -276,34 +287,31 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "toil") service.work = std::chrono::milliseconds(60000);
   if (name == "nobackup") {
     service.backup_fault = "no folder for backups is configured";
-    service.status.storage.warnings = {
-        "The last backup failed: no folder for backups is configured: set backup_folder in "
-        "[storage]"};
+    service.status.storage.warnings = {say::upkeep::BackupFailed(say::upkeep::NoBackupFolder())};
     service.Notify(web::EventKind::kStatus);
   }
   if (name == "installed") {
     service.update.installing = false;
-    service.update.message = "plumb-0.3.0.raucb is installed: restart the appliance to use it";
+    service.update.message = say::update::Installed("plumb-0.3.0.raucb");
     service.update.restart_needed = true;
     service.Notify(web::EventKind::kUpdate);
   }
   if (name == "rolledback") {
     service.update.restart_needed = false;
-    service.update.rolled_back =
-        "version 0.3.0 was installed, but the machine has gone back to the previous system, "
-        "0.2.0: the new one did not start or was not fit for work";
+    service.update.rolled_back = say::update::RolledBack("0.3.0", "0.2.0");
     service.status.rolled_back = service.update.rolled_back;
     service.Notify(web::EventKind::kUpdate);
     service.Notify(web::EventKind::kStatus);
   }
   if (name == "markermoved") {
     CheckRecord check;
-    check.reasons = {"marker 7 moved 12 mm",
-                     "the markers lie 3.4 mm (RMS) from where they were, at most 3 mm are allowed"};
-    check.items = {
-        {"markers_seen", 12, 12, "", true, ""},      {"misfit", 3.4, 3, "mm", false, ""},
-        {"moved", 12.2, 5, "mm", false, "marker 7"}, {"scale", 0.08, 0.5, "%", true, ""},
-        {"side", -0.4, 3, "%", true, "marker 9"},    {"depth_scale", 0.62, 3, "%", true, ""}};
+    check.reasons = {say::check::Moved(7, 12.0), say::check::Misfit(3.4, 3.0)};
+    check.items = {{"markers_seen", 12, 12, "", true, {}},
+                   {"misfit", 3.4, 3, "mm", false, {}},
+                   {"moved", 12.2, 5, "mm", false, say::check::Marker(7)},
+                   {"scale", 0.08, 0.5, "%", true, {}},
+                   {"side", -0.4, 3, "%", true, say::check::Marker(9)},
+                   {"depth_scale", 0.62, 3, "%", true, {}}};
     check.num_markers = 12;
     service.next_check = check;
   }
@@ -312,7 +320,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "room") {
     std::string what;
     words >> what;
-    service.status.room.is_known = what == "known" || what == "turned";
+    service.status.room.is_known = what != "unknown";
     service.room_of_references.reset();
     // As if each reference's marker had been turned by 90 degrees before the room was calibrated.
     const auto turned = [](const std::array<double, 2>& way) {
@@ -321,35 +329,49 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     if (const RoomOnMap& room = service.status.room; what == "turned")
       service.room_of_references = {
           .gantry_xy = turned(room.gantry_xy), .right_xy = turned(room.right_xy), .is_known = true};
+    if (what == "lasers") {
+      service.room_of_references = service.status.room;
+      service.room_of_references->lasers_m = {0.61, 0.44, 0.05};
+    }
     service.Notify(web::EventKind::kStatus);
   }
   if (name == "board") service.is_board_there = true;
   if (name == "roomdue") {
-    service.room.due = "marker 4 moved 8 mm since the room was calibrated";
+    service.room.due = say::store::RoomMarkerMoved(say::check::Marker(4), 8.0);
     service.Notify(web::EventKind::kData);
   }
-  if (name == "overdue")
-    service.SetOverdue(
-        "the daily check is overdue, and references need one that has passed today: "
-        "open Daily check, sweep over all markers of the room, then go on here");
-  if (name == "checked") service.SetOverdue("");
+  if (name == "overdue") service.SetOverdue(say::scan::CheckOverdue());
+  if (name == "checked") service.SetOverdue({});
   if (name == "cold" || name == "warm") {
     service.status.sensor.powered_s = name == "cold" ? 1020 : 1800;
-    service.status.reference_block =
-        name == "cold" ? "the sensor is still warming up, and references need one that has been on "
-                         "for 20 min: wait, then scan"
-                       : "";
+    service.status.reference_block = name == "cold" ? say::scan::IsWarmingUp(20) : Message();
     service.Notify(web::EventKind::kStatus);
   }
   if (name == "full" || name == "emptied") {
     const bool is_full = name == "full";
     service.status.state = is_full ? ApplianceState::kFault : ApplianceState::kReady;
     service.status.fault_kind = is_full ? FaultKind::kStorage : FaultKind::kNone;
-    service.status.fault = is_full
-                               ? "the disk is full: 90 MB are free, a scan may need 700; remove "
-                                 "scans that are no longer needed"
-                               : "";
+    service.status.fault = is_full ? say::upkeep::DiskFull(90, 700) : Message();
     service.Notify(web::EventKind::kStatus);
+  }
+  if (name == "watch") {  // STATE ADVICE REASON VERTICAL_MM: what live monitoring says
+    double vertical_mm = 0;
+    words >> service.monitor.state >> service.monitor.advice >> service.monitor.reason >>
+        vertical_mm;
+    const bool knows = service.monitor.state == "monitoring";
+    const MotionNumbers numbers{.value = {vertical_mm, -0.4, 0.3, 0.1, -0.05, 0.2},
+                                .u95 = {0.2, 0.4, 0.4, 0.1, 0.1, 0.1}};
+    service.monitor.judges_reference = true;
+    service.monitor.since_zero = knows ? std::optional(numbers) : std::nullopt;
+    service.monitor.against_reference = service.monitor.since_zero;
+    if (knows) service.monitor.against_reference->value[0] += 1.0;
+    service.monitor.age_s = 0.03;
+    service.monitor.has_breathing = knows;
+    service.monitor.breathing_mm =
+        knows ? std::optional(3.0 +
+                              3.0 * std::sin(0.3 * static_cast<double>(service.monitor.frames++)))
+              : std::nullopt;
+    service.Notify(web::EventKind::kMonitor);
   }
   if (name == "hole") service.next_recorded = recorder.Record(WithHole());
   if (name == "shifted")
@@ -384,6 +406,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
       result.u95->vertical_mm = 1.2;
       result.correction->pitch_deg = 0.01;
       result.u95->pitch_deg = 0.14;
+      result.judgements[0] = NumberJudgement::kUnsure;
     }
     service.next_recorded = shown;
   }
@@ -450,13 +473,16 @@ int Serve(const fs::path& root, bool tls) {
       return std::nullopt;
     }
   };
+  service.judge_quality = [](const Scan& scan) {
+    return QualityOf(scan, FilesOf(scan), /*warm_up_min=*/20);
+  };
   service.status.room.right_xy = {kT_iec_reference(0, 0), kT_iec_reference(0, 1)};
   service.status.room.gantry_xy = {kT_iec_reference(1, 0), kT_iec_reference(1, 1)};
   service.status.room.is_known = true;
   service.sweep = std::chrono::milliseconds(1500);
   service.profiles = KnownSensor();
   service.update.supported = true;
-  service.update.message = "";
+  service.update.message = {};
   service.update.slot = "A";
   service.update.bundles = {"plumb-0.2.0.raucb"};
   web::HttpServerOptions options;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What watching costs: viewers_bench.mjs NODE_MODULES PLUMBD OUT_FOLDER CHROMIUM
 // A sweep without viewers, then one with five viewers and a download without end. Viewers are what
 // plumbd sees of a browser (event stream, preview four times a second, status after each event);

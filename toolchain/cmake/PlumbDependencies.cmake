@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Libraries of the system, each by its package's own config where it has one.
 include(PlumbMethodDependencies)
 find_package(nlohmann_json 3.11 REQUIRED)
@@ -9,10 +10,22 @@ find_package(PNG REQUIRED)
 find_package(TIFF REQUIRED)
 find_package(JPEG REQUIRED)
 pkg_check_modules(zlib REQUIRED IMPORTED_TARGET zlib)
+pkg_check_modules(lz4 REQUIRED IMPORTED_TARGET liblz4)
 pkg_check_modules(yaml REQUIRED IMPORTED_TARGET yaml-cpp)
 find_path(PLUMB_TOMLPP_INCLUDE toml++/toml.h REQUIRED)
 add_library(tomlplusplus::tomlplusplus INTERFACE IMPORTED)
 target_include_directories(tomlplusplus::tomlplusplus INTERFACE ${PLUMB_TOMLPP_INCLUDE})
+
+if(PLUMB_WITH_DICOM)
+  # The part of DCMTK that reads files; its own package names all of DCMTK.
+  find_path(PLUMB_DCMTK_INCLUDE dcmtk/dcmdata/dctk.h REQUIRED)
+  add_library(plumb_dcmtk INTERFACE)
+  target_include_directories(plumb_dcmtk SYSTEM INTERFACE ${PLUMB_DCMTK_INCLUDE})
+  foreach(part dcmdata oflog ofstd)
+    find_library(PLUMB_DCMTK_${part} ${part} REQUIRED)
+    target_link_libraries(plumb_dcmtk INTERFACE ${PLUMB_DCMTK_${part}})
+  endforeach()
+endif()
 
 # The appliance. Each hardware library can be left out.
 if(PLUMB_WITH_APPLIANCE)
@@ -31,7 +44,8 @@ if(PLUMB_WITH_USB)
   pkg_check_modules(usb REQUIRED IMPORTED_TARGET libusb-1.0)
 endif()
 if(PLUMB_WITH_GPIO)
-  pkg_check_modules(gpiod REQUIRED IMPORTED_TARGET libgpiod)
+  # Version 2 has another interface.
+  pkg_check_modules(gpiod REQUIRED IMPORTED_TARGET libgpiod<2)
 endif()
 if(PLUMB_BUILD_TESTS AND PLUMB_WITH_APPLIANCE)
   pkg_check_modules(umockdev REQUIRED IMPORTED_TARGET umockdev-1.0)

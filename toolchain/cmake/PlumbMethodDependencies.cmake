@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What the method needs. Installed beside PlumbConfig.cmake: programs that link the library find the
 # same.
 include(CMakeFindDependencyMacro)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Debian's cross compiler against an unpacked arm64 Debian; programs of the build run in QEMU. Used
 # by toolchain/arm64.
 set(CMAKE_SYSTEM_NAME Linux)

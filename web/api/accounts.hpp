@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Set-up, login and accounts: everything that handles passwords.
 #pragma once
 
@@ -7,9 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/api/displays.hpp"
-#include "web/api/json.hpp"
-#include "web/api/routes.hpp"
+#include "web/exchange/json.hpp"
+#include "web/exchange/routes.hpp"
 #include "web/http/gate.hpp"
 #include "web/http/server_options.hpp"
 #include "web/security/device_cookies.hpp"
@@ -21,29 +23,54 @@
 
 namespace plumb::web {
 
+/// What a logged-in user gives to sign an act.
+struct OwnProof {
+  std::string password;
+  std::string second_factor;  ///< A code of the authenticator or a recovery code; empty: none.
+};
+
+/// What somebody types to log in.
+struct LogInForm {
+  std::string name;
+  std::string password;
+  std::string second_factor;  ///< As in OwnProof.
+  std::string presence;       ///< The code that a screen in the room shows; empty: none.
+  bool is_form = false;       ///< Of the page without scripts.
+};
+
+/// The answer while too many passwords wait to be hashed.
+[[nodiscard]] Response BusyWithPasswords();
+
 /// Used on the loop thread.
 class Accounts : public SessionLookup {
  public:
   /// @param options  With a clock; outlives the accounts.
-  /// @param replace_certificate  Stores and serves another certificate; throws DataError or
-  /// IoError, after which the previous one stays. Empty: it cannot be replaced.
+  /// @param serve_certificate  Serves another certificate; throws DataError, after which the
+  /// previous one stays. Empty: it cannot be replaced.
   Accounts(const Services& services, const HttpServerOptions& options,
-           std::function<void(const TlsIdentity&)> replace_certificate);
+           std::function<void(const TlsIdentity&)> serve_certificate);
 
   void AddRoutes(Routes& routes);
 
   /// The session of a request, by its cookie. @param touch  Counts as a use.
   [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request, bool touch) override;
   [[nodiscard]] bool needs_setup() const override { return !setup_code_.empty(); }
-  [[nodiscard]] const std::string& accounts_fault() const override { return accounts_fault_; }
+  [[nodiscard]] const Message& accounts_fault() const override { return accounts_fault_; }
   [[nodiscard]] std::string tls_fingerprint() const override {
     return certificate_ ? certificate_->fingerprint : std::string();
   }
   [[nodiscard]] std::optional<std::string> setup_code() const;
+  /// The code by which people prove that they see a screen in the room or the console: their right
+  /// password is then never refused because others are guessing. Changes every ten minutes; the
+  /// previous one is accepted for ten more.
+  [[nodiscard]] std::string presence_code();
 
   /// Descriptor of the password thread: readable when Dispatch() has something to do.
   [[nodiscard]] int fd() const { return worker_.fd(); }
   void Dispatch() { worker_.Dispatch(); }
+  /// Takes back a certificate that a person set and no browser has come back with in time, and
+  /// renews one that this machine made for itself. Called from time to time.
+  void CareForCertificate();
   /// Ends idle sessions; follows the idle time of the settings; looks again for accounts that could
   /// not be read.
   void Expire();
@@ -51,18 +78,37 @@ class Accounts : public SessionLookup {
  private:
   void LookForAccounts();
   void SetUp(const Request& request, const Respond& respond);
-  void LogIn(const Request& request, const std::string& name, std::string password, bool form,
-             const Respond& respond);
-  void FinishLogIn(const Actor& actor, const std::string& stored, bool matches, bool form,
+  void LogIn(const Request& request, LogInForm form, const Respond& respond);
+  void FinishLogIn(const Actor& actor, const std::string& stored, const LogInForm& form,
                    const std::vector<std::string>& counters, const Respond& respond);
   /// The counters for guesses at this name: only that of its browser if the person has logged in
-  /// from it before, otherwise those of address and name.
-  [[nodiscard]] std::vector<std::string> CountersOf(const Request& request, const std::string& name,
-                                                    const std::string& stored) const;
+  /// from it before or is in the room, otherwise those of address and name.
+  [[nodiscard]] std::vector<std::string> CountersOf(const Request& request, const LogInForm& form,
+                                                    const std::string& stored);
+  /// Whether the request comes from a paired screen, or has the code that such a screen shows.
+  [[nodiscard]] bool IsInTheRoom(const Request& request, const std::string& presence);
+  void NoteGuesses(bool are_running);
+  [[nodiscard]] Response DescribePresence(const Request& request);
   /// Time until the next guess, or nothing; the guess is then counted.
   [[nodiscard]] std::optional<Response> CountGuess(const std::vector<std::string>& counters);
-  /// Checks the password of a logged-in user; calls `then` if it is correct.
-  void VerifyOwn(const Request& request, std::string password, const char* wrong,
+  /// Takes the proof from the body. @param password  Name of the field with the password.
+  [[nodiscard]] static OwnProof ReadProof(Fields& fields, const char* password);
+  /// Calls `then` if the person has no second factor, or if `given` is right; it is then used up.
+  /// @param fail  Answers otherwise.
+  void PassSecondFactor(const Actor& actor, const User& user, const std::string& given,
+                        const Respond& fail, const std::function<void()>& then);
+  void AddSecondFactorRoutes(Routes& routes);
+  /// Answers with a secret for an authenticator; FinishSecondFactor() checks its first code.
+  void OfferSecondFactor(const Request& request, const Respond& respond);
+  void FinishSecondFactor(const Request& request, const Respond& respond);
+  void RemoveSecondFactor(const Request& request, const Respond& respond);
+  void AddSessionRoutes(Routes& routes);
+  [[nodiscard]] Response ListSessions(const Request& request);
+  void EndSession(const Request& request, const Respond& respond);
+  void EndOtherSessions(const Request& request, const Respond& respond);
+  /// Checks the password of a logged-in user, and the second factor of one who has it; calls `then`
+  /// if they are correct.
+  void VerifyOwn(const Request& request, OwnProof proof, const Message& wrong,
                  const Respond& respond, std::function<void(const User&)> then);
   void LogOut(const Request& request, const Respond& respond);
   void SetPreferences(const Request& request, const Respond& respond);
@@ -77,17 +123,22 @@ class Accounts : public SessionLookup {
   void AddSigned(Routes& routes, const char* method, const char* pattern, Permission permission,
                  std::function<SignedAct(const Request&, Fields&)> parse);
   void AddSignedActs(Routes& routes);
+  void AddSignedUnitActs(Routes& routes);
   /// The certificate of the page.
   [[nodiscard]] Response DescribeCertificate() const;
   /// Replaces it by an uploaded one or a new self-signed one; requires the user's own password.
   void ReplaceCertificate(const Request& request, const Respond& respond);
   void MakeNewCertificate(const Request& request, const Respond& respond);
-  void ServeCertificate(const Actor& actor, const TlsIdentity& identity, bool is_self_made,
-                        const Respond& respond);
+  /// Serves an identity from now on. @param replaced_by  Action in the log.
+  void ServeCertificate(const Actor& actor, const TlsIdentity& identity, const char* replaced_by);
+  /// A browser has come back with the certificate on trial: it is kept.
+  void KeepTriedCertificate();
+  /// The certificate before the one on trial is served again.
+  void EndTrial(const char* log_as);
   void AddUser(const Request& request, const Respond& respond);
   void ChangeUser(const Request& request, const Respond& respond);
   /// Opens a session and notifies the page.
-  [[nodiscard]] Response Welcome(const User& user, bool form);
+  [[nodiscard]] Response Welcome(const User& user, const std::string& address, bool form);
   /// Sets the cookie by which this browser is recognised from now on.
   void SetDeviceCookie(Response& response, const std::string& user,
                        const std::string& stored) const;
@@ -96,6 +147,8 @@ class Accounts : public SessionLookup {
                 std::function<void(const std::string&)> then);
   /// The same completion, which does nothing once this object is destroyed.
   [[nodiscard]] Done WhileAlive(Done done) const;
+  /// The idle time may have changed.
+  void FollowSettings();
   /// The time in the settings; nothing where they cannot be read.
   [[nodiscard]] std::optional<int> IdleLogout_min() const;
   [[nodiscard]] std::string cookie_name() const {
@@ -108,20 +161,33 @@ class Accounts : public SessionLookup {
   PatientService& patients_;
   ReferenceService& references_;
   ScanService& scans_;
+  CheckService& checks_;
   RoomCalibrationService& room_;
   SensorProfileService& profiles_;
   UpdateService& updates_;
   BackgroundWork& background_;
   const HttpServerOptions& options_;
-  std::function<void(const TlsIdentity&)> replace_certificate_;
+  std::function<void(const TlsIdentity&)> serve_certificate_;
   std::optional<TlsIdentity> certificate_;  ///< The one that is served now.
+  /// A certificate that a person set is on trial until a browser has connected with it. Until then
+  /// only the previous one is stored, so that a restart ends the trial, too.
+  struct CertificateTrial {
+    TlsIdentity before;
+    std::chrono::steady_clock::time_point begun;
+  };
+  std::optional<CertificateTrial> trial_;
+  std::chrono::steady_clock::time_point next_certificate_care_{};
   Sessions sessions_;
   Displays displays_;
   DeviceCookies devices_;
   LoginLimiter limiter_;
-  std::string accounts_fault_;  ///< Why no account can be seen; empty: they can.
-  std::string setup_code_;      ///< Empty once there is an account.
+  Message accounts_fault_;  ///< Why no account can be seen; empty: they can.
+  std::string setup_code_;  ///< Empty once there is an account.
   bool setting_up_ = false;
+  std::string presence_, presence_before_;
+  std::chrono::steady_clock::time_point presence_made_{};
+  /// When a stranger's guess was last refused; nothing if that was longer than kGuessesShown ago.
+  std::optional<std::chrono::steady_clock::time_point> guessed_;
   int idle_logout_min_ = Settings{}.idle_logout_min;  ///< As last read.
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   PasswordWorker worker_;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/api/disclosures.hpp"
 
 #include <map>
@@ -26,8 +27,9 @@ class Disclosures {
     const bool takes = !download.empty() && (view.empty() || request.query.contains("download"));
     const std::string action(takes ? download : view);
     if (!takes && !IsNewView({request.session->user, request.address, action, subject})) return;
-    log_.Log(request.actor(), action, subject,
-             takes ? request.path.substr(request.path.rfind('/') + 1) : std::string());
+    log_.Log(
+        request.actor(), action, subject,
+        takes ? Message::Verbatim(request.path.substr(request.path.rfind('/') + 1)) : Message());
   }
 
  private:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Audit log entries for viewing and downloading patient data.
 #pragma once
 

@@ -1,7 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/api/display_view.hpp"
 
 #include <string>
 #include <utility>
+
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -9,8 +12,8 @@ namespace {
 /// Decides by one status. Used on the loop thread.
 class DisplayView {
  public:
-  DisplayView(Status status, PatientService& patients, ReferenceService& references)
-      : status_(std::move(status)), patients_(patients), references_(references) {}
+  DisplayView(Status status, ReferenceService& references)
+      : status_(std::move(status)), references_(references) {}
 
   /// @param arguments  The record, and the name of its file if it has one.
   [[nodiscard]] bool Shows(ShownRecord record, const std::vector<std::string>& arguments) const {
@@ -21,7 +24,7 @@ class DisplayView {
       case ShownRecord::kPatient:
         return IsOpenPatient(id) || (last() && last()->patient_id == id);
       case ShownRecord::kReference:
-        return (last() && last()->reference_id == id) || IsOfOpenPatient(id);
+        return (last() && last()->reference_id == id) || IsOfOpenSession(id);
       case ShownRecord::kScan:
         return last() && last()->id == id;
       case ShownRecord::kScanFile:
@@ -36,10 +39,9 @@ class DisplayView {
     return status_.session && status_.session->patient_id == id;
   }
   /// The surface that grows during a sweep has the sides of the posture that is planned there.
-  [[nodiscard]] bool IsOfOpenPatient(const std::string& reference_id) const {
-    if (!status_.session) return false;
-    const auto patient = patients_.FindPatient(status_.session->patient_id);
-    return patient && patient->approved_reference_id == reference_id;
+  [[nodiscard]] bool IsOfOpenSession(const std::string& reference_id) const {
+    return status_.session && status_.session->reference &&
+           status_.session->reference->id == reference_id;
   }
   /// The map of the last result is drawn on the grid of its reference's scene.
   [[nodiscard]] bool IsSceneOfReference(const std::string& scan_id, const std::string& file) const {
@@ -49,7 +51,6 @@ class DisplayView {
   }
 
   Status status_;
-  PatientService& patients_;
   ReferenceService& references_;
 };
 
@@ -59,13 +60,12 @@ void LimitDisplays(Router& router, const Services& services) {
   router.Wrap([&](const Route& route) -> Handler {
     if (route.permission != Permission::kRoom || route.pattern.find('{') == std::string::npos)
       return route.handler;
-    return [services, shown = route.shown, absent = std::string(route.absent),
-            answer = route.handler](const Request& request, const Respond& respond) {
+    return [services, shown = route.shown, absent = route.absent, answer = route.handler](
+               const Request& request, const Respond& respond) {
       if (request.session->role == Role::kDisplay) {
         if (shown == ShownRecord::kNone)
-          return respond(ErrorResponse(404, "nothing was found at this address"));
-        const DisplayView view(services.appliance.GetStatus(), services.patients,
-                               services.references);
+          return respond(ErrorResponse(404, say::web::NothingHere()));
+        const DisplayView view(services.appliance.GetStatus(), services.references);
         if (!view.Shows(shown, request.arguments)) return respond(ErrorResponse(404, absent));
       }
       answer(request, respond);

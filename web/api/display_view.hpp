@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A display in the room may read what the status names, and nothing else.
 #pragma once
 

@@ -1,19 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/api/displays.hpp"
 
 #include <algorithm>
 #include <functional>
 #include <utility>
 
-#include "web/api/json.hpp"
+#include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"
 #include "web/model/account.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/wall_clock.hpp"
+#include "web/security/secrets.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
 
 constexpr std::size_t kMaxWaiting = 8;
+constexpr std::size_t kMaxOfAddress = 2;  // a screen whose page was loaded again counts twice
 constexpr std::chrono::minutes kWaitsFor{10};
 constexpr std::chrono::seconds kReloadInterval{5};
 constexpr int kMaxWrongCodes = 20;
@@ -66,17 +70,36 @@ void Displays::AddRoutes(Routes& routes) {
   };
   add("POST", "/api/v1/displays/pair", Permission::kNone, BodyKind::kNone, &Displays::Begin);
   add("POST", "/api/v1/displays/claim", Permission::kNone, BodyKind::kJson, &Displays::Claim);
-  add("POST", "/api/v1/displays", Permission::kUsers, BodyKind::kJson, &Displays::Approve);
-  add("DELETE", "/api/v1/displays/{id}", Permission::kUsers, BodyKind::kNone, &Displays::Remove);
 }
 
-void Displays::Begin(const Request&, const Respond& respond) {
+void Displays::MakeRoomFor(const std::string& address) {
+  std::map<std::string, std::size_t> counts;
+  for (const Pairing& pairing : pairings_) ++counts[pairing.address];
+  // A newcomer replaces the oldest pairing of its own address, or of the address with the most, so
+  // that nobody can keep other screens out by asking again and again.
+  std::string from;
+  if (counts[address] >= kMaxOfAddress) {
+    from = address;
+  } else if (pairings_.size() >= kMaxWaiting) {
+    from = std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) {
+             return a.second < b.second;
+           })->first;
+  } else {
+    return;
+  }
+  pairings_.erase(std::find_if(pairings_.begin(), pairings_.end(),
+                               [&](const Pairing& pairing) { return pairing.address == from; }));
+}
+
+void Displays::Begin(const Request& request, const Respond& respond) {
   Expire();
-  if (pairings_.size() >= kMaxWaiting)
-    return respond(
-        ErrorResponse(503, "too many screens are waiting to be paired; try again later"));
+  const std::string address = NetworkOf(request.address);
+  MakeRoomFor(address);
   const std::string token = RandomToken(32);
-  pairings_.push_back({.code = RandomCode(6), .token_hash = StoredHashOf(token), .begun = now_()});
+  pairings_.push_back({.code = RandomCode(6),
+                       .token_hash = StoredHashOf(token),
+                       .begun = now_(),
+                       .address = address});
   respond(JsonResponse({{"code", pairings_.back().code}, {"secret", token}}));
 }
 
@@ -94,34 +117,29 @@ void Displays::Claim(const Request& request, const Respond& respond) {
   const bool waits = std::any_of(pairings_.begin(), pairings_.end(), [&](const Pairing& pairing) {
     return pairing.token_hash == hash;
   });
-  if (!waits) return respond(ErrorResponse(404, "this pairing has expired: start again"));
+  if (!waits) return respond(ErrorResponse(404, say::web::PairingExpired()));
   respond(JsonResponse({{"paired", false}}));
 }
 
-void Displays::Approve(const Request& request, const Respond& respond) {
-  Fields fields(request.body);
-  std::string code = fields.Text("code", 1, 16);
-  const std::string name = fields.Text("name", 1, kMaxName);
-  fields.Finish();
+void Displays::Approve(const Actor& actor, const std::string& code, const std::string& name,
+                       const Done& done) {
   Expire();
-  std::transform(code.begin(), code.end(), code.begin(),
-                 [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; });
-  const auto found = std::find_if(pairings_.begin(), pairings_.end(),
-                                  [&](const Pairing& pairing) { return pairing.code == code; });
+  const auto found = std::find_if(pairings_.begin(), pairings_.end(), [&](const Pairing& pairing) {
+    return PlainCode(pairing.code) == PlainCode(code);
+  });
   if (found == pairings_.end()) {
     if (++wrong_codes_ > kMaxWrongCodes) pairings_.clear();
-    return respond(ErrorResponse(404, "no screen shows this code; a code is valid for 10 minutes"));
+    return done(Refused(ChangeResult::kNotFound, say::web::NoScreenShowsCode()));
   }
-  static_assert(kMaxDisplays == 20);  // The page translates the sentence with its number.
   if (service_.Displays().size() >= kMaxDisplays)
-    return respond(ErrorResponse(409, "20 screens are paired already: remove one first"));
+    return done(Refused(ChangeResult::kConflict, say::web::ScreensPaired(kMaxDisplays)));
   const Display display{.id = {},
                         .name = name,
                         .token_hash = found->token_hash,
                         .paired_at = WallClock::now(),
-                        .paired_by = request.actor().user};
+                        .paired_by = actor.user};
   pairings_.erase(found);
-  service_.AddDisplay(request.actor(), display, LoadThenAnswer(respond));
+  service_.AddDisplay(actor, display, LoadThen(done));
 }
 
 Response Displays::List() {
@@ -135,15 +153,15 @@ Response Displays::List() {
   return JsonResponse({{"displays", list}});
 }
 
-void Displays::Remove(const Request& request, const Respond& respond) {
-  service_.RemoveDisplay(request.actor(), request.arguments.at(0), LoadThenAnswer(respond));
+void Displays::Remove(const Actor& actor, const std::string& id, const Done& done) {
+  service_.RemoveDisplay(actor, id, LoadThen(done));
 }
 
-Done Displays::LoadThenAnswer(const Respond& respond) {
-  return [this, alive = std::weak_ptr(alive_), respond](const Change& change) {
+Done Displays::LoadThen(const Done& done) {
+  return [this, alive = std::weak_ptr(alive_), done](const Change& change) {
     if (alive.expired()) return;
     Load();
-    respond(ChangeResponse(change));
+    done(change);
   };
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Displays in the room: pairing and recognising them.
 #pragma once
 
@@ -8,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "web/api/routes.hpp"
+#include "web/exchange/routes.hpp"
 #include "web/security/sessions.hpp"
 #include "web/service/account_services.hpp"
 
@@ -23,6 +24,10 @@ class Displays {
   Displays(DisplayService& service, bool tls, std::function<TimePoint()> now);
 
   void AddRoutes(Routes& routes);
+  /// Pairs the screen that shows this code. For a person who has signed it.
+  void Approve(const Actor& actor, const std::string& code, const std::string& name,
+               const Done& done);
+  void Remove(const Actor& actor, const std::string& id, const Done& done);
   /// Session of a request with a paired display's cookie; null for all others.
   [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request);
 
@@ -31,15 +36,16 @@ class Displays {
     std::string code;        ///< Shown on the display, typed by an engineer.
     std::string token_hash;  ///< Hash of the secret that the display keeps.
     TimePoint begun;
+    std::string address;  ///< As NetworkOf() returns it.
   };
 
   void Begin(const Request& request, const Respond& respond);
   void Claim(const Request& request, const Respond& respond);
-  void Approve(const Request& request, const Respond& respond);
   [[nodiscard]] Response List();
-  void Remove(const Request& request, const Respond& respond);
   /// Reads the displays again after a change.
-  [[nodiscard]] Done LoadThenAnswer(const Respond& respond);
+  [[nodiscard]] Done LoadThen(const Done& done);
+  /// Makes room for the pairing of this address.
+  void MakeRoomFor(const std::string& address);
   void Expire();
   void Load();
   [[nodiscard]] std::string cookie_name() const {

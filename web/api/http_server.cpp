@@ -1,28 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/api/http_server.hpp"
 
-#include <fmt/format.h>
 #include <sys/epoll.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
-#include "web/api/api.hpp"
+#include "web/api/all_routes.hpp"
 #include "web/api/disclosures.hpp"
 #include "web/api/display_view.hpp"
-#include "web/api/json.hpp"
-#include "web/assets/assets.hpp"
+#include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/transport.hpp"
+#include "web/page/assets.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kBeat{5000};
+constexpr std::chrono::milliseconds kBeat{2000};
 constexpr std::chrono::milliseconds kExpireEvery{
     500};  // while somebody watches, so that the end of a session is shown within a second
 constexpr std::chrono::milliseconds kMinEventGap{100};
@@ -41,6 +43,8 @@ std::string_view Name(EventKind kind) {
       return "data";
     case EventKind::kUpdate:
       return "update";
+    case EventKind::kMonitor:
+      return "monitor";
     case EventKind::kStatus:
     case EventKind::kProgress:
       break;
@@ -64,7 +68,9 @@ class HttpServer::Impl {
                    [this](EventStream& stream) { stream.Send(StatusEvent()); }) {
     Routes routes(router_, services.background);
     accounts_.AddRoutes(routes);
-    AddApiRoutes(routes, services);
+    AddPatientApi(routes, services);
+    AddScanApi(routes, services);
+    AddUnitApi(routes, services);
     AddResultPage(routes, services);
     AddExportRoutes(routes, services);
     AddRoomCalibrationRoutes(routes, services);
@@ -72,8 +78,7 @@ class HttpServer::Impl {
     LogDisclosures(router_, services.audit, options_.now);
     AddPageRoutes(routes);
     epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
-    if (epoll_fd_ < 0)
-      throw IoError(fmt::format("cannot make an epoll descriptor: {}", std::strerror(errno)));
+    if (epoll_fd_ < 0) throw IoError(say::web::CannotMakeEpoll(std::strerror(errno)));
     Watch(transport_.fd());
     Watch(transport_.wake_fd());
     Watch(accounts_.fd());
@@ -91,7 +96,7 @@ class HttpServer::Impl {
   Impl& operator=(const Impl&) = delete;
 
   [[nodiscard]] int fd() const { return epoll_fd_; }
-  [[nodiscard]] const Accounts& accounts() const { return accounts_; }
+  [[nodiscard]] Accounts& accounts() { return accounts_; }
   [[nodiscard]] const Transport& transport() const { return transport_; }
   [[nodiscard]] const Router& router() const { return router_; }
 
@@ -109,6 +114,7 @@ class HttpServer::Impl {
     if (now >= next_beat_) {
       next_beat_ = now + kBeat;
       accounts_.Expire();
+      accounts_.CareForCertificate();
       hub_.Beat();
     }
     transport_.Run();  // first: requests that have arrived by now are not late
@@ -117,6 +123,10 @@ class HttpServer::Impl {
       const bool was_paused = transport_.has_connections() && now > next_cut_ + 2 * kCutEvery;
       next_cut_ = now + kCutEvery;
       if (!was_paused) transport_.CutLate();
+      // The answer to the person who replaced the certificate has been sent by now. Browsers
+      // connect again at once, and see the new one.
+      if (cut_before_ && options_.now() - *cut_before_ >= kCutEvery)
+        transport_.CutOlderThan(*std::exchange(cut_before_, std::nullopt));
     }
     if (hub_.EndOver())
       transport_.Run();  // a log-out that has just arrived ends its own streams at once
@@ -138,7 +148,8 @@ class HttpServer::Impl {
   [[nodiscard]] std::function<void(const TlsIdentity&)> CertificateReplacer() {
     if (!options_.tls || !options_.keep_certificate) return {};
     return [this](const TlsIdentity& identity) {
-      transport_.Serve(identity, options_.keep_certificate);
+      transport_.Serve(identity);
+      cut_before_ = options_.now();
     };
   }
 
@@ -147,13 +158,13 @@ class HttpServer::Impl {
     event.events = EPOLLIN;
     event.data.fd = watched;
     if (epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, watched, &event) != 0)
-      throw IoError(fmt::format("cannot watch a descriptor: {}", std::strerror(errno)));
+      throw IoError(say::web::CannotWatch(std::strerror(errno)));
   }
 
   static void AddPageRoutes(Routes& routes) {
     const auto serve = [](const Request& request) {
       const Asset* asset = FindAsset(request.path == "/room" ? "/" : request.path);
-      if (asset == nullptr) return ErrorResponse(404, "no such file");
+      if (asset == nullptr) return ErrorResponse(404, say::web::NoSuchFile());
       const auto accepted = request.headers.find("accept-encoding");
       Response response;
       response.type = std::string(asset->type);
@@ -173,6 +184,7 @@ class HttpServer::Impl {
     routes.Read("/api/v1/events", Permission::kRoom, [](const Request&) {
       Response response = BodyResponse("text/event-stream", "");
       response.event_stream = true;
+      response.headers.emplace_back("X-Accel-Buffering", "no");  // nginx would hold events back
       return response;
     });
   }
@@ -192,6 +204,10 @@ class HttpServer::Impl {
   /// The state is sent at once but at most ten times a second; the other events only ask the page
   /// to reload.
   void OnEvent(EventKind kind) {
+    if (kind == EventKind::kMonitor) {
+      if (hub_.size() > 0) hub_.Broadcast(Name(kind), Dump(MonitorJson(appliance_.GetMonitor())));
+      return;
+    }
     if (kind != EventKind::kStatus && kind != EventKind::kProgress)
       hub_.Broadcast(Name(kind), "{}");
     if (kind == EventKind::kData || kind == EventKind::kUpdate) return;
@@ -211,6 +227,7 @@ class HttpServer::Impl {
   SteadyClock::time_point next_cut_;
   SteadyClock::time_point last_status_;
   std::optional<SteadyClock::time_point> status_due_;
+  std::optional<SteadyClock::time_point> cut_before_;  ///< A certificate was replaced then.
 };
 
 HttpServer::HttpServer(const Services& services, HttpServerOptions options)
@@ -221,6 +238,7 @@ void HttpServer::Run() { impl_->Run(); }
 std::optional<std::chrono::milliseconds> HttpServer::timeout() const { return impl_->timeout(); }
 std::uint16_t HttpServer::port() const { return impl_->transport().port(); }
 std::optional<std::string> HttpServer::setup_code() const { return impl_->accounts().setup_code(); }
+std::string HttpServer::presence_code() { return impl_->accounts().presence_code(); }
 const std::vector<Route>& HttpServer::routes() const { return impl_->router().routes(); }
 
 }  // namespace plumb::web

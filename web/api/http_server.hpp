@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The appliance's HTTP server, driven by the daemon's event loop.
 #pragma once
 
@@ -41,6 +42,8 @@ class HttpServer {
   /// "XXXX-XXXX" while there is no account: it permits creating the first one, an engineer. Print
   /// it where only the owner can see it.
   [[nodiscard]] std::optional<std::string> setup_code() const;
+  /// As Accounts::presence_code().
+  [[nodiscard]] std::string presence_code();
 
  private:
   class Impl;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/api/look_back.hpp"
 
 #include <functional>
@@ -32,6 +33,12 @@ LoginHistory LoginsBefore(AuditLog& log, const std::string& user, WallClock::tim
     if (entry.action != "login" || entry.time >= before) return false;
     history.last = entry;
     return true;
+  });
+  constexpr std::size_t kMost = 20;
+  Walk(log, "user.", [&](const AuditEntry& entry) {
+    if (history.last && entry.number < history.last->number) return true;
+    if (entry.subject == user && entry.action != "user.add") history.changes.push_back(entry);
+    return history.changes.size() >= kMost;
   });
   return history;
 }

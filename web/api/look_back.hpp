@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // Searches the log for earlier events: the last login of a person, the last backup.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "web/service/account_services.hpp"
 
@@ -11,6 +13,8 @@ namespace plumb::web {
 struct LoginHistory {
   std::optional<AuditEntry> last;  ///< The login before this one.
   int failed = 0;                  ///< Wrong passwords for this name since then.
+  /// What was changed about the account since then, newest first.
+  std::vector<AuditEntry> changes;
 };
 
 /// To be called within BackgroundWork::RunInBackground(). Reads the newest 5000 entries of logins.

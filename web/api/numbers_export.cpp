@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Exports for other programs: the numbers of a patient as CSV and JSON, reports, a whole course as
 // one archive, sensor profiles.
 #include <fmt/format.h>
@@ -7,9 +8,11 @@
 #include <fstream>
 #include <utility>
 
-#include "web/api/api.hpp"
-#include "web/api/json.hpp"
-#include "web/api/zip_archive.hpp"
+#include "web/api/all_routes.hpp"
+#include "web/exchange/json.hpp"
+#include "web/exchange/zip_archive.hpp"
+#include "words/store.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -35,25 +38,28 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
   std::string text = "patient,scan,fraction,purpose,started_at,verdict";
   for (const char* prefix : {",", ",u95_"})
     for (const NumberAxis& axis : kNumberAxes) text.append(prefix).append(axis.key);
-  text += ",accepted_by,accepted_at,accepted_reason,check_overdue,check_failed\r\n";
+  text += ",accepted_by,accepted_at,accepted_reason,check_overdue,check_failed";
+  for (const NumberAxis& axis : kNumberAxes) text.append(",judgement_").append(axis.name);
+  text += "\r\n";
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != ScanOutcome::kDone) continue;
-    const bool is_advice = scan->result && scan->result->verdict != Verdict::kNoAnswer;
+    std::vector<ShownRow> rows(kNumberAxes.size());
+    const bool is_advice = scan->result && !ShownRows(*scan->result).empty();
+    if (is_advice) rows = ShownRows(*scan->result);
     text +=
         fmt::format("{},{},{},{},{},{}", Cell(patient.code), Cell(scan->id),
                     scan->fraction > 0 ? std::to_string(scan->fraction) : "", Name(scan->purpose),
                     TimeText(scan->started_at), scan->result ? Name(scan->result->verdict) : "");
-    const auto add = [&](const std::optional<ReportedNumbers>& numbers) {
-      for (const NumberAxis& axis : kNumberAxes)
-        text.append(1, ',').append(Number(axis.In(numbers)));
-    };
-    add(is_advice ? scan->result->correction : std::nullopt);
-    add(is_advice ? scan->result->u95 : std::nullopt);
-    text += fmt::format(",{},{},{},{},{}\r\n", Cell(scan->accepted_by),
+    for (const ShownRow& row : rows) text += "," + Number(row.value);
+    for (const ShownRow& row : rows) text += "," + Number(row.u95);
+    text += fmt::format(",{},{},{},{},{}", Cell(scan->accepted_by),
                         scan->accepted_at ? TimeText(*scan->accepted_at) : "",
                         Cell(scan->accepted_reason),
                         scan->daily_check != DailyCheck::kPassed ? "yes" : "no",
                         scan->daily_check == DailyCheck::kFailed ? "yes" : "no");
+    for (const ShownRow& row : rows)
+      text.append(1, ',').append(is_advice ? Name(row.judgement) : std::string_view());
+    text += "\r\n";
   }
   return text;
 }
@@ -67,7 +73,7 @@ void AddReports(Routes& routes, ScanService& scans) {
       .ReadInBackground("/api/v1/scans/{id}/report.pdf", Permission::kView,
                         [&scans](const Request& request) {
                           auto pdf = scans.ScanReport(request.arguments[0], LanguageIn(request));
-                          if (!pdf) return ErrorResponse(404, "there is no such scan");
+                          if (!pdf) return ErrorResponse(404, say::store::NoScan());
                           return Download("application/pdf", std::move(*pdf),
                                           fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
                         })
@@ -76,7 +82,7 @@ void AddReports(Routes& routes, ScanService& scans) {
       .ReadInBackground("/api/v1/patients/{id}/report.pdf", Permission::kView,
                         [&scans](const Request& request) {
                           auto pdf = scans.CourseReport(request.arguments[0], LanguageIn(request));
-                          if (!pdf) return ErrorResponse(404, "there is no such patient");
+                          if (!pdf) return ErrorResponse(404, say::store::NoPatient());
                           return Download("application/pdf", std::move(*pdf),
                                           fmt::format("plumb_course_{}.pdf", request.arguments[0]));
                         })
@@ -88,7 +94,7 @@ void AddNumbers(Routes& routes, PatientService& patients, ScanService& scans) {
       .ReadInBackground("/api/v1/patients/{id}/numbers.csv", Permission::kView,
                         [&patients, &scans](const Request& request) {
                           const auto patient = patients.FindPatient(request.arguments[0]);
-                          if (!patient) return ErrorResponse(404, "there is no such patient");
+                          if (!patient) return ErrorResponse(404, say::store::NoPatient());
                           return Download("text/csv; charset=utf-8",
                                           Csv(*patient, scans.Scans(patient->id, kMaxScans)),
                                           fmt::format("plumb_numbers_{}.csv", patient->code));
@@ -98,7 +104,7 @@ void AddNumbers(Routes& routes, PatientService& patients, ScanService& scans) {
       .ReadInBackground("/api/v1/patients/{id}/numbers.json", Permission::kView,
                         [&patients, &scans](const Request& request) {
                           const auto patient = patients.FindPatient(request.arguments[0]);
-                          if (!patient) return ErrorResponse(404, "there is no such patient");
+                          if (!patient) return ErrorResponse(404, say::store::NoPatient());
                           return Download(
                               "application/json",
                               NumbersJson(*patient, scans.Scans(patient->id, kMaxScans)),
@@ -128,7 +134,7 @@ void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files
   for (const Scan& scan : scans) {
     if (!scan.result) continue;
     if (scan.folder.empty()) {  // compared, but its files are unavailable
-      left_out += fmt::format("{}: {}\r\n", scan.id, scan.failure);
+      left_out += fmt::format("{}: {}\r\n", scan.id, scan.failure.English());
       continue;
     }
     for (const char* name : {"result.json", "error_map.png", "overlay.png"}) {
@@ -152,7 +158,7 @@ void AddCourse(Routes& routes, PatientService& patients, ScanService& scans) {
       .ReadInBackground("/api/v1/patients/{id}/course.zip", Permission::kView,
                         [&patients, &scans](const Request& request) {
                           const auto patient = patients.FindPatient(request.arguments[0]);
-                          if (!patient) return ErrorResponse(404, "there is no such patient");
+                          if (!patient) return ErrorResponse(404, say::store::NoPatient());
                           const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
                           std::vector<ArchivedFile> files = {
                               {.name = "numbers.csv", .bytes = Csv(*patient, list)},
@@ -167,8 +173,8 @@ void AddCourse(Routes& routes, PatientService& patients, ScanService& scans) {
 }
 
 Json ProfilesJson(const SensorProfiles& profiles) {
-  Json json = {
-      {"serial", profiles.serial}, {"why_none", profiles.why_none}, {"versions", Json::array()}};
+  Json json = {{"serial", profiles.serial}, {"versions", Json::array()}};
+  PutMessage(json, "why_none", profiles.why_none, "");
   for (const SensorProfileVersion& one : profiles.versions)
     json["versions"].push_back({{"version", one.version},
                                 {"made_at", one.made_at},
@@ -191,7 +197,7 @@ void AddProfiles(Routes& routes, SensorProfileService& profiles) {
   routes.ReadInBackground("/api/v1/sensor-profile/{version}/file", Permission::kView,
                           [&profiles](const Request& request) {
                             auto text = profiles.SensorProfileFile(VersionIn(request.arguments[0]));
-                            if (!text) return ErrorResponse(404, "there is no such profile");
+                            if (!text) return ErrorResponse(404, say::web::NoSuchProfile());
                             return Download(
                                 "application/json", std::move(*text),
                                 fmt::format("plumb_sensor_profile_{}.json", request.arguments[0]));

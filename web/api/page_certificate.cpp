@@ -1,28 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
 // The certificate of the page: showing it, replacing it, creating a new self-signed one.
-#include <fmt/format.h>
+#include <cstdio>
+#include <utility>
 
 #include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
-#include "web/api/json.hpp"
+#include "web/exchange/json.hpp"
 #include "web/security/certificate_care.hpp"
 #include "web/security/password_rules.hpp"
+#include "words/audit.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
 
 constexpr std::size_t kMaxChainBytes = 32 << 10, kMaxKeyBytes = 16 << 10;
 
-Response NotReplaceable() {
-  return ErrorResponse(409,
-                       "the certificate cannot be replaced here: the page is served without TLS, "
-                       "or the configuration names the certificate (web.tls_certificate)");
-}
+/// A certificate that a person set is taken back unless a browser has connected with it by then.
+constexpr std::chrono::seconds kTrial{120};
+constexpr std::chrono::hours kCareEvery{1};
+
+/// The appliance itself, as the store names it.
+const Actor kSelf{.user = "plumbd", .address = ""};
+
+Response NotReplaceable() { return ErrorResponse(409, say::web::NotReplaceable()); }
 
 }  // namespace
 
 Response Accounts::DescribeCertificate() const {
   Json json = {{"fingerprint", tls_fingerprint()},
-               {"replaceable", static_cast<bool>(replace_certificate_)}};
+               {"replaceable", static_cast<bool>(serve_certificate_)},
+               {"on_trial", trial_.has_value()}};
   if (certificate_) {
     const CertificateFacts facts = FactsOfCertificate(certificate_->certificate_pem);
     json["subject"] = facts.subject;
@@ -35,45 +43,88 @@ void Accounts::ReplaceCertificate(const Request& request, const Respond& respond
   Fields fields(request.body);
   const std::string chain = fields.Text("certificate", 1, kMaxChainBytes, /*allow_lines=*/true);
   const std::string key = fields.Text("key", 1, kMaxKeyBytes, /*allow_lines=*/true);
-  std::string password = fields.Text("password", 1, kMaxPassword);
+  OwnProof proof = ReadProof(fields, "password");
   fields.Finish();
-  if (!replace_certificate_) return respond(NotReplaceable());
+  if (!serve_certificate_) return respond(NotReplaceable());
   const TlsIdentity identity = UsableTlsIdentity(chain, key, WallClock::now());
-  VerifyOwn(request, std::move(password), "the password is wrong", respond,
+  VerifyOwn(request, std::move(proof), say::web::WrongPassword(), respond,
             [this, identity, actor = request.actor(), respond](const User&) {
-              ServeCertificate(actor, identity, /*is_self_made=*/false, respond);
+              const TlsIdentity before = trial_ ? trial_->before : *certificate_;
+              try {
+                // Shows now, not at the end of the trial, whether a certificate can be stored.
+                options_.keep_certificate(before);
+                ServeCertificate(actor, identity, "certificate.replace");
+              } catch (const std::runtime_error& error) {
+                return respond(ErrorResponse(500, say::web::NotReplaced(MessageOf(error))));
+              }
+              trial_ = {before, options_.now()};
+              Response response = JsonResponse(
+                  {{"fingerprint", identity.fingerprint}, {"trial_s", kTrial.count()}});
+              response.headers.emplace_back("Connection", "close");
+              respond(std::move(response));
             });
 }
 
 void Accounts::MakeNewCertificate(const Request& request, const Respond& respond) {
   Fields fields(request.body);
-  std::string password = fields.Text("password", 1, kMaxPassword);
+  OwnProof proof = ReadProof(fields, "password");
   fields.Finish();
-  if (!replace_certificate_) return respond(NotReplaceable());
-  VerifyOwn(request, std::move(password), "the password is wrong", respond,
+  if (!serve_certificate_) return respond(NotReplaceable());
+  VerifyOwn(request, std::move(proof), say::web::WrongPassword(), respond,
             [this, actor = request.actor(), respond](const User&) {
               try {
                 const TlsIdentity identity = MakeTlsIdentity(options_.host_names);
-                ServeCertificate(actor, identity, /*is_self_made=*/true, respond);
+                options_.keep_certificate(identity);
+                trial_.reset();
+                ServeCertificate(actor, identity, "certificate.new");
+                respond(JsonResponse({{"fingerprint", identity.fingerprint}}));
               } catch (const std::runtime_error& error) {
-                respond(ErrorResponse(500, error.what()));
+                respond(ErrorResponse(500, say::web::NotReplaced(MessageOf(error))));
               }
             });
 }
 
-void Accounts::ServeCertificate(const Actor& actor, const TlsIdentity& identity, bool is_self_made,
-                                const Respond& respond) {
+void Accounts::ServeCertificate(const Actor& actor, const TlsIdentity& identity,
+                                const char* replaced_by) {
   const std::string before = tls_fingerprint();
-  try {
-    replace_certificate_(identity);
-  } catch (const std::runtime_error& error) {
-    return respond(
-        ErrorResponse(500, fmt::format("the certificate was not replaced: {}", error.what())));
-  }
+  serve_certificate_(identity);
   certificate_ = identity;
-  audit_.Log(actor, is_self_made ? "certificate.new" : "certificate.replace", "",
-             fmt::format("{} -> {}", before, identity.fingerprint));
-  respond(JsonResponse({{"fingerprint", identity.fingerprint}}));
+  if (options_.on_certificate) options_.on_certificate(identity);
+  audit_.Log(actor, replaced_by, "", say::audit::Certificate(before, identity.fingerprint));
+}
+
+void Accounts::KeepTriedCertificate() {
+  try {
+    options_.keep_certificate(*certificate_);
+    trial_.reset();
+  } catch (const std::runtime_error&) {
+    EndTrial("certificate.not_kept");
+  }
+}
+
+void Accounts::EndTrial(const char* log_as) {
+  const TlsIdentity before = trial_->before;
+  trial_.reset();
+  ServeCertificate(kSelf, before, log_as);
+}
+
+void Accounts::CareForCertificate() {
+  const auto now = options_.now();
+  if (!serve_certificate_) return;
+  if (trial_ && now - trial_->begun >= kTrial) EndTrial("certificate.revert");
+  if (trial_ || now < next_certificate_care_) return;
+  next_certificate_care_ = now + kCareEvery;
+  std::vector<std::string> names = OwnNames();
+  names.insert(names.end(), options_.host_names.begin(), options_.host_names.end());
+  try {
+    if (!IsDueForRenewal(certificate_->certificate_pem, WallClock::now(), names)) return;
+    const TlsIdentity identity = MakeTlsIdentity(options_.host_names);
+    options_.keep_certificate(identity);
+    ServeCertificate(kSelf, identity, "certificate.renew");
+  } catch (const std::runtime_error& error) {
+    // The previous one stays, with a warning before it expires.
+    std::fprintf(stderr, "web: the page's certificate was not renewed: %s\n", error.what());
+  }
 }
 
 }  // namespace plumb::web

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The last result as plain HTML: for browsers without script, and for printing.
 #include <fmt/format.h>
 
@@ -5,13 +6,11 @@
 #include <cmath>
 
 #include "algo/base/digits.hpp"
-#include "web/api/api.hpp"
+#include "web/api/all_routes.hpp"
 #include "web/api/display_view.hpp"
-#include "web/api/json.hpp"
-#include "web/api/local_time.hpp"
-#include "web/api/result_words.hpp"
-#include "web/assets/assets.hpp"
-#include "web/assets/spanish.hpp"
+#include "web/exchange/json.hpp"
+#include "web/exchange/local_time.hpp"
+#include "web/exchange/preferred_language.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
 #include "web/model/account.hpp"
@@ -22,18 +21,15 @@
 #include "web/model/scan.hpp"
 #include "web/model/status.hpp"
 #include "web/model/wall_clock.hpp"
+#include "web/page/assets.hpp"
 #include "web/security/password_rules.hpp"
+#include "web/service/result_terms.hpp"
+#include "words/result.hpp"
 
 namespace plumb::web {
 namespace {
 
 constexpr std::chrono::seconds kRefreshEvery{10};
-
-/// A pattern of the words, filled in.
-template <typename... Values>
-std::string Filled(std::string_view pattern, const Values&... values) {
-  return fmt::format(fmt::runtime(pattern), values...);
-}
 
 /// The appliance's "-8.0 mm" and "1 deg" as the table has them: "\u22128.0 mm", "1\u00b0".
 std::string Typeset(std::string text) {
@@ -54,15 +50,26 @@ std::string Typeset(std::string text) {
 }
 
 /// Words of the appliance, in the page's language, for HTML.
-std::string Said(const std::string& text, const ResultWords& words) {
-  const bool is_spanish = &words == &ResultWordsOf(Language::kSpanish);
-  return EscapeHtml(Typeset(is_spanish ? InSpanish(text).value_or(text) : text));
+std::string Said(const Message& message, const Catalogue& language) {
+  return EscapeHtml(Typeset(Text(message, language)));
 }
 
-/// @param query      Query of this page, for the link to it in the other language.
+/// Links to this page in the other languages.
+std::string LanguageLinks(const std::string& query, const Catalogue& language) {
+  std::string links;
+  for (const Catalogue* other : Catalogues()) {
+    if (other->code == language.code) continue;
+    links +=
+        fmt::format("<a href=\"/result?{0}language={1}\" lang=\"{1}\" hreflang=\"{1}\">{2}</a> ",
+                    query, other->code, other->name);
+  }
+  return links;
+}
+
+/// @param query      Query of this page, for the links to it in the other languages.
 /// @param refreshes  Reloads the page, without counting as use, because its content may be
 /// outdated.
-std::string Document(const ResultWords& words, const std::string& body, const std::string& query,
+std::string Document(const Catalogue& language, const std::string& body, const std::string& query,
                      bool refreshes = false) {
   std::string style;
   for (const Asset& asset : Assets()) {
@@ -73,113 +80,120 @@ std::string Document(const ResultWords& words, const std::string& body, const st
       "<!doctype html><html lang=\"{}\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width\"><title>{}</title>{}{}</head><body class=\"plain\">"
       "<aside class=\"notice\" aria-label=\"{}\"><p>{}</p></aside><main>{}"
-      "<p class=\"languages\"><a href=\"/result?{}language={}\" lang=\"{}\" hreflang=\"{}\">{}"
-      "</a></p></main></body></html>",
-      words.code, words.title,
+      "<p class=\"languages\">{}</p></main></body></html>",
+      language.code, Word(say::result::kPageTitle, language),
       refreshes ? fmt::format("<meta http-equiv=\"refresh\" "
                               "content=\"{};url=/result?again&amp;language={}\">",
-                              kRefreshEvery.count(), words.code)
+                              kRefreshEvery.count(), language.code)
                 : "",
-      style, words.notice_label, words.terms.notice, body, query, words.other_code,
-      words.other_code, words.other_code, words.other);
+      style, Word(say::result::kPageNoticeLabel, language), Word(say::result::kNotice, language),
+      body, LanguageLinks(query, language));
 }
 
-std::string LoginForm(const ResultWords& words, std::string_view trouble) {
+std::string LoginForm(const Catalogue& language, const std::string& trouble) {
   return fmt::format(
       "<h1>{}</h1>{}<form method=\"post\" action=\"/login\" class=\"card form\">"
       "<label>{} <input name=\"name\" autocomplete=\"username\" required "
       "maxlength=\"{}\"></label>"
       "<label>{} <input name=\"password\" type=\"password\" "
       "autocomplete=\"current-password\" required maxlength=\"{}\"></label>"
+      "<label>{} <input name=\"second_factor\" autocomplete=\"one-time-code\" "
+      "maxlength=\"32\"></label>"
       "<button class=\"primary\">{}</button></form>",
-      words.log_in, trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble),
-      words.name, kMaxName, words.password, kMaxPassword, words.log_in);
+      Word(say::result::kPageLogIn, language),
+      trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble),
+      Word(say::result::kPageName, language), kMaxName, Word(say::result::kPagePassword, language),
+      kMaxPassword, Word(say::result::kPageSecondFactor, language),
+      Word(say::result::kPageLogIn, language));
 }
 
-/// A row of the table. Only the verdict MOVE asks for moves.
-std::string NumberCells(std::size_t i, const ResultSummary& result, std::string_view name,
-                        const Tolerance& tolerances, const ResultWords& words) {
-  const NumberAxis& axis = kNumberAxes[i];
-  const std::optional<double> value = axis.In(result.correction);
-  if (!value)
+/// A row of the table.
+std::string NumberCells(const ShownRow& row, Verdict verdict, const Catalogue& language) {
+  const std::string name = EscapeHtml(Text(row.name, language));
+  if (!row.value)
     return fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td></td><td></td><td></td><td></td></tr>", name,
-        words.terms.not_known);
-  const double u95 = axis.In(result.u95).value_or(0.0), size = std::abs(*value);
-  const double tolerance = axis.is_shift() ? tolerances.shift_mm : tolerances.rotation_deg;
-  const char decimal = words.terms.decimal;
-  const ShownNumber shown = Shown(*value, u95, axis.is_shift() ? 1 : 2, decimal);
-  const std::string unit = axis.is_shift() ? " mm" : axis.symbol();
-  const bool in = size + u95 <= tolerance, unsure = !in && size <= tolerance;
-  const std::string way = result.verdict != Verdict::kMove
-                              ? std::string(unsure ? words.terms.scan_again : words.terms.no_move)
-                          : shown.is_zero ? std::string(words.no_change)
-                          : size <= u95   ? std::string(words.terms.insignificant)
-                                          : Said(result.words[i], words);
+        Word(say::result::kNotKnown, language));
+  const bool is_shift = IsShift(row.number);
+  const char decimal = language.decimal;
+  const ShownNumber shown = Shown(*row.value, row.u95.value_or(NAN), is_shift ? 1 : 2, decimal);
+  const std::string unit = is_shift ? " mm" : "\u00b0";
   // A narrow window has no heads above the numbers: what a bare "±" means stands beside it.
   return fmt::format(
       "<tr><th scope=\"row\">{}</th><td>{}{}</td><td data-label=\"{}\">{}</td>"
       "<td data-label=\"{}\">\u00b1{}{}</td><td>{}</td><td>{}</td></tr>",
-      name, shown.value, unit, words.heads[2],
-      shown.u95.empty() ? std::string(words.terms.not_known) : "\u00b1" + shown.u95 + unit,
-      words.heads[3], PlainNumber(tolerance, decimal), unit,
-      in       ? words.terms.within
-      : unsure ? words.terms.not_surely
-               : words.terms.outside,
-      way);
+      name, shown.value, unit, Word(say::result::kPageHeadU95, language),
+      shown.u95.empty() ? Word(say::result::kNotKnown, language) : "\u00b1" + shown.u95 + unit,
+      Word(say::result::kPageHeadTolerance, language), PlainNumber(row.tolerance, decimal), unit,
+      Text(JudgementWord(row.judgement), language), Said(WayOf(row, verdict), language));
 }
 
 /// @param review  The page is for reading or printing, or the result can no longer be acted on.
-std::string_view TableTitle(Verdict verdict, bool review, const ResultWords& words) {
-  if (verdict == Verdict::kMove) return review ? words.found_then : words.to_apply;
-  if (verdict == Verdict::kInTolerance) return review ? words.remained_then : words.remaining;
-  return review ? words.measured_then : words.measured;
+std::string TableTitle(Verdict verdict, bool review, const Catalogue& language) {
+  const auto word = [&](MessageId now, MessageId then) {
+    return Word(review ? then : now, language);
+  };
+  if (verdict == Verdict::kMove)
+    return word(say::result::kPageToApply, say::result::kPageFoundThen);
+  if (verdict == Verdict::kInTolerance)
+    return word(say::result::kPageRemaining, say::result::kPageRemainedThen);
+  return word(say::result::kPageMeasured, say::result::kPageMeasuredThen);
 }
 
-/// A correction without an answer must not be applied, so it is left out.
-std::string NumbersTable(const ResultSummary& result, const std::array<std::string, 6>& names,
-                         const Tolerance& tolerance, bool review, const ResultWords& words) {
-  if (!result.correction || result.verdict == Verdict::kNoAnswer) return "";
+std::string NumbersTable(const ResultSummary& result, bool review, const Catalogue& language) {
   std::string rows, heads;
-  for (std::size_t i = 0; i < names.size(); ++i)
-    rows += NumberCells(i, result, EscapeHtml(names[i]), tolerance, words);
-  for (const std::string_view head : words.heads)
-    heads += fmt::format("<th scope=\"col\">{}</th>", head);
+  for (const ShownRow& row : ShownRows(result)) rows += NumberCells(row, result.verdict, language);
+  if (rows.empty()) return "";
+  for (const MessageId head : {say::result::kPageHeadAxis, say::result::kPageHeadValue,
+                               say::result::kPageHeadU95, say::result::kPageHeadTolerance,
+                               say::result::kPageHeadAssessment, say::result::kPageHeadDirection})
+    heads += fmt::format("<th scope=\"col\">{}</th>", Word(head, language));
   return fmt::format(
       "<table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>{}</tbody></table>",
-      TableTitle(result.verdict, review, words), heads, rows);
+      TableTitle(result.verdict, review, language), heads, rows);
 }
 
-std::string BodyList(const ResultSummary& result, const ResultWords& words) {
+std::string BodyList(const ResultSummary& result, const Catalogue& language) {
   if (!result.correction || result.verdict == Verdict::kNoAnswer) return "";
-  const auto list = [&](std::string_view title, const std::vector<std::string>& parts) {
+  const auto list = [&](const std::string& title, const std::vector<Message>& parts) {
     std::string items;
-    for (const std::string& part : parts) items += fmt::format("<li>{}</li>", Said(part, words));
+    for (const Message& part : parts) items += fmt::format("<li>{}</li>", Said(part, language));
     if (items.empty())
-      items = fmt::format("<li class=\"fine-part\">{}</li>", words.terms.as_reference);
+      items =
+          fmt::format("<li class=\"fine-part\">{}</li>", Word(say::result::kAsReference, language));
     return fmt::format("<h3>{}</h3><ul class=\"findings\">{}</ul>", title, items);
   };
-  return fmt::format("<h2>{}</h2>", words.where) + list(words.terms.posture, result.body_after) +
-         list(words.now, result.body_now);
+  return fmt::format("<h2>{}</h2>", Word(say::result::kPageWhere, language)) +
+         list(Word(say::result::kPosture, language), result.body_after) +
+         list(Word(say::result::kPageNow, language), result.body_now);
 }
 
-std::string Pictures(const Scan& scan, const ResultWords& words) {
+std::string Pictures(const Scan& scan, const Catalogue& language) {
   std::error_code ignored;
   if (!std::filesystem::exists(scan.folder / "result/error_map.png", ignored)) return "";
   return fmt::format(
       "<figure><img src=\"/api/v1/scans/{0}/files/error_map.png?language={3}\" "
       "alt=\"{1}\"></figure>"
       "<figure><img src=\"/api/v1/scans/{0}/files/overlay.png?language={3}\" alt=\"{2}\"></figure>",
-      scan.id, words.map, words.overlay, words.code);
+      scan.id, Word(say::result::kPageMap, language), Word(say::result::kPageOverlay, language),
+      language.code);
 }
 
-std::string_view VerdictText(Verdict verdict, bool review, const ResultWords& words) {
-  const VerdictWords* said = verdict == Verdict::kInTolerance ? &words.in_tolerance
-                             : verdict == Verdict::kUnsure    ? &words.unsure
-                             : verdict == Verdict::kMove      ? &words.move
-                                                              : nullptr;
-  if (said == nullptr) return words.terms.no_answer;
-  return review ? said->then : said->now;
+std::string VerdictText(Verdict verdict, bool review, const Catalogue& language) {
+  const auto word = [&](MessageId now, MessageId then) {
+    return Word(review ? then : now, language);
+  };
+  switch (verdict) {
+    case Verdict::kInTolerance:
+      return word(say::result::kPageInToleranceNow, say::result::kPageInToleranceThen);
+    case Verdict::kUnsure:
+      return word(say::result::kPageUnsureNow, say::result::kPageUnsureThen);
+    case Verdict::kMove:
+      return word(say::result::kPageMoveNow, say::result::kPageMoveThen);
+    case Verdict::kNoAnswer:
+      break;
+  }
+  return Word(say::result::kNoAnswer, language);
 }
 
 /// Content of the page.
@@ -194,8 +208,7 @@ struct Wanted {
   std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
   Status status;                    ///< At the time of the request.
   bool is_display = false;          ///< Requested by a display in the room.
-  Language language = Language::kEnglish;
-  const ResultWords& words = ResultWordsOf(language);
+  const Catalogue& language;
 
   /// A new scan is running or being computed.
   [[nodiscard]] bool runs() const {
@@ -216,8 +229,7 @@ std::optional<double> SteadyAge_s(const Scan& scan, const Status& status) {
 bool IsOld(const Scan& scan, bool has_newer, const Wanted& wanted) {
   const std::optional<double> age_s = SteadyAge_s(scan, wanted.status);
   const std::optional<TreatmentSession>& session = wanted.status.session;
-  const bool is_on_couch =
-      scan.patient_id.empty() || (session && session->patient_id == scan.patient_id);
+  const bool is_on_couch = scan.patient_id.empty() || (session && session->id == scan.session_id);
   return !age_s || *age_s > kResultValid_s || has_newer || wanted.runs() || !is_on_couch;
 }
 
@@ -226,82 +238,90 @@ std::string AgoText(const Scan& scan, const Wanted& wanted) {
   std::chrono::duration<double> age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
   if (const auto steady_s = SteadyAge_s(scan, wanted.status))
     age = std::chrono::duration<double>(*steady_s);
-  if (age < age.zero()) return std::string(wanted.words.ago_unknown);
-  return Filled(wanted.words.ago_min, std::chrono::floor<std::chrono::minutes>(age).count());
+  if (age < age.zero()) return Word(say::result::kPageAgoUnknown, wanted.language);
+  return Text(say::result::PageAgoMin(
+                  static_cast<double>(std::chrono::floor<std::chrono::minutes>(age).count())),
+              wanted.language);
 }
 
-std::string AcceptedLine(const Scan& scan, const ResultWords& words) {
+std::string AcceptedLine(const Scan& scan, const Catalogue& language) {
   if (scan.accepted_by.empty()) return "";
   const std::string who =
       EscapeHtml(scan.accepted_by) +
       (scan.accepted_at ? ", " + LocalTimeText(*scan.accepted_at) : std::string());
-  return fmt::format("<p>{}</p>",
-                     scan.accepted_reason.empty()
-                         ? Filled(words.accepted_by, who)
-                         : Filled(IsUnsure(scan) ? words.accepted_unsure : words.accepted_outside,
-                                  who, EscapeHtml(scan.accepted_reason)));
+  const std::string reason = EscapeHtml(scan.accepted_reason);
+  const Message line = reason.empty()   ? say::result::PageAcceptedBy(who)
+                       : IsUnsure(scan) ? say::result::PageAcceptedUnsure(who, reason)
+                                        : say::result::PageAcceptedOutside(who, reason);
+  return fmt::format("<p>{}</p>", Text(line, language));
 }
 
 /// Version and time of the reference, and who approved it, when.
-std::string ReferenceLine(const Reference& reference, const ResultWords& words) {
+std::string ReferenceLine(const Reference& reference, const Catalogue& language) {
   const std::string who =
       EscapeHtml(reference.approved_by) +
       (reference.approved_at ? ", " + LocalTimeText(*reference.approved_at) : std::string());
-  return fmt::format("<p>{}</p>", Filled(words.reference_line, reference.version,
-                                         LocalTimeText(reference.created_at), who));
+  return fmt::format("<p>{}</p>",
+                     Text(say::result::PageReferenceLine(reference.version,
+                                                         LocalTimeText(reference.created_at), who),
+                          language));
 }
 
 /// Patient, number and age of the scan, and who accepted it.
 /// @param newer  A later scan without a result; null if there is none.
 std::string Identity(const Records& records, const Scan& scan, const Scan* newer, bool old,
                      const Wanted& wanted) {
-  const ResultWords& words = wanted.words;
+  const Catalogue& language = wanted.language;
   const auto patient = records.patients.FindPatient(scan.patient_id);
   std::string text;
   if (newer != nullptr) {
-    text += fmt::format(
-        "<p role=\"alert\">{}</p>",
-        Filled(words.newer_failed, LocalTimeText(newer->started_at), Said(newer->failure, words)));
+    text += fmt::format("<p role=\"alert\">{}</p>",
+                        Text(say::result::PageNewerFailed(LocalTimeText(newer->started_at),
+                                                          Said(newer->failure, language)),
+                             language));
   }
-  if (wanted.runs()) text += fmt::format("<p role=\"alert\">{}</p>", words.running);
+  if (wanted.runs())
+    text += fmt::format("<p role=\"alert\">{}</p>", Word(say::result::kPageRunning, language));
   text += fmt::format(
       "<h1>{}</h1><p>{}{}{}</p>",
-      patient ? Filled(words.patient, EscapeHtml(patient->code)) : std::string(words.no_patient),
-      scan.fraction > 0 ? Filled(words.fraction, scan.fraction) + " " : "",
-      Filled(words.scan_line, EscapeHtml(scan.id), LocalTimeText(scan.started_at),
-             AgoText(scan, wanted)),
-      old ? fmt::format(" <strong>{}</strong>", words.old) : "");
-  return text + AcceptedLine(scan, words);
+      patient ? Text(say::result::PagePatient(EscapeHtml(patient->code)), language)
+              : Word(say::result::kPageNoPatient, language),
+      scan.fraction > 0 ? Text(say::result::PageFraction(scan.fraction), language) + " " : "",
+      Text(say::result::PageScanLine(EscapeHtml(scan.id), LocalTimeText(scan.started_at),
+                                     AgoText(scan, wanted)),
+           language),
+      old ? fmt::format(" <strong>{}</strong>", Word(say::result::kPageOld, language)) : "");
+  return text + AcceptedLine(scan, language);
 }
 
 /// @param newer      A later scan without a result that is mentioned; null if there is none.
 /// @param has_newer  There is one, whether it is mentioned or not.
 std::string ResultBody(const Records& records, const Scan& scan, const Scan* newer, bool has_newer,
                        const Wanted& wanted) {
-  const ResultWords& words = wanted.words;
+  const Catalogue& language = wanted.language;
   const bool old = scan.result && IsOld(scan, has_newer, wanted);
   std::string body = Identity(records, scan, newer, old, wanted);
   if (scan.outcome != ScanOutcome::kDone)
     return body + fmt::format(
                       "<section class=\"old\"><p class=\"verdict no_answer\">{}</p>"
                       "<p>{}</p></section>",
-                      words.terms.no_answer, Said(scan.failure, words));
+                      Word(say::result::kNoAnswer, language), Said(scan.failure, language));
   const auto reference = records.references.FindReference(scan.reference_id);
-  if (reference) body += ReferenceLine(*reference, words);
-  if (!scan.result) return body + fmt::format("<p>{}</p>", words.no_reference);
+  if (reference) body += ReferenceLine(*reference, language);
+  if (!scan.result)
+    return body + fmt::format("<p>{}</p>", Word(say::result::kPageNoReference, language));
   const Verdict verdict = scan.result->verdict;
   const bool review = old || wanted.scan.has_value();
   body += fmt::format("<section class=\"{}\"><p class=\"verdict {}\">{}</p>", old ? "old" : "fresh",
-                      Name(verdict), VerdictText(verdict, review, words));
-  for (const std::string& reason : scan.result->reasons)
-    body += fmt::format("<p>{}</p>", Said(reason, words));
-  const ResultNotes notes = records.scans.Notes(scan.id, wanted.language);
-  for (const std::string& caution : notes.cautions)
-    body += fmt::format("<p class=\"caution\">{}</p>", EscapeHtml(caution));
-  return body +
-         NumbersTable(*scan.result, notes.axes, reference ? reference->plan.tolerance : Tolerance{},
-                      review, words) +
-         BodyList(*scan.result, words) + Pictures(scan, words) + "</section>";
+                      Name(verdict), VerdictText(verdict, review, language));
+  for (const Message& reason : scan.result->reasons)
+    body += fmt::format("<p>{}</p>", Said(reason, language));
+  const ScanQuality quality = records.scans.QualityOf(scan.id);
+  for (const auto* list : {&quality.cautions, &quality.remarks})
+    for (const Message& caution : *list)
+      body += fmt::format("<p class=\"caution\">{}</p>", Said(caution, language));
+  return body + NumbersTable(*scan.result, review, language) + BodyList(*scan.result, language) +
+         Pictures(scan, language) + "</section>";
 }
 
 /// The scan that is named, else the newest completed one; a later failed one is mentioned.
@@ -333,30 +353,35 @@ Response ResultPage(const Records& records, const Wanted& wanted) {
   // A page for a named scan is read or printed, so it does not reload itself.
   Response response = BodyResponse(
       "text/html; charset=utf-8",
-      Document(wanted.words,
+      Document(wanted.language,
                scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, has_newer, wanted)
-                    : fmt::format("<h1>{}</h1>", wanted.words.none),
+                    : fmt::format("<h1>{}</h1>", Word(say::result::kPageNone, wanted.language)),
                scan && wanted.scan ? fmt::format("scan={}&amp;", scan->id) : "", !wanted.scan));
   if (scan) response.about = scan->id;
   return response;
 }
 
 /// The language that the address names ("?language=es"), else the one that the browser prefers.
-Language LanguageOf(const Request& request) {
+const Catalogue& LanguageOf(const Request& request) {
   const auto found = request.query.find("language");
   if (found == request.query.end()) return PreferredLanguage(request.Header("accept-language"));
-  return found->second == "es" ? Language::kSpanish : Language::kEnglish;
+  const Catalogue* const named = FindCatalogue(found->second);
+  return named != nullptr ? *named : EnglishCatalogue();
 }
 
 /// @param why_none  Why nobody can log in; empty: they can.
-Response LoginPage(const Request& request, const ResultWords& words, const std::string& why_none) {
+Response LoginPage(const Request& request, const Catalogue& language, const Message& why_none) {
   const std::string body =
-      !why_none.empty() ? fmt::format("<h1>{}</h1><p role=\"alert\">{}</p>", words.out_of_order,
-                                      Filled(words.nobody_can, Said(why_none, words)))
-                        : LoginForm(words, request.query.contains("failed")  ? words.wrong_password
-                                           : request.query.contains("first") ? words.first_password
-                                                                             : "");
-  Response response = BodyResponse("text/html; charset=utf-8", Document(words, body, ""));
+      !why_none.empty()
+          ? fmt::format("<h1>{}</h1><p role=\"alert\">{}</p>",
+                        Word(say::result::kPageOutOfOrder, language),
+                        Text(say::result::PageNobodyCan(Said(why_none, language)), language))
+          : LoginForm(language, request.query.contains("failed")
+                                    ? Word(say::result::kPageWrongPassword, language)
+                                : request.query.contains("first")
+                                    ? Word(say::result::kPageFirstPassword, language)
+                                    : std::string());
+  Response response = BodyResponse("text/html; charset=utf-8", Document(language, body, ""));
   if (!why_none.empty()) response.status = 503;
   return response;
 }
@@ -366,23 +391,22 @@ Response LoginPage(const Request& request, const ResultWords& words, const std::
 void AddResultPage(Routes& routes, const Services& services) {
   const Records records{services.patients, services.references, services.scans};
   routes
-      .Add(
-          "GET", "/result", Permission::kNone, BodyKind::kNone,
-          [records, &appliance = services.appliance, &accounts = services.accounts,
-           &background = services.background](const Request& request, const Respond& respond) {
-            const Language language = LanguageOf(request);
-            if (!request.session)
-              return respond(LoginPage(request, ResultWordsOf(language), accounts.WhyUnreadable()));
-            const auto named = request.query.find("scan");
-            const Wanted wanted{
-                .scan = named == request.query.end() ? std::nullopt : std::optional(named->second),
-                .status = appliance.GetStatus(),
-                .is_display = request.session->role == Role::kDisplay,
-                .language = language};
-            RespondInBackground(
-                background, "GET /result",
-                [records, wanted] { return ResultPage(records, wanted); }, respond);
-          })
+      .Add("GET", "/result", Permission::kNone, BodyKind::kNone,
+           [records, &appliance = services.appliance, &accounts = services.accounts,
+            &background = services.background](const Request& request, const Respond& respond) {
+             const Catalogue& language = LanguageOf(request);
+             if (!request.session)
+               return respond(LoginPage(request, language, accounts.WhyUnreadable()));
+             const auto named = request.query.find("scan");
+             const Wanted wanted{
+                 .scan = named == request.query.end() ? std::nullopt : std::optional(named->second),
+                 .status = appliance.GetStatus(),
+                 .is_display = request.session->role == Role::kDisplay,
+                 .language = language};
+             RespondInBackground(
+                 background, "GET /result",
+                 [records, wanted] { return ResultPage(records, wanted); }, respond);
+           })
       .Discloses("view.scan");
 }
 

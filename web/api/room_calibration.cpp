@@ -1,15 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 // The room's calibration: its state, and the board to print.
 #include <utility>
 
-#include "web/api/api.hpp"
-#include "web/api/json.hpp"
+#include "web/api/all_routes.hpp"
+#include "web/exchange/json.hpp"
 
 namespace plumb::web {
 namespace {
 
 Json ScanJson(const RoomBoardScan& scan) {
-  Json json = {
-      {"check", scan.check_id}, {"time", scan.time}, {"user", scan.user}, {"fault", scan.fault}};
+  Json json = {{"check", scan.check_id}, {"time", scan.time}, {"user", scan.user}};
+  PutMessage(json, "fault", scan.fault, "");
   if (!scan.fault.empty()) return json;
   json["num_markers"] = scan.num_markers;
   json["rms_mm"] = scan.rms_mm;
@@ -27,7 +28,6 @@ Json VersionJson(const RoomCalibrationVersion& one) {
 
 Json StatusJson(const RoomCalibrationStatus& status) {
   Json json = {{"versions", Json::array()},
-               {"due", status.due},
                {"configured", status.is_configured},
                {"scans", Json::array()},
                {"num_wanted", status.num_wanted},
@@ -35,8 +35,9 @@ Json StatusJson(const RoomCalibrationStatus& status) {
                {"turn_deg", status.turn_deg},
                {"max_shift_mm", status.max_shift_mm},
                {"max_turn_deg", status.max_turn_deg},
-               {"why_not_sign", status.why_not_sign},
                {"digest", status.digest}};
+  PutMessage(json, "due", status.due, "");
+  PutMessage(json, "why_not_sign", status.why_not_sign, "");
   for (const RoomCalibrationVersion& one : status.versions)
     json["versions"].push_back(VersionJson(one));
   for (const RoomBoardScan& scan : status.scans) json["scans"].push_back(ScanJson(scan));
@@ -52,7 +53,7 @@ void AddRoomCalibrationRoutes(Routes& routes, const Services& services) {
   });
   routes.ReadInBackground(
       "/api/v1/room-calibration/board.pdf", Permission::kView, [&room](const Request&) {
-        std::string why_not;
+        Message why_not;
         auto pdf = room.RoomBoardPdf(why_not);
         if (!pdf) return ErrorResponse(409, why_not);
         return Download("application/pdf", std::move(*pdf), "plumb_room_board.pdf");

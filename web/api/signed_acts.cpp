@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 // Actions that a logged-in user signs with the own password.
 #include <utility>
 
 #include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
-#include "web/api/json.hpp"
+#include "web/exchange/json.hpp"
 #include "web/model/account.hpp"
 #include "web/model/limits.hpp"
 #include "web/security/password_rules.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 
@@ -17,9 +19,9 @@ void Accounts::AddSigned(Routes& routes, const char* method, const char* pattern
              [this, parse = std::move(parse)](const Request& request, const Respond& respond) {
                Fields fields(request.body);
                SignedAct act = parse(request, fields);
-               std::string password = fields.Text("password", 1, kMaxPassword);
+               OwnProof proof = ReadProof(fields, "password");
                fields.Finish();
-               VerifyOwn(request, std::move(password), "the password is wrong", respond,
+               VerifyOwn(request, std::move(proof), say::web::WrongPassword(), respond,
                          [this, act = std::move(act), actor = request.actor(),
                           respond](const User&) { act(actor, WhileAlive(Answer(respond))); });
              });
@@ -35,13 +37,26 @@ void Accounts::AddSignedActs(Routes& routes) {
                 scans_.AcceptScan(actor, scan, reason, std::move(done));
               };
             });
+  AddSigned(routes, "POST", "/api/v1/treatment/fraction", Permission::kAccept,
+            [this](const Request&, Fields& fields) -> SignedAct {
+              const std::string session = fields.Text("session_id", 1, 64);
+              const int fraction = fields.Integer("fraction", 1, kMaxFraction);
+              return
+                  [this, session, fraction, reason = fields.Text("reason", kMinReason, kMaxReason)](
+                      const Actor& actor, Done done) {
+                    patients_.CorrectFraction(actor, session, fraction, reason, std::move(done));
+                  };
+            });
   // Approves the plan that the person was shown, identified by its revision and digest.
   AddSigned(routes, "POST", "/api/v1/references/{id}/approve", Permission::kApprove,
             [this](const Request& request, Fields& fields) -> SignedAct {
               const int revision = fields.Integer("revision", 1, kMaxRevision);
-              return [this, id = request.arguments.at(0), revision,
+              const std::string reason = fields.Has("reason")
+                                             ? fields.Text("reason", kMinReason, kMaxReason)
+                                             : std::string();
+              return [this, id = request.arguments.at(0), revision, reason,
                       digest = fields.Text("digest", 1, 64)](const Actor& actor, Done done) {
-                references_.ApproveReference(actor, id, revision, digest, std::move(done));
+                references_.ApproveReference(actor, id, revision, digest, reason, std::move(done));
               };
             });
   AddSigned(routes, "DELETE", "/api/v1/patients/{id}", Permission::kWipe,
@@ -55,6 +70,33 @@ void Accounts::AddSignedActs(Routes& routes) {
             [this](const Request&, Fields& fields) -> SignedAct {
               return [this, digest = fields.Text("digest", 64, 64)](const Actor& actor, Done done) {
                 room_.SignRoomCalibration(actor, digest, std::move(done));
+              };
+            });
+  AddSignedUnitActs(routes);
+}
+
+void Accounts::AddSignedUnitActs(Routes& routes) {
+  // Makes a daily check the one that later ones are compared with.
+  AddSigned(routes, "POST", "/api/v1/checks/{id}/baseline", Permission::kPlan,
+            [this](const Request& request, Fields& fields) -> SignedAct {
+              return [this, id = request.arguments.at(0),
+                      reason = fields.Text("reason", kMinReason, kMaxReason)](const Actor& actor,
+                                                                              Done done) {
+                checks_.SetCheckBaseline(actor, id, reason, std::move(done));
+              };
+            });
+  AddSigned(routes, "POST", "/api/v1/displays", Permission::kUsers,
+            [this](const Request&, Fields& fields) -> SignedAct {
+              const std::string code = fields.Text("code", 1, 16);
+              return [this, code, name = fields.Text("name", 1, kMaxName)](const Actor& actor,
+                                                                           Done done) {
+                displays_.Approve(actor, code, name, done);
+              };
+            });
+  AddSigned(routes, "DELETE", "/api/v1/displays/{id}", Permission::kUsers,
+            [this](const Request& request, Fields&) -> SignedAct {
+              return [this, id = request.arguments.at(0)](const Actor& actor, Done done) {
+                displays_.Remove(actor, id, done);
               };
             });
   AddSigned(routes, "POST", "/api/v1/sensor-profile/reset", Permission::kSettings,
@@ -80,8 +122,7 @@ void Accounts::AddSignedActs(Routes& routes) {
   AddSigned(routes, "POST", "/api/v1/system/factory-reset", Permission::kUpdate,
             [this](const Request&, Fields& fields) -> SignedAct {
               const std::string kind = fields.Text("kind", 1, 32);
-              if (kind != "keep_records" && kind != "wipe")
-                throw DataError("kind: expected keep_records or wipe");
+              if (kind != "keep_records" && kind != "wipe") throw DataError(say::web::FieldReset());
               return
                   [this, reset = kind == "wipe" ? FactoryReset::kWipe : FactoryReset::kKeepRecords](
                       const Actor& actor, Done done) {

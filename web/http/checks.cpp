@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/checks.hpp"
 
 #include <arpa/inet.h>
@@ -164,6 +165,18 @@ std::string NetworkOf(const std::string& address) {
   std::array<char, INET6_ADDRSTRLEN> text{};
   inet_ntop(AF_INET6, &v6, text.data(), text.size());
   return text.data();
+}
+
+bool IsToken(std::string_view text) {
+  static constexpr std::string_view kMarks = "!#$%&'*+-.^_`|~";
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return c < 0x80 &&
+           (std::isalnum(c) != 0 || kMarks.find(static_cast<char>(c)) != std::string_view::npos);
+  });
+}
+
+bool IsChunked(std::string_view transfer_encoding) {
+  return Lower(Trim(transfer_encoding)) == "chunked";
 }
 
 std::string EscapeHtml(std::string_view text) {

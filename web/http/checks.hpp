@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks of input from browsers and other clients, before it is used. Pure functions; each has a
 // fuzz target.
 #pragma once
@@ -40,6 +41,12 @@ namespace plumb::web {
 /// The address that counters use: one machine can have all addresses of an IPv6 network of 64 bits
 /// ("2001:db8:1:2::"), so they count as one; other addresses are returned unchanged.
 [[nodiscard]] std::string NetworkOf(const std::string& address);
+
+/// A name of a header field (RFC 9110): letters, digits and some marks, without a blank; not empty.
+[[nodiscard]] bool IsToken(std::string_view text);
+
+/// A Transfer-Encoding of "chunked" alone, the only coding that is taken.
+[[nodiscard]] bool IsChunked(std::string_view transfer_encoding);
 
 /// Escapes text for an HTML element or a quoted attribute.
 [[nodiscard]] std::string EscapeHtml(std::string_view text);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/connection_table.hpp"
 
 #include <algorithm>
@@ -69,6 +70,7 @@ bool IsLocalAddress(const std::string& address) {
 Connection* ConnectionTable::Add(int fd, const std::string& address, Connection::TimePoint now) {
   connections_.push_back({.fd = fd,
                           .address = address,
+                          .begun = now,
                           .since = now,
                           .receiving = true,
                           .has_head = false,
@@ -124,6 +126,14 @@ Connection* ConnectionTable::NextLate(Connection::TimePoint now) {
         return !connection.is_leaving && IsLate(connection, now);
       });
   return late == connections_.end() ? nullptr : Leave(&*late);
+}
+
+Connection* ConnectionTable::NextOlderThan(Connection::TimePoint time) {
+  const auto old =
+      std::find_if(connections_.begin(), connections_.end(), [&](const Connection& connection) {
+        return !connection.is_leaving && connection.begun < time;
+      });
+  return old == connections_.end() ? nullptr : Leave(&*old);
 }
 
 }  // namespace plumb::web

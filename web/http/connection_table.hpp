@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keeps track of connections and selects those to close when there are too many or a request takes
 // too long.
 #pragma once
@@ -16,6 +17,7 @@ struct Connection {
 
   int fd = -1;
   std::string address;      ///< Address of the peer.
+  TimePoint begun;          ///< Time at which it was made.
   TimePoint since;          ///< Time at which its present request could have begun.
   bool receiving = true;    ///< Its request is not complete yet.
   bool has_head = false;    ///< Line and headers of its request have arrived.
@@ -45,6 +47,8 @@ class ConnectionTable {
   [[nodiscard]] Connection* NextOverLimit(Connection::TimePoint now);
   /// Returns in the same way a connection whose request has not arrived in time.
   [[nodiscard]] Connection* NextLate(Connection::TimePoint now);
+  /// Returns in the same way a connection that was made before `time`.
+  [[nodiscard]] Connection* NextOlderThan(Connection::TimePoint time);
 
  private:
   [[nodiscard]] bool IsLate(const Connection& connection, Connection::TimePoint now) const;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/event_hub.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The event stream (text/event-stream) to every open page.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/exchange.hpp"
 
 #include <microhttpd.h>
@@ -5,6 +6,7 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -14,26 +16,25 @@ constexpr std::size_t kUploadBlock = 1 << 20;
 
 }  // namespace
 
-void Transport::Exchange::Suspend() {
+void Exchange::Suspend() {
   suspended = true;
   MHD_suspend_connection(connection);
 }
 
-void Transport::Exchange::Resume() {
+void Exchange::Resume() {
   if (!suspended) return;
   suspended = false;
   MHD_resume_connection(connection);
-  owner->Wake();
+  wake();
 }
 
-void Transport::Exchange::Answer(Response given) {
+void Exchange::Answer(Response given) {
   if (response) return;
   response = std::move(given);
   Resume();
 }
 
-bool Transport::Exchange::TakeBody(std::string_view bytes) {
-  const HttpServerOptions& options = owner->options_;
+bool Exchange::TakeBody(std::string_view bytes) {
   if (response) return true;  // refused in the middle of a file: the rest is read and dropped
   if (!request.upload) {
     if (request.body.size() + bytes.size() > options.max_body_bytes) return false;
@@ -48,26 +49,25 @@ bool Transport::Exchange::TakeBody(std::string_view bytes) {
 }
 
 /// Passes the buffered data to the disk, or makes the connection wait for the previous piece.
-void Transport::Exchange::WriteUpload() {
+void Exchange::WriteUpload() {
   if (writing) return Suspend();
-  const auto failure = std::make_shared<std::string>();
+  const auto failure = std::make_shared<Message>();
   const auto work = [file = request.upload, bytes = std::exchange(unwritten, {}), failure] {
     try {
       file->Append(bytes);
     } catch (const IoError& error) {
-      *failure = error.what();
+      *failure = error.message();
     }
   };
   writing = true;
-  const bool accepted = owner->background_.RunInBackground(BackgroundPool::kFiles, work,
-                                                           [weak = weak_from_this(), failure] {
-                                                             if (const auto alive = weak.lock())
-                                                               alive->HaveWritten(*failure);
-                                                           });
-  if (!accepted) HaveWritten("the disk is too busy; send the file again later");
+  const bool accepted =
+      background.RunInBackground(BackgroundPool::kFiles, work, [weak = weak_from_this(), failure] {
+        if (const auto alive = weak.lock()) alive->HaveWritten(*failure);
+      });
+  if (!accepted) HaveWritten(say::web::DiskTooBusy());
 }
 
-void Transport::Exchange::HaveWritten(const std::string& failure) {
+void Exchange::HaveWritten(const Message& failure) {
   writing = false;
   if (!failure.empty() && !response) {
     request.upload.reset();
@@ -78,7 +78,7 @@ void Transport::Exchange::HaveWritten(const std::string& failure) {
   Resume();
 }
 
-bool Transport::Exchange::HasWholeUpload() {
+bool Exchange::HasWholeUpload() {
   if (!request.upload) return true;
   if (!writing && !unwritten.empty()) WriteUpload();
   if (!writing) return true;

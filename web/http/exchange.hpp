@@ -1,26 +1,42 @@
-// One request with its answer; a part of the transport.
+// SPDX-License-Identifier: Apache-2.0
+// One request with its answer.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
-#include "web/http/transport.hpp"
+#include "web/http/event_hub.hpp"
+#include "web/http/head_layout.hpp"
+#include "web/http/message.hpp"
+#include "web/http/router.hpp"
+#include "web/http/server_options.hpp"
+#include "web/service/background_work.hpp"
 
 struct MHD_Connection;
 
 namespace plumb::web {
 
 /// Used on the loop thread.
-struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
-  Transport* owner = nullptr;
-  MHD_Connection* connection = nullptr;
+struct Exchange : std::enable_shared_from_this<Exchange> {
+  /// Everything is borrowed. @param wake_loop  Called when an answer can be sent.
+  Exchange(const HttpServerOptions& limits, BackgroundWork& writes, std::function<void()> wake_loop,
+           MHD_Connection* of)
+      : options(limits), background(writes), wake(std::move(wake_loop)), connection(of) {}
+
+  const HttpServerOptions& options;
+  BackgroundWork& background;
+  const std::function<void()> wake;
+  MHD_Connection* const connection;
   Request request;
   const Route* route = nullptr;
   bool head_only = false;
   bool malformed = false;
+  HeadLayout head;
   int num_hosts = 0;
   bool started = false;
   bool suspended = false;
@@ -41,7 +57,7 @@ struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
 
  private:
   void WriteUpload();
-  void HaveWritten(const std::string& failure);
+  void HaveWritten(const Message& failure);
 };
 
 }  // namespace plumb::web

@@ -1,6 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/gate.hpp"
-
-#include <sodium.h>
 
 #include <algorithm>
 #include <chrono>
@@ -8,7 +7,11 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/message_json.hpp"
 #include "web/http/checks.hpp"
+#include "web/security/secrets.hpp"
+#include "web/security/tls_identity.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -21,19 +24,16 @@ bool IsType(std::string_view header, std::string_view type) {
 
 Response InternalError(std::string_view name, const std::exception& error) {
   std::fprintf(stderr, "web: %.*s: %s\n", static_cast<int>(name.size()), name.data(), error.what());
-  return ErrorResponse(500, "internal error; the journal has the details");
+  return ErrorResponse(500, say::web::InternalError());
 }
 
 /// Turns a handler's exception into an answer. A refusal by the disk is stated, as it is in safe
 /// mode.
 Response AnswerOf(std::string_view name, const std::exception& error) {
-  if (dynamic_cast<const DataError*>(&error) != nullptr) return ErrorResponse(400, error.what());
-  if (dynamic_cast<const IoError*>(&error) != nullptr) return ErrorResponse(500, error.what());
+  if (dynamic_cast<const DataError*>(&error) != nullptr)
+    return ErrorResponse(400, MessageOf(error));
+  if (dynamic_cast<const IoError*>(&error) != nullptr) return ErrorResponse(500, MessageOf(error));
   return InternalError(name, error);
-}
-
-bool SameToken(std::string_view a, std::string_view b) {
-  return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
 }  // namespace
@@ -46,23 +46,26 @@ bool Gate::IsOwnPage(const Request& request) const {
 }
 
 Response Gate::NotLoggedIn() const {
+  using Json = nlohmann::ordered_json;
+  const Message why = say::web::LogInFirst();
+  const Message& fault = sessions_.accounts_fault();
   Response response;
   response.status = 401;
   response.body =
-      nlohmann::json{
-          {"error", "log in first"},
-          {"setup_required", sessions_.needs_setup()},
-          {"fault", sessions_.accounts_fault()},
-          {"certificate", sessions_.needs_setup() ? sessions_.tls_fingerprint() : std::string()}}
-          .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+      Json{{"error", why.English()},
+           {"error_message", MessageJson(why)},
+           {"setup_required", sessions_.needs_setup()},
+           {"fault", fault.English()},
+           {"fault_message", fault.empty() ? Json(nullptr) : MessageJson(fault)},
+           {"certificate", sessions_.needs_setup() ? sessions_.tls_fingerprint() : std::string()}}
+          .dump(-1, ' ', false, Json::error_handler_t::replace);
   return response;
 }
 
 std::variant<const Route*, Response> Gate::Admit(Request& request) const {
-  if (!IsKnownHost(request.Header("host"), host_names_)) {
-    return ErrorResponse(
-        421,
-        "unknown host name; use the appliance's address, or add the name to its configuration");
+  if (!IsKnownHost(request.Header("host"), host_names_) &&
+      !IsKnownHost(request.Header("host"), OwnNames())) {
+    return ErrorResponse(421, say::web::UnknownHost());
   }
   Router::Match match = router_.Find(request.method, request.path);
   const bool api = request.path.starts_with("/api/");
@@ -73,8 +76,8 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   request.session = sessions_.SessionOf(request, touch);
   if (match.route == nullptr) {
     if (api && !request.session) return NotLoggedIn();
-    if (match.allowed.empty()) return ErrorResponse(404, "nothing was found at this address");
-    Response response = ErrorResponse(405, "this address accepts only " + match.allowed);
+    if (match.allowed.empty()) return ErrorResponse(404, say::web::NothingHere());
+    Response response = ErrorResponse(405, say::web::AcceptsOnly(match.allowed));
     response.headers.emplace_back("Allow", match.allowed);
     return response;
   }
@@ -83,37 +86,35 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   if (route.permission != Permission::kNone) {
     if (!request.session) return NotLoggedIn();
     if (!May(request.session->role, route.permission))
-      return ErrorResponse(403, "your role is not allowed to do this");
+      return ErrorResponse(403, say::web::RoleNotAllowed());
     if (request.session->must_change_password && route.permission != Permission::kLogin)
-      return ErrorResponse(403, "choose a password of your own first");
+      return ErrorResponse(403, say::web::ChooseOwnPassword());
   } else if (request.session && request.session->must_change_password) {
     request.session.reset();  // for pages that show more to logged-in users
   }
   if (request.method != "GET") {
-    if (!IsOwnPage(request))
-      return ErrorResponse(403, "this request was made by a page of another site");
+    if (!IsOwnPage(request)) return ErrorResponse(403, say::web::OtherSite());
     if (route.permission != Permission::kNone &&
-        !SameToken(request.Header("x-csrf-token"), request.session->csrf_token)) {
-      return ErrorResponse(403,
-                           "the token of this session is missing or wrong; load the page again");
+        !IsSameSecret(request.Header("x-csrf-token"), request.session->csrf_token)) {
+      return ErrorResponse(403, say::web::WrongToken());
     }
   }
   const std::string_view type = request.Header("content-type");
   if (route.body == BodyKind::kJson && !IsType(type, "application/json"))
-    return ErrorResponse(415, "expected application/json");
+    return ErrorResponse(415, say::web::ExpectedJson());
   if (route.body == BodyKind::kForm && !IsType(type, "application/x-www-form-urlencoded"))
-    return ErrorResponse(415, "expected a form");
+    return ErrorResponse(415, say::web::ExpectedForm());
   if (route.body == BodyKind::kFile && !IsType(type, "application/octet-stream"))
-    return ErrorResponse(415, "expected application/octet-stream");
+    return ErrorResponse(415, say::web::ExpectedBytes());
   return &route;
 }
 
 void Gate::Handle(const Route& route, const Request& request, const Respond& respond) {
   if (route.body == BodyKind::kNone && !request.body.empty())
-    return respond(ErrorResponse(400, "expected no body"));
+    return respond(ErrorResponse(400, say::web::ExpectedNoBody()));
   // The body may have taken long, and the account may have been disabled meanwhile.
   if (route.permission != Permission::kNone && request.session->ended)
-    return respond(ErrorResponse(401, "the session has ended: log in again"));
+    return respond(ErrorResponse(401, say::web::SessionEnded()));
   RespondGuarded(
       route.Name(), [&] { route.handler(request, respond); }, respond);
 }
@@ -140,8 +141,7 @@ void RespondInBackground(BackgroundWork& background, const std::string& name,
   if (background.RunInBackground(BackgroundPool::kReads, work,
                                  [made, respond] { respond(std::move(*made)); }))
     return;
-  respond(RetryLater(503, "too many requests at once; try again in a few seconds",
-                     std::chrono::seconds(2)));
+  respond(RetryLater(503, say::web::TooManyRequests(), std::chrono::seconds(2)));
 }
 
 void AddSecurityHeaders(Response& response, bool tls) {

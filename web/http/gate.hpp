@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The checks that every request passes before its handler: host, route, login, role, origin, token,
 // type.
 #pragma once
@@ -8,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/http/router.hpp"
 #include "web/service/background_work.hpp"
 
@@ -22,7 +24,7 @@ class SessionLookup {
   /// True while there is no account yet.
   [[nodiscard]] virtual bool needs_setup() const = 0;
   /// Why nobody can log in since the start (safe mode); empty if people can.
-  [[nodiscard]] virtual const std::string& accounts_fault() const = 0;
+  [[nodiscard]] virtual const Message& accounts_fault() const = 0;
   /// Fingerprint of the server's certificate; empty without TLS.
   [[nodiscard]] virtual std::string tls_fingerprint() const = 0;
 };

@@ -1,7 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/listen_socket.hpp"
 
 #include <arpa/inet.h>
-#include <fmt/format.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "algo/base/errors.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -21,8 +22,7 @@ sockaddr_storage AddressOf(int socket_fd) {
   sockaddr_storage address{};
   socklen_t length = sizeof address;
   if (getsockname(socket_fd, reinterpret_cast<sockaddr*>(&address), &length) != 0) {
-    throw IoError(
-        fmt::format("cannot listen on descriptor {}: {}", socket_fd, std::strerror(errno)));
+    throw IoError(say::web::CannotListenOnDescriptor(socket_fd, std::strerror(errno)));
   }
   return address;
 }
@@ -57,19 +57,23 @@ struct Endpoint {
 int OpenListenSocket(const std::string& address, std::uint16_t port) {
   const Endpoint endpoint(address, port);
   if (!endpoint.is_valid) {
-    throw IoError(
-        fmt::format("cannot listen on {}: expected an IPv4 or IPv6 address in numbers", address));
+    throw IoError(say::web::NotAnAddress(address));
   }
   const int fd = socket(endpoint.family(), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  const int on = 1;
+  if (fd < 0 && errno == EAFNOSUPPORT && address == "::")  // a kernel without IPv6
+    return OpenListenSocket("0.0.0.0", port);
+  const int on = 1, off = 0;
+  // For "::": both families, whatever the machine's default is.
+  if (endpoint.family() == AF_INET6 && fd >= 0)
+    setsockopt(fd, IPPROTO_IPV6, IPV6_V6ONLY, &off, sizeof off);
   if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
       setsockopt(fd, IPPROTO_IP, IP_FREEBIND, &on, sizeof on) != 0 || endpoint.Bind(fd) != 0 ||
       listen(fd, kBacklog) != 0) {
     const int error = errno;
     if (fd >= 0) close(fd);
-    throw IoError(fmt::format("cannot listen on {} port {}: {}{}", address, port,
-                              std::strerror(error),
-                              error == EADDRINUSE ? "; is another server running there?" : ""));
+    throw IoError(error == EADDRINUSE
+                      ? say::web::PortInUse(address, port, std::strerror(error))
+                      : say::web::CannotListen(address, port, std::strerror(error)));
   }
   return fd;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/message.hpp"
 
 #include <fcntl.h>
@@ -11,6 +12,8 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/message_json.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 
@@ -19,8 +22,7 @@ UploadFile::UploadFile(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder, ignored);
   std::string name = (folder / ".upload-XXXXXX").string();
   fd_ = ::mkostemp(name.data(), O_CLOEXEC);
-  if (fd_ < 0)
-    throw IoError(fmt::format("cannot write to {}: {}", folder.string(), std::strerror(errno)));
+  if (fd_ < 0) throw IoError(say::web::CannotWriteTo(folder.string(), std::strerror(errno)));
   path_ = name;
 }
 
@@ -34,8 +36,7 @@ void UploadFile::Append(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t count = ::write(fd_, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0)
-      throw IoError(fmt::format("cannot write the upload to the disk: {}", std::strerror(errno)));
+    if (count <= 0) throw IoError(say::web::CannotWriteUpload(std::strerror(errno)));
     bytes.remove_prefix(static_cast<std::size_t>(count));
     written_ += count;
   }
@@ -53,13 +54,11 @@ std::string_view Request::Header(const std::string& name) const {
 
 OpenFile::OpenFile(const std::filesystem::path& file)
     : fd_(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)) {
-  if (fd_ < 0)
-    throw IoError(
-        fmt::format("cannot open {}: {}", file.filename().string(), std::strerror(errno)));
+  if (fd_ < 0) throw IoError(say::web::CannotOpen(file.filename().string(), std::strerror(errno)));
   struct stat info {};
   if (fstat(fd_, &info) != 0 || !S_ISREG(info.st_mode)) {
     close(fd_);
-    throw IoError(fmt::format("{} is not a regular file", file.filename().string()));
+    throw IoError(say::web::NoRegularFile(file.filename().string()));
   }
   size_ = static_cast<std::uint64_t>(info.st_size);
   // Sending happens on the loop in small pieces; the file is prefetched so that they come from
@@ -73,16 +72,17 @@ OpenFile::~OpenFile() {
 
 int OpenFile::Release() { return std::exchange(fd_, -1); }
 
-Response ErrorResponse(int status, const std::string& message) {
+Response ErrorResponse(int status, const Message& why) {
+  using Json = nlohmann::ordered_json;
   Response response;
   response.status = status;
-  response.body = nlohmann::json{{"error", message}}.dump(-1, ' ', false,
-                                                          nlohmann::json::error_handler_t::replace);
+  response.body = Json{{"error", why.English()}, {"error_message", MessageJson(why)}}.dump(
+      -1, ' ', false, Json::error_handler_t::replace);
   return response;
 }
 
-Response RetryLater(int status, const std::string& message, std::chrono::seconds wait) {
-  Response response = ErrorResponse(status, message);
+Response RetryLater(int status, const Message& why, std::chrono::seconds wait) {
+  Response response = ErrorResponse(status, why);
   response.headers.emplace_back("Retry-After", std::to_string(wait.count()));
   return response;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One request and one answer, independent of the HTTP library.
 #pragma once
 
@@ -13,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/security/sessions.hpp"
 
 namespace plumb::web {
@@ -45,6 +47,7 @@ struct Request {
   std::string body;
   std::shared_ptr<UploadFile> upload;  ///< Replaces body in routes that take a file.
   std::string address;                 ///< Address of the browser.
+  std::chrono::steady_clock::time_point connected_at;  ///< When its connection was made.
   /// Values of the route's path parameters: [A-Za-z0-9._-]{1,64}, not beginning with a dot.
   std::vector<std::string> arguments;
   std::shared_ptr<Session> session;  ///< Set if the route requires a login.
@@ -84,11 +87,10 @@ struct Response {
   std::string about = {};  ///< Subject of the answer if the path does not state it: a scan's id.
 };
 
-/// {"error": message}
-[[nodiscard]] Response ErrorResponse(int status, const std::string& message);
+/// {"error": English sentence, "error_message": the message as in algo/base/message_json.hpp}
+[[nodiscard]] Response ErrorResponse(int status, const Message& why);
 /// The same, with the time after which the client may try again.
-[[nodiscard]] Response RetryLater(int status, const std::string& message,
-                                  std::chrono::seconds wait);
+[[nodiscard]] Response RetryLater(int status, const Message& why, std::chrono::seconds wait);
 [[nodiscard]] Response BodyResponse(std::string type, std::string body);
 /// Makes the browser save the answer as a file of this name; empty: the browser shows it.
 void NameDownload(Response& response, const std::string& name);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The table of routes: handler and permission of each.
 #pragma once
 
@@ -5,8 +6,10 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/http/message.hpp"
 #include "web/security/permissions.hpp"
 
@@ -35,7 +38,7 @@ struct Route {
   std::string_view view = {}, download = {};
   /// Without a record, a route with path parameters is refused to displays in the room.
   ShownRecord shown = ShownRecord::kNone;
-  std::string_view absent = {};  ///< The refusal to a display: as if there were no such record.
+  Message absent = {};  ///< The refusal to a display: as if there were no such record.
 
   [[nodiscard]] std::string Name() const { return method + " " + pattern; }
   [[nodiscard]] bool DisclosesPatientData() const { return !view.empty() || !download.empty(); }
@@ -44,9 +47,9 @@ struct Route {
     download = download_action;
     return *this;
   }
-  Route& ShowsDisplays(ShownRecord record, std::string_view when_absent) {
+  Route& ShowsDisplays(ShownRecord record, Message when_absent) {
     shown = record;
-    absent = when_absent;
+    absent = std::move(when_absent);
     return *this;
   }
 };

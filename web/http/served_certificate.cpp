@@ -1,8 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/served_certificate.hpp"
 
-#include <fmt/format.h>
-
 #include "algo/base/errors.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -28,11 +28,7 @@ ServedCertificate::ServedCertificate(const TlsIdentity& identity) {
     result = gnutls_privkey_import_x509_raw(key_, &key, GNUTLS_X509_FMT_PEM, nullptr, 0);
   if (result >= 0) return;
   Release();
-  throw DataError(
-      fmt::format("the certificate {} cannot be served ({}); expected PEM: the certificate of this "
-                  "machine, then "
-                  "each that leads from it to an authority",
-                  identity.fingerprint, gnutls_strerror(result)));
+  throw DataError(say::web::CertificateNotServed(identity.fingerprint, gnutls_strerror(result)));
 }
 
 ServedCertificate::~ServedCertificate() { Release(); }

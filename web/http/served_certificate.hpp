@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A certificate and its key in the form that GnuTLS needs at each handshake.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The listening address of the server and the limits for its clients.
 #pragma once
 
@@ -21,9 +22,15 @@ struct HttpServerOptions {
   /// A listening socket passed in (socket activation); address and port are then unused.
   std::optional<int> listen_fd;
   std::optional<TlsIdentity> tls;  ///< HTTPS instead of HTTP; see CheckedTlsIdentity().
-  /// Stores another identity durably before it is served. Throws IoError, after which the previous
-  /// one stays. Empty: the certificate cannot be replaced on the page.
+  /// Stores an identity durably for the next start; one that a person set only after a browser has
+  /// connected with it. Throws IoError, after which the previous one stays. Empty: the certificate
+  /// cannot be replaced on the page.
   std::function<void(const TlsIdentity&)> keep_certificate;
+  /// Called with every identity that replaces another. May be empty.
+  std::function<void(const TlsIdentity&)> on_certificate;
+  /// Called when strangers begin to guess passwords faster than permitted, and again when none has
+  /// done so for ten minutes. May be empty.
+  std::function<void(bool are_running)> on_guesses;
   /// 32 random bytes that outlive a restart, for the cookies of browsers that logged in before.
   /// Empty: new ones are created, so that a restart forgets those browsers.
   std::string device_key;

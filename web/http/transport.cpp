@@ -1,7 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/transport.hpp"
 
 #include <arpa/inet.h>
-#include <fmt/format.h>
 #include <microhttpd.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -18,6 +18,7 @@
 #include "web/http/exchange.hpp"
 #include "web/http/listen_socket.hpp"
 #include "web/http/served_certificate.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -35,8 +36,14 @@ std::string AddressOf(MHD_Connection* connection) {
     inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(info->client_addr)->sin_addr,
               text.data(), text.size());
   } else if (info->client_addr->sa_family == AF_INET6) {
-    inet_ntop(AF_INET6, &reinterpret_cast<const sockaddr_in6*>(info->client_addr)->sin6_addr,
-              text.data(), text.size());
+    const in6_addr& v6 = reinterpret_cast<const sockaddr_in6*>(info->client_addr)->sin6_addr;
+    // On a socket for both families, IPv4 addresses are mapped ones: the log and the counters get
+    // the plain address.
+    if (IN6_IS_ADDR_V4MAPPED(&v6)) {
+      inet_ntop(AF_INET, &v6.s6_addr[12], text.data(), text.size());
+    } else {
+      inet_ntop(AF_INET6, &v6, text.data(), text.size());
+    }
   }
   return text.data();
 }
@@ -115,6 +122,7 @@ struct Transport::Callbacks {
 
   static MHD_Result OnHeader(void* cls, MHD_ValueKind, const char* key, const char* value) {
     auto* exchange = static_cast<Exchange*>(cls);
+    if (!IsToken(key) || !exchange->head.TakeHeader(key, value)) exchange->malformed = true;
     std::string name(key);
     std::transform(name.begin(), name.end(), name.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -125,7 +133,7 @@ struct Transport::Callbacks {
     const auto [where, fresh] = headers.emplace(std::move(name), text);
     if (!fresh && where->first == "cookie") where->second.append("; ").append(text);
     if (!fresh && (where->first == "content-length" || where->first == "x-csrf-token" ||
-                   where->first == "origin"))
+                   where->first == "origin" || where->first == "transfer-encoding"))
       exchange->malformed = true;
     return MHD_YES;
   }
@@ -137,43 +145,51 @@ struct Transport::Callbacks {
     const bool valid =
         IsName(key) && (text.empty() || IsName(text)) && query.size() < kMaxQueryFields;
     if (!valid || !query.emplace(key, text).second) exchange->malformed = true;
+    exchange->head.TakeQuery(key, value);
     return MHD_YES;
   }
 
-  static std::optional<Response> RefuseByHead(Exchange& exchange, std::size_t max_body) {
+  static std::optional<Response> RefuseByHead(Transport& transport, Exchange& exchange,
+                                              std::size_t max_body) {
     const Request& request = exchange.request;
     if (exchange.malformed || exchange.num_hosts != 1 || request.path.size() > kMaxPath)
-      return ErrorResponse(400, "malformed request");
+      return ErrorResponse(400, say::web::Malformed());
     const std::string_view length = request.Header("content-length");
-    if (!length.empty() && !request.Header("transfer-encoding").empty())
-      return ErrorResponse(400, "the length of the body is stated twice");
-    std::uint64_t bytes = 0;
-    if (!length.empty() &&
-        std::from_chars(length.data(), length.data() + length.size(), bytes).ec != std::errc()) {
-      return ErrorResponse(413, "the body is too long");
+    if (const auto coding = request.headers.find("transfer-encoding");
+        coding != request.headers.end()) {
+      if (request.headers.contains("content-length"))
+        return ErrorResponse(400, say::web::LengthTwice());
+      // The library ignores other codings, and would read the body as the next request.
+      if (!IsChunked(coding->second)) return ErrorResponse(400, say::web::CodingUnknown());
     }
-    auto admitted = exchange.owner->gate_.Admit(exchange.request);
+    std::uint64_t bytes = 0;
+    if (!length.empty()) {
+      const char* const end = length.data() + length.size();
+      const auto [stop, error] = std::from_chars(length.data(), end, bytes);
+      if (error == std::errc::result_out_of_range)
+        return ErrorResponse(413, say::web::BodyTooLong());
+      if (error != std::errc() || stop != end) return ErrorResponse(400, say::web::Malformed());
+    }
+    auto admitted = transport.gate_.Admit(exchange.request);
     if (Connection* known = ConnectionOf(exchange.connection))
       known->user = request.session ? request.session->user : std::string();
     if (auto* refusal = std::get_if<Response>(&admitted)) return std::move(*refusal);
     exchange.route = std::get<const Route*>(admitted);
-    if (exchange.route->body == BodyKind::kFile) return BeginUpload(exchange, bytes);
+    if (exchange.route->body == BodyKind::kFile) return BeginUpload(transport, exchange, bytes);
     if (bytes > max_body)
-      return ErrorResponse(413, fmt::format("the body is too long: at most {} bytes", max_body));
+      return ErrorResponse(413, say::web::BodyLongerThan(static_cast<double>(max_body)));
     return std::nullopt;
   }
 
-  static std::optional<Response> BeginUpload(Exchange& exchange, std::uint64_t bytes) {
-    Transport& transport = *exchange.owner;
+  static std::optional<Response> BeginUpload(Transport& transport, Exchange& exchange,
+                                             std::uint64_t bytes) {
     const HttpServerOptions& options = transport.options_;
-    if (options.upload_folder.empty()) return ErrorResponse(409, "this machine accepts no uploads");
-    if (!transport.upload_.expired())
-      return ErrorResponse(409, "another file is being uploaded: wait until it has arrived");
-    if (bytes == 0)
-      return ErrorResponse(411, "an upload must state its length and must not be empty");
+    if (options.upload_folder.empty()) return ErrorResponse(409, say::web::NoUploads());
+    if (!transport.upload_.expired()) return ErrorResponse(409, say::web::AnotherUpload());
+    if (bytes == 0) return ErrorResponse(411, say::web::UploadLength());
     if (bytes > options.max_upload_bytes)
       return ErrorResponse(
-          413, fmt::format("the file is too large: at most {} MB", options.max_upload_bytes >> 20));
+          413, say::web::FileTooLarge(static_cast<double>(options.max_upload_bytes >> 20)));
     constexpr std::uintmax_t kSpare = 64U << 20;
     try {
       // Removing it takes time in proportion to its size.
@@ -185,14 +201,13 @@ struct Transport::Callbacks {
               delete file;
           });
     } catch (const IoError& error) {
-      return ErrorResponse(507, error.what());
+      return ErrorResponse(507, error.message());
     }
     std::error_code error;
     const auto space = std::filesystem::space(options.upload_folder, error);
     if (!error && space.available < bytes + kSpare) {
       exchange.request.upload.reset();
-      return ErrorResponse(
-          507, fmt::format("the disk is too full: {} MB are free", space.available >> 20));
+      return ErrorResponse(507, say::web::DiskTooFull(static_cast<double>(space.available >> 20)));
     }
     transport.upload_ = exchange.request.upload;
     if (Connection* known = ConnectionOf(exchange.connection)) known->uploading = true;
@@ -200,20 +215,25 @@ struct Transport::Callbacks {
   }
 
   static MHD_Result Begin(Transport& transport, MHD_Connection* connection, const char* url,
-                          const char* method, void** context) {
-    auto exchange = std::make_shared<Exchange>();
-    exchange->owner = &transport;
-    exchange->connection = connection;
+                          const char* method, const char* version, void** context) {
+    auto exchange = std::make_shared<Exchange>(
+        transport.options_, transport.background_, [&transport] { transport.Wake(); }, connection);
     exchange->head_only = std::strcmp(method, "HEAD") == 0;
     exchange->request.method = exchange->head_only ? "GET" : method;
     exchange->request.path = url;
     exchange->request.address = AddressOf(connection);
-    MHD_get_connection_values(connection, MHD_HEADER_KIND, OnHeader, exchange.get());
+    exchange->head = HeadLayout(method, url, version);
     MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, OnQuery, exchange.get());
-    if (Connection* known = ConnectionOf(connection)) known->has_head = true;
+    MHD_get_connection_values(connection, MHD_HEADER_KIND, OnHeader, exchange.get());
+    const auto* size = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    if (size == nullptr || !exchange->head.IsWhole(size->header_size)) exchange->malformed = true;
+    if (Connection* known = ConnectionOf(connection)) {
+      known->has_head = true;
+      exchange->request.connected_at = known->begun;
+    }
     transport.exchanges_.push_back(exchange.get());
     *context = new std::shared_ptr<Exchange>(exchange);
-    if (auto refusal = RefuseByHead(*exchange, transport.options_.max_body_bytes)) {
+    if (auto refusal = RefuseByHead(transport, *exchange, transport.options_.max_body_bytes)) {
       exchange->response = std::move(*refusal);
       exchange->started = true;
       // An answer before the complete request ends the connection, so it is used only if a body
@@ -222,19 +242,19 @@ struct Transport::Callbacks {
                             exchange->malformed ||
                             (!exchange->request.Header("content-length").empty() &&
                              exchange->request.Header("content-length") != "0");
-      if (has_body) return Queue(*exchange);
+      if (has_body) return Queue(transport, *exchange);
     }
     return MHD_YES;
   }
 
   static MHD_Result OnRequest(void* self, MHD_Connection* connection, const char* url,
-                              const char* method, const char*, const char* upload,
+                              const char* method, const char* version, const char* upload,
                               std::size_t* upload_size, void** context) {
     auto& transport = *static_cast<Transport*>(self);
     try {
       if (*context == nullptr) {
         const ScopedLoopLabel label(transport.options_, "the head of a request");
-        return Begin(transport, connection, url, method, context);
+        return Begin(transport, connection, url, method, version, context);
       }
       const std::shared_ptr<Exchange> exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
       if (*upload_size > 0) {
@@ -254,7 +274,7 @@ struct Transport::Callbacks {
                        if (const auto alive = weak.lock()) alive->Answer(std::move(response));
                      });
       }
-      if (exchange->response) return Queue(*exchange);
+      if (exchange->response) return Queue(transport, *exchange);
       exchange->Suspend();
       return MHD_YES;
     } catch (const std::exception&) {
@@ -279,14 +299,14 @@ struct Transport::Callbacks {
 
   static void FreeStream(void* cls) { delete static_cast<std::shared_ptr<Exchange>*>(cls); }
 
-  static MHD_Response* MakeStream(Exchange& exchange) {
-    exchange.stream = exchange.owner->hub_.Open(exchange.request.session);
+  static MHD_Response* MakeStream(Transport& transport, Exchange& exchange) {
+    exchange.stream = transport.hub_.Open(exchange.request.session);
     exchange.stream->wake = [&exchange] { exchange.Resume(); };
     exchange.stream->cut = [&exchange] {
       CutSocket(exchange.connection);
       exchange.Resume();
     };
-    exchange.owner->send_initial_events_(*exchange.stream);
+    transport.send_initial_events_(*exchange.stream);
     auto held = std::make_unique<std::shared_ptr<Exchange>>(exchange.shared_from_this());
     return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream,
                                              held.release(), FreeStream);
@@ -308,32 +328,31 @@ struct Transport::Callbacks {
   static void FreeBody(void* cls) { delete static_cast<UnsentBody*>(cls); }
 
   /// Replaces a large body by a refusal while too much waits for slow readers.
-  static void BoundUnsent(Exchange& exchange) {
-    const HttpServerOptions& options = exchange.owner->options_;
+  static void BoundUnsent(const Transport& transport, Exchange& exchange) {
+    const HttpServerOptions& options = transport.options_;
     const std::size_t size = exchange.response->body.size();
-    const std::size_t unsent = exchange.owner->unsent_bytes_;
+    const std::size_t unsent = transport.unsent_bytes_;
     if (size <= options.small_answer_bytes ||
         (unsent <= options.max_unsent_bytes && size <= options.max_unsent_bytes - unsent))
       return;
-    exchange.response = RetryLater(503, "too much data is being sent; try again in a few seconds",
-                                   std::chrono::seconds(5));
+    exchange.response = RetryLater(503, say::web::TooMuchSent(), std::chrono::seconds(5));
   }
 
   /// Takes the body: there is never a second copy of it.
-  static MHD_Response* MakeFromMemory(Exchange& exchange) {
-    BoundUnsent(exchange);
-    auto body = std::make_unique<UnsentBody>(std::move(exchange.response->body),
-                                             exchange.owner->unsent_bytes_);
+  static MHD_Response* MakeFromMemory(Transport& transport, Exchange& exchange) {
+    BoundUnsent(transport, exchange);
+    auto body =
+        std::make_unique<UnsentBody>(std::move(exchange.response->body), transport.unsent_bytes_);
     MHD_Response* made = MHD_create_response_from_buffer_with_free_callback_cls(
         body->bytes.size(), body->bytes.data(), FreeBody, body.get());
     if (made != nullptr) static_cast<void>(body.release());  // FreeBody() has it from now on
     return made;
   }
 
-  static MHD_Response* MakeBody(Exchange& exchange) {
+  static MHD_Response* MakeBody(Transport& transport, Exchange& exchange) {
     Response& response = *exchange.response;
     if (response.event_stream && !exchange.head_only) {
-      if (MHD_Response* stream = MakeStream(exchange)) return stream;
+      if (MHD_Response* stream = MakeStream(transport, exchange)) return stream;
     }
     if (response.file) {
       const std::uint64_t size = response.file->size();
@@ -344,14 +363,14 @@ struct Transport::Callbacks {
                                              const_cast<char*>(response.constant_body.data()),
                                              MHD_RESPMEM_PERSISTENT);
     }
-    return MakeFromMemory(exchange);
+    return MakeFromMemory(transport, exchange);
   }
 
-  static MHD_Result Queue(Exchange& exchange) {
-    MHD_Response* made = MakeBody(exchange);
+  static MHD_Result Queue(Transport& transport, Exchange& exchange) {
+    MHD_Response* made = MakeBody(transport, exchange);
     if (made == nullptr) return MHD_NO;
     Response& response = *exchange.response;
-    AddSecurityHeaders(response, exchange.owner->options_.tls.has_value());
+    AddSecurityHeaders(response, transport.options_.tls.has_value());
     MHD_add_response_header(made, MHD_HTTP_HEADER_CONTENT_TYPE, response.type.c_str());
     for (const auto& [name, value] : response.headers)
       MHD_add_response_header(made, name.c_str(), value.c_str());
@@ -372,7 +391,7 @@ Transport::Transport(const HttpServerOptions& options, BackgroundWork& backgroun
       send_initial_events_(std::move(send_initial_events)),
       connections_(options_),
       wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-  if (wake_fd_ < 0) throw IoError(fmt::format("cannot make an eventfd: {}", std::strerror(errno)));
+  if (wake_fd_ < 0) throw IoError(say::web::CannotMakeEventfd(std::strerror(errno)));
   try {
     if (options_.tls) Serve(*options_.tls);
     Start(options.listen_fd ? *options.listen_fd : OpenListenSocket(options.address, options.port));
@@ -405,8 +424,7 @@ void Transport::Start(int listen_fd) {
       MHD_OPTION_ARRAY, extra.data(), MHD_OPTION_END);
   if (daemon_ == nullptr) {
     if (!options_.listen_fd) close(listen_fd);
-    throw IoError(fmt::format("cannot start the HTTP server on port {}{}", port_,
-                              options_.tls ? "; can the TLS certificate and key be used?" : ""));
+    throw IoError(options_.tls ? say::web::NoHttpsServer(port_) : say::web::NoHttpServer(port_));
   }
   epoll_fd_ = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd;
 }
@@ -414,7 +432,7 @@ void Transport::Start(int listen_fd) {
 Transport::~Transport() {
   // The library cannot stop while connections are suspended.
   for (Exchange* exchange : std::list(exchanges_)) {
-    if (!exchange->response) exchange->response = ErrorResponse(503, "the appliance is stopping");
+    if (!exchange->response) exchange->response = ErrorResponse(503, say::web::Stopping());
     exchange->Resume();
   }
   RunLibrary();
@@ -435,11 +453,8 @@ void Transport::RunLibrary() {
   serving = nullptr;
 }
 
-void Transport::Serve(const TlsIdentity& identity,
-                      const std::function<void(const TlsIdentity&)>& keep) {
-  auto certificate = std::make_unique<ServedCertificate>(identity);
-  if (keep) keep(identity);
-  certificates_.push_back(std::move(certificate));
+void Transport::Serve(const TlsIdentity& identity) {
+  certificates_.push_back(std::make_unique<ServedCertificate>(identity));
 }
 
 void Transport::Wake() const {
@@ -452,6 +467,10 @@ std::optional<std::chrono::milliseconds> Transport::timeout() const {
   MHD_UNSIGNED_LONG_LONG wait_ms = 0;
   if (MHD_get_timeout(daemon_, &wait_ms) != MHD_YES) return std::nullopt;
   return std::chrono::milliseconds(wait_ms);
+}
+
+void Transport::CutOlderThan(Connection::TimePoint time) {
+  while (const Connection* old = connections_.NextOlderThan(time)) shutdown(old->fd, SHUT_RDWR);
 }
 
 void Transport::CutLate() {

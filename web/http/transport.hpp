@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Connects libmicrohttpd to the loop: connections, limits, bodies, files, streams.
 #pragma once
 
@@ -19,6 +20,7 @@ struct MHD_Daemon;
 
 namespace plumb::web {
 
+struct Exchange;
 class ServedCertificate;
 
 /// Reports the current activity to HttpServerOptions::doing during its lifetime.
@@ -57,13 +59,14 @@ class Transport {
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
   /// Closes connections whose request has not arrived in time.
   void CutLate();
+  /// Closes connections that were made before `time`, and their streams: browsers make new ones.
+  void CutOlderThan(Connection::TimePoint time);
   /// For new TLS connections; open ones are unchanged.
-  /// @param keep  Called once it is known that the identity can be served; may throw.
-  void Serve(const TlsIdentity& identity, const std::function<void(const TlsIdentity&)>& keep = {});
+  /// @throws DataError if it cannot be served.
+  void Serve(const TlsIdentity& identity);
   [[nodiscard]] bool has_connections() const { return !connections_.empty(); }
   [[nodiscard]] std::uint16_t port() const { return port_; }
 
-  struct Exchange;
   /// Callbacks of libmicrohttpd, whose types only the .cpp knows.
   struct Callbacks;
 

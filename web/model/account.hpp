@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 // People who log in, and the displays of the room.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "algo/base/names.hpp"
 #include "web/model/wall_clock.hpp"
@@ -24,8 +27,16 @@ struct Actor {
 
 /// A person's choices for the page; empty: the browser's language, the default theme.
 struct Preferences {
-  std::string language;  ///< "en" or "es".
+  std::string language;  ///< Code of a catalogue, such as "en".
   std::string theme;     ///< "dark", "light" or "auto".
+};
+
+/// What a person has besides the password: an authenticator, and recovery codes.
+struct SecondFactor {
+  std::string secret;                        ///< Base32, as the authenticator has it.
+  std::int64_t last_step = 0;                ///< Of the last code; none counts twice.
+  std::vector<std::string> recovery_hashes;  ///< Of the codes that were not used yet.
+  bool operator==(const SecondFactor&) const = default;
 };
 
 struct User {
@@ -35,6 +46,7 @@ struct User {
       password_hash;  ///< libsodium's argon2id string; leaves the service only for the login.
   bool disabled = false;
   WallClock::time_point created_at;
+  bool has_second_factor = false;  ///< Read only.
 };
 
 /// Changes of an account; fields that are not set stay unchanged.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Entries of the audit log.
 #pragma once
 
@@ -5,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "algo/base/message.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
@@ -25,7 +27,7 @@ struct AuditEntry {
   std::string address;
   std::string action;   ///< "login", "reference.approve".
   std::string subject;  ///< Id of the changed object.
-  std::string detail;
+  Message detail;
   std::optional<AuditSubject> about = {};  ///< Not set: people know the subject by its id.
 };
 

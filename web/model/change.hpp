@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The answer to a requested change.
 #pragma once
 
@@ -5,6 +6,8 @@
 #include <functional>
 #include <string>
 #include <utility>
+
+#include "algo/base/message.hpp"
 
 namespace plumb {
 
@@ -21,13 +24,16 @@ enum class ChangeResult {
 /// The answer to a change.
 struct Change {
   ChangeResult result = ChangeResult::kDone;
-  std::string message;         ///< For people; empty when done.
+  Message message;             ///< For people; empty when done.
   std::string id;              ///< Id of a new record, if any.
   std::filesystem::path file;  ///< Path of a new file, if any.
 };
 /// An answer with a message, mostly for a change that was not made.
-[[nodiscard]] inline Change Refused(ChangeResult result, std::string message) {
+[[nodiscard]] inline Change Refused(ChangeResult result, Message message) {
   return {.result = result, .message = std::move(message), .id = {}, .file = {}};
+}
+[[nodiscard]] inline Change Refused(ChangeResult result, const std::string& verbatim) {
+  return Refused(result, Message::Verbatim(verbatim));
 }
 [[nodiscard]] inline Change DoneWith(std::string id) {
   return {.result = ChangeResult::kDone, .message = {}, .id = std::move(id), .file = {}};

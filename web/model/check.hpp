@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Daily checks of the room's markers.
 #pragma once
 
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "algo/acceptance/verdict.hpp"
+#include "algo/base/message.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
@@ -22,7 +24,7 @@ struct CheckItem {
   double limit = 0.0;
   std::string unit;
   bool passed = false;
-  std::string note;
+  Message note;
 };
 
 /// A scan of the room's markers compared with the baseline.
@@ -32,7 +34,7 @@ struct CheckRecord {
   std::string user;  ///< User who requested it.
   std::string sensor_serial;
   MarkerCheckStatus status = MarkerCheckStatus::kFailed;
-  std::vector<std::string> reasons;
+  std::vector<Message> reasons;
   std::vector<CheckItem> items;
   std::size_t num_markers = 0;  ///< Markers that were seen well.
 };
@@ -49,6 +51,8 @@ struct CheckStatus {
   std::vector<CheckRecord> checks;  ///< Newest first.
   std::optional<CheckBaseline> baseline;
   DailyCheck today = DailyCheck::kOverdue;
+  /// What becomes otherwise if the newest check takes the place of the baseline; empty without one.
+  std::vector<Message> changes = {};
 };
 
 }  // namespace plumb

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // Limits of settings, plans and texts, used by requests, the appliance and the store. The page has
-// its own copy in web/assets/limits.js; a test compares them.
+// its own copy in web/page/limits.js; a test compares them.
 #pragma once
 
 #include <cstddef>
@@ -34,6 +35,7 @@ inline constexpr Limits kIdleLogout_min{.entered = {1, 240}, .stored = {1, 100'0
 /// Lengths of texts in bytes. A name is that of an account, a display, or a patient (its code).
 inline constexpr std::size_t kMaxName = 32, kMaxSite = 64, kMaxNote = 500;
 inline constexpr std::size_t kMinReason = 3, kMaxReason = 200;
+inline constexpr int kMaxFraction = 999;
 
 /// Head or feet first, supine or prone.
 inline constexpr auto kPostures = kNamesOf<PatientPosture>;

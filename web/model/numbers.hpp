@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The six numbers of a correction as they are stored, shown and exported.
 #pragma once
 
@@ -9,13 +10,9 @@ namespace plumb {
 
 /// Read back from a result; the method's own are CouchNumbers.
 struct ReportedNumbers {
-  std::optional<double> vertical_mm;  ///< Shifts are not set with couch-fixed markers.
-  std::optional<double> longitudinal_mm;
-  std::optional<double> lateral_mm;
-  /// Rotations are always set; optional only so that kNumberAxes has one type of member.
-  std::optional<double> pitch_deg = 0.0;
-  std::optional<double> roll_deg = 0.0;
-  std::optional<double> yaw_deg = 0.0;
+  /// Not set where not known, as shifts with couch-fixed markers.
+  std::optional<double> vertical_mm, longitudinal_mm, lateral_mm;
+  std::optional<double> pitch_deg, roll_deg, yaw_deg;
 };
 
 /// The names of one of the six numbers, and where it is found.

@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // Patients and their courses. Codes are pseudonyms; no field holds the name of a person who was
 // scanned.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "web/model/reference.hpp"
@@ -10,6 +12,17 @@
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
+
+/// For how long a closed session can go on.
+inline constexpr int kResumable_h = 12;
+
+/// A session for fractions that is closed and can be opened again.
+struct EndedSession {
+  std::string id;
+  int fraction = 0;
+  int num_scans = 0;  ///< Completed in it.
+  WallClock::time_point closed_at;
+};
 
 struct Patient {
   std::string id;    ///< Id in the store, never shown.
@@ -22,12 +35,22 @@ struct Patient {
   std::string draft_reference_id;
   std::string note = {};  ///< Note on this course, at most kMaxNote bytes; no name.
   bool archived = false;  ///< Not in the list and not to be opened; nothing is deleted.
+  /// The newest session for fractions, if scans were completed in it and it was closed in the last
+  /// kResumable_h hours. Not set in lists.
+  std::optional<EndedSession> last_session = {};
 };
 
 /// People write these about a patient's course.
 struct CourseNotes {
   std::string site, note;
   bool operator==(const CourseNotes&) const = default;
+};
+
+/// A version of a reference by its number.
+struct ReferenceVersion {
+  std::string id;
+  int version = 0;
+  bool operator==(const ReferenceVersion&) const = default;
 };
 
 /// A patient on the couch, from opening to closing. At most one at a time.
@@ -40,6 +63,11 @@ struct TreatmentSession {
   int num_scans = 0;  ///< Completed in this session.
   std::string opened_by;
   WallClock::time_point opened_at;
+  bool has_unaccepted = false;  ///< Nobody has accepted its newest result.
+  /// What its scans are compared with. Not set while no reference is approved.
+  std::optional<ReferenceVersion> reference = {};
+  /// A newer one that was approved since: used once a person says so.
+  std::optional<ReferenceVersion> newer_reference = {};
 };
 
 /// Defaults for plans of one site. Letter case of site names is ignored.

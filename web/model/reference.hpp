@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Versions of a patient's reference, and their plans.
 #pragma once
 
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "algo/base/default_tolerance.hpp"
+#include "algo/base/message.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
@@ -35,7 +37,7 @@ struct Reference {
   std::string scan_id;  ///< Its scene is DIR/scans/SCAN_ID/scene.
   WallClock::time_point created_at;
   std::string created_by;
-  std::string reason;
+  Message reason;
   /// Counts the plans saved into this version; saving and approving state which one was read.
   int revision = 1;
   std::string digest = {};  ///< SHA-256 of the signed data: scan, version and plan.
@@ -43,7 +45,7 @@ struct Reference {
   std::string approved_by;  ///< Empty for a draft; "auto" for the demo's.
   std::optional<WallClock::time_point> approved_at = {};
   ReferencePlan plan = {};
-  std::string unreadable = {};  ///< Why the stored plan cannot be read; `plan` is then invalid.
+  Message unreadable = {};  ///< Why the stored plan cannot be read; `plan` is then invalid.
 };
 
 /// A draft that is to be planned or approved.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scans and what is kept of their results.
 #pragma once
 
@@ -7,10 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "algo/acceptance/verdict.hpp"
+#include "algo/acceptance/shown_row.hpp"
+#include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "web/model/check.hpp"
 #include "web/model/numbers.hpp"
+#include "web/model/reference.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
@@ -31,15 +34,36 @@ inline constexpr double kResultValid_s = 120.0;
 /// Summary of a comparison, short enough for a list. All other data is in result.json.
 struct ResultSummary {
   Verdict verdict = Verdict::kNoAnswer;
-  std::vector<std::string> reasons = {};
+  std::vector<Message> reasons = {};
   /// The motion to APPLY. With kNoAnswer it is for analysis only, never to be shown as advice.
   std::optional<ReportedNumbers> correction = {};
   std::optional<ReportedNumbers> u95 = {};
-  /// Directions of the correction, in the order of kNumberAxes; empty if unknown.
-  std::array<std::string, 6> words = {};
-  std::vector<std::string> body_now = {};    ///< "left shoulder 9 mm high", before any correction.
-  std::vector<std::string> body_after = {};  ///< The same after the correction: the posture.
+  // In the order of kNumberAxes:
+  std::array<Message, 6> words = {};  ///< Directions of the correction; empty if unknown.
+  NumberJudgements judgements = {};
+  std::array<Message, 6> axes = {};      ///< Their names; empty: along the couch.
+  Tolerance tolerance = {};              ///< By which the numbers were judged.
+  std::vector<Message> body_now = {};    ///< "left shoulder 9 mm high", before any correction.
+  std::vector<Message> body_after = {};  ///< The same after the correction: the posture.
 };
+
+/// The six numbers for people; none without an answer, which must not be acted on.
+[[nodiscard]] inline std::vector<ShownRow> ShownRows(const ResultSummary& result) {
+  std::vector<ShownRow> rows;
+  if (!result.correction || result.verdict == Verdict::kNoAnswer) return rows;
+  for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
+    const NumberAxis& axis = kNumberAxes[i];
+    rows.push_back(
+        {.name = result.axes[i].empty() ? AxisName(i) : result.axes[i],
+         .number = i,
+         .value = axis.In(result.correction),
+         .u95 = axis.In(result.u95),
+         .tolerance = axis.is_shift() ? result.tolerance.shift_mm : result.tolerance.rotation_deg,
+         .judgement = result.judgements[i],
+         .words = result.words[i]});
+  }
+  return rows;
+}
 
 struct Scan {
   std::string id;
@@ -47,7 +71,7 @@ struct Scan {
   std::string reference_id;  ///< Reference of the comparison; empty if there is none.
   ScanPurpose purpose = ScanPurpose::kFraction;
   ScanOutcome outcome = ScanOutcome::kRunning;
-  std::string failure;  ///< Reason for a failed or cancelled scan.
+  Message failure;  ///< Reason for a failed or cancelled scan.
   WallClock::time_point started_at;
   std::optional<WallClock::time_point> finished_at = {};
   std::optional<ResultSummary> result = {};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Profiles of a sensor unit.
 #pragma once
 
@@ -6,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "web/model/wall_clock.hpp"
 
@@ -30,7 +32,7 @@ struct SensorProfileVersion {
 /// Profiles of the connected sensor unit.
 struct SensorProfiles {
   std::string serial;
-  std::string why_none;                        ///< Why no profile is kept; empty if one is.
+  Message why_none;                            ///< Why no profile is kept; empty if one is.
   std::vector<SensorProfileVersion> versions;  ///< Newest first; the first one is in use.
 };
 

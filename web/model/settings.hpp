@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The settings, one by one, and a change of some of them.
 #pragma once
 

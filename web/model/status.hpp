@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The state of the appliance.
 #pragma once
 
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "web/model/check.hpp"
 #include "web/model/patient.hpp"
@@ -16,10 +18,10 @@
 namespace plumb {
 
 // The names of the values are in names.hpp.
-enum class ApplianceState { kNoSensor, kReady, kScanning, kWorking, kResult, kFault };
+enum class ApplianceState { kNoSensor, kReady, kScanning, kWorking, kResult, kMonitoring, kFault };
 template <>
 inline constexpr auto kNamesOf<ApplianceState> = NamesUpTo<ApplianceState::kFault>(
-    {"no_sensor", "ready", "scanning", "working", "result", "fault"});
+    {"no_sensor", "ready", "scanning", "working", "result", "monitoring", "fault"});
 
 /// The reason why the appliance cannot scan, or will not be able to once the running scan has
 /// ended.
@@ -71,7 +73,7 @@ struct LiveScan {
   std::int64_t frames = 0;
   std::int64_t frames_tracked = 0;
   std::int64_t frames_dropped = 0;
-  std::string step;            ///< "tracking", then the steps of the reconstructor.
+  Message step;                ///< "tracking", then the steps of the reconstructor.
   double step_fraction = 0.0;  ///< 0..1
 };
 
@@ -79,7 +81,7 @@ struct StorageStatus {
   std::int64_t free_bytes = 0;
   std::int64_t total_bytes = 0;
   bool writable = true;
-  std::vector<std::string> warnings = {};  ///< Sentences for people: nearly full, no backup.
+  std::vector<Message> warnings = {};  ///< Nearly full, no backup.
 };
 
 /// Directions of the room on maps (x, y of a reference marker's frame): to the gantry, and to the
@@ -87,11 +89,13 @@ struct StorageStatus {
 struct RoomOnMap {
   std::array<double, 2> gantry_xy = {0, 1}, right_xy = {1, 0};
   bool is_known = false;  ///< False: the marker's axes are shown in place of the room's.
+  /// Where the lasers cross, in the frame of the map; only of a reference in a calibrated room.
+  std::optional<std::array<double, 3>> lasers_m = {};
 };
 
 struct Status {
   ApplianceState state = ApplianceState::kNoSensor;
-  std::string fault;  ///< In words, in state kFault.
+  Message fault;  ///< In state kFault.
   FaultKind fault_kind = FaultKind::kNone;
   SensorStatus sensor;
   StorageStatus storage;
@@ -107,28 +111,28 @@ struct Status {
   std::optional<CheckRecord> last_check;
   DailyCheck daily_check = DailyCheck::kOverdue;  ///< Today's check.
   /// Why no reference may be scanned or approved now, with the next step; empty if it may.
-  std::string reference_block = {};
+  Message reference_block = {};
   std::optional<Scan> last_result;  ///< The newest finished scan since the start.
   std::string version;
-  std::vector<std::string> warnings;  ///< About the set-up of the appliance.
-  std::string rolled_back;            ///< The same as in UpdateStatus.
+  std::vector<Message> warnings;  ///< About the set-up of the appliance.
+  Message rolled_back;            ///< The same as in UpdateStatus.
 };
 
 struct UpdateStatus {
   bool supported = false;  ///< False: not an appliance image.
-  std::string message;     ///< Why not, or the present activity.
+  Message message;         ///< Why not, or the present activity.
   std::string slot;
   bool installing = false;
   double fraction = 0.0;
   std::vector<std::string> bundles;  ///< Names of bundles on attached media.
   bool restart_needed = false;       ///< An update is installed and starts at the next restart.
-  std::string failure;      ///< Why the last attempt was refused or failed; empty if it succeeded.
-  std::string rolled_back;  ///< A sentence if the machine has gone back to the previous system.
+  Message failure;      ///< Why the last attempt was refused or failed; empty if it succeeded.
+  Message rolled_back;  ///< A sentence if the machine has gone back to the previous system.
 };
 
 struct Health {
   bool ok = true;
-  std::string reason;
+  Message reason;
 };
 
 }  // namespace plumb

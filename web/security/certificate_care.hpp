@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Warnings about the page's certificate before browsers reject it.
 #pragma once
 
@@ -6,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/security/tls_identity.hpp"
 
 namespace plumb::web {
@@ -13,14 +15,14 @@ namespace plumb::web {
 /// Time before its end from which a certificate is warned about.
 inline constexpr std::chrono::hours kWarnBeforeEnd{30 * 24};
 
-/// Sentences for people, each with the subject of its certificate: a weak key (RSA of less than
-/// 2048 bits, curves of less than 224), an expiry that has passed or comes within kWarnBeforeEnd, a
-/// validity that has not begun. Checks the first certificate's key and every date of the chain.
-/// Empty if there is nothing to report.
+/// For people, each with the subject of its certificate: a weak key (RSA of less than
+/// 2048 bits), a kind of key that browsers do not accept, an expiry that has passed or comes within
+/// kWarnBeforeEnd, a validity that has not begun. Checks the first certificate's key and every date
+/// of the chain. Empty if there is nothing to report.
 /// @param pem  The certificate and any that lead from it to an authority; other blocks are ignored.
 /// @throws DataError if it contains no certificate that can be read.
-[[nodiscard]] std::vector<std::string> CertificateWarnings(
-    const std::string& pem, std::chrono::system_clock::time_point now);
+[[nodiscard]] std::vector<Message> CertificateWarnings(const std::string& pem,
+                                                       std::chrono::system_clock::time_point now);
 
 /// Properties of a certificate for comparison and planning.
 struct CertificateFacts {
@@ -30,8 +32,18 @@ struct CertificateFacts {
 /// @throws DataError as CertificateWarnings().
 [[nodiscard]] CertificateFacts FactsOfCertificate(const std::string& pem);
 
-/// CheckedTlsIdentity() for an uploaded identity: also refuses what browsers would reject now, such
-/// as a weak key, an expired certificate or one that is not valid yet.
+/// Whether this machine made the certificate for itself and must now replace it, because it expires
+/// within twice kWarnBeforeEnd, begins in the future (the clock was wrong), is valid for longer
+/// than kOwnValidity (as those of 0.2.0) or lacks one of `names`. A certificate that a person set
+/// is never due.
+/// @throws DataError as CertificateWarnings().
+[[nodiscard]] bool IsDueForRenewal(const std::string& pem,
+                                   std::chrono::system_clock::time_point now,
+                                   const std::vector<std::string>& names);
+
+/// CheckedTlsIdentity() for an uploaded identity: also refuses what browsers would reject now: keys
+/// other than RSA of 2048 bits or more, P-256 and P-384, also of the authorities in the chain, an
+/// expired certificate or one that is not valid yet.
 /// @throws DataError
 [[nodiscard]] TlsIdentity UsableTlsIdentity(const std::string& certificate_pem,
                                             const std::string& key_pem,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/security/device_cookies.hpp"
 
 #include <array>
@@ -6,7 +7,7 @@
 #include <fmt/format.h>
 #include <sodium.h>
 
-#include "web/security/sessions.hpp"
+#include "web/security/secrets.hpp"
 
 namespace plumb::web {
 namespace {
@@ -67,10 +68,7 @@ std::optional<std::string> DeviceCookies::Identify(std::string_view value, std::
     return std::nullopt;
   const std::string_view number = value.substr(0, dot), code = value.substr(dot + 1);
   const std::string expected = CodeOf(number, user, password_hash);
-  if (code.size() != expected.size() ||
-      sodium_memcmp(code.data(), expected.data(), expected.size()) != 0)
-    return std::nullopt;
-  return std::string(number);
+  return IsSameSecret(code, expected) ? std::optional(std::string(number)) : std::nullopt;
 }
 
 }  // namespace plumb::web

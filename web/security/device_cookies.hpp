@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cookies of browsers from which a person has logged in before ("device cookies", OWASP): guesses
 // from elsewhere cannot lock such a browser out.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/security/login_limiter.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Slows down password guessing.
 #pragma once
 

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/security/password_rules.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cctype>
 
-#include <fmt/format.h>
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -94,17 +95,15 @@ bool IsRepetition(std::string_view text) {
 
 }  // namespace
 
-std::string WhyNotPassword(std::string_view password, std::string_view user) {
+Message WhyNotPassword(std::string_view password, std::string_view user) {
   if (password.size() < kMinPassword || password.size() > kMaxPassword)
-    return fmt::format("the password must have {} to {} bytes", kMinPassword, kMaxPassword);
+    return say::web::PasswordLength(kMinPassword, kMaxPassword);
   const std::string small = InSmallLetters(password), name = InSmallLetters(user);
   const std::string_view core = WithoutTail(small);
-  if (IsCommon(small) || IsCommon(core))
-    return "this password is one of the first that are guessed; choose several words that do not "
-           "belong together";
+  if (IsCommon(small) || IsCommon(core)) return say::web::PasswordCommon();
   if (!name.empty() && (small == name || core == WithoutTail(name) || small == name + name))
-    return "the password must not be the name of the account";
-  if (IsRepetition(small)) return "the password repeats one short piece; choose a longer one";
+    return say::web::PasswordIsName();
+  if (IsRepetition(small)) return say::web::PasswordRepeats();
   return {};
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/security/password_worker.hpp"
 
 #include <sodium.h>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -32,9 +34,9 @@ void Wipe(std::string& secret) { sodium_memzero(secret.data(), secret.size()); }
 
 PasswordWorker::PasswordWorker(std::uint64_t operations, std::uint64_t memory_bytes)
     : operations_(operations), memory_bytes_(memory_bytes) {
-  if (sodium_init() < 0) throw IoError("libsodium found no random generator");
+  if (sodium_init() < 0) throw IoError(say::web::NoRandom());
   event_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-  if (event_fd_ < 0) throw IoError(std::string("cannot make an eventfd: ") + std::strerror(errno));
+  if (event_fd_ < 0) throw IoError(say::web::CannotMakeEventfd(std::strerror(errno)));
   thread_ = std::jthread([this](const std::stop_token& stop) { Work(stop); });
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // argon2id on a separate thread: a hash takes tenths of a second and much memory, and the event
 // loop must not wait for it.
 #pragma once

@@ -1,79 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/security/sessions.hpp"
-
-#include <sodium.h>
 
 #include <algorithm>
 
-#include "algo/base/errors.hpp"
+#include "web/security/secrets.hpp"
 
 namespace plumb::web {
 namespace {
 
 constexpr std::size_t kMaxSessions = 256;
+constexpr std::size_t kMaxOfUser = 16;
 constexpr std::size_t kTokenBytes = 32;
-
-std::string HashOf(const std::string& token) {
-  std::string hash(crypto_generichash_BYTES, '\0');
-  crypto_generichash(reinterpret_cast<unsigned char*>(hash.data()), hash.size(),
-                     reinterpret_cast<const unsigned char*>(token.data()), token.size(), nullptr,
-                     0);
-  return hash;
-}
+constexpr std::size_t kIdBytes = 9;
 
 }  // namespace
 
-std::string RandomBytes(std::size_t bytes) {
-  if (sodium_init() < 0) throw IoError("libsodium found no random generator");
-  std::string random(bytes, '\0');
-  randombytes_buf(random.data(), random.size());
-  return random;
-}
-
-std::string RandomCode(int letters) {
-  constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";
-  std::string code;
-  for (int i = 0; i < letters; ++i) {
-    if (i == letters / 2) code += '-';
-    code += kLetters[randombytes_uniform(static_cast<std::uint32_t>(kLetters.size()))];
-  }
-  return code;
-}
-
-std::string RandomToken(std::size_t bytes) {
-  const std::string random = RandomBytes(bytes);
-  std::string text(sodium_base64_ENCODED_LEN(bytes, sodium_base64_VARIANT_URLSAFE_NO_PADDING),
-                   '\0');
-  sodium_bin2base64(text.data(), text.size(), reinterpret_cast<const unsigned char*>(random.data()),
-                    random.size(), sodium_base64_VARIANT_URLSAFE_NO_PADDING);
-  text.pop_back();  // its terminating zero
-  return text;
-}
-
-std::string StoredHashOf(const std::string& token) {
-  const std::string hash = HashOf(token);
-  std::string text(2 * hash.size() + 1, '\0');
-  sodium_bin2hex(text.data(), text.size(), reinterpret_cast<const unsigned char*>(hash.data()),
-                 hash.size());
-  text.pop_back();  // its terminating zero
-  return text;
-}
-
 bool Sessions::IsOver(const Session& session, TimePoint now) const {
-  return session.ended || now - session.last_used >= idle_ || now - session.begun >= whole_;
+  return session.ended || now - session.last_used >= IdleOf(session.role) ||
+         now - session.begun >= whole_;
 }
 
-Sessions::Opened Sessions::Open(const User& user, TimePoint now) {
+std::chrono::seconds Sessions::IdleOf(Role role) const {
+  constexpr std::chrono::minutes kPhysicist{30}, kEngineer{10};
+  if (role == Role::kPhysicist) return std::min<std::chrono::seconds>(idle_, kPhysicist);
+  if (role == Role::kEngineer) return std::min<std::chrono::seconds>(idle_, kEngineer);
+  return idle_;
+}
+
+std::vector<std::shared_ptr<Session>> Sessions::Of(const std::string& user) const {
+  std::vector<std::shared_ptr<Session>> found;
+  for (const auto& [hash, session] : sessions_)
+    if (session->user == user) found.push_back(session);
+  std::sort(found.begin(), found.end(),
+            [](const auto& a, const auto& b) { return a->begun > b->begun; });
+  return found;
+}
+
+Sessions::Opened Sessions::Open(const User& user, const std::string& address, TimePoint now) {
   Expire(now);
+  const auto end_oldest = [](const std::vector<std::shared_ptr<Session>>& of) {
+    (*std::min_element(of.begin(), of.end(), [](const auto& a, const auto& b) {
+      return a->last_used < b->last_used;
+    }))->ended = true;
+  };
+  if (const auto own = Of(user.name); own.size() >= kMaxOfUser) end_oldest(own);
   if (sessions_.size() >= kMaxSessions) {
-    const auto oldest = std::min_element(
-        sessions_.begin(), sessions_.end(),
-        [](const auto& a, const auto& b) { return a.second->last_used < b.second->last_used; });
-    oldest->second->ended = true;
-    sessions_.erase(oldest);
+    std::vector<std::shared_ptr<Session>> all;
+    for (const auto& [hash, session] : sessions_) all.push_back(session);
+    end_oldest(all);
   }
+  Expire(now);
   Opened opened{
       RandomToken(kTokenBytes),
       std::make_shared<Session>(Session{user.name, user.role, RandomToken(kTokenBytes), now, now})};
+  opened.session->id = RandomToken(kIdBytes);
+  opened.session->address = address;
   sessions_[HashOf(opened.token)] = opened.session;
   return opened;
 }

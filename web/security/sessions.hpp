@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sessions of logged-in users. They are kept in memory only, so a restart logs everybody off.
 #pragma once
 
@@ -5,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "web/model/account.hpp"
 
@@ -20,20 +22,11 @@ struct Session {
   /// The password was chosen by somebody else: until the user has changed it nothing else is
   /// allowed.
   bool must_change_password = false;
+  std::string id = {};       ///< By which its owner ends it; worthless as a cookie.
+  std::string address = {};  ///< Of the browser that logged in.
+  /// Of an authenticator that is being set up; empty: none is.
+  std::string offered_secret = {};
 };
-
-/// Random text from that many bytes of the system's generator, in letters, digits, '-' and '_'.
-[[nodiscard]] std::string RandomToken(std::size_t bytes);
-
-/// A code that people type: that many letters and digits that are not easily confused, of 5 bits
-/// each, with a hyphen in the middle, as in "AB3D-7KQM".
-[[nodiscard]] std::string RandomCode(int letters);
-
-/// The hash by which a display's token is stored, in hexadecimal digits.
-[[nodiscard]] std::string StoredHashOf(const std::string& token);
-
-/// That many bytes from the same generator.
-[[nodiscard]] std::string RandomBytes(std::size_t bytes);
 
 class Sessions {
  public:
@@ -43,8 +36,8 @@ class Sessions {
     std::string token;  ///< For the cookie; only its hash is kept.
     std::shared_ptr<Session> session;
   };
-  /// Ends the least recently used one if there are too many.
-  [[nodiscard]] Opened Open(const User& user, TimePoint now);
+  /// Ends the least recently used one if there are too many, of this user or of all.
+  [[nodiscard]] Opened Open(const User& user, const std::string& address, TimePoint now);
   /// Null if unknown or over. @param touch  Counts as a use, which restarts the idle time.
   [[nodiscard]] std::shared_ptr<Session> Find(const std::string& token, TimePoint now, bool touch);
   void End(const std::shared_ptr<Session>& session);
@@ -55,6 +48,11 @@ class Sessions {
   void Expire(TimePoint now);
 
   void SetLimits(std::chrono::seconds idle, std::chrono::seconds whole);
+  /// The idle time of a role: that of the settings, but no longer than 30 minutes for a physicist
+  /// and 10 for an engineer, who may change more.
+  [[nodiscard]] std::chrono::seconds IdleOf(Role role) const;
+  /// Those of a user, newest first.
+  [[nodiscard]] std::vector<std::shared_ptr<Session>> Of(const std::string& user) const;
   [[nodiscard]] std::size_t size() const { return sessions_.size(); }
 
  private:

@@ -1,6 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/security/tls_identity.hpp"
 
 #include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <array>
@@ -15,14 +20,15 @@
 #include <gnutls/x509.h>
 
 #include "algo/base/errors.hpp"
+#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
 
-constexpr std::time_t kValidFrom = 1577836800;  // 2020-01-01
+using Failed = Message (*)(std::string_view why);
 
-void Check(int result, std::string_view what) {
-  if (result < 0) throw IoError(fmt::format("{}: {}", what, gnutls_strerror(result)));
+void Check(int result, Failed failed) {
+  if (result < 0) throw IoError(failed(gnutls_strerror(result)));
 }
 
 gnutls_datum_t Datum(const std::string& text) {
@@ -35,13 +41,13 @@ using Key = std::unique_ptr<gnutls_x509_privkey_int, decltype(&gnutls_x509_privk
 
 Certificate NewCertificate() {
   gnutls_x509_crt_t made = nullptr;
-  Check(gnutls_x509_crt_init(&made), "cannot make a certificate");
+  Check(gnutls_x509_crt_init(&made), say::web::CannotMakeCertificate);
   return {made, &gnutls_x509_crt_deinit};
 }
 
 Key NewKey() {
   gnutls_x509_privkey_t made = nullptr;
-  Check(gnutls_x509_privkey_init(&made), "cannot make a key");
+  Check(gnutls_x509_privkey_init(&made), say::web::CannotMakeKey);
   return {made, &gnutls_x509_privkey_deinit};
 }
 
@@ -49,7 +55,7 @@ std::string FingerprintOf(const Certificate& certificate) {
   std::array<unsigned char, 32> digest{};
   std::size_t size = digest.size();
   Check(gnutls_x509_crt_get_fingerprint(certificate.get(), GNUTLS_DIG_SHA256, digest.data(), &size),
-        "cannot compute the fingerprint of a certificate");
+        say::web::CannotFingerprint);
   return fmt::format("{:02X}", fmt::join(digest, ":"));
 }
 
@@ -57,7 +63,7 @@ std::string FingerprintOf(const Certificate& certificate) {
 template <typename Export>
 std::string PemOf(Export&& write) {
   gnutls_datum_t pem{};
-  Check(write(&pem), "cannot write a certificate or key as PEM");
+  Check(write(&pem), say::web::CannotWritePem);
   std::string text(reinterpret_cast<const char*>(pem.data), pem.size);
   gnutls_free(pem.data);
   return text;
@@ -69,31 +75,34 @@ void AddName(const Certificate& certificate, const std::string& name) {
     if (inet_pton(family, name.c_str(), address.data()) != 1) continue;
     return Check(gnutls_x509_crt_set_subject_alt_name(certificate.get(), GNUTLS_SAN_IPADDRESS,
                                                       address.data(), bytes, GNUTLS_FSAN_APPEND),
-                 "cannot add an address to a certificate");
+                 say::web::CannotAddAddress);
   }
   Check(
       gnutls_x509_crt_set_subject_alt_name(certificate.get(), GNUTLS_SAN_DNSNAME, name.data(),
                                            static_cast<unsigned>(name.size()), GNUTLS_FSAN_APPEND),
-      "cannot add a name to a certificate");
+      say::web::CannotAddName);
 }
 
-void Describe(const Certificate& certificate, const Key& key,
-              const std::vector<std::string>& names) {
-  constexpr const char* kWhat = "cannot make a certificate";
+void Describe(const Certificate& certificate, const Key& key, const std::vector<std::string>& names,
+              std::chrono::system_clock::time_point now) {
+  using Clock = std::chrono::system_clock;
+  // The browser's clock may be behind, or in another time zone.
+  const Clock::time_point begin = now - std::chrono::hours(24);
+  constexpr Failed kWhat = say::web::CannotMakeCertificate;
   std::array<unsigned char, 16> serial{};
   Check(gnutls_rnd(GNUTLS_RND_NONCE, serial.data(), serial.size()), kWhat);
   serial[0] &= 0x7F;  // positive and not zero
   serial[0] |= 0x40;
   Check(gnutls_x509_crt_set_version(certificate.get(), 3), kWhat);
   Check(gnutls_x509_crt_set_serial(certificate.get(), serial.data(), serial.size()), kWhat);
-  Check(gnutls_x509_crt_set_activation_time(certificate.get(), kValidFrom), kWhat);
-  Check(gnutls_x509_crt_set_expiration_time(
-            certificate.get(), static_cast<std::time_t>(GNUTLS_X509_NO_WELL_DEFINED_EXPIRATION)),
+  Check(gnutls_x509_crt_set_activation_time(certificate.get(), Clock::to_time_t(begin)), kWhat);
+  Check(gnutls_x509_crt_set_expiration_time(certificate.get(),
+                                            Clock::to_time_t(begin + kOwnValidity)),
         kWhat);
-  constexpr std::string_view kSubject = "Plumb scan appliance";
-  Check(gnutls_x509_crt_set_dn_by_oid(certificate.get(), GNUTLS_OID_X520_COMMON_NAME, 0,
-                                      kSubject.data(), static_cast<unsigned>(kSubject.size())),
-        kWhat);
+  Check(
+      gnutls_x509_crt_set_dn_by_oid(certificate.get(), GNUTLS_OID_X520_COMMON_NAME, 0,
+                                    kOwnSubject.data(), static_cast<unsigned>(kOwnSubject.size())),
+      kWhat);
   Check(gnutls_x509_crt_set_key(certificate.get(), key.get()), kWhat);
   Check(gnutls_x509_crt_set_basic_constraints(certificate.get(), 0, -1), kWhat);
   Check(gnutls_x509_crt_set_key_usage(certificate.get(), GNUTLS_KEY_DIGITAL_SIGNATURE), kWhat);
@@ -103,25 +112,52 @@ void Describe(const Certificate& certificate, const Key& key,
   for (const std::string& name : names) AddName(certificate, name);
 }
 
+/// This machine's addresses in its networks, as numbers.
+std::vector<std::string> OwnAddresses() {
+  std::vector<std::string> addresses;
+  ifaddrs* list = nullptr;
+  if (getifaddrs(&list) != 0) return addresses;
+  for (const ifaddrs* one = list; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || (one->ifa_flags & IFF_LOOPBACK) != 0) continue;
+    std::array<char, INET6_ADDRSTRLEN> text{};
+    if (one->ifa_addr->sa_family == AF_INET) {
+      inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(one->ifa_addr)->sin_addr,
+                text.data(), text.size());
+    } else if (one->ifa_addr->sa_family == AF_INET6) {
+      const in6_addr& v6 = reinterpret_cast<const sockaddr_in6*>(one->ifa_addr)->sin6_addr;
+      if (IN6_IS_ADDR_LINKLOCAL(&v6)) continue;
+      inet_ntop(AF_INET6, &v6, text.data(), text.size());
+    } else {
+      continue;
+    }
+    addresses.emplace_back(text.data());
+  }
+  freeifaddrs(list);
+  return addresses;
+}
+
 }  // namespace
 
-TlsIdentity MakeTlsIdentity(const std::vector<std::string>& names) {
-  std::vector<std::string> all = {"localhost", "127.0.0.1", "::1"};
+std::vector<std::string> OwnNames() {
   std::array<char, 65> host{};
-  if (gethostname(host.data(), host.size() - 1) == 0 && host[0] != '\0') {
-    all.emplace_back(host.data());
-    all.push_back(all.back() + ".local");
-  }
-  all.insert(all.end(), names.begin(), names.end());
+  if (gethostname(host.data(), host.size() - 1) != 0 || host[0] == '\0') return {};
+  return {host.data(), std::string(host.data()) + ".local"};
+}
+
+TlsIdentity MakeTlsIdentity(const std::vector<std::string>& names,
+                            std::chrono::system_clock::time_point now) {
+  std::vector<std::string> all = {"localhost", "127.0.0.1", "::1"};
+  for (const std::vector<std::string>& more : {OwnNames(), OwnAddresses(), names})
+    all.insert(all.end(), more.begin(), more.end());
   const Key key = NewKey();
   Check(gnutls_x509_privkey_generate(key.get(), GNUTLS_PK_ECDSA,
                                      GNUTLS_CURVE_TO_BITS(GNUTLS_ECC_CURVE_SECP256R1), 0),
-        "cannot make a key");
+        say::web::CannotMakeKey);
   const Certificate certificate = NewCertificate();
-  Describe(certificate, key, all);
+  Describe(certificate, key, all, now);
   Check(
       gnutls_x509_crt_sign2(certificate.get(), certificate.get(), key.get(), GNUTLS_DIG_SHA256, 0),
-      "cannot sign a certificate");
+      say::web::CannotSignCertificate);
   return {.certificate_pem = PemOf([&](gnutls_datum_t* pem) {
             return gnutls_x509_crt_export2(certificate.get(), GNUTLS_X509_FMT_PEM, pem);
           }),
@@ -133,34 +169,30 @@ TlsIdentity MakeTlsIdentity(const std::vector<std::string>& names) {
 }
 
 TlsIdentity CheckedTlsIdentity(const std::string& certificate_pem, const std::string& key_pem,
-                               const std::string& name) {
-  const auto refuse = [&](int result, std::string_view what) {
-    if (result < 0)
-      throw DataError(fmt::format("{}: {} ({}); expected PEM files as `openssl req` writes them",
-                                  name, what, gnutls_strerror(result)));
+                               const Message& what) {
+  const auto refuse = [&](int result, Message (*why)(Message, std::string_view)) {
+    if (result < 0) throw DataError(why(what, gnutls_strerror(result)));
   };
   std::array<gnutls_x509_crt_t, kMaxChain> chain{};
   unsigned count = kMaxChain;
   const gnutls_datum_t certificate_text = Datum(certificate_pem), key_text = Datum(key_pem);
   refuse(gnutls_x509_crt_list_import(chain.data(), &count, &certificate_text, GNUTLS_X509_FMT_PEM,
                                      GNUTLS_X509_CRT_LIST_IMPORT_FAIL_IF_EXCEED),
-         "holds no certificate that can be read");
+         say::web::HoldsNoCertificate);
   std::vector<Certificate> held;
   for (unsigned i = 0; i < count; ++i) held.emplace_back(chain[i], &gnutls_x509_crt_deinit);
   const Key key = NewKey();
   refuse(gnutls_x509_privkey_import2(key.get(), &key_text, GNUTLS_X509_FMT_PEM, nullptr, 0),
-         "holds no key that can be read without a password");
+         say::web::HoldsNoKey);
   std::array<unsigned char, 64> of_certificate{}, of_key{};
   std::size_t size = of_certificate.size(), key_size = of_key.size();
   refuse(gnutls_x509_crt_get_key_id(held.front().get(), GNUTLS_KEYID_USE_SHA256,
                                     of_certificate.data(), &size),
-         "holds a certificate of an unknown kind");
+         say::web::HoldsUnknownCertificate);
   refuse(
       gnutls_x509_privkey_get_key_id(key.get(), GNUTLS_KEYID_USE_SHA256, of_key.data(), &key_size),
-      "holds a key of an unknown kind");
-  if (size != key_size || of_certificate != of_key)
-    throw DataError(fmt::format(
-        "{}: the key is not that of the certificate; give the two that were made together", name));
+      say::web::HoldsUnknownKey);
+  if (size != key_size || of_certificate != of_key) throw DataError(say::web::OtherKey(what));
   return {certificate_pem, key_pem, FingerprintOf(held.front())};
 }
 

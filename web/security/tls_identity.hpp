@@ -1,8 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 // Certificate and key of the appliance for TLS.
 #pragma once
 
+#include <chrono>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "algo/base/message.hpp"
 
 namespace plumb::web {
 
@@ -18,17 +23,29 @@ inline constexpr unsigned kMaxChain = 8;  ///< Certificates of one identity at m
 inline constexpr const char* kTlsPriorities =
     "SECURE128:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2:-RSA:%SERVER_PRECEDENCE";
 
-/// An elliptic key and a self-signed certificate for localhost, this machine's name and `names`. It
-/// is valid from 2020 to 2106: at its first start a machine may not know the date, and it is
-/// trusted by its fingerprint alone.
+/// The names that this machine has now: its host name, with and without ".local" (mDNS). Read anew
+/// at each call, because a name can change while the service runs. Empty where it has none.
+[[nodiscard]] std::vector<std::string> OwnNames();
+
+/// Subject of the certificates that this machine makes for itself.
+inline constexpr std::string_view kOwnSubject = "Plumb scan appliance";
+
+/// The validity of such a certificate: Safari refuses one of more than 825 days.
+inline constexpr std::chrono::hours kOwnValidity{820 * 24};
+
+/// An elliptic key and a self-signed certificate for localhost, this machine's names and addresses
+/// (without link-local ones), and `names`. It is valid from a day before `now` for
+/// kOwnValidity.
 /// @throws IoError if the library refuses.
-[[nodiscard]] TlsIdentity MakeTlsIdentity(const std::vector<std::string>& names);
+[[nodiscard]] TlsIdentity MakeTlsIdentity(
+    const std::vector<std::string>& names,
+    std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
 
 /// Checks PEM texts from files: a certificate, a key, and that they belong together. One text may
 /// hold both.
-/// @param name  Name of the source for messages.
+/// @param what  The source, in messages.
 /// @throws DataError
 [[nodiscard]] TlsIdentity CheckedTlsIdentity(const std::string& certificate_pem,
-                                             const std::string& key_pem, const std::string& name);
+                                             const std::string& key_pem, const Message& what);
 
 }  // namespace plumb::web

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Patients with their treatment sessions, and the references that fractions are compared with.
 #pragma once
 
@@ -42,6 +43,17 @@ class PatientService {
   ///         another patient's is open.
   virtual void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
                            const std::string& reason, const std::string& replaces, Done done) = 0;
+  /// Opens a session again that Patient::last_session names.
+  /// @param replaces  As in OpenPatient(), also for another session of the same patient.
+  virtual void ResumeSession(const Actor& actor, const std::string& session_id,
+                             const std::string& replaces, Done done) = 0;
+  /// Corrects the number of a session for fractions, open or closed.
+  virtual void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
+                               const std::string& reason, Done done) = 0;
+  /// The session is compared with this reference from now on. kConflict during a scan, if another
+  /// session is open, or if it is not the newest approved reference of its patient.
+  virtual void UseReference(const Actor& actor, const std::string& session_id,
+                            const std::string& reference_id, Done done) = 0;
   /// Ends the treatment session. kConflict during a scan, or if another session is open.
   virtual void CloseSession(const Actor& actor, const std::string& session_id, Done done) = 0;
 };
@@ -70,8 +82,10 @@ class ReferenceService {
   /// @param revision  The revision that was read, as above.
   /// @param digest    Digest of the data that was read and is signed; kConflict if other data is
   ///         stored. Empty: only the revision is checked.
+  /// @param reason  kConflict if it is empty and the scan has cautions (ScanQuality).
   virtual void ApproveReference(const Actor& actor, const std::string& id, int revision,
-                                const std::string& digest, Done done) = 0;
+                                const std::string& digest, const std::string& reason,
+                                Done done) = 0;
 };
 
 }  // namespace plumb::web

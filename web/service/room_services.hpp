@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The room and its sensor: the daily check of the markers, the room's calibration, which defines
 // the axes of the room, and the profile of the sensor unit.
 #pragma once
@@ -6,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/model/account.hpp"
 #include "web/model/change.hpp"
 #include "web/model/check.hpp"
@@ -23,7 +25,8 @@ class CheckService {
   /// The next scan, from any button, is a check of the room's markers. kConflict during a scan.
   virtual void OpenCheck(const Actor& actor, Done done) = 0;
   /// Sets this check as the baseline. kRefused for the user who took it.
-  virtual void SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) = 0;
+  virtual void SetCheckBaseline(const Actor& actor, const std::string& check_id,
+                                const std::string& reason, Done done) = 0;
 };
 
 /// One check scan that saw the board.
@@ -31,7 +34,7 @@ struct RoomBoardScan {
   std::string check_id;
   WallClock::time_point time;
   std::string user;
-  std::string fault;  ///< Why it cannot be used; empty if it can.
+  Message fault;  ///< Why it cannot be used; empty if it can.
   std::size_t num_markers = 0;
   double rms_mm = 0.0;
   double scale_percent = 100.0;
@@ -54,7 +57,7 @@ struct RoomCalibrationVersion {
 struct RoomCalibrationStatus {
   std::vector<RoomCalibrationVersion> versions;  ///< Newest first; the first one is in use.
   /// Why comparisons do not use it: a marker has moved since, or it cannot be read.
-  std::string due;
+  Message due;
   bool is_configured = false;  ///< [iec] T_iec_reference is set; it is used only without a version.
   /// Since the last version, of today and this sensor; newest first.
   std::vector<RoomBoardScan> scans;
@@ -63,8 +66,8 @@ struct RoomCalibrationStatus {
   std::optional<double> turn_deg;
   double max_shift_mm = 0.0;
   double max_turn_deg = 0.0;
-  std::string why_not_sign;  ///< Empty if it may be signed.
-  std::string digest;        ///< Digest of the calibration that would be signed.
+  Message why_not_sign;  ///< Empty if it may be signed.
+  std::string digest;    ///< Digest of the calibration that would be signed.
 };
 
 /// The rules of services.hpp hold.
@@ -77,8 +80,8 @@ class RoomCalibrationService {
   ///         would be stored, or if it may not be signed. Returns the version.
   virtual void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) = 0;
   /// The board as a PDF at true size (background). Nothing if the room's markers are too large for
-  /// one; the sentence then says so.
-  [[nodiscard]] virtual std::optional<std::string> RoomBoardPdf(std::string& why_not) = 0;
+  /// one; `why_not` then says so.
+  [[nodiscard]] virtual std::optional<std::string> RoomBoardPdf(Message& why_not) = 0;
 };
 
 /// The rules of services.hpp hold.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scans, their files and their reports.
 #pragma once
 
@@ -6,22 +7,26 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/message.hpp"
 #include "web/model/account.hpp"
 #include "web/model/change.hpp"
 #include "web/model/scan.hpp"
 
 namespace plumb::web {
 
-/// Language of a report or a picture; see `daemon/appliance/report_words.hpp`.
-enum class Language { kEnglish, kSpanish };
-
 /// Pictures that are made of a comparison.
 enum class ComparisonPicture { kErrorMap, kOverlay };
 
-/// Texts to read beside the numbers of a result.
-struct ResultNotes {
-  std::array<std::string, 6> axes;    ///< Names of the six numbers.
-  std::vector<std::string> cautions;  ///< Whole sentences.
+/// One of the values that a scan's quality is judged by.
+struct QualityRow {
+  Message name, value;
+  bool is_caution = false;  ///< The value is worse than it should be.
+};
+
+struct ScanQuality {
+  std::vector<QualityRow> rows;
+  std::vector<Message> cautions;  ///< To be read beside the verdict: how the scan was taken.
+  std::vector<Message> remarks;   ///< What the comparison could not rely on, and warnings.
 };
 
 /// The rules of services.hpp hold.
@@ -48,19 +53,19 @@ class ScanService {
   ///         surface.
   [[nodiscard]] virtual std::optional<std::string> CompactMap(const std::string& scan_id,
                                                               const std::string& name) = 0;
-  /// Texts to read beside the verdict and the numbers of a scan (background).
-  [[nodiscard]] virtual ResultNotes Notes(const std::string& scan_id, Language language) = 0;
+  /// Empty if there is no such scan (background).
+  [[nodiscard]] virtual ScanQuality QualityOf(const std::string& scan_id) = 0;
   /// A picture of a comparison as a PNG file, with texts and marks in a language; nothing if there
   /// is no such comparison, or it cannot be drawn (background).
   [[nodiscard]] virtual std::optional<std::string> PictureOf(const std::string& scan_id,
                                                              ComparisonPicture picture,
-                                                             Language language) = 0;
+                                                             const Catalogue& language) = 0;
   /// One page about a scan, or the course of a patient, as a PDF file; nothing if there is no such
   /// scan or patient, or the report cannot be drawn (background).
   [[nodiscard]] virtual std::optional<std::string> ScanReport(const std::string& scan_id,
-                                                              Language language) = 0;
+                                                              const Catalogue& language) = 0;
   [[nodiscard]] virtual std::optional<std::string> CourseReport(const std::string& patient_id,
-                                                                Language language) = 0;
+                                                                const Catalogue& language) = 0;
 };
 
 }  // namespace plumb::web

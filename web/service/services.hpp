@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The interface of the appliance to the web, one class for each subject. The daemon implements it;
 // the web only calls it.
 #pragma once

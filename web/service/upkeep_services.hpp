@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Settings and templates of plans, backups and diagnostics, system updates, the restart after them,
 // and the reset to the state of delivery.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The rules on the real services and their store, with a sensor of the test's own.
 #include <sys/epoll.h>
 
@@ -6,8 +7,8 @@
 #include <thread>
 
 #include "daemon/appliance/appliance.hpp"
-#include "daemon/appliance/web_services.hpp"
 #include "daemon/records/profile_shelf.hpp"
+#include "daemon/services/web_services.hpp"
 #include "tests/support/api_rules.hpp"
 #include "tests/support/board_checks.hpp"
 #include "tests/support/fake_sensor.hpp"
@@ -21,14 +22,17 @@ namespace {
 /// Asked for nothing by these rules.
 class NoRestart : public SystemRestart {
  public:
-  void Restart(std::function<void(const std::string&)> done) override { done("not here"); }
+  void Restart(std::function<void(const Message&)> done) override {
+    done(Message::Verbatim("not here"));
+  }
 };
 
 /// Made, used and destroyed on the loop's thread.
 struct Served {
   Served(EventLoop& loop, const ApplianceParts& parts)
-      : appliance(loop, parts),
-        services(appliance, parts.config.update, std::make_unique<NoRestart>()),
+      : shared(loop, parts),
+        appliance(shared),
+        services(appliance, shared, std::make_unique<NoRestart>()),
         http(services.services(), CheapPasswords()) {
     timer = loop.MakeTimer("http", [this] { Run(); });
     source = loop.WatchDescriptor("http", http.fd(), EPOLLIN, [this](std::uint32_t) { Run(); });
@@ -49,6 +53,7 @@ struct Served {
     }
   }
 
+  SharedParts shared;
   Appliance appliance;
   WebServices services;
   web::HttpServer http;
@@ -97,7 +102,7 @@ class RealRuledAppliance : public RuledAppliance {
   std::string StoreScan(const std::string& patient_id) override {
     std::string id;
     On([&] {
-      Store& store = *served_->appliance.store();
+      Store& store = *served_->shared.store.get();
       id = store.scans.Begin({.patient_id = patient_id,
                               .reference_id = {},
                               .purpose = ScanPurpose::kReference,
@@ -110,8 +115,8 @@ class RealRuledAppliance : public RuledAppliance {
   std::string PassDailyCheck(const std::string& user) override {
     std::string id;
     On([&] {
-      id = served_->appliance.store()->checks.Add({.user = user, .address = {}}, "A",
-                                                  testing::CheckOver());
+      id = served_->shared.store->checks.Add({.user = user, .address = {}}, "A",
+                                             testing::CheckOver());
     });
     return id;
   }
@@ -119,7 +124,7 @@ class RealRuledAppliance : public RuledAppliance {
   void LearnProfile() override {
     SensorProfile profile = ProfileOfAnyUnit(testing::FakeBus::Info().intrinsics);
     profile.num_sweeps = 4;
-    On([&] { (void)served_->appliance.profiles().shelf()->Add("A", profile); });
+    On([&] { (void)served_->shared.profiles.shelf()->Add("A", profile); });
   }
 
  private:

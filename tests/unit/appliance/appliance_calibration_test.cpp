@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The profile of the sensor's unit and the calibration of the room, as the page changes them.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -11,6 +12,7 @@
 #include "tests/support/board_checks.hpp"
 #include "tests/support/synthetic_scene.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
@@ -37,7 +39,7 @@ class ApplianceProfileTest : public ApplianceTest {
   }
   /// The profile that a scan of now begins from: read as each scan reads it, from the same shelf.
   [[nodiscard]] std::string NextScanBeginsFrom() const {
-    UnitProfile unit(appliance_->profiles().shelf(), "A", FakeBus::Info().intrinsics);
+    UnitProfile unit(shared_->profiles.shelf(), "A", FakeBus::Info().intrinsics);
     ReconstructorOptions options;
     unit.Begin(options);
     if (!options.profile) return "none";
@@ -52,12 +54,12 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
   ProfileShelf shelf(folder_ / "state" / "sensor-profiles");
   for (known.num_sweeps = 4; known.num_sweeps <= 5; ++known.num_sweeps) (void)shelf.Add("A", known);
   Play([&] {
-    EXPECT_EQ(services_->services().profiles.GetSensorProfiles().why_none, "no sensor is attached");
+    EXPECT_EQ(services_->services().profiles.GetSensorProfiles().why_none, say::scan::NoSensor());
     EXPECT_EQ(Reset("A").result, ChangeResult::kConflict);
     MakeReady();
     const SensorProfiles shown = services_->services().profiles.GetSensorProfiles();
     EXPECT_EQ(shown.serial, "A");
-    EXPECT_EQ(shown.why_none, "");
+    EXPECT_TRUE(shown.why_none.empty());
     ASSERT_EQ(shown.versions.size(), 2U);
     EXPECT_EQ(shown.versions[0].version, 2);
     EXPECT_EQ(shown.versions[0].num_sweeps, 5);
@@ -80,12 +82,12 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
 TEST_F(ApplianceProfileTest, NothingChangesUnderAScan) {
   Play([&] {
     MakeReady();
-    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), ""); });
     const Change answer = Reset("A");
     EXPECT_EQ(answer.result, ChangeResult::kConflict);
-    EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
+    EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("wait for its result"));
     EXPECT_TRUE(services_->services().profiles.GetSensorProfiles().versions.empty());
-    On([&] { EXPECT_EQ(appliance_->Cancel(kTester), ""); });
+    On([&] { EXPECT_EQ(appliance_->Cancel(kTester).English(), ""); });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     EXPECT_EQ(Reset("A").result, ChangeResult::kDone);
     EXPECT_EQ(services_->services().profiles.GetSensorProfiles().versions.size(), 1U);
@@ -96,7 +98,7 @@ TEST_F(ApplianceProfileTest, SwitchedOffItSaysSo) {
   parts_.config.appliance.sensor_profiles = false;
   Play([&] {
     MakeReady();
-    EXPECT_THAT(services_->services().profiles.GetSensorProfiles().why_none,
+    EXPECT_THAT(services_->services().profiles.GetSensorProfiles().why_none.English(),
                 ::testing::HasSubstr("switched off"));
     EXPECT_EQ(Reset("A").result, ChangeResult::kConflict);
   });
@@ -105,7 +107,7 @@ TEST_F(ApplianceProfileTest, SwitchedOffItSaysSo) {
 class ApplianceRoomTest : public ApplianceProfileTest {
  protected:
   void ScanBoard() {
-    On([&] { (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver()); });
+    On([&] { (void)shared_->store->checks.Add(erik_, "A", testing::CheckOver()); });
   }
   ChangeResult Sign() {
     const std::string digest = services_->services().room.GetRoomCalibration().digest;
@@ -120,7 +122,7 @@ class ApplianceRoomTest : public ApplianceProfileTest {
     On([&] {
       const Status status = appliance_->WebStatus();
       if (status.room.is_known) gantry = Eigen::Vector2d(status.room.gantry_xy.data());
-      warnings_ = fmt::format("{}", fmt::join(status.warnings, "; "));
+      warnings_ = fmt::format("{}", fmt::join(EnglishTexts(status.warnings), "; "));
     });
     return gantry;
   }
@@ -128,7 +130,7 @@ class ApplianceRoomTest : public ApplianceProfileTest {
   Reference ReferenceOf(const MarkerMap& markers) {
     std::optional<Reference> reference;
     On([&] {
-      Store& store = *appliance_->store();
+      Store& store = *shared_->store.get();
       test::SyntheticOptions options;
       options.with_cloud = false;
       Scene scene = test::MakeSyntheticScene(options);
@@ -168,12 +170,12 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
     MarkerMap moved = testing::MarkersOfRoom();
     for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
     On([&] {
-      (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
-      appliance_->room().Refresh();
+      (void)shared_->store->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
+      shared_->room.Refresh();
     });
     EXPECT_FALSE(Gantry()) << "neither the calibration nor the configuration";
     EXPECT_THAT(warnings_, ::testing::HasSubstr("marker 4 moved 8 mm"));
-    EXPECT_THAT(services_->services().room.GetRoomCalibration().due,
+    EXPECT_THAT(services_->services().room.GetRoomCalibration().due.English(),
                 ::testing::HasSubstr("marker 4"));
     for (int i = 0; i < 3; ++i) ScanBoard();
     EXPECT_EQ(Sign(), ChangeResult::kDone);
@@ -208,19 +210,19 @@ TEST_F(ApplianceRoomTest, OnTheMapsOfAReferenceTheRoomLiesAsItsOwnMarkersSay) {
         (Eigen::Vector2d(shown().right_xy.data()) - Eigen::Vector2d(expected.y(), -expected.x()))
             .norm(),
         1e-6);
-    const auto ways = appliance_->room().In(turned);
+    const auto ways = shared_->room.In(turned);
     ASSERT_TRUE(ways);
     EXPECT_LT((ways->gantry - expected).norm(), 1e-6) << "the same in the report";
-    EXPECT_FALSE(appliance_->room().In(two)) << "too few markers: a comparison would not know it";
+    EXPECT_FALSE(shared_->room.In(two)) << "too few markers: a comparison would not know it";
 
     MarkerMap moved = testing::MarkersOfRoom();
     for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
     On([&] {
-      (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
-      appliance_->room().Refresh();
+      (void)shared_->store->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
+      shared_->room.Refresh();
     });
     EXPECT_FALSE(shown().is_known) << "it has to be calibrated again";
-    EXPECT_FALSE(appliance_->room().In(turned));
+    EXPECT_FALSE(shared_->room.In(turned));
   });
 }
 
@@ -228,11 +230,11 @@ TEST_F(ApplianceRoomTest, WithoutAnyNobodyKnowsTheRoom) {
   Play([&] {
     MakeReady();
     EXPECT_FALSE(Gantry());
-    EXPECT_FALSE(appliance_->room().In(testing::MarkersOfRoom()));
+    EXPECT_FALSE(shared_->room.In(testing::MarkersOfRoom()));
     EXPECT_EQ(warnings_, "");
-    std::string why_not;
+    Message why_not;
     EXPECT_EQ(services_->services().room.RoomBoardPdf(why_not).value_or("").substr(0, 5), "%PDF-")
-        << why_not;
+        << why_not.English();
   });
 }
 

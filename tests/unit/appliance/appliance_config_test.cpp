@@ -1,5 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
 #include "daemon/config/config.hpp"
@@ -27,6 +30,7 @@ session_idle_min = 45
 [storage]
 backup_folder = "/mnt/backup"
 backup_hours = 12
+backup_recipients = ["age1z8q8p3f3getd6h87azd0zc2vzskwttwywjqumzv8yqddd73pwg3svc56n6"]
 backup_key_file = "/etc/plumb/backup.key"
 [button]
 chip = "gpiochip1"
@@ -52,6 +56,7 @@ host_names = ["plumb.local", "couch"]
   EXPECT_EQ(config.appliance.backup_folder, "/mnt/backup");
   EXPECT_EQ(config.appliance.backup_hours, 12);
   EXPECT_EQ(config.appliance.backup_key_file, "/etc/plumb/backup.key");
+  EXPECT_EQ(config.appliance.backup_recipients.keys().size(), 1U);
   EXPECT_EQ(config.appliance.warm_up_min, 20.0);
   EXPECT_EQ(config.appliance.session_idle_min, 45.0);
   EXPECT_EQ(config.panel.button_chip, "gpiochip1");
@@ -76,6 +81,9 @@ TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
   EXPECT_THAT(complaint("[storage]\nbackup_hours = 0.5\n"), HasSubstr("1 to 8760"));
   EXPECT_THAT(complaint("[storage]\nbackup_folder = \"usb\"\n"), HasSubstr("absolute"));
   EXPECT_THAT(complaint("[storage]\nbackup_key_file = \"key\"\n"), HasSubstr("absolute"));
+  for (const char* keys : {"\"age1\"", "[\"age1\"]", "[\"ssh-ed25519 AAAA\"]", "[7]"})
+    EXPECT_THAT(complaint(fmt::format("[storage]\n\nbackup_recipients = {}\n", keys)),
+                AllOf(HasSubstr("plumb.toml:3"), HasSubstr("public keys of age")));
   EXPECT_THAT(complaint("[appliance]\nquota = 3\n"),
               AllOf(HasSubstr(":2"), HasSubstr("unknown key 'quota'"), HasSubstr("quota_gb")));
   EXPECT_THAT(complaint("[web]\nlisten = \"8080\"\n"),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The appliance on its loop, with a sensor and a machine that do what a test says.
 #pragma once
 
@@ -14,7 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "daemon/appliance/appliance.hpp"
-#include "daemon/appliance/web_services.hpp"
+#include "daemon/services/web_services.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -37,9 +38,9 @@ class SlowProvider : public FakeProvider {
 /// A machine that stays on.
 class FakeRestart : public SystemRestart {
  public:
-  void Restart(std::function<void(const std::string&)> done) override {
+  void Restart(std::function<void(const Message&)> done) override {
     ++num_asked;
-    done(failure);
+    done(failure.empty() ? Message() : Message::Verbatim(failure));
   }
   [[nodiscard]] std::chrono::milliseconds limit() const override { return stays_up_after; }
   int num_asked = 0;
@@ -64,11 +65,11 @@ class ApplianceTest : public ::testing::Test {
   /// Runs the test beside the loop, which has the main thread; a loop that has ended does not begin
   /// again.
   void Play(const std::function<void()>& test) {
-    appliance_ = std::make_unique<Appliance>(loop_, parts_);
+    shared_ = std::make_unique<SharedParts>(loop_, parts_);
+    appliance_ = std::make_unique<Appliance>(*shared_);
     auto restart = std::make_unique<FakeRestart>();
     restart_ = restart.get();
-    services_ =
-        std::make_unique<WebServices>(*appliance_, parts_.config.update, std::move(restart));
+    services_ = std::make_unique<WebServices>(*appliance_, *shared_, std::move(restart));
     std::jthread player([&] {
       test();
       if (!opens_) LetOpen();
@@ -77,6 +78,7 @@ class ApplianceTest : public ::testing::Test {
     loop_.Run();
     services_.reset();
     appliance_.reset();
+    shared_.reset();
   }
 
   /// On the loop's thread; waits for it.
@@ -121,7 +123,7 @@ class ApplianceTest : public ::testing::Test {
   }
   /// On the loop's thread.
   void AddPassedCheck(const Actor& actor) {
-    (void)appliance_->store()->checks.Add(
+    (void)shared_->store->checks.Add(
         actor, appliance_->WebStatus().sensor.serial,
         TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
   }
@@ -136,6 +138,7 @@ class ApplianceTest : public ::testing::Test {
   TempFolder folder_;
   FakeBus bus_;
   ApplianceParts parts_;
+  std::unique_ptr<SharedParts> shared_;
   std::unique_ptr<Appliance> appliance_;
   std::unique_ptr<WebServices> services_;
   FakeRestart* restart_ = nullptr;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // When the machine may be restarted and reset to its factory state.
 #include <filesystem>
 #include <future>
@@ -6,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/records/factory_reset.hpp"
+#include "daemon/archive/factory_reset.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
 
 namespace plumb {
@@ -16,7 +17,8 @@ using ApplianceRestartTest = testing::ApplianceTest;
 
 /// What RestartSystem() answers, on the loop.
 Change Restarted(WebServices& services) {
-  Change answer{.result = ChangeResult::kFailed, .message = "none", .id = {}, .file = {}};
+  Change answer{
+      .result = ChangeResult::kFailed, .message = Message::Verbatim("none"), .id = {}, .file = {}};
   services.updates().RestartSystem({.user = "erik", .address = {}},
                                    [&](const Change& change) { answer = change; });
   return answer;
@@ -34,23 +36,23 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedUnderAScan) {
   Play([&] {
     MakeReady();
     On([&] {
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "");
       ASSERT_EQ(appliance_->state().phase, ApplianceState::kScanning);
       EXPECT_EQ(Restarted(*services_).result, ChangeResult::kConflict);
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "");
       ASSERT_EQ(appliance_->state().phase, ApplianceState::kWorking);
       const Change answer = Restarted(*services_);
       EXPECT_EQ(answer.result, ChangeResult::kConflict);
-      EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
+      EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("wait for its result"));
       EXPECT_EQ(restart_->num_asked, 0);
     });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     On([&] {
       EXPECT_EQ(Restarted(*services_).result, ChangeResult::kDone);
       EXPECT_EQ(restart_->num_asked, 1);
-      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester),
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester).English(),
                   ::testing::HasSubstr("being restarted"));
-      EXPECT_THAT(Restarted(*services_).message, ::testing::HasSubstr("being restarted"));
+      EXPECT_THAT(Restarted(*services_).message.English(), ::testing::HasSubstr("being restarted"));
       EXPECT_EQ(restart_->num_asked, 1);
     });
   });
@@ -73,26 +75,27 @@ TEST_F(ApplianceRestartTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
     const auto is_noted = [&] {
       return std::filesystem::exists(folder_ / "state" / kFactoryResetFile);
     };
-    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), ""); });
     EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).result, ChangeResult::kConflict)
         << "a scan runs";
     EXPECT_FALSE(is_noted());
-    On([&] { EXPECT_EQ(appliance_->Cancel(kTester), ""); });
+    On([&] { EXPECT_EQ(appliance_->Cancel(kTester).English(), ""); });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     restart_->failure = "the machine cannot be restarted from here: no";
-    EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).message, restart_->failure);
+    EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).message.English(),
+              restart_->failure);
     EXPECT_FALSE(is_noted()) << "nothing is reset where the machine does not restart";
     restart_->failure.clear();
     EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).result, ChangeResult::kDone);
     EXPECT_TRUE(is_noted());
     On([&] {
-      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester),
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester).English(),
                   ::testing::HasSubstr("being restarted"));
-      const std::string patient = appliance_->store()->patients.Add(kTester, "P-1", "");
+      const std::string patient = shared_->store->patients.Add(kTester, "P-1", "");
       Change answer;
       services_->services().patients.OpenPatient(kTester, patient, ScanPurpose::kReference, "", "",
                                                  [&](const Change& change) { answer = change; });
-      EXPECT_THAT(answer.message, ::testing::HasSubstr("being restarted"));
+      EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("being restarted"));
     });
   });
 }
@@ -104,9 +107,9 @@ TEST_F(ApplianceRestartTest, AMachineThatDoesNotGoDownIsUsableAgainAndIsNotReset
     EXPECT_EQ(AskedToReset(*services_, loop_, FactoryReset::kWipe).result, ChangeResult::kDone);
     EXPECT_TRUE(
         Becomes([&] { return !std::filesystem::exists(folder_ / "state" / kFactoryResetFile); }));
-    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), ""); });
     EXPECT_TRUE(Becomes([&] {
-      return appliance_->store()->audit.Find({0, 10, "system.restart_failed"}).size() == 1;
+      return shared_->store->audit.Find({0, 10, "system.restart_failed"}).size() == 1;
     })) << "it is written by another thread";
   });
 }
@@ -120,16 +123,17 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedInASessionAndAFailedRestart
                               {.user = "tess", .address = {}});
       const Change answer = Restarted(*services_);
       EXPECT_EQ(answer.result, ChangeResult::kConflict);
-      EXPECT_THAT(answer.message, ::testing::HasSubstr("session of a patient is open"));
+      EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("session of a patient is open"));
       EXPECT_EQ(restart_->num_asked, 0);
-      EXPECT_THAT(Installed(*services_).message,
+      EXPECT_THAT(Installed(*services_).message.English(),
                   ::testing::HasSubstr("close it first, then install the update"));
-      EXPECT_EQ(appliance_->CloseSession({.user = "tess", .address = {}}), "");
-      EXPECT_THAT(Installed(*services_).message, ::testing::Not(::testing::HasSubstr("session")));
+      EXPECT_EQ(appliance_->CloseSession({.user = "tess", .address = {}}).English(), "");
+      EXPECT_THAT(Installed(*services_).message.English(),
+                  ::testing::Not(::testing::HasSubstr("session")));
       restart_->failure = "the machine cannot be restarted from here: no";
       const Change failed = Restarted(*services_);
       EXPECT_EQ(failed.result, ChangeResult::kFailed);
-      EXPECT_EQ(failed.message, restart_->failure);
+      EXPECT_EQ(failed.message.English(), restart_->failure);
       restart_->failure.clear();
       EXPECT_EQ(Restarted(*services_).result, ChangeResult::kDone) << "asked again";
       EXPECT_EQ(restart_->num_asked, 2);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sessions of patients, and the references and daily checks that scans in them need.
 #include <filesystem>
 #include <functional>
@@ -14,7 +15,8 @@
 #include "drivers/files/file_io.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
 #include "tests/unit/records/scan_folder.hpp"
-#include "web/api/json.hpp"
+#include "web/exchange/json.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
@@ -40,9 +42,10 @@ Approved AddApproved(Store& store, const Actor& actor) {
   return {patient, scan};
 }
 
-void OpenForFraction(Appliance& appliance, const std::string& patient, const Actor& actor) {
-  appliance.OpenSession(appliance.store()->treatments.Open(actor, patient, ScanPurpose::kFraction),
-                        patient, ScanPurpose::kFraction, "", actor);
+void OpenForFraction(Appliance& appliance, const CurrentStore& store, const std::string& patient,
+                     const Actor& actor) {
+  appliance.OpenSession(store->treatments.Open(actor, patient, ScanPurpose::kFraction), patient,
+                        ScanPurpose::kFraction, "", actor);
 }
 
 TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) {
@@ -67,7 +70,7 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     EXPECT_EQ(opened.get_future().get().result, ChangeResult::kDone);
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().patient_id, id);
-      EXPECT_EQ(appliance_->OpenCheck(actor), "");
+      EXPECT_EQ(appliance_->OpenCheck(actor).English(), "");
       services_->services().patients.WipePatient(
           actor, id, [&](const Change& change) { wiped.set_value(change); });
       EXPECT_EQ(appliance_->WebStatus().next_purpose, ScanPurpose::kDailyCheck)
@@ -75,7 +78,8 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     });
     EXPECT_EQ(wiped.get_future().get().result, ChangeResult::kDone);
     On([&] {
-      for (int i = 0; i < 2; ++i) EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
+      for (int i = 0; i < 2; ++i)
+        EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "");
     });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     On([&] {
@@ -95,8 +99,8 @@ TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClose
     Change second, closed;
     std::string patient;
     On([&] {
-      patient = appliance_->store()->patients.Add(tess, "A", "");
-      const std::string other = appliance_->store()->patients.Add(tess, "B", "");
+      patient = shared_->store->patients.Add(tess, "A", "");
+      const std::string other = shared_->store->patients.Add(tess, "B", "");
       AddPassedCheck(tess);
       auto& service = services_->services().patients;
       service.OpenPatient(tess, patient, ScanPurpose::kReference, "", "",
@@ -104,19 +108,19 @@ TEST_F(ApplianceTest, WhileAPatientIsBeingOpenedNoOtherIsOpenedAndNothingIsClose
       service.OpenPatient(tess, other, ScanPurpose::kReference, "", "",
                           [&](const Change& change) { second = change; });
       service.CloseSession(tess, "", [&](const Change& change) { closed = change; });
-      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess).English(),
                   ::testing::HasSubstr("a patient is being opened"));
     });
     EXPECT_EQ(first.get_future().get().result, ChangeResult::kDone);
     for (const Change& refused : {second, closed}) {
       EXPECT_EQ(refused.result, ChangeResult::kConflict);
-      EXPECT_EQ(refused.message, "a patient is being opened: try again in a moment");
+      EXPECT_EQ(refused.message.English(), "a patient is being opened: try again in a moment");
     }
     On([&] {
       ASSERT_TRUE(appliance_->WebStatus().session);
       EXPECT_EQ(appliance_->WebStatus().session->patient_id, patient);
-      EXPECT_EQ(appliance_->session().patient_id(), patient);
-      EXPECT_EQ(appliance_->CloseSession(tess), "");
+      EXPECT_EQ(shared_->session.patient_id(), patient);
+      EXPECT_EQ(appliance_->CloseSession(tess).English(), "");
     });
   });
 }
@@ -130,7 +134,7 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
     std::promise<Change> opened, refused, wiped;
     std::string patient, running;
     On([&] {
-      patient = appliance_->store()->patients.Add(tess, "A", "");
+      patient = shared_->store->patients.Add(tess, "A", "");
       AddPassedCheck(tess);
       services_->services().patients.OpenPatient(
           tess, patient, ScanPurpose::kReference, "", "",
@@ -138,31 +142,32 @@ TEST_F(ApplianceTest, AWipeThatIsRefusedLeavesTheSessionOpen) {
     });
     EXPECT_EQ(opened.get_future().get().result, ChangeResult::kDone);
     On([&] {
-      running = appliance_->store()->scans.Begin({.patient_id = patient,
-                                                  .reference_id = {},
-                                                  .purpose = ScanPurpose::kReference,
-                                                  .sensor_serial = "A"});
+      running = shared_->store->scans.Begin({.patient_id = patient,
+                                             .reference_id = {},
+                                             .purpose = ScanPurpose::kReference,
+                                             .sensor_serial = "A"});
       services_->services().patients.WipePatient(
           tess, patient, [&](const Change& change) { refused.set_value(change); });
-      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess),
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, tess).English(),
                   ::testing::HasSubstr("data is being removed"));
-      EXPECT_THAT(appliance_->CloseSession(tess), ::testing::HasSubstr("data is being removed"));
+      EXPECT_THAT(appliance_->CloseSession(tess).English(),
+                  ::testing::HasSubstr("data is being removed"));
     });
-    EXPECT_THAT(refused.get_future().get().message,
+    EXPECT_THAT(refused.get_future().get().message.English(),
                 ::testing::HasSubstr("a scan of this patient is running"));
     On([&] {
       ASSERT_TRUE(appliance_->WebStatus().session) << "nothing was removed";
-      EXPECT_EQ(appliance_->session().patient_id(), patient);
-      appliance_->store()->scans.Finish(
-          running,
-          {.outcome = ScanOutcome::kCancelled, .failure = "discarded", .swept_area_m2 = 0.0});
+      EXPECT_EQ(shared_->session.patient_id(), patient);
+      shared_->store->scans.Finish(running, {.outcome = ScanOutcome::kCancelled,
+                                             .failure = Message::Verbatim("discarded"),
+                                             .swept_area_m2 = 0.0});
       services_->services().patients.WipePatient(
           tess, patient, [&](const Change& change) { wiped.set_value(change); });
     });
     EXPECT_EQ(wiped.get_future().get().result, ChangeResult::kDone);
     On([&] {
       EXPECT_FALSE(appliance_->WebStatus().session);
-      EXPECT_EQ(appliance_->session().patient_id(), "");
+      EXPECT_EQ(shared_->session.patient_id(), "");
     });
   });
 }
@@ -174,7 +179,7 @@ TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVe
     MakeReady();
     std::string patient;
     On([&] {
-      Store& store = *appliance_->store();
+      Store& store = *shared_->store.get();
       const Approved reference = AddApproved(store, kTester);
       patient = reference.patient;
       const std::filesystem::path cloud =
@@ -182,8 +187,8 @@ TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVe
       std::string bytes = ReadTextFile(cloud, 1000);
       bytes[3] = static_cast<char>(bytes[3] ^ 1);
       WriteWholeFile(cloud, bytes);
-      OpenForFraction(*appliance_, patient, kTester);
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
+      OpenForFraction(*appliance_, shared_->store, patient, kTester);
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "");
     });
     EXPECT_TRUE(Becomes([&] {
       bus_.GiveFrame();
@@ -191,13 +196,38 @@ TEST_F(ApplianceTest, AReferenceThatHasChangedSinceItsApprovalGivesAFaultAndNoVe
     }));
     On([&] {
       EXPECT_THAT(
-          appliance_->WebStatus().fault,
+          appliance_->WebStatus().fault.English(),
           ::testing::HasSubstr("the patient's reference cannot be used: scene/cloud.ply has "
                                "been changed since it was stored"));
       EXPECT_TRUE(appliance_->StatusJson()["last_result"].is_null());
-      const Scan failed = appliance_->store()->scans.List(patient, 1)[0];
+      const Scan failed = shared_->store->scans.List(patient, 1)[0];
       EXPECT_EQ(failed.outcome, ScanOutcome::kFailed);
       EXPECT_FALSE(failed.result);
+    });
+  });
+}
+
+TEST_F(ApplianceTest, AScanOfAnEarlierSessionOfThePatientIsNotAcceptedInTheNext) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
+  Play([&] {
+    MakeReady();
+    std::string patient;
+    On([&] {
+      patient = AddApproved(*shared_->store.get(), kTester).patient;
+      OpenForFraction(*appliance_, shared_->store, patient, kTester);
+      for (int i = 0; i < 2; ++i)
+        EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "");
+    });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    On([&] {
+      const std::string scan = shared_->store->scans.List(patient, 1)[0].id;
+      OpenForFraction(*appliance_, shared_->store, patient, kTester);
+      Change accepted;
+      services_->services().scans.AcceptScan(kTester, scan, "",
+                                             [&](const Change& change) { accepted = change; });
+      EXPECT_EQ(accepted.result, ChangeResult::kConflict);
+      EXPECT_EQ(accepted.message.English(), say::scan::AcceptInSession().English());
     });
   });
 }
@@ -210,30 +240,31 @@ TEST_F(ApplianceTest, APlanThatCannotBeReadRefusesTheScanInWords) {
     std::string patient;
     std::size_t num_scans = 0;
     const auto num_folders = [&] {
-      const std::filesystem::directory_iterator folders(appliance_->store()->folders.scans());
+      const std::filesystem::directory_iterator folders(shared_->store->folders.scans());
       return std::distance(begin(folders), end(folders));
     };
     On([&] {
-      Store& store = *appliance_->store();
+      Store& store = *shared_->store.get();
       patient = AddApproved(store, kTester).patient;
       store.database().ForChanges()->Prepare("DROP TRIGGER refs_immutable").Run();
       store.database().ForChanges()->Prepare("UPDATE refs SET plan = '{'").Run();
       num_scans = store.scans.List(patient, 10).size();
-      OpenForFraction(*appliance_, patient, kTester);
+      OpenForFraction(*appliance_, shared_->store, patient, kTester);
     });
     const auto folders_before = num_folders();
-    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), ""); });
     EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ApplianceState::kFault; }));
     On([&] {
-      EXPECT_THAT(appliance_->WebStatus().fault,
+      EXPECT_THAT(appliance_->WebStatus().fault.English(),
                   ::testing::HasSubstr("the scan could not begin: version 1 of the reference"));
       EXPECT_EQ(appliance_->WebStatus().light, "fault");
       EXPECT_FALSE(appliance_->WebStatus().scan);
-      EXPECT_EQ(appliance_->storage_fault(), "") << "other patients can be scanned";
+      EXPECT_EQ(shared_->storage.fault().English(), "") << "other patients can be scanned";
       EXPECT_TRUE(appliance_->StatusJson()["last_result"].is_null());
-      EXPECT_EQ(appliance_->store()->scans.List(patient, 10).size(), num_scans);
+      EXPECT_EQ(shared_->store->scans.List(patient, 10).size(), num_scans);
       EXPECT_EQ(num_folders(), folders_before);
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "") << "acknowledges the fault";
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "")
+          << "acknowledges the fault";
       EXPECT_EQ(appliance_->state().phase, ApplianceState::kReady);
     });
   });
@@ -249,33 +280,34 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
     const Done keep = [&](const Change& change) { answer = change; };
     std::string patient;
     On([&] {
-      patient = appliance_->store()->patients.Add(tess, "P-1", "");
-      EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("daily check"));
+      patient = shared_->store->patients.Add(tess, "P-1", "");
+      EXPECT_THAT(appliance_->WebStatus().reference_block.English(),
+                  ::testing::HasSubstr("daily check"));
       services_->services().patients.OpenPatient(tess, patient, ScanPurpose::kReference, "", "",
                                                  keep);
       EXPECT_EQ(answer.result, ChangeResult::kConflict);
-      EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
-      services_->services().references.ApproveReference(tess, "1", 1, "", keep);
-      EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
+      EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("open Daily check"));
+      services_->services().references.ApproveReference(tess, "1", 1, "", "", keep);
+      EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("open Daily check"));
       services_->services().references.AddReference(tess, "1", "", keep);
-      EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
+      EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("open Daily check"));
       // A session that was open since yesterday.
       appliance_->OpenSession("1", patient, ScanPurpose::kReference, "", tess);
       (void)appliance_->Press(ButtonPress::kShort, kTester);
     });
     EXPECT_TRUE(Becomes([&] {
-      return appliance_->WebStatus().fault.find("open Daily check") != std::string::npos;
+      return appliance_->WebStatus().fault.English().find("open Daily check") != std::string::npos;
     }));
     On([&] {
-      EXPECT_TRUE(appliance_->store()->scans.List("", 10).empty()) << "nothing was scanned";
+      EXPECT_TRUE(shared_->store->scans.List("", 10).empty()) << "nothing was scanned";
       AddPassedCheck(tess);
-      EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->references().WhyNot(ScanOf(DailyCheck::kPassed)), "");
-      EXPECT_THAT(appliance_->references().WhyNot(ScanOf(DailyCheck::kOverdue)),
+      EXPECT_EQ(appliance_->WebStatus().reference_block.English(), "");
+      EXPECT_EQ(shared_->references.WhyNot(ScanOf(DailyCheck::kPassed)).English(), "");
+      EXPECT_THAT(shared_->references.WhyNot(ScanOf(DailyCheck::kOverdue)).English(),
                   ::testing::HasSubstr("scan the reference again"))
           << "of a scan from before the check";
       const auto check = [&](MarkerCheckStatus status) {
-        (void)appliance_->store()->checks.Add(
+        (void)shared_->store->checks.Add(
             tess, appliance_->WebStatus().sensor.serial,
             TakenCheck{{.status = status, .items = {}, .reasons = {}}});
       };
@@ -283,13 +315,13 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
       const web::Json status = web::ToJson(appliance_->WebStatus(), WallClock::now());
       EXPECT_TRUE(status["check_overdue"]);
       EXPECT_TRUE(status["check_failed"]);
-      EXPECT_EQ(appliance_->references().Checks().today, DailyCheck::kFailed);
-      EXPECT_THAT(appliance_->references().WhyNot(ScanOf(DailyCheck::kPassed)),
+      EXPECT_EQ(shared_->references.Checks().today, DailyCheck::kFailed);
+      EXPECT_THAT(shared_->references.WhyNot(ScanOf(DailyCheck::kPassed)).English(),
                   ::testing::HasSubstr("the daily check has failed"))
           << "after one that had passed";
       check(MarkerCheckStatus::kPassed);
-      EXPECT_EQ(appliance_->references().WhyNot(ScanOf(DailyCheck::kPassed)), "");
-      EXPECT_THAT(appliance_->references().WhyNot(ScanOf(DailyCheck::kFailed)),
+      EXPECT_EQ(shared_->references.WhyNot(ScanOf(DailyCheck::kPassed)).English(), "");
+      EXPECT_THAT(shared_->references.WhyNot(ScanOf(DailyCheck::kFailed)).English(),
                   ::testing::HasSubstr("after a failed daily check"));
       (void)appliance_->CloseSession(tess);
       (void)appliance_->Press(ButtonPress::kShort, kTester);  // acknowledges the fault
@@ -307,14 +339,14 @@ TEST_F(ApplianceTest, ASessionWithoutScansClosesByItself) {
     MakeReady();
     const Actor tess = {.user = "tess", .address = {}};
     On([&] {
-      const std::string patient = appliance_->store()->patients.Add(tess, "P-1", "");
+      const std::string patient = shared_->store->patients.Add(tess, "P-1", "");
       const std::string session =
-          appliance_->store()->treatments.Open(tess, patient, ScanPurpose::kReference);
+          shared_->store->treatments.Open(tess, patient, ScanPurpose::kReference);
       appliance_->OpenSession(session, patient, ScanPurpose::kReference, "", tess);
       EXPECT_TRUE(appliance_->WebStatus().session.has_value());
     });
     EXPECT_TRUE(Becomes([&] { return !appliance_->WebStatus().session.has_value(); }));
-    EXPECT_TRUE(Becomes([&] { return !appliance_->store()->treatments.Opened().has_value(); }));
+    EXPECT_TRUE(Becomes([&] { return !shared_->store->treatments.Opened().has_value(); }));
   });
 }
 
@@ -324,21 +356,23 @@ TEST_F(ApplianceTest, AColdSensorTakesNoReference) {
   Play([&] {
     MakeReady();
     On([&] {
-      (void)appliance_->store()->checks.Add(
+      (void)shared_->store->checks.Add(
           {.user = "tess", .address = {}}, appliance_->WebStatus().sensor.serial,
           {.check = {.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
-      EXPECT_THAT(appliance_->WebStatus().reference_block,
+      EXPECT_THAT(appliance_->WebStatus().reference_block.English(),
                   ::testing::HasSubstr("the sensor is still warming up"));
-      EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("15 min"));
+      EXPECT_THAT(appliance_->WebStatus().reference_block.English(),
+                  ::testing::HasSubstr("15 min"));
       // What was scanned long ago is judged by how warm the sensor was then.
       Scan scan = ScanOf(DailyCheck::kPassed);
       scan.sensor_on_s = 899;
-      EXPECT_THAT(appliance_->references().WhyNot(scan),
+      EXPECT_THAT(shared_->references.WhyNot(scan).English(),
                   ::testing::HasSubstr("scan the reference again"));
       scan.sensor_on_s = 900;
-      EXPECT_EQ(appliance_->references().WhyNot(scan), "");
+      EXPECT_EQ(shared_->references.WhyNot(scan).English(), "");
       scan.sensor_on_s.reset();
-      EXPECT_EQ(appliance_->references().WhyNot(scan), "") << "not known: from an older version";
+      EXPECT_EQ(shared_->references.WhyNot(scan).English(), "")
+          << "not known: from an older version";
     });
   });
 }
@@ -368,8 +402,8 @@ TEST_F(ApplianceTest, TheDemoNeedsNoCheckForItsReference) {
     MakeReady();
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().daily_check, DailyCheck::kOverdue);
-      EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->references().WhyNot(ScanOf(DailyCheck::kOverdue)), "");
+      EXPECT_EQ(appliance_->WebStatus().reference_block.English(), "");
+      EXPECT_EQ(shared_->references.WhyNot(ScanOf(DailyCheck::kOverdue)).English(), "");
     });
   });
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What an appliance says and refuses when its disk is nearly full.
 #include <algorithm>
 #include <cstdint>
@@ -54,7 +55,8 @@ class ApplianceSpaceTest : public testing::ApplianceTest {
 
 TEST_F(ApplianceSpaceTest, FourFifthsOfTheDiskAreToldByPageStatusAndLight) {
   const auto warns = [&] {
-    const std::vector<std::string> warnings = appliance_->WebStatus().storage.warnings;
+    const std::vector<std::string> warnings =
+        EnglishTexts(appliance_->WebStatus().storage.warnings);
     return std::find(warnings.begin(), warnings.end(),
                      "The disk is 80 % full: back up and remove scans.") != warnings.end();
   };
@@ -91,15 +93,17 @@ TEST_F(ApplianceSpaceTest, OneByteTooLittleIsAFaultAndNoReadiness) {
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().state, ApplianceState::kFault);
       EXPECT_EQ(appliance_->WebStatus().fault_kind, FaultKind::kStorage);
-      EXPECT_THAT(appliance_->WebStatus().fault, HasSubstr("the disk is full: 24 MB are free"));
+      EXPECT_THAT(appliance_->WebStatus().fault.English(),
+                  HasSubstr("the disk is full: 24 MB are free"));
       EXPECT_THAT(appliance_->StatusLine(), HasSubstr("the disk is full"));
-      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester), HasSubstr("the disk is full"));
-      EXPECT_EQ(appliance_->storage_fault(), "") << "scans can be removed";
-      EXPECT_NE(appliance_->store()->patients.Add(kTester, "A", ""), "");
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester).English(),
+                  HasSubstr("the disk is full"));
+      EXPECT_EQ(shared_->storage.fault().English(), "") << "scans can be removed";
+      EXPECT_NE(shared_->store->patients.Add(kTester, "A", ""), "");
     });
     SetAvailable(kScanBytes);
     EXPECT_TRUE(IsLit("ready_disk_nearly_full"));
-    On([&] { EXPECT_EQ(appliance_->WebStatus().fault, ""); });
+    On([&] { EXPECT_EQ(appliance_->WebStatus().fault.English(), ""); });
   });
 }
 
@@ -109,14 +113,14 @@ TEST_F(ApplianceSpaceTest, ARecordingNeedsItsOwnRoomAndADailyCheckHasNone) {
   settings.scan_limit_s = 60;
   Play([&] {
     MakeReady();
-    On([&] { appliance_->store()->settings.Change(kTester, settings); });
-    const auto reason = [&] { return appliance_->health().reason; };
+    On([&] { shared_->store->settings.Change(kTester, settings); });
+    const auto reason = [&] { return appliance_->health().reason.English(); };
     SetAvailable(kScanBytes + kRecordingBytes);
     On([&] { EXPECT_EQ(reason(), ""); });
     SetAvailable(kScanBytes + kRecordingBytes - 1);
     On([&] {
       EXPECT_THAT(reason(), HasSubstr("the disk is full"));
-      EXPECT_EQ(appliance_->OpenCheck(kTester), "");
+      EXPECT_EQ(appliance_->OpenCheck(kTester).English(), "");
       EXPECT_EQ(reason(), "");
     });
     SetAvailable(kScanBytes);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An appliance whose database fails under it.
 #include <algorithm>
 #include <chrono>
@@ -9,14 +10,15 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
-#include "daemon/appliance/unit_recovery.hpp"
-#include "daemon/appliance/web_services.hpp"
-#include "daemon/records/file_cipher.hpp"
+#include "daemon/archive/age_file.hpp"
+#include "daemon/services/web_services.hpp"
+#include "daemon/unit/unit_recovery.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
+#include "tests/unit/archive/age_keys.hpp"
 
 namespace plumb {
 namespace {
@@ -47,7 +49,7 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
         around.config.appliance.state);  // and closed again: nothing of it is in anybody's memory
     (void)store.patients.Add({.user = "anna", .address = {}}, "A", "");
   }
-  Appliance appliance(
+  SharedParts shared(
       around.loop,
       {.config = around.config,
        .make_provider = [&] { return std::make_unique<testing::FakeProvider>(around.bus); },
@@ -56,6 +58,7 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
        .indicator = nullptr,
        .demo_patient = {},
        .storage = {.retries = {std::chrono::milliseconds(1)}}});
+  Appliance appliance(shared);
   for (const fs::directory_entry& entry : fs::directory_iterator(around.config.appliance.state)) {
     if (!entry.is_regular_file()) continue;
     std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
@@ -64,7 +67,9 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
   }
   EXPECT_EQ(appliance.WebStatus().state, ApplianceState::kNoSensor);
   RunFor(around.loop, std::chrono::milliseconds(300));
-  EXPECT_THAT(appliance.storage_fault(), HasSubstr("damaged")) << "and it is not tried again";
+  EXPECT_THAT(shared.storage.fault().English(),
+              ::testing::AnyOf(HasSubstr("damaged"), HasSubstr("is not as it was written")))
+      << "and it is not tried again";
   EXPECT_FALSE(appliance.WebStatus().fault.empty());
   EXPECT_FALSE(appliance.health().ok);
 }
@@ -97,25 +102,27 @@ ApplianceParts PartsOf(const Config& config, testing::FakeBus& bus) {
 TEST(ApplianceStorage, AFaultThatQuotesAPathInAnyEncodingIsUtf8) {
   Surroundings around;
   ApplianceParts parts = PartsOf(around.config, around.bus);
-  parts.storage.configuration_fault = "cannot read /media/\xff.toml";
-  Appliance appliance(around.loop, parts);
-  EXPECT_EQ(appliance.storage_fault(), "cannot read /media/\xEF\xBF\xBD.toml");
+  parts.storage.configuration_fault = Message::Verbatim("cannot read /media/\xff.toml");
+  SharedParts shared(around.loop, parts);
+  Appliance appliance(shared);
+  EXPECT_EQ(shared.storage.fault().English(), "cannot read /media/\xEF\xBF\xBD.toml");
 }
 
 TEST(ApplianceStorage, AListenerThatFailsIsReportedAndDoesNotEndTheLoop) {
   Surroundings around;
-  Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+  SharedParts shared(around.loop, PartsOf(around.config, around.bus));
+  Appliance appliance(shared);
   int lines = 0, notices = 0;
-  appliance.SetEventListener([&](const std::string&) {
+  shared.notices.SetWatchers([&](const std::string&) {
     ++lines;
     throw std::runtime_error("the socket is gone");
   });
-  appliance.SetWebListener([&](web::EventKind) {
+  shared.notices.SetPage([&](web::EventKind) {
     ++notices;
     throw std::bad_alloc();
   });
   around.loop.Post("test", [&] {
-    appliance.SetRolledBack("the update was rolled back");
+    appliance.SetRolledBack(Message::Verbatim("the update was rolled back"));
     (void)appliance.Press(ButtonPress::kShort,
                           {.user = "tester", .address = ""});  // ignored without a sensor
   });
@@ -139,9 +146,11 @@ TEST(ApplianceStorage, AnAuditLogThatWasChangedFromOutsideIsReported) {
                                  "audit_no_delete; ") +
                      change);
     }
-    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+    SharedParts shared(around.loop, PartsOf(around.config, around.bus));
+    Appliance appliance(shared);
     const auto is_told = [&] {
-      const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
+      const std::vector<std::string> warnings =
+          EnglishTexts(appliance.WebStatus().storage.warnings);
       return std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
         return warning.starts_with("The audit log has been changed");
       });
@@ -181,12 +190,16 @@ TEST(ApplianceStorage, ADatabaseTooLargeForTheCheckAtTheStartIsCheckedWhileItWor
     MakeLargeDatabase(around.config.appliance.state, is_damaged);
     ApplianceParts parts = PartsOf(around.config, around.bus);
     parts.storage.check_limit = std::chrono::milliseconds(-1);
-    Appliance appliance(around.loop, std::move(parts));
-    EXPECT_EQ(appliance.storage_fault(), "") << "the start did not wait for the check";
-    const auto is_found = [&] { return !appliance.storage_fault().empty(); };
+    SharedParts shared(around.loop, std::move(parts));
+    Appliance appliance(shared);
+    // A damaged page that the start reads is found at once, by its checksum.
+    if (!is_damaged) {
+      EXPECT_EQ(shared.storage.fault().English(), "") << "the start did not wait for the check";
+    }
+    const auto is_found = [&] { return !shared.storage.fault().empty(); };
     if (is_damaged) {
       EXPECT_TRUE(RunUntil(around.loop, is_found));
-      EXPECT_THAT(appliance.storage_fault(), HasSubstr("is damaged"));
+      EXPECT_THAT(shared.storage.fault().English(), HasSubstr("is not as it was written"));
       EXPECT_FALSE(appliance.health().ok);
       continue;
     }
@@ -199,8 +212,9 @@ TEST(ApplianceStorage, ADatabaseTooLargeForTheCheckAtTheStartIsCheckedWhileItWor
 TEST(ApplianceStorage, ADamagedDatabaseIsFoundAtTheStart) {
   Surroundings around;
   MakeLargeDatabase(around.config.appliance.state, true);
-  const Appliance appliance(around.loop, PartsOf(around.config, around.bus));
-  EXPECT_THAT(appliance.storage_fault(), HasSubstr("is damaged"));
+  SharedParts shared(around.loop, PartsOf(around.config, around.bus));
+  const Appliance appliance(shared);
+  EXPECT_THAT(shared.storage.fault().English(), HasSubstr("is not as it was written"));
 }
 
 TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
@@ -216,14 +230,16 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
         .Execute("UPDATE settings SET value = '" + text + "' WHERE name = 'settings'");
   };
   {
-    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
-    StoreAccess access(appliance);
+    SharedParts shared(around.loop, PartsOf(around.config, around.bus));
+    Appliance appliance(shared);
+    StoreAccess access(shared.loop, shared.storage, shared.store_thread, shared.notices);
     EXPECT_EQ(MakeWebSettings(access)->GetSettings().idle_logout_min, 7);
   }
   set("{");
   EventLoop another;
-  Appliance appliance(another, PartsOf(around.config, around.bus));
-  StoreAccess access(appliance);
+  SharedParts shared(another, PartsOf(around.config, around.bus));
+  Appliance appliance(shared);
+  StoreAccess access(shared.loop, shared.storage, shared.store_thread, shared.notices);
   EXPECT_THAT(testing::MessageOf<IoError>([&] { (void)MakeWebSettings(access)->GetSettings(); }),
               HasSubstr("what is stored cannot be read: the stored settings cannot be read: "))
       << "the page goes by this sentence";
@@ -242,55 +258,76 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
 TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
   Surroundings around;
   {
-    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
-    EXPECT_TRUE(appliance.upkeep().BackupTarget().empty());
+    SharedParts shared(around.loop, PartsOf(around.config, around.bus));
+    Appliance appliance(shared);
+    EXPECT_TRUE(shared.upkeep.BackupTarget().empty());
     std::optional<std::string> made, refused;
-    appliance.upkeep().BackUp({.user = "anna", .address = {}}, around.folder / "backup",
-                              [&](const std::string& error, const BackupReport& report) {
-                                made = error;
-                                EXPECT_EQ(report.files, 1U);
-                              });
-    appliance.upkeep().BackUp(
+    shared.upkeep.BackUp({.user = "anna", .address = {}}, around.folder / "backup",
+                         [&](const Message& error, const BackupReport& report) {
+                           made = error.English();
+                           EXPECT_EQ(report.files, 1U);
+                         });
+    shared.upkeep.BackUp(
         {.user = "anna", .address = {}}, "/proc/backup",
-        [&](const std::string& error, const BackupReport&) { refused = error; });
+        [&](const Message& error, const BackupReport&) { refused = error.English(); });
     EXPECT_FALSE(made || refused) << "the loop does not wait";
     EXPECT_TRUE(RunUntil(around.loop, [&] { return made && refused; }));
     EXPECT_EQ(made, "");
     EXPECT_THAT(refused.value_or(""), HasSubstr("/proc"));
   }
   EXPECT_EQ(RestoreBackup(around.folder / "backup", around.folder / "restored").files, 1U);
-  // With a key in the configuration every backup is encrypted, the clock's and the page's too.
-  std::ofstream(around.folder / "key") << "a passphrase of some length\n";
-  fs::permissions(around.folder / "key", fs::perms::owner_read | fs::perms::owner_write);
+  // With recipients in the configuration every backup is encrypted, the clock's and the page's too.
   {
-    ApplianceConfig& appliance_config = around.config.appliance;
-    appliance_config.backup_key_file = around.folder / "key";
+    around.config.appliance.backup_recipients = AgeRecipients({testing::kRecipient});
     EventLoop another;
-    Appliance appliance(another, PartsOf(around.config, around.bus));
-    std::optional<std::string> made, refused;
-    appliance.upkeep().BackUp({.user = "anna", .address = {}}, around.folder / "sealed",
-                              [&](const std::string& error, const BackupReport&) { made = error; });
-    appliance.upkeep().BackUp(
-        {.user = "anna", .address = {}}, around.folder / "none",
-        [&](const std::string& error, const BackupReport&) { refused = error; },
-        around.folder / "no-such-key");
-    EXPECT_TRUE(RunUntil(another, [&] { return made && refused; }));
+    SharedParts shared(another, PartsOf(around.config, around.bus));
+    Appliance appliance(shared);
+    std::optional<std::string> made, made_for_other;
+    shared.upkeep.BackUp(
+        {.user = "anna", .address = {}}, around.folder / "sealed",
+        [&](const Message& error, const BackupReport&) { made = error.English(); });
+    shared.upkeep.BackUp(
+        {.user = "anna", .address = {}}, around.folder / "other",
+        [&](const Message& error, const BackupReport& report) {
+          made_for_other = error.English() + report.target.string();
+        },
+        AgeRecipients({testing::kOtherRecipient}));
+    EXPECT_TRUE(RunUntil(another, [&] { return made && made_for_other; }));
     EXPECT_EQ(made, "");
-    EXPECT_THAT(refused.value_or(""), HasSubstr("no-such-key"));
-    EXPECT_FALSE(fs::exists(around.folder / "none"));
+    EXPECT_EQ(made_for_other, (around.folder / "other.tar.age").string());
   }
-  EXPECT_THROW((void)RestoreBackup(around.folder / "sealed", around.folder / "opened"), DataError);
-  const BackupSecret secret(around.folder / "key");
-  EXPECT_EQ(RestoreBackup(around.folder / "sealed", around.folder / "opened", {}, &secret).files,
-            1U);
+  std::ofstream(around.folder / "id") << testing::kIdentity;
+  const AgeIdentity identity(around.folder / "id");
+  const BackupKeys keys{.identity = &identity};
+  EXPECT_EQ(
+      RestoreBackup(around.folder / "sealed.tar.age", around.folder / "opened", {}, keys).files,
+      1U);
+  EXPECT_THROW(
+      (void)RestoreBackup(around.folder / "other.tar.age", around.folder / "unopened", {}, keys),
+      DataError);
+  // Where 0.2.0 encrypted, nothing is written plain because the new keys are missing.
+  {
+    around.config.appliance.backup_recipients = {};
+    around.config.appliance.backup_key_file = around.folder / "key";
+    EventLoop another;
+    SharedParts shared(another, PartsOf(around.config, around.bus));
+    Appliance appliance(shared);
+    std::string refused;
+    shared.upkeep.BackUp(
+        {.user = "anna", .address = {}}, around.folder / "plain",
+        [&](const Message& error, const BackupReport&) { refused = error.English(); });
+    EXPECT_THAT(refused, HasSubstr("backup_recipients"));
+    EXPECT_FALSE(fs::exists(around.folder / "plain"));
+  }
   {
     std::ofstream(around.config.appliance.state / "plumb.db") << std::string(20000, 'x');
     EventLoop another;
-    Appliance appliance(another, PartsOf(around.config, around.bus));
+    SharedParts shared(another, PartsOf(around.config, around.bus));
+    Appliance appliance(shared);
     std::string answer;
-    appliance.upkeep().BackUp(
+    shared.upkeep.BackUp(
         {.user = "anna", .address = {}}, around.folder / "other",
-        [&](const std::string& error, const BackupReport&) { answer = error; });
+        [&](const Message& error, const BackupReport&) { answer = error.English(); });
     EXPECT_THAT(answer, HasSubstr("safe mode"));
   }
 }
@@ -309,14 +346,16 @@ TEST(ApplianceStorage, ABackupBesideTheScansIsWarnedOf) {
     if (!is_beside) around.config.appliance.state = memory / "state";
     around.config.appliance.backup_folder = around.folder / "backup";
     {
-      Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+      SharedParts shared(around.loop, PartsOf(around.config, around.bus));
+      Appliance appliance(shared);
       std::optional<std::string> made;
-      appliance.upkeep().BackUp(
-          {.user = "anna", .address = {}}, appliance.upkeep().BackupTarget(),
-          [&](const std::string& error, const BackupReport&) { made = error; });
+      shared.upkeep.BackUp(
+          {.user = "anna", .address = {}}, shared.upkeep.BackupTarget(),
+          [&](const Message& error, const BackupReport&) { made = error.English(); });
       EXPECT_TRUE(RunUntil(around.loop, [&] { return made.has_value(); }));
       EXPECT_EQ(made, "");
-      const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
+      const std::vector<std::string> warnings =
+          EnglishTexts(appliance.WebStatus().storage.warnings);
       EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(),
                               [](const std::string& warning) {
                                 return warning.find("lies on the disk of the scans") !=
@@ -331,11 +370,12 @@ TEST(ApplianceStorage, ABackupBesideTheScansIsWarnedOf) {
 TEST(ApplianceStorage, ABackupInMemoryIsRefused) {
   Surroundings around;
   const fs::path memory = InMemory(around);
-  Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+  SharedParts shared(around.loop, PartsOf(around.config, around.bus));
+  Appliance appliance(shared);
   std::optional<std::string> refused;
-  appliance.upkeep().BackUp(
+  shared.upkeep.BackUp(
       {.user = "anna", .address = {}}, memory,
-      [&](const std::string& error, const BackupReport&) { refused = error; });
+      [&](const Message& error, const BackupReport&) { refused = error.English(); });
   EXPECT_TRUE(RunUntil(around.loop, [&] { return refused.has_value(); }));
   EXPECT_THAT(refused.value_or(""), HasSubstr("is empty after a restart of the machine"));
   EXPECT_FALSE(fs::exists(memory));
@@ -351,17 +391,17 @@ class StorageRetryTest : public testing::ApplianceTest {
   [[nodiscard]] fs::path state() const { return folder_ / "state"; }
   [[nodiscard]] std::string Fault() {
     std::string fault;
-    On([&] { fault = appliance_->storage_fault(); });
+    On([&] { fault = shared_->storage.fault().English(); });
     return fault;
   }
   [[nodiscard]] std::vector<AuditEntry> Recoveries() const {
-    return appliance_->store()->audit.Find({0, 100, "storage.recovered"});
+    return shared_->store->audit.Find({0, 100, "storage.recovered"});
   }
   /// Waits until several attempts to leave safe mode have failed.
   void LetItTryInVain() {
     std::size_t before = 0;
-    On([&] { before = appliance_->storage().num_retries(); });
-    ASSERT_TRUE(Becomes([&] { return appliance_->storage().num_retries() >= before + 5; }));
+    On([&] { before = shared_->storage.num_retries(); });
+    ASSERT_TRUE(Becomes([&] { return shared_->storage.num_retries() >= before + 5; }));
   }
 };
 
@@ -372,25 +412,25 @@ TEST_F(StorageRetryTest, SafeModeEndsWhenWhatIsStoredCanBeReadAgainAndNotBefore)
     Database direct(state() / "plumb.db", Database::Access::kReadWrite);
     direct.Execute("ALTER TABLE checks RENAME TO away");
     On([&] { (void)appliance_->WebStatus(); });
-    ASSERT_TRUE(Becomes([&] { return !appliance_->storage_fault().empty(); }));
+    ASSERT_TRUE(Becomes([&] { return !shared_->storage.fault().empty(); }));
     const std::string fault = Fault();
     LetItTryInVain();
     On([&] {
-      EXPECT_EQ(appliance_->storage_fault(), fault);
+      EXPECT_EQ(shared_->storage.fault().English(), fault);
       EXPECT_EQ(appliance_->WebStatus().state, ApplianceState::kFault);
       EXPECT_FALSE(appliance_->health().ok);
       EXPECT_EQ(Recoveries().size(), 0U);
     });
     direct.Execute("ALTER TABLE away RENAME TO checks");
-    ASSERT_TRUE(Becomes([&] { return appliance_->storage_fault().empty(); }));
+    ASSERT_TRUE(Becomes([&] { return shared_->storage.fault().empty(); }));
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().state, ApplianceState::kReady);
-      EXPECT_EQ(appliance_->WebStatus().fault, "");
-      EXPECT_TRUE(appliance_->health().ok) << appliance_->health().reason;
+      EXPECT_EQ(appliance_->WebStatus().fault.English(), "");
+      EXPECT_TRUE(appliance_->health().ok) << appliance_->health().reason.English();
       ASSERT_EQ(Recoveries().size(), 1U);
-      EXPECT_EQ(Recoveries()[0].detail, fault);
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "") << "scans go on";
-      EXPECT_EQ(appliance_->Cancel(kTester), "");
+      EXPECT_EQ(Recoveries()[0].detail.English(), fault);
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "") << "scans go on";
+      EXPECT_EQ(appliance_->Cancel(kTester).English(), "");
     });
   });
 }
@@ -423,16 +463,15 @@ TEST_F(StorageRetryTest, AStoreThatCouldNotBeOpenedIsOpenedWhenItsScansAreThere)
     EXPECT_THAT(Fault(), HasSubstr("cannot be seen"));
     LetItTryInVain();
     EXPECT_THAT(Fault(), HasSubstr("cannot be seen"));
-    EXPECT_THROW((void)appliance_->store()->patients.Add(kTester, "B", ""), DiskRefused)
-        << "read-only";
-    EXPECT_EQ(appliance_->store()->patients.List().size(), 1U);
+    EXPECT_THROW((void)shared_->store->patients.Add(kTester, "B", ""), DiskRefused) << "read-only";
+    EXPECT_EQ(shared_->store->patients.List().size(), 1U);
     fs::rename(folder_ / "away", state() / "scans");
-    ASSERT_TRUE(Becomes([&] { return appliance_->storage_fault().empty(); }));
+    ASSERT_TRUE(Becomes([&] { return shared_->storage.fault().empty(); }));
     On([&] {
-      EXPECT_EQ(appliance_->store()->scans.List(patient, 10).size(), 3U);
-      EXPECT_NE(appliance_->store()->patients.Add(kTester, "B", ""), "");
+      EXPECT_EQ(shared_->store->scans.List(patient, 10).size(), 3U);
+      EXPECT_NE(shared_->store->patients.Add(kTester, "B", ""), "");
       EXPECT_EQ(Recoveries().size(), 1U);
-      EXPECT_TRUE(appliance_->health().ok) << appliance_->health().reason;
+      EXPECT_TRUE(appliance_->health().ok) << appliance_->health().reason.English();
       EXPECT_EQ(appliance_->WebStatus().state, ApplianceState::kNoSensor);
     });
   });
@@ -446,7 +485,8 @@ TEST_F(StorageRetryTest, ScansThatAreConfirmedAsLostEndSafeModeAndAreInTheLog) {
     const auto confirm = [&](int number) {
       return Becomes([&] {  // a try may hold the folder at this moment
         try {
-          (void)RecoverUnit({.lost_scans = number, .backup = {}, .key_file = {}}, state(), {});
+          (void)RecoverUnit({.lost_scans = number, .backup = {}, .key_file = {}, .identity = {}},
+                            state(), {});
           return true;
         } catch (const DataError&) {
           return false;
@@ -457,14 +497,15 @@ TEST_F(StorageRetryTest, ScansThatAreConfirmedAsLostEndSafeModeAndAreInTheLog) {
     LetItTryInVain();
     EXPECT_THAT(Fault(), HasSubstr("lost_scans = 3"));
     ASSERT_TRUE(confirm(3));
-    ASSERT_TRUE(Becomes([&] { return appliance_->storage_fault().empty(); }));
+    ASSERT_TRUE(Becomes([&] { return shared_->storage.fault().empty(); }));
     On([&] {
-      const auto entries = appliance_->store()->audit.Find({0, 10, "scans.lost"});
+      const auto entries = shared_->store->audit.Find({0, 10, "scans.lost"});
       ASSERT_EQ(entries.size(), 1U);
-      EXPECT_THAT(entries[0].detail, HasSubstr("3 of 3"));
-      EXPECT_EQ(appliance_->store()->scans.List(patient, 10).size(), 3U);
+      EXPECT_THAT(entries[0].detail.English(), HasSubstr("3 of 3"));
+      EXPECT_EQ(shared_->store->scans.List(patient, 10).size(), 3U);
     });
-    EXPECT_THROW((void)RecoverUnit({.lost_scans = 3, .backup = {}, .key_file = {}}, state(), {}),
+    EXPECT_THROW((void)RecoverUnit({.lost_scans = 3, .backup = {}, .key_file = {}, .identity = {}},
+                                   state(), {}),
                  DataError)
         << "a unit that works is left alone";
   });
@@ -494,18 +535,20 @@ TEST(ApplianceStorage, ScansThatWereLostAreAWarningUntilTheyAreBack) {
   }
   fs::rename(scans / last, around.folder / "lost");
   const auto warns = [](Appliance& appliance) {
-    const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
+    const std::vector<std::string> warnings = EnglishTexts(appliance.WebStatus().storage.warnings);
     return std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
       return warning.starts_with("Files of some stored scans (1) are missing or changed");
     });
   };
   {
-    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+    SharedParts shared(around.loop, PartsOf(around.config, around.bus));
+    Appliance appliance(shared);
     EXPECT_TRUE(RunUntil(around.loop, [&] { return warns(appliance); }));
   }
   fs::rename(around.folder / "lost", scans / last);
   EventLoop another;
-  Appliance appliance(another, PartsOf(around.config, around.bus));
+  SharedParts shared(another, PartsOf(around.config, around.bus));
+  Appliance appliance(shared);
   RunFor(another, std::chrono::milliseconds(1500));
   EXPECT_FALSE(warns(appliance));
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Workers, button, log, surface and displays of the appliance.
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -13,10 +14,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/message_json.hpp"
 #include "daemon/files/compact_map.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
+#include "words/scan.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 namespace {
@@ -42,10 +46,10 @@ TEST_F(ApplianceTest, AWorkerIsNotAliveWhileAResultIsComputedWithoutProgress) {
   Play([&] {
     MakeReady();
     On([&] {
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "");
       EXPECT_EQ(appliance_->state().phase, ApplianceState::kScanning);
       EXPECT_TRUE(appliance_->WorkersAreAlive()) << "it waits for frames";
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "");
       EXPECT_EQ(appliance_->state().phase, ApplianceState::kWorking);
       EXPECT_FALSE(appliance_->WorkersAreAlive());
     });
@@ -63,7 +67,7 @@ TEST_F(ApplianceTest, ASurfaceIsPackedOnceAndAFailureIsNotKept) {
     };
     std::vector<Scan> scans;
     On([&] {
-      Store& store = *appliance_->store();
+      Store& store = *shared_->store.get();
       const std::string patient = store.patients.Add(kTester, "P-1", "");
       for (int i = 0; i < 3; ++i) {
         const std::string id = store.scans.Begin({.patient_id = patient,
@@ -91,7 +95,7 @@ TEST_F(ApplianceTest, ASurfaceIsPackedOnceAndAFailureIsNotKept) {
     EXPECT_NE(packed(scans[1]), packed(scans[2]));
     EXPECT_FALSE(packed(scans[0])) << "only two are kept";
     EXPECT_FALSE(services_->services().scans.CompactMap(scans[1].id, "heightmap"));
-    On([&] { appliance_->store()->removal.RemoveScan(kTester, scans[2].id, "a test"); });
+    On([&] { shared_->store->removal.RemoveScan(kTester, scans[2].id, "a test"); });
     EXPECT_FALSE(packed(scans[2])) << "gone with its scan";
   });
 }
@@ -102,11 +106,11 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
   const Actor tess{.user = "tess", .address = {}};
   // "code number kind" of an action's newest entry.
   const auto logged = [&](const std::string& action) {
-    const auto entries = appliance_->store()->audit.Find({0, 1, action});
+    const auto entries = shared_->store->audit.Find({0, 1, action});
     if (entries.empty()) return std::string("nothing");
     const auto& about = entries[0].about;
     return (about ? about->patient_code + " " + std::to_string(about->number) : "no subject:") +
-           " " + entries[0].detail;
+           " " + entries[0].detail.English();
   };
   Play([&] {
     MakeReady();
@@ -123,10 +127,10 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
       EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     };
     scan("no subject: unassigned");
-    On([&] { EXPECT_EQ(appliance_->OpenCheck(tess), ""); });
-    scan("no subject: daily_check");
+    On([&] { EXPECT_EQ(appliance_->OpenCheck(tess).English(), ""); });
+    scan("no subject: daily check");
     On([&] {
-      Store& store = *appliance_->store();
+      Store& store = *shared_->store.get();
       (void)store.checks.Add(
           tess, appliance_->WebStatus().sensor.serial,
           TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
@@ -165,7 +169,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
   // "who action: code number, detail" of each entry about scans, the oldest first.
   const auto logged = [&] {
     std::vector<std::string> lines;
-    for (const AuditEntry& entry : appliance_->store()->audit.Find({0, 100, ""})) {
+    for (const AuditEntry& entry : shared_->store->audit.Find({0, 100, ""})) {
       if (!entry.action.starts_with("scan.") && entry.action != "cancel" &&
           entry.action != "press" && entry.action != "session.close")
         continue;
@@ -173,7 +177,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
       lines.insert(lines.begin(),
                    entry.user + " " + entry.action + ": " +
                        (about ? about->patient_code + " " + std::to_string(about->number) : "") +
-                       ", " + entry.detail);
+                       ", " + entry.detail.English());
     }
     return lines;
   };
@@ -197,7 +201,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     std::string patient;
     On([&] {
-      Store& store = *appliance_->store();
+      Store& store = *shared_->store.get();
       patient = store.patients.Add(kTester, "P-1", "");
       const std::string session = store.treatments.Open(kTester, patient, ScanPurpose::kReference);
       appliance_->OpenSession(session, patient, ScanPurpose::kReference, "", kTester);
@@ -207,7 +211,7 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
     EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ApplianceState::kFault; }));
     On([&] {
       page();
-      (void)appliance_->store()->checks.Add(
+      (void)shared_->store->checks.Add(
           kTester, appliance_->WebStatus().sensor.serial,
           TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
       page();
@@ -223,19 +227,65 @@ TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
   });
 }
 
+TEST_F(ApplianceTest, StatusAndEventsHaveAMessageBesideEachSentence) {
+  const std::vector<std::string> keys = {"reason", "rolled_back", "profile_fault", "step"};
+  std::vector<nlohmann::ordered_json> told;
+  const auto look = [&](const nlohmann::ordered_json& json) {
+    for (const std::string& key : keys) {
+      if (!json.contains(key)) continue;
+      ASSERT_TRUE(json.contains(key + "_message")) << json;
+      if (json[key] == "") continue;
+      EXPECT_EQ(MessageFromJson(json[key + "_message"], "").English(), json[key]);
+      told.push_back(json[key + "_message"]);
+    }
+  };
+  Play([&] {
+    On([&] {
+      shared_->notices.SetWatchers(
+          [&](const std::string& line) { look(nlohmann::ordered_json::parse(line)); });
+      EXPECT_FALSE(appliance_->Press(ButtonPress::kShort, kTester).empty()) << "without a sensor";
+      appliance_->SetRolledBack(say::upkeep::RestartNotCarriedOut());
+      const nlohmann::ordered_json status(appliance_->StatusJson());
+      look(status);
+      look(status["scan"]);
+      look(status["sensor"]);
+      EXPECT_EQ(MessagesFromJson(status["warning_messages"],
+                                 status["warnings"].get<std::vector<std::string>>()),
+                appliance_->WebStatus().storage.warnings);
+      shared_->notices.SetWatchers({});
+    });
+  });
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[0]["id"], say::scan::kPlugSensorIn.name);
+  EXPECT_EQ(told[1]["id"], say::upkeep::kRestartNotCarriedOut.name);
+}
+
+TEST_F(ApplianceTest, GuessesAtPasswordsAreShownByTheLightAndNothingStops) {
+  Play([&] {
+    MakeReady();
+    On([&] {
+      appliance_->SetPage(
+          {.url = {}, .certificate = {}, .warnings = {}, .are_guesses_running = true});
+      EXPECT_EQ(appliance_->WebStatus().light, "ready_guessed");
+      appliance_->SetPage({});
+      EXPECT_EQ(appliance_->WebStatus().light, "ready");
+    });
+  });
+}
+
 TEST_F(ApplianceTest, ARollBackIsToldByStatusAndLightUntilItIsSeen) {
   Play([&] {
     MakeReady();
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().light, "ready");
-      appliance_->SetRolledBack("the machine has gone back");
+      appliance_->SetRolledBack(Message::Verbatim("the machine has gone back"));
       EXPECT_EQ(appliance_->WebStatus().light, "ready_rolled_back");
-      EXPECT_EQ(appliance_->WebStatus().rolled_back, "the machine has gone back");
+      EXPECT_EQ(appliance_->WebStatus().rolled_back.English(), "the machine has gone back");
       EXPECT_THAT(appliance_->StatusJson().dump(),
                   ::testing::HasSubstr("the machine has gone back"));
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "") << "scans go on";
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "") << "scans go on";
       EXPECT_EQ(appliance_->WebStatus().light, "scanning");
-      EXPECT_EQ(appliance_->Cancel(kTester), "");
+      EXPECT_EQ(appliance_->Cancel(kTester).English(), "");
     });
     EXPECT_TRUE(Becomes([&] { return appliance_->WebStatus().light == "ready_rolled_back"; }));
     On([&] {
@@ -250,7 +300,7 @@ TEST_F(ApplianceTest, TheProvisionedDisplayIsPairedWhenItsStoreOpens) {
   WriteWholeFile(folder_ / "state" / "provisioned-display", std::string(64, 'a') + " Room 1\n");
   Play([&] {
     On([&] {
-      const std::vector<Display> paired = appliance_->store()->displays.List();
+      const std::vector<Display> paired = shared_->store->displays.List();
       ASSERT_EQ(paired.size(), 1U);
       EXPECT_EQ(paired[0].name, "Room 1");
       EXPECT_EQ(paired[0].token_hash, std::string(64, 'a'));
@@ -264,8 +314,8 @@ TEST_F(ApplianceTest, AProvisionedDisplayThatCannotBeReadDoesNotPreventScanning)
   Play([&] {
     MakeReady();
     On([&] {
-      EXPECT_EQ(appliance_->storage_fault(), "");
-      EXPECT_TRUE(appliance_->store()->displays.List().empty());
+      EXPECT_EQ(shared_->storage.fault().English(), "");
+      EXPECT_TRUE(shared_->store->displays.List().empty());
     });
   });
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Backups, checks and removals by an appliance whose ticks take a millisecond instead of a second.
 #include <algorithm>
 #include <atomic>
@@ -9,6 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/archive/backup.hpp"
+#include "daemon/state_folder/outside_note.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
 #include "tests/unit/records/scan_folder.hpp"
@@ -34,12 +37,13 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   [[nodiscard]] fs::path state() const { return folder_ / "state"; }
   /// On the loop's thread.
   [[nodiscard]] bool Warns(const std::string& begin) const {
-    const std::vector<std::string> warnings = appliance_->WebStatus().storage.warnings;
+    const std::vector<std::string> warnings =
+        EnglishTexts(appliance_->WebStatus().storage.warnings);
     return std::any_of(warnings.begin(), warnings.end(),
                        [&](const std::string& warning) { return warning.starts_with(begin); });
   }
   [[nodiscard]] std::vector<AuditEntry> Backups() const {
-    return appliance_->store()->audit.Find({0, 100, "backup.make"});
+    return shared_->store->audit.Find({0, 100, "backup.make"});
   }
   /// Like Becomes(), but leaves the processor to a backup, which gives way to everything else.
   [[nodiscard]] bool Comes(const std::function<bool()>& holds) {
@@ -53,7 +57,7 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   /// Until the store's thread has done everything that was posted to it.
   void WaitForStore() {
     const auto done = std::make_shared<std::promise<void>>();
-    On([&] { EXPECT_TRUE(appliance_->store_thread().Post([done] { done->set_value(); })); });
+    On([&] { EXPECT_TRUE(shared_->store_thread.Post([done] { done->set_value(); })); });
     done->get_future().wait();
   }
   /// A patient's reference and two more scans; their numbers.
@@ -71,7 +75,7 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   /// Numbers of the stored scans, the oldest first. On the loop's thread.
   [[nodiscard]] std::vector<std::string> Stored() const {
     std::vector<std::string> ids;
-    for (const Scan& scan : appliance_->store()->scans.List("", 100)) ids.push_back(scan.id);
+    for (const Scan& scan : shared_->store->scans.List("", 100)) ids.push_back(scan.id);
     std::sort(ids.begin(), ids.end());
     return ids;
   }
@@ -92,7 +96,7 @@ TEST_F(ApplianceUpkeepTest, ABackupIsMadeWhenItIsDueAndNotBefore) {
     On([&] {
       ASSERT_EQ(Backups().size(), 1U) << "it is not due again";
       EXPECT_EQ(Backups()[0].user, "plumbd");
-      EXPECT_THAT(Backups()[0].detail, ::testing::HasSubstr("3 scans"));
+      EXPECT_THAT(Backups()[0].detail.English(), ::testing::HasSubstr("3 scans"));
     });
     const auto make_older = [&](std::chrono::hours age) {
       for (const auto& entry : fs::recursive_directory_iterator(folder_ / "backups")) {
@@ -185,7 +189,7 @@ TEST_F(ApplianceUpkeepTest, AFileThatChangesWhileTheApplianceRunsIsAWarning) {
     ChangeDatabase("UPDATE scans SET checked_at = 1");  // as if a day had passed
     EXPECT_TRUE(Comes([&] { return Warns(warning); }));
     On([&] {
-      const auto entries = appliance_->store()->audit.Find({0, 10, "scan.unavailable"});
+      const auto entries = shared_->store->audit.Find({0, 10, "scan.unavailable"});
       ASSERT_EQ(entries.size(), 1U);
       EXPECT_EQ(entries[0].subject, scan);
     });
@@ -199,14 +203,14 @@ TEST_F(ApplianceUpkeepTest, ARecordingHasADigestSoonAfterItsScan) {
     WaitForTicks(50);  // the first search has found nothing
     std::string scan;
     On([&] {
-      Store& store = *appliance_->store();
+      Store& store = *shared_->store.get();
       scan = testing::StoreScan(store, "", [](const fs::path& folder) {
         testing::FillScan(folder);
         fs::create_directory(folder / "recording");
         WriteWholeFile(folder / "recording" / "rgb.txt", std::string_view("images"));
       });
-      EXPECT_EQ(appliance_->StartSweep(kTester), "");
-      EXPECT_EQ(appliance_->Cancel(kTester), "");
+      EXPECT_EQ(appliance_->StartSweep(kTester).English(), "");
+      EXPECT_EQ(appliance_->Cancel(kTester).English(), "");
     });
     const auto has_digest = [&] {
       Database database(state() / "plumb.db", Database::Access::kReadOnly);
@@ -214,6 +218,45 @@ TEST_F(ApplianceUpkeepTest, ARecordingHasADigestSoonAfterItsScan) {
     };
     EXPECT_TRUE(Becomes(has_digest, std::chrono::seconds(10), milliseconds(100)));
   });
+}
+
+TEST_F(ApplianceUpkeepTest, WhatIsInTheLogOfWritesAloneGoesIntoTheDatabaseSoon) {
+  (void)StoreScans();
+  const fs::path log = state() / "plumb.db-wal";
+  Play([&] {
+    MakeReady();
+    On([&] { shared_->store->audit.Log(kTester, "login", "", Message()); });
+    EXPECT_TRUE(Comes([&] { return fs::file_size(log) == 0; }));
+  });
+}
+
+constexpr const char* kRolledBack = "The data of this unit is older than the note";
+
+TEST_F(ApplianceUpkeepTest, TheEndOfTheLogIsNotedBesideTheBackups) {
+  const fs::path backups = folder_ / "backups";
+  parts_.config.appliance.backup_folder = backups;
+  fs::create_directories(backups);
+  const std::size_t num_scans = StoreScans().size();
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return ReadOutsideNote(backups).has_value(); }));
+    On([&] { EXPECT_FALSE(Warns(kRolledBack)); });
+  });
+  EXPECT_EQ(ReadOutsideNote(backups)->last_scan, static_cast<std::int64_t>(num_scans));
+  EXPECT_FALSE(ReadOutsideNote(backups)->heads.empty());
+}
+
+TEST_F(ApplianceUpkeepTest, AStateFolderThatWasRolledBackIsAWarning) {
+  const fs::path backups = folder_ / "backups";
+  parts_.config.appliance.backup_folder = backups;
+  fs::create_directories(backups);
+  (void)StoreScans();
+  WriteOutsideNote(backups,
+                   {.last_scan = 41, .heads = {{.number = 100, .chain = "of another log"}}});
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Warns(kRolledBack); }));
+    On([&] { EXPECT_EQ(testing::StoreScan(*shared_->store.get(), ""), "000042"); });
+  });
+  EXPECT_EQ(ReadOutsideNote(backups)->last_scan, 41) << "it stays as it was";
 }
 
 TEST_F(ApplianceUpkeepTest, FoldersThatWereSetAsideAreAWarning) {
@@ -228,16 +271,83 @@ TEST_F(ApplianceUpkeepTest, FoldersThatWereSetAsideAreAWarning) {
 
 TEST_F(ApplianceUpkeepTest, AboveTheConfiguredQuotaScansAreRemovedButNotReferences) {
   parts_.config.appliance.quota_gb = 1e-9;
+  parts_.removal_rules = testing::kAtOnce;
   const std::vector<std::string> scans = StoreScans();
+  std::ofstream(state() / "remove-without-backup") << "";
   Play([&] {
     EXPECT_TRUE(Comes([&] { return Stored() == std::vector{scans[0]}; }));
     On([&] {
-      const auto entries = appliance_->store()->audit.Find({0, 10, "scan.remove"});
+      const auto entries = shared_->store->audit.Find({0, 10, "scan.remove"});
       ASSERT_EQ(entries.size(), 2U);
-      EXPECT_EQ(entries[0].detail, "quota");
-      (void)testing::StoreScan(*appliance_->store(), "1");
+      EXPECT_EQ(entries[0].detail.English(), "quota");
+      (void)testing::StoreScan(*shared_->store.get(), "1");
     });
     EXPECT_TRUE(Comes([&] { return Stored() == std::vector{scans[0]}; })) << "and again later";
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, WithoutABackupNothingIsRemovedAndThatIsSaid) {
+  parts_.config.appliance.quota_gb = 1e-9;
+  parts_.removal_rules = testing::kAtOnce;
+  const std::vector<std::string> scans = StoreScans();
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Warns("Scans are due to be removed"); }));
+    WaitForTicks(4000);
+    WaitForStore();
+    On([&] { EXPECT_EQ(Stored(), scans); });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, ARemovalIsAnnounced) {
+  parts_.config.appliance.quota_gb = 1e-9;
+  const std::vector<std::string> scans = StoreScans();
+  std::ofstream(state() / "remove-without-backup") << "";
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Warns("In a day, scans will be removed"); }));
+    On([&] { EXPECT_EQ(Stored(), scans); });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, WhatAVerifiedBackupHoldsIsRemoved) {
+  const fs::path backups = folder_ / "backups";
+  parts_.config.appliance.backup_folder = backups;
+  parts_.config.appliance.quota_gb = 1e-9;
+  parts_.removal_rules.notice = std::chrono::seconds(0);
+  const std::vector<std::string> scans = StoreScans();
+  Play([&] { EXPECT_TRUE(Comes([&] { return Stored() == std::vector{scans[0]}; })); });
+}
+
+TEST_F(ApplianceUpkeepTest, ABackupThatChangesIsAWarning) {
+  const fs::path backups = folder_ / "backups";
+  parts_.config.appliance.backup_folder = backups;
+  (void)StoreScans();
+  const auto checked = [&](const std::string& what) {
+    return Database(state() / "plumb.db", Database::Access::kReadOnly)
+        .Has("SELECT 1 FROM backups WHERE " + what);
+  };
+  Play([&] {
+    ASSERT_TRUE(Comes([&] { return checked("verified_at > 0"); }));
+    On([&] { EXPECT_FALSE(Warns("A backup cannot be relied on")); });
+    for (const auto& entry : fs::recursive_directory_iterator(backups)) {
+      if (entry.path().filename() != "cloud.ply") continue;
+      fs::permissions(entry.path(), fs::perms::owner_write, fs::perm_options::add);
+      std::ofstream(entry.path(), std::ios::app) << "x";
+      break;
+    }
+    On([&] { shared_->store->database().ForChanges()->Run("UPDATE backups SET checked_at = 0"); });
+    EXPECT_TRUE(Comes([&] { return Warns("A backup cannot be relied on"); }));
+    EXPECT_FALSE(checked("verified_at > 0"));
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, WhatARestoreReplacedIsAWarning) {
+  (void)StoreScans();
+  (void)BackUpStopped(state(), folder_ / "backup");
+  (void)RestoreOver(folder_ / "backup", state());
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Warns("Data from before a restore"); }));
+    fs::remove_all(state() / "before-restore-1");
+    EXPECT_TRUE(Comes([&] { return !Warns("Data from before a restore"); }));
   });
 }
 
@@ -248,14 +358,14 @@ TEST_F(ApplianceUpkeepTest, AChangedConfigurationIsInTheLogWithItsKeys) {
     return config;
   };
   parts_.config = with("[appliance]\nwarm_up_min = 15\n[web]\nlisten = \"127.0.0.1:1\"\n");
-  const auto entries = [&] { return appliance_->store()->audit.Find({0, 10, "config.reload"}); };
+  const auto entries = [&] { return shared_->store->audit.Find({0, 10, "config.reload"}); };
   Play([&] {
     const Config next = with("[appliance]\nwarm_up_min = 20\nquota_gb = 5.0\n");
     On([&] { appliance_->Reload(next); });
     ASSERT_TRUE(Comes([&] { return entries().size() == 1; }));
     On([&] {
       EXPECT_EQ(entries()[0].user, "plumbd");
-      EXPECT_EQ(entries()[0].detail,
+      EXPECT_EQ(entries()[0].detail.English(),
                 R"({"appliance.quota_gb":[null,"5.0"],"appliance.warm_up_min":["15","20"],)"
                 R"("web.listen":["'127.0.0.1:1'",null,"restart"]})");
       appliance_->Reload(next);
@@ -271,6 +381,15 @@ class ApplianceRetentionTest : public ApplianceUpkeepTest {
     scans_ = StoreScans(/*retention_days=*/30);
     constexpr std::int64_t kTwoMonths_us = 60LL * 24 * 3600 * 1'000'000;
     ChangeDatabase("UPDATE scans SET started_at = started_at - " + std::to_string(kTwoMonths_us));
+    std::ofstream(state() / "remove-without-backup") << "";
+    parts_.removal_rules = testing::kAtOnce;
+    parts_.storage.is_clock_kept = [] { return false; };
+  }
+  /// As if the unit had been off for a month; or the clock is wrong.
+  void LetClockLeap() const {
+    constexpr std::int64_t kMonth_us = 30LL * 24 * 3600 * 1'000'000;
+    ChangeDatabase("DROP TRIGGER audit_no_update; UPDATE audit SET time = time - " +
+                   std::to_string(kMonth_us));
   }
   std::vector<std::string> scans_;
 };
@@ -280,9 +399,28 @@ TEST_F(ApplianceRetentionTest, OldScansAreRemovedByATrustedClock) {
   Play([&] {
     EXPECT_TRUE(Comes([&] { return Stored() == std::vector{scans_[0]}; }));
     On([&] {
-      EXPECT_EQ(appliance_->store()->audit.Find({0, 10, "scan.remove"})[0].detail, "retention");
+      EXPECT_EQ(shared_->store->audit.Find({0, 10, "scan.remove"})[0].detail.English(),
+                "retention");
     });
   });
+}
+
+TEST_F(ApplianceRetentionTest, AClockThatLeaptRemovesNothing) {
+  parts_.clock_trusted_after = milliseconds(200);
+  LetClockLeap();
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Warns("The clock was far ahead"); }));
+    WaitForTicks(4000);
+    WaitForStore();
+    On([&] { EXPECT_EQ(Stored(), scans_); });
+  });
+}
+
+TEST_F(ApplianceRetentionTest, AClockThatLeaptIsTrustedOnceATimeServerKeepsIt) {
+  parts_.clock_trusted_after = milliseconds(200);
+  parts_.storage.is_clock_kept = [] { return true; };
+  LetClockLeap();
+  Play([&] { EXPECT_TRUE(Comes([&] { return Stored() == std::vector{scans_[0]}; })); });
 }
 
 TEST_F(ApplianceRetentionTest, AClockThatIsNotYetTrustedRemovesNothing) {

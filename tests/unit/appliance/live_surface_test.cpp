@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // A flat table seen from above: where its surface lies and what of a region is missing is known
 // from geometry.
-#include "daemon/appliance/live_surface.hpp"
+#include "daemon/sweep/live_surface.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a person approves must be what a scan is judged by: every field of the plan, each unlike its
 // default and unlike what the room is configured with.
 #include "daemon/appliance/plan_options.hpp"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scans of a still wall: how they end, and what they report meanwhile.
 #include "daemon/appliance/scan_session.hpp"
 
@@ -79,7 +80,7 @@ TEST_F(ScanSessionTest, ClosingTheFeedEndsTheSweepWithEveryFrameThatWaited) {
   Push(12);
   session_->feed()->Close();
   const EndedScan outcome = WaitForEnd();
-  EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason;
+  EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason.English();
   EXPECT_EQ(outcome.frames, 12);
   EXPECT_EQ(outcome.frames_dropped, 0);
   EXPECT_THAT(saved_, ElementsAre(Kind::kDone));
@@ -98,8 +99,8 @@ TEST_F(ScanSessionTest, WhatIsKnownOfTheSensorReachesTheSceneAndAScanWithoutMark
     Push(12);
     session_->feed()->Close();
     const EndedScan outcome = WaitForEnd();
-    EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason;
-    EXPECT_THAT(outcome.why_not_learned, HasSubstr("0 markers"));
+    EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason.English();
+    EXPECT_THAT(outcome.why_not_learned.English(), HasSubstr("0 markers"));
     const Scene scene = ReadScene(folder_ / "scene");
     EXPECT_EQ(scene.sensor_profile.value_or(""),
               serial == std::string("A") ? "A version 1, 4 sweeps" : "");
@@ -148,7 +149,7 @@ TEST_F(ScanSessionTest, NoFramesAreNoSceneWithAReason) {
   session_->feed()->Close();
   const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kNoScene);
-  EXPECT_NE(outcome.reason, "");
+  EXPECT_NE(outcome.reason.English(), "");
 }
 
 TEST_F(ScanSessionTest, AReferenceWithoutItsMarkerIsNoneAndSaysWhatToDo) {
@@ -158,7 +159,7 @@ TEST_F(ScanSessionTest, AReferenceWithoutItsMarkerIsNoneAndSaysWhatToDo) {
   session_->feed()->Close();
   const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kNoScene);
-  EXPECT_THAT(outcome.reason, HasSubstr("reference marker"));
+  EXPECT_THAT(outcome.reason.English(), HasSubstr("reference marker"));
 }
 
 TEST_F(ScanSessionTest, AFrameOfTheWrongSizeEndsTheScanAndNotTheProcess) {
@@ -179,7 +180,7 @@ TEST_F(ScanSessionTest, AStoreThatRefusesFailsTheScanAndIsToldOfTheFailure) {
   session_->feed()->Close();
   const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kFailed);
-  EXPECT_EQ(outcome.reason, "the disk is full");
+  EXPECT_EQ(outcome.reason.English(), "the disk is full");
   EXPECT_THAT(saved_, ElementsAre(Kind::kDone, Kind::kFailed));
 }
 
@@ -187,7 +188,7 @@ TEST_F(ScanSessionTest, AStoreThatDoesNotEvenBeginFailsTheScan) {
   callbacks_.begin = []() -> std::filesystem::path { throw IoError("read-only disk"); };
   Start();
   EXPECT_EQ(WaitForEnd().kind, Kind::kFailed);
-  EXPECT_EQ(outcome_->reason, "read-only disk");
+  EXPECT_EQ(outcome_->reason.English(), "read-only disk");
 }
 
 TEST_F(ScanSessionTest, AReferenceThatCannotBeReadEndsTheSweepAsAFault) {
@@ -196,22 +197,24 @@ TEST_F(ScanSessionTest, AReferenceThatCannotBeReadEndsTheSweepAsAFault) {
   PushUntilTheEnd();
   const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kFailed) << "another sweep would not help";
-  EXPECT_THAT(outcome.reason, ::testing::AllOf(HasSubstr("nowhere"), HasSubstr("backup")));
+  EXPECT_THAT(outcome.reason.English(),
+              ::testing::AllOf(HasSubstr("nowhere"), HasSubstr("backup")));
   EXPECT_THAT(saved_, ElementsAre(Kind::kFailed));
 }
 
 TEST_F(ScanSessionTest, AReferenceThatIsNotWhatWasStoredGivesNoVerdict) {
   job_.reference_scene = folder_ / "000007" / "scene";
   job_.check_reference = [](const std::stop_token&) {
-    return std::string("scene/cloud.ply has been changed");
+    return Message::Verbatim("scene/cloud.ply has been changed");
   };
   Start();
   PushUntilTheEnd();
   const EndedScan outcome = WaitForEnd();
   EXPECT_EQ(outcome.kind, Kind::kFailed);
   EXPECT_FALSE(outcome.verdict);
-  EXPECT_THAT(outcome.reason, ::testing::AllOf(HasSubstr("scene/cloud.ply has been changed"),
-                                               HasSubstr("000007"), HasSubstr("backup")));
+  EXPECT_THAT(outcome.reason.English(),
+              ::testing::AllOf(HasSubstr("scene/cloud.ply has been changed"), HasSubstr("000007"),
+                               HasSubstr("backup")));
 }
 
 TEST_F(ScanSessionTest, AFailedSweepLeavesItsWholeRecording) {
@@ -260,7 +263,7 @@ TEST_F(ScanSessionTest, ARecordingThatCannotBeWrittenEndsTheSweepWithItsReason) 
   first_frame.get_future().wait();
   PushUntilTheEnd();
   EXPECT_EQ(WaitForEnd().kind, Kind::kFailed);
-  EXPECT_THAT(outcome_->reason, HasSubstr("0.000000.png"));
+  EXPECT_THAT(outcome_->reason.English(), HasSubstr("0.000000.png"));
 }
 
 TEST_F(ScanSessionTest, ARecordingHoldsWhatTrackingTook) {
@@ -268,7 +271,7 @@ TEST_F(ScanSessionTest, ARecordingHoldsWhatTrackingTook) {
   Start();
   Push(9);
   session_->feed()->Close();
-  EXPECT_EQ(WaitForEnd().kind, Kind::kDone) << outcome_->reason;
+  EXPECT_EQ(WaitForEnd().kind, Kind::kDone) << outcome_->reason.English();
   EXPECT_TRUE(std::filesystem::exists(folder_ / "recording" / "camera.yaml"));
   int num_images = 0;
   for ([[maybe_unused]] const auto& entry :

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every state with every event: what must hold everywhere, and the table of what each one leads to.
 #include "daemon/appliance/scan_state.hpp"
 
@@ -6,6 +7,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
@@ -17,7 +20,7 @@ using enum ApplianceState;
 using E = ScanEvent;
 using A = ScanAction;
 
-constexpr int kNumEvents = static_cast<int>(E::kStorageWorks) + 1;
+constexpr int kNumEvents = static_cast<int>(E::kMonitorEnded) + 1;
 
 bool IsRunning(const ScanState& s) { return s.phase == kScanning || s.phase == kWorking; }
 
@@ -27,7 +30,8 @@ bool IsConsistent(const ScanState& s) {
   if (s.sensor_fails && (s.has_sensor || s.fault == FaultKind::kNone)) return false;
   if (s.fault == FaultKind::kSensor && !s.sensor_fails) return false;
   if (s.phase == kFault) return s.fault != FaultKind::kNone;
-  if (s.phase == kReady) return s.has_sensor && s.fault == FaultKind::kNone;
+  if (s.phase == kReady || s.phase == kMonitoring)
+    return s.has_sensor && s.fault == FaultKind::kNone;
   if (s.phase == kNoSensor) return !s.has_sensor && s.fault == FaultKind::kNone;
   return true;
 }
@@ -61,9 +65,10 @@ void ForEveryStateAndEvent(const Check& check) {
   }
 }
 
-TEST(ScanStateTest, ReachesAllSixStatesAndOnlyConsistentOnes) {
+TEST(ScanStateTest, ReachesAllStatesAndOnlyConsistentOnes) {
   const std::vector<ScanState> states = ReachableStates();
-  for (const ApplianceState phase : {kNoSensor, kReady, kScanning, kWorking, kResult, kFault}) {
+  for (const ApplianceState phase :
+       {kNoSensor, kReady, kScanning, kWorking, kResult, kMonitoring, kFault}) {
     EXPECT_TRUE(std::any_of(states.begin(), states.end(), [&](const ScanState& s) {
       return s.phase == phase;
     })) << Name(phase);
@@ -81,10 +86,25 @@ TEST(ScanStateTest, EachRefusalSaysWhyAndEachReasonIsARefusal) {
 TEST(ScanStateTest, AScanStartsOnlyWithAWorkingSensorAndNoScanUnderWay) {
   ForEveryStateAndEvent([](const ScanState& before, E event, const ScanTransition& t) {
     if (std::count(t.actions.begin(), t.actions.end(), A::kStartScan) == 0) return;
-    EXPECT_TRUE(before.phase == kReady || before.phase == kResult);
+    EXPECT_TRUE(before.phase == kReady || before.phase == kResult || before.phase == kMonitoring);
     EXPECT_TRUE(before.has_sensor && before.fault == FaultKind::kNone);
     EXPECT_TRUE(event == E::kShortPress || event == E::kStart);
     EXPECT_EQ(t.state.phase, kScanning);
+  });
+}
+
+TEST(ScanStateTest, MonitoringBeginsAndEndsWithItsPhase) {
+  ForEveryStateAndEvent([](const ScanState& before, E event, const ScanTransition& t) {
+    const bool was = before.phase == kMonitoring, is = t.state.phase == kMonitoring;
+    EXPECT_EQ(std::count(t.actions.begin(), t.actions.end(), A::kStartMonitor), !was && is);
+    EXPECT_EQ(std::count(t.actions.begin(), t.actions.end(), A::kEndMonitor), was && !is);
+    if (!was && is) {
+      EXPECT_EQ(event, E::kMonitorStart);
+    }
+    // A sweep and monitoring share the sensor: first the one ends, then the other begins.
+    if (was && t.state.phase == kScanning) {
+      EXPECT_THAT(t.actions, ElementsAre(A::kEndMonitor, A::kStartScan));
+    }
   });
 }
 
@@ -164,10 +184,10 @@ TEST(ScanStateTest, ARefusalTellsASensorThatFailsFromNone) {
   for (const E press : {E::kShortPress, E::kStart}) {
     std::vector<E> events = result;
     events.insert(events.end(), {E::kSensorFailed, E::kScanDone, press});
-    EXPECT_THAT(After(events).refusal, testing::HasSubstr("does not work"));
+    EXPECT_TRUE(After(events).refusal.Is(say::scan::kSensorFails));
     events = result;
     events.insert(events.end(), {E::kSensorLost, E::kScanDone, press});
-    EXPECT_THAT(After(events).refusal, testing::HasSubstr("no sensor is attached"));
+    EXPECT_TRUE(After(events).refusal.Is(say::scan::kPlugSensorIn));
   }
 }
 
@@ -199,6 +219,7 @@ constexpr ScanState kInReady{.phase = kReady, .has_sensor = true};
 constexpr ScanState kInScanning{.phase = kScanning, .has_sensor = true};
 constexpr ScanState kInWorking{.phase = kWorking, .has_sensor = true};
 constexpr ScanState kInResult{.phase = kResult, .has_sensor = true};
+constexpr ScanState kInMonitoring{.phase = kMonitoring, .has_sensor = true};
 constexpr ScanState kSensorFault{
     .phase = kFault, .sensor_fails = true, .fault = FaultKind::kSensor};
 constexpr ScanState kScanFault{.phase = kFault, .has_sensor = true, .fault = FaultKind::kScan};
@@ -251,6 +272,24 @@ TEST(ScanStateTest, TheTable) {
       {kInReady, E::kStorageWorks, kInReady, {}},
       {kScanFault, E::kStorageWorks, kScanFault, {}},
       {kInScanning, E::kStorageWorks, kInScanning, {}},
+      {kInReady, E::kMonitorStart, kInMonitoring, {A::kStartMonitor}},
+      {kInResult, E::kMonitorStart, kInMonitoring, {A::kStartMonitor}},
+      {kInScanning, E::kMonitorStart, kInScanning, {A::kRefuse}},
+      {kInWorking, E::kMonitorStart, kInWorking, {A::kRefuse}},
+      {kInNoSensor, E::kMonitorStart, kInNoSensor, {A::kRefuse}},
+      {kScanFault, E::kMonitorStart, kScanFault, {A::kRefuse}},
+      {kInReady, E::kMonitorStop, kInReady, {A::kRefuse}},
+      {kInMonitoring, E::kMonitorStart, kInMonitoring, {A::kRefuse}},
+      {kInMonitoring, E::kCancel, kInMonitoring, {A::kRefuse}},
+      {kInMonitoring, E::kMonitorStop, kInReady, {A::kEndMonitor}},
+      {kInMonitoring, E::kShortPress, kInReady, {A::kEndMonitor}},
+      {kInMonitoring, E::kLongPress, kInReady, {A::kEndMonitor}},
+      {kInMonitoring, E::kMonitorEnded, kInReady, {A::kEndMonitor}},
+      {kInMonitoring, E::kStart, kInScanning, {A::kEndMonitor, A::kStartScan}},
+      {kInMonitoring, E::kSensorLost, kInNoSensor, {A::kEndMonitor}},
+      {kInMonitoring, E::kSensorFailed, kSensorFault, {A::kEndMonitor}},
+      {kInMonitoring, E::kStorageFailed, kStorageFault, {A::kEndMonitor}},
+      {kInMonitoring, E::kResultExpired, kInMonitoring, {}},
   };
   for (const Row& row : rows) {
     SCOPED_TRACE(Text(row.from, row.event));

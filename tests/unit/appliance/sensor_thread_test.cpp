@@ -1,4 +1,5 @@
-#include "daemon/appliance/sensor_thread.hpp"
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/sweep/sensor_thread.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -175,11 +176,11 @@ TEST_F(SensorThreadTest, AFailureIsToldOnceAndTriedAgain) {
   bus_.RefuseToOpen("no permission; see plumb doctor");
   bus_.Plug("A");
   EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
-  EXPECT_EQ(events_.At(1).reason, "no permission; see plumb doctor");
+  EXPECT_EQ(events_.At(1).reason.English(), "no permission; see plumb doctor");
   bus_.GiveFrame();
   EXPECT_EQ(events_.At(2).kind, Kind::kReady) << "by itself, without anything being plugged in";
   bus_.FailOnce("no pair for 2 s");
-  EXPECT_EQ(events_.At(3).reason, "no pair for 2 s");
+  EXPECT_EQ(events_.At(3).reason.English(), "no pair for 2 s");
   bus_.GiveFrame();
   EXPECT_EQ(events_.At(4).kind, Kind::kReady);
 }
@@ -188,7 +189,7 @@ TEST_F(SensorThreadTest, OnlyTheConfiguredSensorIsUsed) {
   Start({.serial = "B", .before_scan = {}});
   bus_.Plug("A");
   EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
-  EXPECT_THAT(events_.At(1).reason,
+  EXPECT_THAT(events_.At(1).reason.English(),
               ::testing::AllOf(::testing::HasSubstr("B"), ::testing::HasSubstr("A")));
   bus_.Plug("B");
   bus_.GiveFrame();
@@ -207,7 +208,7 @@ TEST_F(SensorThreadTest, ALibraryThatDoesNotStartIsAFailureThatIsTriedAgain) {
                           .first_retry = milliseconds(1),
                           .last_retry = milliseconds(2)},
       [this](const SensorEvent& event) { events_(event); });
-  EXPECT_EQ(events_.At(0).reason, "the library is missing");
+  EXPECT_EQ(events_.At(0).reason.English(), "the library is missing");
   EXPECT_EQ(events_.At(1).kind, Kind::kLost) << "and then it works, and sees no sensor";
 }
 
@@ -278,7 +279,7 @@ TEST_F(SensorThreadTest, ASensorWhoseDepthNoiseIsImpossibleIsNotUsed) {
   bus_.StateNoise({.constant_m = 1.2});
   bus_.Plug("A");
   EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
-  EXPECT_THAT(events_.At(1).reason,
+  EXPECT_THAT(events_.At(1).reason.English(),
               ::testing::AllOf(::testing::HasSubstr("sensor A"),
                                ::testing::HasSubstr("constant_m is 1.2, expected"),
                                ::testing::HasSubstr("correct the driver")));

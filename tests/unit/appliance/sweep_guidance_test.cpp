@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // Guidance over a flat table seen from above: areas, speeds and distances are known from geometry.
-#include "daemon/appliance/sweep_guidance.hpp"
+#include "daemon/sweep/sweep_guidance.hpp"
 
 #include <gtest/gtest.h>
 

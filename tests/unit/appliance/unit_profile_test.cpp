@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is known of a sensor unit, on its way into a scan and out of it.
 #include "daemon/appliance/unit_profile.hpp"
 
@@ -67,7 +68,7 @@ TEST_F(UnitProfileTest, TheFirstSweepMakesTheFirstVersionAndTheNextJoinsIt) {
   first.Begin(options_);
   EXPECT_FALSE(options_.profile);
   Sweep(options_, 0.001);
-  EXPECT_EQ(first.Drift(), "");
+  EXPECT_EQ(first.Drift().English(), "");
   first.LearnFromScan();
   UnitProfile second = Of("A");
   second.Begin(options_);
@@ -85,15 +86,15 @@ TEST_F(UnitProfileTest, ASweepBeyondTheGateIsNotJoinedAndReported) {
   UnitProfile within = Of("A");
   within.Begin(options_);
   Sweep(options_, 0.001 + 0.00040);
-  EXPECT_EQ(within.Drift(), "");
+  EXPECT_EQ(within.Drift().English(), "");
   within.LearnFromScan();
   EXPECT_EQ(shelf_->Versions("A").size(), 2U);
   (void)shelf_->RollBack("A", 1);
   UnitProfile beyond = Of("A");
   beyond.Begin(options_);
   Sweep(options_, 0.001 + 0.00043);
-  EXPECT_THAT(beyond.Drift(), HasSubstr("sensor A no longer agrees with its profile"));
-  EXPECT_THAT(beyond.Drift(), HasSubstr("on the settings page"));
+  EXPECT_THAT(beyond.Drift().English(), HasSubstr("sensor A no longer agrees with its profile"));
+  EXPECT_THAT(beyond.Drift().English(), HasSubstr("on the settings page"));
   beyond.LearnFromScan();
   EXPECT_EQ(shelf_->Versions("A").size(), 3U) << "nothing was added";
   EXPECT_EQ(shelf_->Read("A").newest.value().profile.value().mean[kFocal], 0.001);
@@ -102,7 +103,7 @@ TEST_F(UnitProfileTest, ASweepBeyondTheGateIsNotJoinedAndReported) {
 TEST_F(UnitProfileTest, ASweepThatLearnedNothingTeachesNothing) {
   UnitProfile unit = Of("A");
   unit.Begin(options_);
-  EXPECT_EQ(unit.Drift(), "");
+  EXPECT_EQ(unit.Drift().English(), "");
   unit.LearnFromScan();
   EXPECT_FALSE(shelf_->Read("A").newest);
 }
@@ -153,20 +154,20 @@ TEST(WhyNotLearned, NamesEachCheckThatAScanHasToPass) {
   Scene scene;
   for (int id = 0; id < limits.min_shared_markers; ++id) scene.markers[id] = {};
   scene.longest_lost_s = limits.max_lost_s;
-  EXPECT_EQ(WhyNotLearned(scene, {}, limits), "");
-  EXPECT_EQ(WhyNotLearned(scene, Verdict::kMove, limits), "");
-  EXPECT_THAT(WhyNotLearned(scene, Verdict::kNoAnswer, limits), HasSubstr("no answer"));
+  EXPECT_TRUE(WhyNotLearned(scene, {}, limits).empty());
+  EXPECT_TRUE(WhyNotLearned(scene, Verdict::kMove, limits).empty());
+  EXPECT_THAT(WhyNotLearned(scene, Verdict::kNoAnswer, limits).English(), HasSubstr("no answer"));
   Scene lost = scene;
   lost.longest_lost_s = limits.max_lost_s + 0.01;
-  EXPECT_THAT(WhyNotLearned(lost, {}, limits), HasSubstr("lost"));
+  EXPECT_THAT(WhyNotLearned(lost, {}, limits).English(), HasSubstr("lost"));
   Scene breathing = scene;
   breathing.breathing = Breathing{.amplitude_m = limits.max_breathing_m};
-  EXPECT_EQ(WhyNotLearned(breathing, {}, limits), "");
+  EXPECT_TRUE(WhyNotLearned(breathing, {}, limits).empty());
   breathing.breathing->amplitude_m += 1e-6;
-  EXPECT_THAT(WhyNotLearned(breathing, {}, limits), HasSubstr("rose and fell"));
+  EXPECT_THAT(WhyNotLearned(breathing, {}, limits).English(), HasSubstr("rose and fell"));
   Scene few = scene;
   few.markers.erase(0);
-  EXPECT_THAT(WhyNotLearned(few, {}, limits), HasSubstr("markers"));
+  EXPECT_THAT(WhyNotLearned(few, {}, limits).English(), HasSubstr("markers"));
 }
 
 }  // namespace

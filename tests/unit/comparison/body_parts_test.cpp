@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/body_parts.hpp"
 
 #include <array>
@@ -117,7 +118,7 @@ class Lying {
                   T_iec_reference, MarkerKind::kRoom, posture};
     view.hole_centre_m =
         (T_iec_reference_.inverse() * Eigen::Vector3d(room.x(), room.y(), 0.0)).head<2>();
-    return DescribeBody(view).hole_place;
+    return DescribeBody(view).hole_place.English();
   }
 
   /// As where the room's directions were never set.
@@ -138,7 +139,8 @@ class Lying {
 std::vector<std::string> Said(const BodyParts& body) {
   std::vector<std::string> said;
   for (const BodyPart& part : body.parts) {
-    if (const std::string words = HeightWords(part, part.after_m, 3 * kMillimetre); !words.empty())
+    if (const std::string words = HeightWords(part, part.after_m, 3 * kMillimetre).English();
+        !words.empty())
       said.push_back(words);
   }
   return said;
@@ -147,7 +149,8 @@ std::vector<std::string> Said(const BodyParts& body) {
 std::vector<std::string> SaidOfShifts(const BodyParts& body) {
   std::vector<std::string> said;
   for (const BodyPart& part : body.parts) {
-    if (std::string words = ShiftWords(part, *body.patient, 8 * kMillimetre); !words.empty())
+    if (std::string words = ShiftWords(part, *body.patient, 8 * kMillimetre).English();
+        !words.empty())
       said.push_back(words);
   }
   return said;
@@ -155,7 +158,7 @@ std::vector<std::string> SaidOfShifts(const BodyParts& body) {
 
 std::vector<std::string> NamesOf(const BodyParts& body) {
   std::vector<std::string> names;
-  for (const BodyPart& part : body.parts) names.push_back(part.name);
+  for (const BodyPart& part : body.parts) names.push_back(part.name.English());
   return names;
 }
 
@@ -246,6 +249,31 @@ TEST(BodyPartsTest, NothingIsLeftOrRightWhereTheBodyLiesAcrossWhatThePostureSays
   EXPECT_THAT(NamesOf(body), Each(AllOf(Not(HasSubstr("left")), Not(HasSubstr("right")))));
 }
 
+TEST(BodyPartsTest, NothingIsLeftOrRightWhereTheHeadIsAtTheOtherEnd) {
+  const std::array other = {kCases[2].posture, kCases[3].posture, kCases[0].posture,
+                            kCases[1].posture};
+  for (std::size_t i = 0; i < kCases.size(); ++i) {
+    const Lying person(kCases[i], 0.3, IsPerson, HighLeftShoulder);
+    EXPECT_FALSE(person.Describe(kCases[i].posture).head_at_other_end);
+    const BodyParts body = person.Describe(other[i]);
+    EXPECT_TRUE(body.head_at_other_end) << Name(other[i]);
+    EXPECT_FALSE(body.by_posture);
+    EXPECT_FALSE(body.patient);
+    EXPECT_THAT(NamesOf(body), Each(AllOf(Not(HasSubstr("left")), Not(HasSubstr("right")))));
+  }
+  const Lying trunk(kCases[0], 0.3, IsTrunk, HighLeftShoulder);
+  const BodyParts body = trunk.Describe(PatientPosture::kFeetFirstSupine);
+  EXPECT_FALSE(body.head_at_other_end) << "no end shows a head";
+  EXPECT_TRUE(body.by_posture);
+  // Hips as wide as no head is, a waist, then a chest.
+  const auto hourglass = [](double down, double left) {
+    const double width = down <= 0.85 ? 0.44 : down < 1.1 ? 0.26 : 0.31;
+    return down > 0.3 && down < 1.25 && std::abs(left) < width / 2;
+  };
+  const Lying hips(kCases[0], 0.3, hourglass, HighLeftShoulder);
+  EXPECT_FALSE(hips.Describe(PatientPosture::kHeadFirstSupine).head_at_other_end);
+}
+
 TEST(BodyPartsTest, RoomWordsNameTheGantryEndAndTheSideOfX) {
   // Head at the gantry, prone: the left lies at -X.
   const Lying person(kCases[1], 0.3, IsPerson,
@@ -325,17 +353,17 @@ TEST(BodyPartsTest, NowIsTheRiseOfThePartWithWhatItsPostureAdds) {
   const Pose T_motion(Eigen::Translation3d(0, 0, 0.004) *
                       Eigen::AngleAxisd(-1 * kDegree, Eigen::Vector3d::UnitY()));
   for (const BodyPart& part : person.Describe(kCases[0].posture, T_motion).parts) {
-    if (part.name != "left shoulder" && part.name != "right shoulder") continue;
+    const std::string name = part.name.English();
+    if (name != "left shoulder" && name != "right shoulder") continue;
     // Half a shoulder's width of 0.22 m on, the middle lies 0.11 m out; 0.2 m high.
-    const double side = part.name == "left shoulder" ? 0.11 : -0.11;
+    const double side = name == "left shoulder" ? 0.11 : -0.11;
     const double rise = 0.004 + side * std::sin(1 * kDegree) + 0.2 * (std::cos(1 * kDegree) - 1);
-    EXPECT_NEAR(part.now_m.value(), rise + (side > 0 ? 0.009 : 0.0), 0.2 * kMillimetre)
-        << part.name;
+    EXPECT_NEAR(part.now_m.value(), rise + (side > 0 ? 0.009 : 0.0), 0.2 * kMillimetre) << name;
   }
   // A shift sideways lifts nothing.
   for (const BodyPart& part :
        person.Describe(kCases[0].posture, Pose(Eigen::Translation3d(0.03, -0.02, 0))).parts) {
-    EXPECT_NEAR(part.now_m.value(), part.after_m, 1e-6) << part.name;
+    EXPECT_NEAR(part.now_m.value(), part.after_m, 1e-6) << part.name.English();
   }
 }
 
@@ -367,7 +395,7 @@ TEST(BodyPartsTest, AHoleIsNamedByThePartItLiesOn) {
   const Lying person(kCases[0], 0.0, IsPerson, [](double, double) { return 0.0; });
   EXPECT_EQ(person.PlaceOfHole(0.32, 0.15, std::nullopt), "+X side at the gantry end");
   EXPECT_EQ(person.PlaceOfHole(0.32, 0.15, std::nullopt, false), "+X side at the +Y end");
-  EXPECT_EQ(person.Describe(kCases[0].posture).hole_place, "") << "there is none";
+  EXPECT_EQ(person.Describe(kCases[0].posture).hole_place, Message()) << "there is none";
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/comparison.hpp"
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
 #include "tests/support/synthetic_scene.hpp"
+#include "words/diagnosis.hpp"
 
 namespace plumb {
 namespace {
@@ -104,7 +106,7 @@ TEST(ComparisonTest, FindsSmallAndLargeMotionsOfAPerfectScan) {
     // Measured over eight motions and two bodies: at most 0.002 mm and 0.001 deg.
     EXPECT_LT(ErrorAt_mm(comparison, T_motion, centroid), 0.01);
     EXPECT_LT(Angle_deg(comparison, T_motion), 0.005);
-    EXPECT_EQ(comparison.verdict, Verdict::kMove) << comparison.reasons.at(0);
+    EXPECT_EQ(comparison.verdict, Verdict::kMove) << comparison.reasons.at(0).English();
     // The numbers are those of the true motion at the centroid that the comparison chose.
     const Vector6d truth = CouchVector(T_motion, comparison.motion->centroid_m, Pose::Identity());
     EXPECT_NEAR(comparison.correction->value.vertical_mm.value(), truth[2] / kMillimetre, 0.02);
@@ -192,7 +194,8 @@ TEST(ComparisonTest, TheRollOfACylinderIsNotWellSeen) {
   EXPECT_EQ(comparison.verdict, Verdict::kNoAnswer);
   // The bar lies along x: its roll is the rotation about X, which is called pitch in the room.
   EXPECT_THAT(comparison.motion->weak_directions, Contains(Field(&WeakDirection::name, "pitch")));
-  EXPECT_THAT(comparison.reasons, Contains(HasSubstr("pitch is not well determined")));
+  EXPECT_THAT(EnglishTexts(comparison.reasons),
+              Contains(HasSubstr("pitch is not well determined")));
   // What is seen is still right: heights.
   EXPECT_NEAR((comparison.motion->T * comparison.motion->centroid_m -
                T_motion * comparison.motion->centroid_m)
@@ -212,6 +215,23 @@ TEST(ComparisonTest, APolygonLimitsTheRegionAndMovesTheIsocentre) {
   options.isocentre_m = Eigen::Vector3d(0.5, 0.4, 0.05);
   const Comparison elsewhere = Compare(PerfectReference(), PerfectRepeat(), options);
   EXPECT_EQ(elsewhere.correction->isocentre_m, *options.isocentre_m);
+}
+
+TEST(ComparisonTest, AnIsocentreFarFromTheRegionIsSaidAndOneOutOfReachRefused) {
+  CompareOptions options;
+  const auto at = [&](const Eigen::Vector3d& isocentre_m) {
+    options.isocentre_m = isocentre_m;
+    return Compare(PerfectReference(), PerfectRepeat(), options);
+  };
+  EXPECT_THAT(EnglishTexts(at({0.6, 1.40, 0.1}).warnings),
+              Not(testing::Contains(HasSubstr("isocentre"))));
+  const Comparison far = at({0.6, 1.50, 0.1});
+  EXPECT_THAT(EnglishTexts(far.warnings), testing::Contains(HasSubstr("isocentre lies 1.")));
+  EXPECT_NE(far.verdict, Verdict::kNoAnswer);
+  const Comparison millimetres = at({600, 450, 100});
+  EXPECT_EQ(millimetres.verdict, Verdict::kNoAnswer);
+  EXPECT_THAT(millimetres.reasons.front().English(), HasSubstr("millimetres?"));
+  EXPECT_THAT(at({60, 45, 10}).reasons.front().English(), HasSubstr("centimetres?"));
 }
 
 TEST(ComparisonTest, ACurrentScanWithoutTheReferenceMarkerStillCompares) {
@@ -262,23 +282,25 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   half.hidden = [](const Eigen::Vector3d& p) { return p.x() > 0.7; };
   const Comparison uncovered = Compare(PerfectReference(), MakeSyntheticScene(half));
   EXPECT_EQ(uncovered.verdict, Verdict::kNoAnswer);
-  EXPECT_THAT(uncovered.reasons.at(0), HasSubstr("% of the region"));
+  EXPECT_THAT(uncovered.reasons.at(0).English(), HasSubstr("% of the region"));
 
   SyntheticOptions hole = MovedBy(Pose::Identity(), reference);
   hole.hidden = [](const Eigen::Vector3d& p) {
     return (p.head<2>() - Eigen::Vector2d(0.6, 0.45)).norm() < 0.035;
   };
   const Comparison holed = Compare(PerfectReference(), MakeSyntheticScene(hole));
-  EXPECT_THAT(holed.body_parts->hole_place, Not(IsEmpty()));
-  EXPECT_THAT(holed.reasons.at(0), AllOf(HasSubstr("hole of 63 mm in the region ("),
-                                         HasSubstr("(" + holed.body_parts->hole_place + ")")));
+  EXPECT_FALSE(holed.body_parts->hole_place.empty());
+  EXPECT_THAT(holed.reasons.at(0).English(),
+              AllOf(HasSubstr("hole of 63 mm in the region ("),
+                    HasSubstr("(" + holed.body_parts->hole_place.English() + ")")));
 
   SyntheticOptions other = ReferenceOptions(BodyShape::kCylinder);
   EXPECT_EQ(Compare(PerfectReference(), MakeSyntheticScene(other)).verdict, Verdict::kNoAnswer);
 
   Scene lost = PerfectRepeat();
   lost.longest_lost_s = 1.5;
-  EXPECT_THAT(Compare(PerfectReference(), lost).reasons.at(0), HasSubstr("lost for 1.5 s"));
+  EXPECT_THAT(Compare(PerfectReference(), lost).reasons.at(0).English(),
+              HasSubstr("lost for 1.5 s"));
   CompareOptions paper;
   paper.preset = Preset::kPaper;
   EXPECT_EQ(Compare(PerfectReference(), PerfectRepeat(), paper).verdict, Verdict::kInTolerance);
@@ -288,14 +310,14 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   EXPECT_TRUE(lost_by_paper.correction) << "the numbers are reported nevertheless";
   Scene lost_reference = PerfectReference();
   lost_reference.longest_lost_s = 1.5;
-  EXPECT_THAT(Compare(lost_reference, PerfectRepeat()).reasons.at(0),
+  EXPECT_THAT(Compare(lost_reference, PerfectRepeat()).reasons.at(0).English(),
               HasSubstr("in the reference scan"));
 
   Scene breathing = PerfectRepeat();
   breathing.breathing = Breathing{.amplitude_m = 0.009, .period_s = 4.0};
-  EXPECT_THAT(Compare(PerfectReference(), breathing).reasons.at(0),
+  EXPECT_THAT(Compare(PerfectReference(), breathing).reasons.at(0).English(),
               HasSubstr("chest and belly rose by 9.0 mm in the current scan"));
-  EXPECT_THAT(Compare(breathing, PerfectRepeat()).reasons.at(0),
+  EXPECT_THAT(Compare(breathing, PerfectRepeat()).reasons.at(0).English(),
               HasSubstr("in the reference scan"));
 
   lost.markers.clear();
@@ -306,10 +328,10 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   Scene frameless = PerfectReference();
   frameless.frame = SceneFrame::kFirstKeyframe;
   frameless.height_map.reset();
-  EXPECT_THAT(Compare(frameless, PerfectReference()).reasons.at(0),
+  EXPECT_THAT(Compare(frameless, PerfectReference()).reasons.at(0).English(),
               HasSubstr("did not see its reference marker"));
   frameless.frame = SceneFrame::kReferenceMarker;
-  EXPECT_THAT(Compare(frameless, PerfectReference()).reasons.at(0),
+  EXPECT_THAT(Compare(frameless, PerfectReference()).reasons.at(0).English(),
               HasSubstr("measured no surface around its reference marker"));
 
   Scene empty = PerfectReference();
@@ -317,6 +339,33 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   empty.height_map = HeightMap(empty.height_map->grid);
   EXPECT_EQ(Compare(PerfectReference(), empty).verdict, Verdict::kNoAnswer);
   EXPECT_EQ(Compare(empty, PerfectReference()).verdict, Verdict::kNoAnswer);
+}
+
+TEST(ComparisonTest, KnowsWhatItsScansWereRefusedAndWarnedFor) {
+  Scene reference = PerfectReference(), current = PerfectRepeat();
+  reference.warnings = {say::diagnosis::Mirrored()};
+  Comparison compared = Compare(reference, current, {});
+  EXPECT_EQ(compared.verdict, Verdict::kInTolerance) << "a warning alone refuses nothing";
+  EXPECT_THAT(EnglishTexts(compared.warnings),
+              testing::Contains(AllOf(HasSubstr("reference scan"), HasSubstr("mirror"))));
+  current.warnings = current.refusals = {say::diagnosis::DepthUnit(5.0)};
+  compared = Compare(reference, current, {});
+  EXPECT_EQ(compared.verdict, Verdict::kNoAnswer);
+  EXPECT_THAT(EnglishTexts(compared.reasons),
+              testing::ElementsAre(AllOf(HasSubstr("current scan"), HasSubstr("depth_scale"))));
+}
+
+TEST(ComparisonTest, ScansOfDifferentClassesOfSensorsAreNotCompared) {
+  Scene reference = PerfectReference(), current = PerfectRepeat();
+  reference.depth_sensor = current.depth_sensor = DepthSensor::kActiveStereo;
+  EXPECT_EQ(Compare(reference, current, {}).verdict, Verdict::kInTolerance);
+  reference.depth_sensor.reset();
+  EXPECT_EQ(Compare(reference, current, {}).verdict, Verdict::kInTolerance) << "not known";
+  reference.depth_sensor = DepthSensor::kTimeOfFlight;
+  const Comparison compared = Compare(reference, current, {});
+  EXPECT_EQ(compared.verdict, Verdict::kNoAnswer);
+  ASSERT_EQ(compared.reasons.size(), 1U);
+  EXPECT_EQ(compared.reasons.front().id(), "comparison.other_depth_sensor");
 }
 
 TEST(ComparisonTest, TheSensorProfileOfEachSceneIsNamed) {
@@ -337,14 +386,15 @@ TEST(ComparisonTest, WithoutASupportOnlyADrawnRegionGetsAVerdict) {
   const Comparison all =
       Compare(floorless, MakeSyntheticScene(MovedBy(Pose::Identity(), reference)));
   EXPECT_EQ(all.verdict, Verdict::kNoAnswer);
-  EXPECT_THAT(all.reasons.at(0), HasSubstr("no flat support was found in the reference scan"));
+  EXPECT_THAT(all.reasons.at(0).English(),
+              HasSubstr("no flat support was found in the reference scan"));
   EXPECT_TRUE(all.motion) << "the computed motion is reported";
 
   CompareOptions drawn;
   drawn.region_polygon_m = {{0.35, 0.25}, {0.85, 0.25}, {0.85, 0.65}, {0.35, 0.65}};
   const Comparison region =
       Compare(floorless, MakeSyntheticScene(MovedBy(Pose::Identity(), reference)), drawn);
-  EXPECT_EQ(region.verdict, Verdict::kInTolerance) << region.reasons.at(0);
+  EXPECT_EQ(region.verdict, Verdict::kInTolerance) << region.reasons.at(0).English();
   CompareOptions paper;
   paper.preset = Preset::kPaper;
   EXPECT_EQ(
@@ -366,8 +416,8 @@ TEST(ComparisonTest, CoverageIsCountedWhereTheMotionTookTheBody) {
   current.hidden = [](const Eigen::Vector3d& p) { return p.z() < 0.02; };
   const Comparison comparison = Compare(PerfectReference(), MakeSyntheticScene(current));
   ASSERT_TRUE(comparison.region);
-  EXPECT_GT(comparison.region->coverage, 0.95) << comparison.reasons.at(0);
-  EXPECT_EQ(comparison.verdict, Verdict::kMove) << comparison.reasons.at(0);
+  EXPECT_GT(comparison.region->coverage, 0.95) << comparison.reasons.at(0).English();
+  EXPECT_EQ(comparison.verdict, Verdict::kMove) << comparison.reasons.at(0).English();
 }
 
 // The half of the body at larger x rose by 8 mm, the other half stayed.
@@ -430,7 +480,7 @@ TEST(ComparisonTest, TheNumbersAreThoseOfTheRoomsAxes) {
   ASSERT_TRUE(comparison.correction);
   EXPECT_NEAR(comparison.correction->value.longitudinal_mm.value(), -12.0, 0.02);
   EXPECT_NEAR(comparison.correction->value.lateral_mm.value(), 0.0, 0.02);
-  EXPECT_EQ(comparison.correction->words[1], "away from gantry");
+  EXPECT_EQ(comparison.correction->words[1].English(), "away from gantry");
 }
 
 TEST(ComparisonTest, WhereTheRoomWasNeverSaidNoWordSpeaksOfIt) {
@@ -442,9 +492,9 @@ TEST(ComparisonTest, WhereTheRoomWasNeverSaidNoWordSpeaksOfIt) {
   const Comparison set = Compare(PerfectReference(), moved, options);
   const auto said = [](const Comparison& comparison) {
     std::string text;
-    for (const std::string& word : comparison.correction->words) text += word + "; ";
-    for (const std::string& reason : comparison.reasons) text += reason + "; ";
-    for (const BodyPart& part : comparison.body_parts->parts) text += part.name + "; ";
+    for (const Message& word : comparison.correction->words) text += word.English() + "; ";
+    for (const Message& reason : comparison.reasons) text += reason.English() + "; ";
+    for (const BodyPart& part : comparison.body_parts->parts) text += part.name.English() + "; ";
     return text;
   };
   EXPECT_THAT(said(unset), testing::Not(HasSubstr("gantry")));
@@ -462,15 +512,15 @@ TEST(ComparisonTest, CouchMarkersRefuseShiftsAndJudgePostureOnly) {
       PerfectReference(), MakeSyntheticScene(MovedBy(T_motion, ReferenceOptions())), options);
   EXPECT_EQ(comparison.verdict, Verdict::kInTolerance);
   EXPECT_FALSE(comparison.correction->value.lateral_mm);
-  EXPECT_THAT(comparison.warnings, Contains(HasSubstr("posture only")));
+  EXPECT_THAT(EnglishTexts(comparison.warnings), Contains(HasSubstr("posture only")));
 }
 
 TEST(ComparisonTest, OtherMarkersAreBadInputAndBadOptionsAreTheCallersMistake) {
   Scene other = PerfectReference();
-  other.marker_length_m = 0.1;
+  other.room_markers.length_m = 0.1;
   EXPECT_THROW((void)Compare(PerfectReference(), other), DataError);
   other = PerfectReference();
-  other.marker_dictionary = "DICT_4X4_50";
+  other.room_markers.dictionary = "DICT_4X4_50";
   EXPECT_THROW((void)Compare(PerfectReference(), other), DataError);
   CompareOptions options;
   options.region_polygon_m = {{0, 0}, {1, 1}};

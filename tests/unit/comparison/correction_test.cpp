@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/correction.hpp"
 
 #include <array>
@@ -108,26 +109,27 @@ TEST(CorrectionTest, TheMarkersYawAgainstTheRoomTurnsTheNumbers) {
 TEST(CorrectionTest, WordsFollowThePosture) {
   const Pose moved =
       Shift(-0.01, 0.01, -0.01);  // correction: to the viewer's right, away from the gantry, up
-  EXPECT_EQ(Correct(moved).words[0], "up");
-  EXPECT_EQ(Correct(moved).words[1], "away from gantry");
+  EXPECT_EQ(Correct(moved).words[0].English(), "up");
+  EXPECT_EQ(Correct(moved).words[1].English(), "away from gantry");
   // On the back with the head to the gantry, the left hand is on the right of a viewer at the feet.
-  EXPECT_EQ(Correct(moved).words[2], "to patient left");
-  EXPECT_EQ(Correct(moved, MarkerKind::kRoom, PatientPosture::kHeadFirstProne).words[2],
+  EXPECT_EQ(Correct(moved).words[2].English(), "to patient left");
+  EXPECT_EQ(Correct(moved, MarkerKind::kRoom, PatientPosture::kHeadFirstProne).words[2].English(),
             "to patient right");
-  EXPECT_EQ(Correct(moved, MarkerKind::kRoom, PatientPosture::kFeetFirstSupine).words[2],
+  EXPECT_EQ(Correct(moved, MarkerKind::kRoom, PatientPosture::kFeetFirstSupine).words[2].English(),
             "to patient right");
-  EXPECT_EQ(Correct(moved, MarkerKind::kRoom, PatientPosture::kFeetFirstProne).words[2],
+  EXPECT_EQ(Correct(moved, MarkerKind::kRoom, PatientPosture::kFeetFirstProne).words[2].English(),
             "to patient left");
   // The gantry end sank: lift it.
   const Pose pitched = TurnAboutIsocentre(-5, Eigen::Vector3d::UnitX());
-  EXPECT_EQ(Correct(pitched).words[3], "head up");
-  EXPECT_EQ(Correct(pitched, MarkerKind::kRoom, PatientPosture::kFeetFirstSupine).words[3],
-            "head down");
+  EXPECT_EQ(Correct(pitched).words[3].English(), "head up");
+  EXPECT_EQ(
+      Correct(pitched, MarkerKind::kRoom, PatientPosture::kFeetFirstSupine).words[3].English(),
+      "head down");
   // Roll > 0 lowers +X, where the left side is head first supine.
-  EXPECT_EQ(Correct(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitY())).words[4],
+  EXPECT_EQ(Correct(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitY())).words[4].English(),
             "patient left side down");
   // Yaw > 0 carries the gantry end to -X, the patient's right.
-  EXPECT_EQ(Correct(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitZ())).words[5],
+  EXPECT_EQ(Correct(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitZ())).words[5].English(),
             "head to patient right");
 }
 
@@ -137,18 +139,19 @@ TEST(CorrectionTest, WithoutAPostureTheWordsAreTheRooms) {
                         Pose::Identity(), MarkerKind::kRoom, std::nullopt)
         .words;
   };
-  EXPECT_EQ(words(Shift(-0.01, 0, 0))[2], "to the right, facing the gantry");
-  EXPECT_EQ(words(Shift(0.01, 0, 0))[2], "to the left, facing the gantry");
-  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitX()))[3], "gantry end up");
-  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitX()))[3], "gantry end down");
+  EXPECT_EQ(words(Shift(-0.01, 0, 0))[2].English(), "to the right, facing the gantry");
+  EXPECT_EQ(words(Shift(0.01, 0, 0))[2].English(), "to the left, facing the gantry");
+  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitX()))[3].English(), "gantry end up");
+  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitX()))[3].English(), "gantry end down");
   // Roll > 0 turns +Z toward +X: the side at +X, right of who faces the gantry, goes down.
-  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitY()))[4],
+  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitY()))[4].English(),
             "right side down, facing the gantry");
-  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitY()))[4],
+  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitY()))[4].English(),
             "left side down, facing the gantry");
-  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitZ()))[5],
+  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitZ()))[5].English(),
             "counter-clockwise from above");
-  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitZ()))[5], "clockwise from above");
+  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitZ()))[5].English(),
+            "clockwise from above");
 }
 
 TEST(CorrectionTest, CouchMarkersGivePostureOnly) {
@@ -160,7 +163,7 @@ TEST(CorrectionTest, CouchMarkersGivePostureOnly) {
   EXPECT_FALSE(correction.u95.vertical_mm || correction.u95.longitudinal_mm ||
                correction.u95.lateral_mm);
   EXPECT_NEAR(correction.value.yaw_deg, -3.0, 1e-9);
-  EXPECT_EQ(correction.words[0], "");
+  EXPECT_EQ(correction.words[0].English(), "");
 }
 
 TEST(CorrectionTest, UncertaintyOfTheIsocentreGrowsWithItsDistanceFromTheBody) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The words beside the six numbers, for every posture, number and sign, from a table written by
 // hand: left and right of the patient are where a mistake would be dangerous.
 #include <gtest/gtest.h>
@@ -69,7 +70,7 @@ TEST(CorrectionWordsTest, EveryPostureNumberAndSignHasItsWords) {
             MotionFor(number, sign), Matrix6d::Identity() * 1e-8, Eigen::Vector3d::Zero(),
             Eigen::Vector3d::Zero(), Pose::Identity(), MarkerKind::kRoom, row.posture);
         const auto i = static_cast<std::size_t>(number);
-        EXPECT_EQ(correction.words[i], row.words[i][sign > 0 ? 0 : 1])
+        EXPECT_EQ(correction.words[i].English(), row.words[i][sign > 0 ? 0 : 1])
             << Name(row.posture) << ", number " << number << ", sign " << sign;
       }
     }
@@ -90,7 +91,8 @@ std::array<std::string, 6> WithoutRoom(double turn_deg, PatientPosture posture, 
     words[static_cast<std::size_t>(number)] =
         CorrectionOf(MotionFor(number, sign), Matrix6d::Identity() * 1e-8, Eigen::Vector3d::Zero(),
                      Eigen::Vector3d::Zero(), std::nullopt, kind, posture, patient)
-            .words[static_cast<std::size_t>(number)];
+            .words[static_cast<std::size_t>(number)]
+            .English();
   }
   return words;
 }
@@ -131,7 +133,8 @@ TEST(CorrectionWordsTest, WithoutARoomNoWordSpeaksOfCouchOrGantry) {
         return CorrectionOf(MotionFor(number, sign), Matrix6d::Identity() * 1e-8,
                             Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), T_iec_reference,
                             MarkerKind::kRoom, std::nullopt)
-            .words[i];
+            .words[i]
+            .English();
       };
       EXPECT_EQ(words(std::nullopt).find("gantry"), std::string::npos) << words(std::nullopt);
       EXPECT_FALSE(words(std::nullopt).empty());

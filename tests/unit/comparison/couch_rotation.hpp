@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The rotation that the couch's angles stand for, as the README defines it.
 #pragma once
 

@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/marker_check.hpp"
 
 #include <cmath>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <limits>
 
 namespace plumb {
 namespace {
@@ -17,8 +20,8 @@ constexpr double kLength_m = 0.104;
 // Twelve markers in a row of three, 0.4 m apart.
 Scene Room() {
   Scene scene;
-  scene.marker_dictionary = "DICT_6X6_250";
-  scene.marker_length_m = kLength_m;
+  scene.room_markers.dictionary = "DICT_6X6_250";
+  scene.room_markers.length_m = kLength_m;
   for (int id = 0; id < 12; ++id) {
     SceneMarker marker;
     const Eigen::Vector3d place(0.4 * (id % 4), 0.4 * (id / 4), 0.0);
@@ -55,7 +58,7 @@ TEST(MarkerCheckTest, TheSameMarkersFromElsewherePass) {
   }
   const MarkerCheck check = Against(scene);
   EXPECT_EQ(check.status, MarkerCheckStatus::kPassed);
-  EXPECT_THAT(check.reasons, IsEmpty());
+  EXPECT_THAT(EnglishTexts(check.reasons), IsEmpty());
   EXPECT_NEAR(Item(check, "misfit").value, 0.0, 1e-6);
   EXPECT_EQ(Item(check, "markers_seen").value, 12);
   EXPECT_NEAR(Item(check, "depth_scale").value, 0.4, 1e-9);
@@ -66,9 +69,9 @@ TEST(MarkerCheckTest, AMovedMarkerIsNamedWithHowFar) {
   Move(scene, 7, {0.012, 0, 0});
   const MarkerCheck check = Against(scene);
   EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
-  EXPECT_THAT(check.reasons, Contains("marker 7 moved 12 mm"));
+  EXPECT_THAT(EnglishTexts(check.reasons), Contains("marker 7 moved 12 mm"));
   EXPECT_NEAR(Item(check, "moved").value, 12.0, 0.5);
-  EXPECT_EQ(Item(check, "moved").note, "marker 7");
+  EXPECT_EQ(Item(check, "moved").note.English(), "marker 7");
   EXPECT_TRUE(Item(check, "misfit").passed) << "the moved one is not counted among the others";
 }
 
@@ -83,7 +86,7 @@ TEST(MarkerCheckTest, TheLimitOfAMoveIsWhereItIsSaid) {
     Move(scene, 7, 0.0051 * way);
     const MarkerCheck far = Against(scene);
     EXPECT_EQ(far.status, MarkerCheckStatus::kFailed);
-    EXPECT_THAT(far.reasons, Contains(HasSubstr("marker 7 moved 5 mm")));
+    EXPECT_THAT(EnglishTexts(far.reasons), Contains(HasSubstr("marker 7 moved 5 mm")));
   }
 }
 
@@ -100,8 +103,8 @@ TEST(MarkerCheckTest, CoveredMarkersAreNamed) {
   const MarkerCheck check = Against(scene);
   EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
   EXPECT_EQ(Item(check, "markers_seen").value, 10);
-  EXPECT_EQ(Item(check, "markers_seen").note, "missing: 3, 9");
-  EXPECT_THAT(check.reasons, Contains(HasSubstr("markers 3, 9 were not seen well")));
+  EXPECT_EQ(Item(check, "markers_seen").note.English(), "missing: 3, 9");
+  EXPECT_THAT(EnglishTexts(check.reasons), Contains(HasSubstr("markers 3, 9 were not seen well")));
 }
 
 TEST(MarkerCheckTest, AWholeThatGrewIsACalibrationThatChanged) {
@@ -122,7 +125,7 @@ TEST(MarkerCheckTest, APrintOfTheWrongSizeFails) {
     corner = centre + 0.96 * (corner - centre);
   const MarkerCheck check = Against(scene);
   EXPECT_NEAR(Item(check, "side").value, -4.0, 1e-6);
-  EXPECT_EQ(Item(check, "side").note, "marker 5");
+  EXPECT_EQ(Item(check, "side").note.English(), "marker 5");
   EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
 }
 
@@ -135,19 +138,34 @@ TEST(MarkerCheckTest, DepthThatIsOffFails) {
   scene.calibration["depth_scale"] = 0.96;
   const MarkerCheck check = Against(scene);
   EXPECT_FALSE(Item(check, "depth_scale").passed);
-  EXPECT_THAT(check.reasons, Contains(HasSubstr("-4.0 %")));
+  EXPECT_THAT(EnglishTexts(check.reasons), Contains(HasSubstr("-4.0 %")));
+}
+
+TEST(MarkerCheckTest, RefusesASweepThatDidNotMeasureTheDepth) {
+  Scene scene = Room();
+  for (const double scale : {1.029, 0.971}) {
+    scene.calibration["depth_scale"] = scale;
+    EXPECT_TRUE(Item(Against(scene), "depth_scale").passed) << scale;
+  }
+  scene.calibration["depth_scale"] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(Item(Against(scene), "depth_scale").passed);
+  scene.calibration.erase("depth_scale");
+  const MarkerCheck check = Against(scene);
+  EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
+  EXPECT_FALSE(Item(check, "depth_scale").passed);
+  EXPECT_THAT(EnglishTexts(check.reasons), Contains(HasSubstr("did not measure the scale")));
 }
 
 TEST(MarkerCheckTest, WithoutABaselineItSaysSoAndDoesNotPass) {
   const MarkerCheck check = CheckMarkers(Room(), std::nullopt);
   EXPECT_EQ(check.status, MarkerCheckStatus::kNoBaseline);
-  EXPECT_THAT(check.reasons, Contains(HasSubstr("no baseline yet")));
+  EXPECT_THAT(EnglishTexts(check.reasons), Contains(HasSubstr("no baseline yet")));
 }
 
 TEST(MarkerCheckTest, OtherMarkersThanTheBaselinesFail) {
   Scene scene = Room();
-  scene.marker_dictionary = "DICT_4X4_50";
-  EXPECT_THAT(Against(scene).reasons, Contains(HasSubstr("take a new baseline")));
+  scene.room_markers.dictionary = "DICT_4X4_50";
+  EXPECT_THAT(EnglishTexts(Against(scene).reasons), Contains(HasSubstr("take a new baseline")));
 }
 
 TEST(MarkerCheckTest, NothingSeenIsAFailureAndNoCrash) {
@@ -158,7 +176,7 @@ TEST(MarkerCheckTest, NothingSeenIsAFailureAndNoCrash) {
   Scene broken = Room();
   broken.markers[0].corners[0].x() = std::nan("");
   EXPECT_EQ(Against(broken).status, MarkerCheckStatus::kFailed);
-  EXPECT_EQ(Item(Against(broken), "markers_seen").note, "missing: 0");
+  EXPECT_EQ(Item(Against(broken), "markers_seen").note.English(), "missing: 0");
 }
 
 }  // namespace

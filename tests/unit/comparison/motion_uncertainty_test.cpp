@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/motion_uncertainty.hpp"
 
 #include <random>
@@ -23,13 +24,15 @@ Alignment SomeAlignment() {
 constexpr double kMillimetre2 = kMillimetre * kMillimetre;
 const Eigen::Vector3d kCentroid(0.6, 0.45, 0.1);
 
-MotionUncertainty Of(const Pose& T_motion, const Alignment& alignment = SomeAlignment()) {
+MotionUncertainty Of(const Pose& T_motion, const Alignment& alignment = SomeAlignment(),
+                     double scale_doubt = 0.0) {
   static const Matrix6d kSurface = 1e-9 * Matrix6d::Identity();
   return Uncertainty({.alignment = alignment,
                       .surface = kSurface,
                       .T_motion = T_motion,
                       .centroid_m = kCentroid,
                       .sensor = std::nullopt,
+                      .scale_doubt = scale_doubt,
                       .breathing_m = 0.005});
 }
 
@@ -69,6 +72,17 @@ TEST(MotionUncertaintyTest, FrameAndScaleCountOnlyForABodyThatMoved) {
   EXPECT_NEAR((shifted.frame.topLeftCorner<3, 3>()).norm(), 0.0, 1e-12) << "a shift turns nothing";
   EXPECT_GT(shifted.scale(3, 3), still.scale(3, 3) + 0.1 * kMillimetre2);
   EXPECT_NEAR(shifted.scale(4, 4), still.scale(4, 4), 1e-12) << "only along the way";
+}
+
+TEST(MotionUncertaintyTest, ADoubtedScaleIsWithinTheIntervalAsAWhole) {
+  const Pose T(Eigen::Translation3d(0.2, 0, 0));
+  const auto half_width_m = [&](double doubt) {
+    const double still = Of(Pose::Identity(), SomeAlignment(), doubt).scale(3, 3);
+    return 1.96 * std::sqrt(Of(T, SomeAlignment(), doubt).scale(3, 3) - still);
+  };
+  // The arm from the markers' centre adds a little.
+  EXPECT_NEAR(half_width_m(0.0), 0.005 * 0.2, 0.3 * kMillimetre) << "prints err by 0.5 %";
+  EXPECT_NEAR(half_width_m(0.03), 0.03 * 0.2, 0.3 * kMillimetre);
 }
 
 // The analytic frame term against motions that were turned into other frames, one after the other.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/room_board.hpp"
 
 #include <cmath>
@@ -45,14 +46,14 @@ MarkerMap SeenRoom(const Pose& T_scene_room) {
   return seen;
 }
 
-std::variant<BoardFit, std::string> Fit(const MarkerMap& seen) {
+std::variant<BoardFit, Message> Fit(const MarkerMap& seen) {
   return FitRoomBoard(MakeRoomBoard(kSize, kLength_m), seen);
 }
 
 BoardFit FitOf(const MarkerMap& seen) {
   const auto fit = Fit(seen);
-  if (const auto* why = std::get_if<std::string>(&fit)) {
-    ADD_FAILURE() << *why;
+  if (const auto* why = std::get_if<Message>(&fit)) {
+    ADD_FAILURE() << why->English();
     return {};
   }
   return std::get<BoardFit>(fit);
@@ -60,8 +61,8 @@ BoardFit FitOf(const MarkerMap& seen) {
 
 std::string WhyNot(const MarkerMap& seen) {
   const auto fit = Fit(seen);
-  const auto* why = std::get_if<std::string>(&fit);
-  return why != nullptr ? *why : "";
+  const auto* why = std::get_if<Message>(&fit);
+  return why != nullptr ? why->English() : "";
 }
 
 // A scan whose board lies a little off where it lay: `off` in the board's own frame.
@@ -71,8 +72,8 @@ RoomScan ScanWith(const Pose& T_scene_room, const Pose& off = Pose::Identity()) 
 
 RoomFit RoomFrom(const std::vector<RoomScan>& scans) {
   const auto fit = FitRoom(scans);
-  if (const auto* why = std::get_if<std::string>(&fit)) {
-    ADD_FAILURE() << *why;
+  if (const auto* why = std::get_if<Message>(&fit)) {
+    ADD_FAILURE() << why->English();
     return {};
   }
   return std::get<RoomFit>(fit);
@@ -154,8 +155,8 @@ TEST(RoomFitTest, FindsTheRoomFromScansOfDifferentFrames) {
   EXPECT_TRUE(fit.T_iec_reference.isApprox(PoseOfScan(0.7).inverse(), 1e-6));
   EXPECT_NEAR(fit.shift_m, 0, 1e-6);
   EXPECT_NEAR(fit.turn_rad, 0, 1e-6);
-  EXPECT_THAT(WhyNotSign(fit, scans.size()), IsEmpty());
-  EXPECT_THAT(WhyNotSign(fit, 2), HasSubstr("2 of 3 scans"));
+  EXPECT_TRUE(WhyNotSign(fit, scans.size()).empty());
+  EXPECT_THAT(WhyNotSign(fit, 2).English(), HasSubstr("2 of 3 scans"));
   // The room's markers keep their poses in the room, whatever coordinate frame another scan has.
   EXPECT_TRUE(
       fit.markers_iec.at(5).corners[0].isApprox(SeenRoom(Pose::Identity()).at(5).corners[0], 1e-6));
@@ -176,8 +177,10 @@ TEST(RoomFitTest, IsNotSignedWhereScansDiffer) {
   const auto why = [](double shift_mm, double turn_deg) {
     const Pose off(Eigen::Translation3d(0, shift_mm * kMillimetre, 0) *
                    Eigen::AngleAxisd(turn_deg * kDegree, Eigen::Vector3d::UnitZ()));
-    return WhyNotSign(
-        RoomFrom({ScanWith(PoseOfScan()), ScanWith(PoseOfScan(), off), ScanWith(PoseOfScan())}), 3);
+    return WhyNotSign(RoomFrom({ScanWith(PoseOfScan()), ScanWith(PoseOfScan(), off),
+                                ScanWith(PoseOfScan())}),
+                      3)
+        .English();
   };
   EXPECT_THAT(why(0.99, 0), IsEmpty());
   EXPECT_THAT(why(1.01, 0), HasSubstr("the scans differ by 1.01 mm"));
@@ -189,8 +192,8 @@ TEST(RoomFitTest, RefusesScansWhoseRoomMarkersDisagree) {
   RoomScan other = ScanWith(PoseOfScan());
   other.room.erase(0), other.room.erase(1), other.room.erase(2), other.room.erase(3);
   const auto fit = FitRoom(std::vector{ScanWith(PoseOfScan()), other});
-  ASSERT_TRUE(std::holds_alternative<std::string>(fit));
-  EXPECT_THAT(std::get<std::string>(fit), HasSubstr("fewer than 3"));
+  ASSERT_TRUE(std::holds_alternative<Message>(fit));
+  EXPECT_THAT(std::get<Message>(fit).English(), HasSubstr("fewer than 3"));
   EXPECT_FALSE(RoomOf(ScanWith(PoseOfScan()).room, other.room).has_value());
   EXPECT_THROW((void)FitRoom({}), std::invalid_argument);
 }

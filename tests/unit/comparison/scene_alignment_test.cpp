@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/scene_alignment.hpp"
 
 #include <random>
@@ -67,7 +68,7 @@ TEST(SceneAlignmentTest, ExactMarkersGiveTheExactPose) {
     ASSERT_TRUE(outcome.alignment);
     EXPECT_LT(WorstCorner_m(*outcome.alignment, room), 1e-12);
     EXPECT_THAT(outcome.alignment->markers_used, ElementsAre(0, 1, 2, 3, 4, 5));
-    EXPECT_THAT(outcome.warnings, IsEmpty());
+    EXPECT_THAT(EnglishTexts(outcome.warnings), IsEmpty());
   }
 }
 
@@ -80,7 +81,7 @@ TEST(SceneAlignmentTest, NamesTheMarkerThatMovedAndLeavesItOut) {
     ASSERT_TRUE(outcome.alignment);
     EXPECT_THAT(outcome.alignment->markers_rejected,
                 ElementsAre(testing::Pair(4, testing::DoubleNear(0.012, 0.002))));
-    EXPECT_THAT(outcome.warnings, ElementsAre(HasSubstr("marker 4 moved")));
+    EXPECT_THAT(EnglishTexts(outcome.warnings), ElementsAre(HasSubstr("marker 4 moved")));
     // 20 corners of 1 mm; measured worst corner over these seeds 1.0 mm.
     EXPECT_LT(WorstCorner_m(*outcome.alignment, room), 0.002);
   }
@@ -103,7 +104,7 @@ TEST(SceneAlignmentTest, ThreeMarkersAreUsedWithACaution) {
   const MarkerMap room = Room(3);
   const AlignmentOutcome three = AlignScenes(room, Seen(room, 0.0005, 1));
   ASSERT_TRUE(three.alignment);
-  EXPECT_THAT(three.warnings, ElementsAre(HasSubstr("only 3 markers")));
+  EXPECT_THAT(EnglishTexts(three.warnings), ElementsAre(HasSubstr("only 3 markers")));
   const MarkerMap more = Room(4);
   EXPECT_THAT(AlignScenes(more, Seen(more, 0.0005, 1)).warnings, IsEmpty());
 }
@@ -141,7 +142,8 @@ TEST(SceneAlignmentTest, OneGoodMarkerAgainstManyMovedIsNoAnswer) {
   Move(current, 4, {0.05, 0.2, 0});
   const AlignmentOutcome outcome = AlignScenes(room, current);
   EXPECT_FALSE(outcome.alignment);
-  EXPECT_THAT(RefusalsOfMarkers(outcome.markers, 3), ElementsAre(HasSubstr("did not move")));
+  EXPECT_THAT(EnglishTexts(RefusalsOfMarkers(outcome.markers, 3)),
+              ElementsAre(HasSubstr("did not move")));
 }
 
 TEST(SceneAlignmentTest, TwoGroupsOfEqualSizeAreNoAnswer) {
@@ -150,7 +152,8 @@ TEST(SceneAlignmentTest, TwoGroupsOfEqualSizeAreNoAnswer) {
   for (const int id : {0, 1, 2}) Move(current, id, {0.1, 0.05, 0});
   const AlignmentOutcome outcome = AlignScenes(room, current);
   EXPECT_FALSE(outcome.alignment);
-  EXPECT_THAT(RefusalsOfMarkers(outcome.markers, 3), ElementsAre(HasSubstr("two groups of 3")));
+  EXPECT_THAT(EnglishTexts(RefusalsOfMarkers(outcome.markers, 3)),
+              ElementsAre(HasSubstr("two groups of 3")));
 }
 
 TEST(SceneAlignmentTest, FewerThanThreeSharedMarkersAreNoAnswerInBestOnly) {
@@ -160,14 +163,15 @@ TEST(SceneAlignmentTest, FewerThanThreeSharedMarkersAreNoAnswerInBestOnly) {
   const AlignmentOutcome best = AlignScenes(room, current);
   EXPECT_FALSE(best.alignment);
   EXPECT_THAT(
-      RefusalsOfMarkers(best.markers, 3),
+      EnglishTexts(RefusalsOfMarkers(best.markers, 3)),
       ElementsAre("scan needs at least 3 markers shared with the reference, found 2 (ids 4, 5); "
                   "keep the markers in view"));
   current.erase(4);
   const AlignmentOutcome paper = AlignScenes(room, current, Preset::kPaper);
   ASSERT_TRUE(paper.alignment);  // four coplanar corners determine a pose
   EXPECT_THAT(paper.alignment->markers_used, ElementsAre(5));
-  EXPECT_THAT(RefusalsOfMarkers(paper.markers, 3), ElementsAre(HasSubstr("found 1 (id 5)")));
+  EXPECT_THAT(EnglishTexts(RefusalsOfMarkers(paper.markers, 3)),
+              ElementsAre(HasSubstr("found 1 (id 5)")));
   current.clear();
   EXPECT_FALSE(AlignScenes(room, current, Preset::kPaper).alignment);
 }
@@ -180,10 +184,11 @@ TEST(SceneAlignmentTest, ThePaperPresetUsesAMovedMarkerAndTheGateIsShownIt) {
   ASSERT_TRUE(paper.alignment);
   EXPECT_THAT(paper.alignment->markers_used, SizeIs(6));
   EXPECT_THAT(paper.markers.moved_used, ElementsAre(4));
-  EXPECT_THAT(RefusalsOfMarkers(paper.markers, 3), ElementsAre(HasSubstr("marker 4 moved")));
+  EXPECT_THAT(EnglishTexts(RefusalsOfMarkers(paper.markers, 3)),
+              ElementsAre(HasSubstr("marker 4 moved")));
   const AlignmentOutcome best = AlignScenes(room, current);
   EXPECT_THAT(best.markers.moved_used, IsEmpty());
-  EXPECT_THAT(RefusalsOfMarkers(best.markers, 3), IsEmpty());
+  EXPECT_THAT(EnglishTexts(RefusalsOfMarkers(best.markers, 3)), IsEmpty());
 }
 
 TEST(SceneAlignmentTest, PreciseMarkersOutweighVagueOnes) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/config/config.hpp"
 
 #include <filesystem>
@@ -100,6 +101,17 @@ T_iec_reference = [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]
       (*config.compare.T_iec_reference * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0.1, 1.2, 0.3))
           .norm(),
       0, 1e-12);
+}
+
+TEST(ConfigTest, TheRoomsUncertaintyAndMarkersAreTaken) {
+  const Config config =
+      ParseConfig("[iec]\nu95_mm = 1.5\nu95_deg = 0.2\nmarkers = \"room\"\n", "test.toml");
+  ASSERT_TRUE(config.compare.iec_u95_m && config.compare.iec_u95_rad && config.markers_scene);
+  EXPECT_DOUBLE_EQ(*config.compare.iec_u95_m, 0.0015);
+  EXPECT_DOUBLE_EQ(*config.compare.iec_u95_rad, 0.2 * kDegree);
+  EXPECT_EQ(*config.markers_scene, "room");
+  EXPECT_THAT(ErrorOf("[iec]\nu95_mm = -1\n"), HasSubstr("iec.u95_mm"));
+  EXPECT_THAT(ErrorOf("[iec]\nu95_deg = 11\n"), HasSubstr("iec.u95_deg"));
 }
 
 TEST(ConfigTest, KeyframesAreHalfToTwiceAsFarApart) {
@@ -283,6 +295,10 @@ green = "e"
 blue = "f"
 beeper = "g"
 active_low = true
+[monitor]
+gate_chip = "h"
+gate_line = "i"
+gate_active_low = true
 [update]
 folder = "/updates"
 max_bundle_mb = 7
@@ -304,7 +320,8 @@ sensor_serial = "7"
               ::testing::UnorderedElementsAre(
                   "markers.dictionary", "markers.length_m", "markers.reference", "button.chip",
                   "button.line", "button.active_low", "light.chip", "light.red", "light.green",
-                  "light.blue", "light.beeper", "light.active_low", "update.folder",
+                  "light.blue", "light.beeper", "light.active_low", "monitor.gate_chip",
+                  "monitor.gate_line", "monitor.gate_active_low", "update.folder",
                   "update.max_bundle_mb", "web.listen", "web.tls_certificate", "web.tls_key",
                   "web.plain_http", "web.host_names", "appliance.state", "appliance.control",
                   "appliance.calibration", "appliance.sensor_serial"));
@@ -325,7 +342,7 @@ TEST(ConfigTest, ASensorsCalibrationFileMayNotNameOtherMarkersThanTheRooms) {
     SensorSettings settings =
         SensorSettingsOf(ParseConfig("[markers]\nlength_m = 0.083\n", "test.toml"));
     settings.calibration_folder = folder.path();
-    return LiveStreamInfo(settings, "S1", 640, 480, 0.0).marker_length_m;
+    return LiveStreamInfo(settings, "S1", 640, 480, 0.0).room_markers.length_m;
   };
   EXPECT_EQ(length_m("0.083"), 0.083);
   EXPECT_THROW((void)length_m("0.104"), DeviceError);
@@ -421,6 +438,10 @@ TEST_F(RegionTest, RefusesWhatIsNoRegion) {
       (void)Read(
           R"({"format": 1, "frame": "reference_marker", "polygon_m": [[0, 0], [1, 0], [1, 1e30]]})"),
       DataError);
+  EXPECT_THROW((void)Read(R"({"format": 1, "frame": "reference_marker",
+                                "polygon_m": [[0, 0], [1, 1], [1, 0], [0, 1]]})"),
+               DataError)
+      << "a bow tie";
   EXPECT_THROW((void)ReadRegion("/nonexistent.json"), DataError);
 }
 

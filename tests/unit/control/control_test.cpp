@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -16,7 +17,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/control/control_protocol.hpp"
 #include "daemon/control/control_server.hpp"
-#include "daemon/control/unix_socket.hpp"
+#include "drivers/files/unix_socket.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -36,13 +37,22 @@ TEST(ControlProtocolTest, EveryRequestReadsBack) {
         ControlRequest{.kind = Kind::kSim, .action = "next-scene", .argument = {}},
         ControlRequest{
             .kind = Kind::kBackup, .action = {}, .argument = {}, .folder = "/mnt/a \"b\""},
+        ControlRequest{.kind = Kind::kBackup,
+        .action = {},
+        .argument = {},
+        .folder = "/mnt/a",
+        .recipients = AgeRecipients(
+            {"age1z8q8p3f3getd6h87azd0zc2vzskwttwywjqumzv8yqddd73pwg3svc56n6"})},
         ControlRequest{.kind = Kind::kUpdate,
         .action = {},
         .argument = {},
         .folder = {},
         .name = "plumb-0.2_1.raucb"},
         ControlRequest{.kind = Kind::kUpdateStatus, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kPresence, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kRestart, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kMonitor, .starts = true, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kMonitor, .starts = false, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kSim, .action = "glitch", .argument = "late 30"}}) {
     EXPECT_EQ(ParseControlRequest(ControlRequestText(request)), request);
   }
@@ -65,14 +75,19 @@ TEST(ControlProtocolTest, RefusesEverythingElse) {
                            "{\"command\":\"status\",\"x\":1}",
                            "{\"command\":\"press\",\"long\":\"yes\"}",
                            "{\"command\":\"sim\"}",
+                           "{\"command\":\"monitor\"}",
+                           "{\"command\":\"monitor\",\"action\":\"pause\"}",
                            "{\"command\":\"sim\",\"action\":\"explode\"}",
                            "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":7}",
                            "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":\"a\\nb\"}",
                            "{\"command\":\"backup\"}",
                            "{\"command\":\"backup\",\"folder\":\"relative\"}",
                            "{\"command\":\"backup\",\"folder\":7}",
-                           "{\"command\":\"backup\",\"folder\":\"/a\",\"key_file\":\"k\"}",
-                           "{\"command\":\"backup\",\"folder\":\"/a\",\"key_file\":7}",
+                           "{\"command\":\"backup\",\"folder\":\"/a\",\"recipients\":\"k\"}",
+                           "{\"command\":\"backup\",\"folder\":\"/a\",\"recipients\":[7]}",
+                           "{\"command\":\"backup\",\"folder\":\"/a\",\"recipients\":[]}",
+                           "{\"command\":\"backup\",\"folder\":\"/a\",\"recipients\":{}}",
+                           "{\"command\":\"backup\",\"folder\":\"/a\",\"recipients\":[\"age1\"]}",
                            "{\"command\":\"backup\",\"folder\":\"/a\\u0000b\"}",
                            "{\"command\":\"update\"}",
                            "{\"command\":\"update\",\"name\":\".raucb\"}",

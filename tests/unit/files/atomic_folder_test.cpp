@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/atomic_folder.hpp"
 
 #include <gmock/gmock.h>
@@ -28,7 +29,7 @@ using testing::TempFolder;
 using testing::WriteOnFullDisk;
 using testing::WriteOutcome;
 
-OutputKind Kind() { return {"thing", "thing.json", {"thing.json", "data"}}; }
+OutputKind Kind() { return {Message::Verbatim("thing"), "thing.json", {"thing.json", "data"}}; }
 
 std::set<std::string> Names(const fs::path& folder) {
   std::set<std::string> names;
@@ -169,7 +170,7 @@ TEST(AtomicFolderTest, TheDisksRefusalIsAnIoErrorThatSaysWhatToDo) {
   EXPECT_THAT(MessageOf<IoError>([] { AtomicFolder("/proc/plumb/out", Kind()); }),
               HasSubstr("/proc/plumb/out"));
   EXPECT_THAT(
-      DescribeWriteError("a/b", ENOSPC),
+      DescribeWriteError("a/b", ENOSPC).English(),
       AllOf(HasSubstr("cannot write a/b"), HasSubstr("No space left"), HasSubstr("free space")));
 }
 

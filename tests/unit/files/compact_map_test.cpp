@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Packed maps read back as the maps they were made of, and reports are whole PDF files.
 #include "daemon/files/compact_map.hpp"
 
@@ -15,9 +16,10 @@
 #include <opencv2/core.hpp>
 
 #include "algo/base/errors.hpp"
-#include "daemon/files/pdf_report.hpp"
+#include "daemon/result/pdf_report.hpp"
 #include "drivers/files/image_file.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "words/direction.hpp"
 
 namespace plumb {
 namespace {
@@ -113,14 +115,31 @@ TEST(CompactMap, TellsAHoleOfTheRegionFromWhatLiesOutside) {
 
 TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
   ScanReport report{
-      .texts = {},
       .title = "Scan report",
       .verdict = "MOVE",
       .why = "The correction below was to be applied.",
       .identity = {{"Patient", "P-0042"}, {"Approved by", "clara"}},
-      .numbers = {{"vertical", "mm", -8.04, 0.6, 3.0, "down"},
-                  {"pitch", "\xC2\xB0", 0.01, 0.14, 1.0, "below its uncertainty"},
-                  {"lateral", "mm", std::nullopt, 0.0, 3.0, ""}},
+      .numbers = {{.name = NumberWord(0),
+                   .number = 0,
+                   .value = -8.04,
+                   .u95 = 0.6,
+                   .tolerance = 3.0,
+                   .judgement = NumberJudgement::kOutside,
+                   .words = say::direction::Down()},
+                  {.name = NumberWord(3),
+                   .number = 3,
+                   .value = 0.01,
+                   .u95 = 0.14,
+                   .tolerance = 1.0,
+                   .judgement = NumberJudgement::kWithin,
+                   .words = {}},
+                  {.name = NumberWord(2),
+                   .number = 2,
+                   .value = std::nullopt,
+                   .u95 = std::nullopt,
+                   .tolerance = 3.0,
+                   .judgement = NumberJudgement::kUnjudged,
+                   .words = {}}},
       .cautions = {"The daily check was overdue at this scan."},
       .quality = {{"Markers matched", "8"}},
       .body = {},
@@ -129,8 +148,7 @@ TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
   const std::string pdf = PdfOf(report);
   EXPECT_EQ(pdf.substr(0, 5), "%PDF-");
   EXPECT_NE(pdf.find("%%EOF"), std::string::npos);
-  CourseReport course{
-      .texts = {}, .title = "Course", .identity = {}, .rows = {}, .note = "", .footer = ""};
+  CourseReport course{.title = "Course", .identity = {}, .rows = {}, .note = "", .footer = ""};
   const std::size_t empty = PdfOf(course).size();
   for (int i = 0; i < 120; ++i)
     course.rows.push_back({.fraction = std::to_string(i),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Packed surfaces read back as the surfaces they were made of.
 #include "daemon/files/compact_map.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/ply_file.hpp"
 
 #include <gmock/gmock.h>
@@ -179,12 +180,13 @@ TEST(PlyFileTest, ContradictionsAreTheCallersMistake) {
   TriangleMesh mesh = Tetrahedron();
   mesh.triangles[1][2] = 4;
   EXPECT_THROW(WriteMeshPly(folder / "m.ply", mesh), std::invalid_argument);
-  EXPECT_THROW(WriteMeshStl(folder / "m.stl", mesh), std::invalid_argument);
+  EXPECT_THROW(WriteMeshStl(folder / "m.stl", mesh, MeshUnit::kMetres), std::invalid_argument);
 }
 
 TEST(MeshFileTest, StlHoldsTheTrianglesWithOutwardNormals) {
   const TempFolder folder;
-  WriteMeshFile(folder / "m.STL", Tetrahedron());
+  EXPECT_EQ(UsualUnit("m.STL"), MeshUnit::kMillimetres);
+  WriteMeshFile(folder / "m.STL", Tetrahedron(), MeshUnit::kMillimetres);
   const Bytes bytes = ReadWholeFile(folder / "m.STL", 10000);
   ASSERT_EQ(bytes.size(), 84U + 4 * 50);
   std::uint32_t count = 0;
@@ -192,8 +194,9 @@ TEST(MeshFileTest, StlHoldsTheTrianglesWithOutwardNormals) {
   EXPECT_EQ(count, 4U);
   float first[12];
   std::memcpy(first, bytes.data() + 84, sizeof first);
-  EXPECT_THAT(first,
-              ElementsAre(0, 0, -1, 0, 0, 0, 0, 1, 0, 1, 0, 0));  // the bottom face looks down
+  EXPECT_THAT(
+      first, ElementsAre(0, 0, -1, 0, 0, 0, 0, 1000, 0, 1000, 0, 0));  // the bottom face looks down
+  EXPECT_THAT(std::string(bytes.begin(), bytes.begin() + 80), HasSubstr("in millimetres"));
   EXPECT_NE(std::string(bytes.begin(), bytes.begin() + 5), "solid");
 }
 
@@ -204,7 +207,8 @@ TEST(MeshFileTest, ObjCountsFromOne) {
   mesh.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
   mesh.colors = {Color{255, 0, 0}, Color{0, 255, 0}, Color{0, 0, 255}};
   mesh.triangles = {{0, 1, 2}};
-  WriteMeshFile(folder / "m.obj", mesh);
+  EXPECT_EQ(UsualUnit("m.obj"), MeshUnit::kMetres);
+  WriteMeshFile(folder / "m.obj", mesh, MeshUnit::kMetres);
   EXPECT_THAT(ReadTextFile(folder / "m.obj", 10000),
               AllOf(HasSubstr("v 0.000000 1.500000 0.000000 0.0000 0.0000 1.0000\n"),
                     HasSubstr("vn 0.00000 0.00000 1.00000\n"), HasSubstr("f 1//1 2//2 3//3\n")));
@@ -212,9 +216,9 @@ TEST(MeshFileTest, ObjCountsFromOne) {
 
 TEST(MeshFileTest, OtherEndingsAreTheCallersMistake) {
   const TempFolder folder;
-  EXPECT_THAT(
-      MessageOf<std::invalid_argument>([&] { WriteMeshFile(folder / "m.gltf", Tetrahedron()); }),
-      HasSubstr(".ply, .stl or .obj"));
+  EXPECT_THAT(MessageOf<std::invalid_argument>(
+                  [&] { WriteMeshFile(folder / "m.gltf", Tetrahedron(), MeshUnit::kMetres); }),
+              HasSubstr(".ply, .stl or .obj"));
 }
 
 }  // namespace

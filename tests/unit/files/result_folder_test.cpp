@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/result_folder.hpp"
 
 #include <gmock/gmock.h>
@@ -73,7 +74,7 @@ TEST(ResultFolderTest, TheMarksNameTheGantryWhereTheRoomIsKnownAndNoSideWithoutA
   EXPECT_THAT(names(comparison), ElementsAre("GANTRY", "HEAD", "FEET", "LEFT", "RIGHT"));
   EXPECT_EQ(MapMarks(comparison)[0].toward, Eigen::Vector2d(1, 0));
   EXPECT_EQ(MapMarks(comparison)[4].toward, Eigen::Vector2d(0, 1)) << "right is opposite the left";
-  const auto body = nlohmann::json::parse(ResultJson(comparison)).at("body");
+  const auto body = nlohmann::json::parse(ResultText(Stored(comparison))).at("body");
   EXPECT_EQ(body.at("gantry_xy"), (nlohmann::json{1.0, 0.0}));
   EXPECT_EQ(body.at("right_xy"), (nlohmann::json{0.0, -1.0}));
   comparison.verdict = Verdict::kNoAnswer;
@@ -81,11 +82,12 @@ TEST(ResultFolderTest, TheMarksNameTheGantryWhereTheRoomIsKnownAndNoSideWithoutA
   comparison.verdict = Verdict::kMove;
   comparison.body_parts->room.reset();
   EXPECT_THAT(names(comparison), ElementsAre("HEAD", "FEET", "LEFT", "RIGHT"));
-  EXPECT_FALSE(nlohmann::json::parse(ResultJson(comparison)).at("body").contains("gantry_xy"));
+  EXPECT_FALSE(
+      nlohmann::json::parse(ResultText(Stored(comparison))).at("body").contains("gantry_xy"));
 }
 
 TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
-  const auto json = nlohmann::json::parse(ResultJson(Answer()));
+  const auto json = nlohmann::json::parse(ResultText(Stored(Answer())));
   EXPECT_EQ(json.at("format"), 1);
   EXPECT_EQ(json.at("verdict"), "move");
   EXPECT_EQ(json.at("preset"), "paper");
@@ -139,16 +141,19 @@ TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
 
 TEST(ResultFolderTest, AbsentResultsAreNull) {
   Comparison comparison;
-  comparison.reasons = {"scan needs at least 3 markers shared with the reference, found 1"};
-  auto json = nlohmann::json::parse(ResultJson(comparison));
+  comparison.reasons = {
+      Message::Verbatim("scan needs at least 3 markers shared with the reference, found 1")};
+  auto json = nlohmann::json::parse(ResultText(Stored(comparison)));
   EXPECT_EQ(json.at("verdict"), "no_answer");
   for (const char* key : {"alignment", "motion", "correction", "region", "deformation"})
     EXPECT_TRUE(json.at(key).is_null()) << key;
 
   comparison = Answer();
   comparison.correction->value.vertical_mm.reset();  // refused for couch-fixed markers
-  EXPECT_TRUE(
-      nlohmann::json::parse(ResultJson(comparison)).at("correction").at("vertical_mm").is_null());
+  EXPECT_TRUE(nlohmann::json::parse(ResultText(Stored(comparison)))
+                  .at("correction")
+                  .at("vertical_mm")
+                  .is_null());
 }
 
 TEST(ResultFolderTest, WritesMapsAndPictures) {
@@ -163,7 +168,7 @@ TEST(ResultFolderTest, WritesMapsAndPictures) {
   EXPECT_EQ(deviation.at<float>(0, 7), Slope(0.009).z[7]);  // row 0 is y_min
   EXPECT_TRUE(std::isnan(deviation.at<float>(0, 5)));
   EXPECT_FALSE(ReadColorImage(folder / "result/error_map.png").empty());
-  EXPECT_EQ(ReadResultJson(folder / "result"), ResultJson(Answer()));
+  EXPECT_EQ(ResultText(ReadResult(folder / "result")), ResultText(Stored(Answer())));
 }
 
 TEST(ResultFolderTest, AResultWithARegionReplacesAnOlderOne) {
@@ -198,10 +203,10 @@ TEST(ResultFolderTest, NoAnswerIsWrittenWithoutMaps) {
 TEST(ResultFolderTest, AnotherFormatAndDamageAreNamed) {
   const TempFolder folder;
   WriteWholeFile(folder / "result.json", std::string_view("{\"format\": 2}"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResult(folder.path()); }),
               AllOf(HasSubstr("format 2"), HasSubstr("update")));
   WriteWholeFile(folder / "result.json", std::string_view("{\"format\": 1"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResult(folder.path()); }),
               HasSubstr("not a result of plumb compare"));
 }
 

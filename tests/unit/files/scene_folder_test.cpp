@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/scene_folder.hpp"
 
 #include <gmock/gmock.h>
@@ -12,7 +13,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
-#include "daemon/files/scene_json.hpp"
+#include "daemon/files/stored_scene.hpp"
 #include "daemon/files/trajectory_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
@@ -20,6 +21,7 @@
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/files/small_output.hpp"
+#include "words/reconstruction.hpp"
 
 namespace plumb {
 namespace {
@@ -59,14 +61,49 @@ class SceneFolderTest : public ::testing::Test {
   fs::path scene_ = folder_ / "scene";
 };
 
+TEST_F(SceneFolderTest, GivesBackAPlanningCt) {
+  Scene scene = SmallScene();
+  scene.frame = SceneFrame::kIec;
+  scene.markers.clear();
+  scene.keyframes.clear();
+  scene.trajectory.clear();
+  PlanningSource& planning = scene.planning.emplace();
+  planning.roi = "BODY";
+  planning.posture = PatientPosture::kFeetFirstProne;
+  planning.isocentre_mm = {72.53, -304.345, -9.309};
+  planning.plan_uid = "1.2.3";
+  planning.slices = 98;
+  planning.slice_spacing_m = 0.003;
+  planning.support_m = -0.17;
+  WriteScene(scene, scene_);
+  EXPECT_EQ(nlohmann::json::parse(SceneJson(scene)).at("source"), "dicom");
+  const Scene read = ReadScene(scene_);
+  EXPECT_EQ(read.frame, SceneFrame::kIec);
+  ASSERT_TRUE(read.planning);
+  EXPECT_EQ(read.planning->roi, "BODY");
+  EXPECT_EQ(read.planning->posture, PatientPosture::kFeetFirstProne);
+  EXPECT_EQ(read.planning->isocentre_mm, scene.planning->isocentre_mm);
+  EXPECT_EQ(read.planning->plan_uid, "1.2.3");
+  EXPECT_EQ(read.planning->slices, 98);
+  EXPECT_EQ(read.planning->support_m, -0.17);
+  EXPECT_EQ(nlohmann::json::parse(SceneJson(SmallScene())).count("source"), 0U);
+}
+
+TEST_F(SceneFolderTest, RefusesAPlanningCtThatIsHalfOfOne) {
+  const std::string contradiction = "source, frame and planning contradict each other";
+  EXPECT_THAT(RefusalWith([](auto& json) { json["source"] = "dicom"; }), HasSubstr(contradiction));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["frame"] = "iec"; }), HasSubstr(contradiction));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["source"] = "fax"; }), HasSubstr("source"));
+}
+
 TEST_F(SceneFolderTest, GivesBackWhatWasWritten) {
   const Scene read = ReadScene(scene_, {.mesh = true});
   const Scene scene = SmallScene();
   EXPECT_EQ(read.preset, scene.preset);
   EXPECT_EQ(read.frame, scene.frame);
-  EXPECT_EQ(read.marker_dictionary, scene.marker_dictionary);
-  EXPECT_EQ(read.marker_length_m, scene.marker_length_m);
-  EXPECT_EQ(read.reference_marker, scene.reference_marker);
+  EXPECT_EQ(read.room_markers.dictionary, scene.room_markers.dictionary);
+  EXPECT_EQ(read.room_markers.length_m, scene.room_markers.length_m);
+  EXPECT_EQ(read.room_markers.reference, scene.room_markers.reference);
   ASSERT_EQ(read.markers.size(), 2U);
   for (const auto& [id, marker] : scene.markers) {
     EXPECT_EQ(read.markers.at(id).corners, marker.corners) << id;  // bit for bit
@@ -132,6 +169,7 @@ TEST_F(SceneFolderTest, HoldsTheKeysOfTheContract) {
   EXPECT_EQ(json.at("calibration_prior_sigma").at("depth_scale"), 0.01);
   EXPECT_EQ(json.at("timings_s").at("clouds"), 0.5);
   EXPECT_EQ(json.at("warnings").at(0), "depth is a little short");
+  EXPECT_EQ(json.at("warning_messages").at(0).at("id"), "text.verbatim");
 }
 
 TEST_F(SceneFolderTest, SameSceneSameBytes) {
@@ -147,7 +185,7 @@ TEST_F(SceneFolderTest, SameSceneSameBytes) {
 TEST_F(SceneFolderTest, ASceneWithoutMarkersHasNoHeightMap) {
   Scene scene = SmallScene();
   scene.frame = SceneFrame::kFirstKeyframe;
-  scene.reference_marker.reset();
+  scene.room_markers.reference.reset();
   scene.markers.clear();
   scene.height_map.reset();
   scene.mesh = {};
@@ -159,7 +197,7 @@ TEST_F(SceneFolderTest, ASceneWithoutMarkersHasNoHeightMap) {
   const Scene read = ReadScene(scene_, {.mesh = true});
   EXPECT_EQ(read.frame, SceneFrame::kFirstKeyframe);
   EXPECT_FALSE(read.height_map);
-  EXPECT_FALSE(read.reference_marker);
+  EXPECT_FALSE(read.room_markers.reference);
   EXPECT_TRUE(read.mesh.triangles.empty());
 }
 
@@ -195,9 +233,21 @@ TEST_F(SceneFolderTest, BreathingThatNobodyCanHaveIsRefused) {
   }
 }
 
+TEST_F(SceneFolderTest, WarningsKeepTheirMessages) {
+  Scene scene = SmallScene();
+  scene.warnings = {say::reconstruction::NoMarker(), say::reconstruction::NoImage(1.57)};
+  auto json = nlohmann::ordered_json::parse(SceneJson(scene));
+  EXPECT_EQ(ParseSceneJson(json.dump(), "scene.json").scene.warnings, scene.warnings);
+  json.erase("warning_messages");  // as 0.2.0 wrote it
+  const std::vector<Message> old = ParseSceneJson(json.dump(), "scene.json").scene.warnings;
+  ASSERT_EQ(old.size(), 2U);
+  EXPECT_FALSE(old[1].Is(say::reconstruction::kNoImage));
+  EXPECT_EQ(EnglishTexts(old), EnglishTexts(scene.warnings));
+}
+
 TEST_F(SceneFolderTest, WarningsInAnyEncodingAreWritten) {
   Scene scene = SmallScene();
-  scene.warnings = {"file \xff\xfe"};
+  scene.warnings = {Message::Verbatim("file \xff\xfe")};
   WriteScene(scene, scene_);
   EXPECT_EQ(ReadScene(scene_).warnings.size(), 1U);
 }
@@ -247,9 +297,10 @@ TEST_F(SceneFolderTest, ANewerFormatIsNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = 2; }),
               AllOf(HasSubstr("scene.json"), HasSubstr("format 2"), HasSubstr("reads format 1"),
                     HasSubstr("update")));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = 0; }), HasSubstr("format is 0"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = 0; }),
+              HasSubstr("has format 0, this version reads format 1"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = "1"; }),
-              HasSubstr("not a whole number"));
+              HasSubstr("format is \"1\", expected a whole number"));
   EXPECT_THAT(RefusalWith([](auto& json) { json.erase("format"); }),
               HasSubstr("format is missing"));
 }
@@ -290,17 +341,17 @@ TEST_F(SceneFolderTest, NanPosesAreNamed) {
 
 TEST_F(SceneFolderTest, CornersThatAreNoNumbersAreNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = nullptr; }),
-              HasSubstr("scene.json.markers.11[1][2] is not a number"));
+              HasSubstr("scene.json: markers.11[1][2] is null, expected a number from"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = 1e30; }),
               HasSubstr("1e+30"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"].erase(0); }),
-              HasSubstr("not a list of 4"));
+              HasSubstr("expected a list of 4"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["-3"] = json["markers"]["11"]; }),
-              HasSubstr("not a marker id"));
+              HasSubstr("markers.-3 is not named by an id from 0 to 65535"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["marker_views"]["12"] = 3; }),
               HasSubstr("belongs to no marker"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"] = nlohmann::json::array(); }),
-              HasSubstr("markers is not an object"));
+              HasSubstr("markers is [], expected an object"));
 }
 
 TEST_F(SceneFolderTest, SizesThatDisagreeAreNamed) {
@@ -319,11 +370,11 @@ TEST_F(SceneFolderTest, AbsurdNumbersAreNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["frames"]["total"] = -1; }),
               HasSubstr("frames.total"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["frame"] = "moon"; }),
-              HasSubstr("neither reference_marker nor first_keyframe"));
+              HasSubstr("frame is \"moon\", expected one of reference_marker, first_keyframe"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["marker_dictionary"] = "DICT_9X9"; }),
               HasSubstr("DICT_9X9"));
   EXPECT_THAT(RefusalWith([](auto& json) { json = nlohmann::json::array(); }),
-              HasSubstr("not an object"));
+              HasSubstr("scene.json is [], expected an object"));
   WriteWholeFile(scene_ / "scene.json", std::string(200'000, '['));
   EXPECT_THAT(Refusal(), HasSubstr("nested at most 32 deep"));
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/files/sensor_profile_file.hpp"
 
 #include <fstream>
@@ -47,6 +48,17 @@ class SensorProfileFile : public ::testing::Test {
   testing::TempFolder folder_;
   std::filesystem::path file_ = folder_ / "unit.json";
 };
+
+TEST_F(SensorProfileFile, ARationalLensComesBackToo) {
+  SensorProfile profile = Profile();
+  profile.stated.distortion = {0.51, -2.74, 0.0006, -0.0002, 1.64, 0.39, -2.55, 1.56};
+  WriteSensorProfile(profile, file_);
+  EXPECT_EQ(ReadSensorProfile(file_).stated, profile.stated);
+  nlohmann::json json = Good();
+  json["stated_intrinsics"]["distortion"].push_back(0.1);
+  Write(json);
+  ExpectRefused("distortion");
+}
 
 TEST_F(SensorProfileFile, ComesBackToTheLastBit) {
   WriteSensorProfile(Profile(), file_);

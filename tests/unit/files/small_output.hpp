@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A scene and a comparison of few points, with everything that can be written of them.
 #pragma once
 
@@ -23,9 +24,9 @@ inline Scene SmallScene() {
   Scene scene;
   scene.preset = Preset::kPaper;
   scene.frame = SceneFrame::kReferenceMarker;
-  scene.marker_dictionary = "DICT_ARUCO_MIP_36h12";
-  scene.marker_length_m = 0.104;
-  scene.reference_marker = 11;
+  scene.room_markers.dictionary = "DICT_ARUCO_MIP_36h12";
+  scene.room_markers.length_m = 0.104;
+  scene.room_markers.reference = 11;
   scene.markers[11] = {CornersInMarkerFrame(0.104), 9, 0.0004};
   scene.markers[100] = {CornersInMarkerFrame(0.104), 2, 0.002};
   scene.markers[100].corners[2] = Eigen::Vector3d(1.0 / 3.0, -0.1, 1e-9);
@@ -49,7 +50,7 @@ inline Scene SmallScene() {
   scene.calibration_sigma["depth_scale"] = 0.00021;
   scene.calibration_prior_sigma["depth_scale"] = 0.01;
   scene.timings_s["clouds"] = 0.5;
-  scene.warnings = {"depth is a little short"};
+  scene.warnings = {Message::Verbatim("depth is a little short")};
   return scene;
 }
 
@@ -68,7 +69,7 @@ inline Comparison Answer() {
   comparison.preset = Preset::kPaper;
   comparison.current_profile = "unit 61, 3 sweeps";
   comparison.verdict = Verdict::kMove;
-  comparison.reasons = {"vertical is 9.0 mm off"};
+  comparison.reasons = {Message::Verbatim("vertical is 9.0 mm off")};
   Alignment alignment;
   alignment.T_reference_current.translation() = Eigen::Vector3d(0.25, 0.5, 0.75);
   alignment.stretch(0, 1) = 0.125;
@@ -87,8 +88,11 @@ inline Comparison Answer() {
   correction.isocentre_m = Eigen::Vector3d(0.1, 0.2, 0.3);
   correction.value = {-9.0, 2.0, 3.0, 0.1, 0.2, 0.3};
   correction.u95 = {0.5, 0.6, 0.7, 0.01, 0.02, 0.03};
-  correction.words[0] = "down 9.0 mm";
+  correction.words[0] = Message::Verbatim("down 9.0 mm");
   comparison.correction = correction;
+  comparison.judgements.fill(NumberJudgement::kWithin);
+  comparison.judgements[0] = NumberJudgement::kOutside;
+  comparison.judgements[2] = NumberJudgement::kUnsure;
   comparison.region = RegionCoverage{0.97, 0.012, Eigen::Vector2d(0.4, 0.5)};
   comparison.limits.min_coverage = 0.85;
   comparison.limits.max_hole_m = 0.04;

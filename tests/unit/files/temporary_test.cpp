@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/files/temporary.hpp"
 
 #include <sys/stat.h>

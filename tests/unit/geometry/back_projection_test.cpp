@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/geometry/back_projection.hpp"
 
 #include <limits>

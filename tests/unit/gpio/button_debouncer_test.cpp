@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/gpio/button_debouncer.hpp"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // libgpiod itself on an emulated chip (umockdev).
 #include "drivers/gpio/gpio.hpp"
 
@@ -259,6 +260,39 @@ TEST_F(GpioTest, ALightOfOneLineShowsEveryColour) {
     EXPECT_EQ(chip_->outputs[5], 1);
   }
   EXPECT_EQ(chip_->outputs[5], 0);  // off at the end
+}
+
+TEST_F(GpioTest, TheGatePulsesOnlyWhileItIsToldInAgainAndAgain) {
+  using std::chrono::milliseconds;
+  std::vector<int> rises_ms;
+  {
+    GpioGate gate({.where = {"gpiochip0", "led-red"}});
+    EXPECT_EQ(chip_->outputs[5], 0) << "a steady level is hold";
+    int level = 0;
+    const Clock::time_point start{};
+    const auto look = [&](int ms) {
+      if (chip_->outputs[5] == 1 && level == 0) rises_ms.push_back(ms);
+      level = chip_->outputs[5];
+    };
+    // Ten groups of frames a second: `in` for a second, then out, then silence.
+    for (int ms = 0; ms < 3000; ms += 10) {
+      const Clock::time_point now = start + milliseconds(ms);
+      if (ms < 2000 && ms % 100 == 0) gate.Judge(ms < 1000, now);
+      if (gate.deadline() && now >= *gate.deadline()) gate.Dispatch(now);
+      look(ms);
+    }
+    ASSERT_EQ(rises_ms.size(), 10U);
+    for (std::size_t i = 1; i < rises_ms.size(); ++i) EXPECT_EQ(rises_ms[i] - rises_ms[i - 1], 100);
+    EXPECT_EQ(level, 0);
+
+    // A loop that stalls in the middle of a pulse leaves a steady level: hold as well.
+    gate.Judge(true, start + milliseconds(5000));
+    EXPECT_EQ(chip_->outputs[5], 1);
+    gate.Judge(false, start + milliseconds(5010));
+    EXPECT_EQ(chip_->outputs[5], 0) << "out ends a pulse at once";
+    gate.Judge(true, start + milliseconds(5100));
+  }
+  EXPECT_EQ(chip_->outputs[5], 0);  // low at the end
 }
 
 TEST_F(GpioTest, ListsChipsWithTheirNamedLines) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/live/frame_box.hpp"
 
 #include <string>
@@ -44,7 +45,7 @@ TEST(FrameBoxTest, AStoppedProcessDoesNotBlameTheSensor) {
     box.Add(StreamKind::kDepth, stamp_us, {});
     box.Add(StreamKind::kColor, stamp_us, {});
   };
-  std::this_thread::sleep_for(kStallTime + milliseconds(150));
+  std::this_thread::sleep_for(kStallTime + milliseconds(150));  // the time itself is tested
   give(0);
   EXPECT_THROW((void)box.Take(), ProcessStalled) << "though a pair is there: there is a gap";
   EXPECT_TRUE(box.Take()) << "it goes on";
@@ -69,7 +70,7 @@ TEST(FrameBoxTest, WhoWasBusyWhilePairsCameHasMissedThem) {
   for (std::int64_t i = 0; FrameBox::Clock::now() - start < 2 * kStallTime; ++i) {
     box.Add(StreamKind::kDepth, 33'000 * i, {});
     box.Add(StreamKind::kColor, 33'000 * i, {});
-    std::this_thread::sleep_for(milliseconds(10));
+    std::this_thread::sleep_for(milliseconds(10));  // the time between pairs is tested
   }
   EXPECT_TRUE(box.Take()) << "the process ran all the time, but Take() was not called";
   EXPECT_GT(box.statistics().num_lost, 0);
@@ -78,7 +79,7 @@ TEST(FrameBoxTest, WhoWasBusyWhilePairsCameHasMissedThem) {
 TEST(FrameBoxTest, AShortAbsenceIsNone) {
   FrameBox box("X", milliseconds(20), milliseconds(2000));
   box.Begin(0);
-  std::this_thread::sleep_for(milliseconds(300));
+  std::this_thread::sleep_for(milliseconds(300));  // the time itself is tested
   box.Add(StreamKind::kDepth, 0, {});
   box.Add(StreamKind::kColor, 0, {});
   EXPECT_TRUE(box.Take());

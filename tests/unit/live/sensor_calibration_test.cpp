@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which markers hold for a live sensor: the room's.
 #include "drivers/live/sensor_calibration.hpp"
 
@@ -21,9 +22,9 @@ class SensorCalibrationTest : public ::testing::Test {
  protected:
   SensorCalibrationTest() {
     room_.calibration_folder = folder_.path();
-    room_.marker_dictionary = "DICT_4X4_50";
-    room_.marker_length_m = 0.083;
-    room_.reference_marker = 7;
+    room_.room_markers.dictionary = "DICT_4X4_50";
+    room_.room_markers.length_m = 0.083;
+    room_.room_markers.reference = 7;
   }
   void Write(const std::string& keys) const {
     std::ofstream(folder_ / "S1.yaml") << "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
@@ -44,16 +45,16 @@ class SensorCalibrationTest : public ::testing::Test {
 TEST_F(SensorCalibrationTest, TheMarkersAreTheRoomsWhateverTheFileLeavesOut) {
   Write("");
   const StreamInfo info = Info();
-  EXPECT_EQ(info.marker_dictionary, "DICT_4X4_50");
-  EXPECT_EQ(info.marker_length_m, 0.083);
-  EXPECT_EQ(info.reference_marker, 7);
+  EXPECT_EQ(info.room_markers.dictionary, "DICT_4X4_50");
+  EXPECT_EQ(info.room_markers.length_m, 0.083);
+  EXPECT_EQ(info.room_markers.reference, 7);
   EXPECT_FALSE(info.intrinsics_assumed);
 }
 
 TEST_F(SensorCalibrationTest, AFileThatSaysTheSameIsTaken) {
   Write("marker_dictionary: DICT_4X4_50\nmarker_length: 0.083\nreference_marker: 7\n");
-  EXPECT_EQ(Info().marker_length_m, 0.083);
-  EXPECT_EQ(Info().reference_marker, 7);
+  EXPECT_EQ(Info().room_markers.length_m, 0.083);
+  EXPECT_EQ(Info().room_markers.reference, 7);
 }
 
 TEST_F(SensorCalibrationTest, AFileWithOtherMarkersThanTheRoomIsRefused) {
@@ -65,27 +66,27 @@ TEST_F(SensorCalibrationTest, AFileWithOtherMarkersThanTheRoomIsRefused) {
               AllOf(HasSubstr("DICT_6X6_250"), HasSubstr("DICT_4X4_50")));
   EXPECT_THAT(Complaint("reference_marker: 8\n"),
               AllOf(HasSubstr("reference_marker is 8"), HasSubstr("this room has 7")));
-  room_.reference_marker.reset();
+  room_.room_markers.reference.reset();
   EXPECT_THAT(Complaint("reference_marker: 7\n"), HasSubstr("none configured"));
 }
 
 TEST_F(SensorCalibrationTest, TheMarkersAreTheRoomsUnlessADriverSaysOtherwise) {
   Write("marker_length: 0.104\n");
   SensorSettings settings{.calibration_folder = folder_.path()};
-  settings.marker_length_m = 0.083;
+  settings.room_markers.length_m = 0.083;
   EXPECT_THAT(MessageOf<DeviceError>([&] { (void)LiveStreamInfo(settings, "S1", 640, 480, 0.0); }),
               HasSubstr("this room has 0.083 m"));
   settings.markers_are_the_rooms = false;
-  EXPECT_EQ(LiveStreamInfo(settings, "S1", 640, 480, 0.0).marker_length_m, 0.104);
+  EXPECT_EQ(LiveStreamInfo(settings, "S1", 640, 480, 0.0).room_markers.length_m, 0.104);
 }
 
 TEST_F(SensorCalibrationTest, WithoutARoomTheFileSaysWhichMarkersThereAre) {
   room_.markers_are_the_rooms = false;
   Write("marker_dictionary: DICT_6X6_250\nmarker_length: 0.104\nreference_marker: 8\n");
   const StreamInfo info = Info();
-  EXPECT_EQ(info.marker_dictionary, "DICT_6X6_250");
-  EXPECT_EQ(info.marker_length_m, 0.104);
-  EXPECT_EQ(info.reference_marker, 8);
+  EXPECT_EQ(info.room_markers.dictionary, "DICT_6X6_250");
+  EXPECT_EQ(info.room_markers.length_m, 0.104);
+  EXPECT_EQ(info.room_markers.reference, 8);
 }
 
 TEST_F(SensorCalibrationTest, TheDepthNoiseIsTheDriversUnlessTheUnitsFileStatesOne) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The registry of drivers: names, kinds and what a wrong name is answered with.
 #include "drivers/live/sensor_driver.hpp"
 

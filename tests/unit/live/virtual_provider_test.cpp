@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // The virtual sensor in this process: frames as the simulator made them, plugs, faults, commands.
-#include "drivers/virtual/virtual_provider.hpp"
+#include "drivers/simulator/player/virtual_provider.hpp"
 
 #include <atomic>
 #include <chrono>
@@ -13,10 +14,10 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/replay/tum_writer.hpp"
-#include "drivers/simulated/suite_plan.hpp"
-#include "drivers/virtual/raw_frame.hpp"
-#include "drivers/virtual/sweep_player.hpp"
-#include "drivers/virtual/virtual_scenes.hpp"
+#include "drivers/simulator/player/raw_frame.hpp"
+#include "drivers/simulator/player/sweep_player.hpp"
+#include "drivers/simulator/player/virtual_scenes.hpp"
+#include "drivers/simulator/suites/suite_plan.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace plumb {
@@ -66,7 +67,7 @@ TEST_F(VirtualProviderTest, EveryFrameOfASweepComesAsTheSimulatorMadeIt) {
   const auto sensor = provider.Open("");
   EXPECT_EQ(sensor->info().intrinsics.width, 320);
   EXPECT_NEAR(sensor->info().intrinsics.fx, camera_.intrinsics.fx, 1e-6);
-  EXPECT_EQ(sensor->info().reference_marker, camera_.reference_marker);
+  EXPECT_EQ(sensor->info().room_markers.reference, camera_.room_markers.reference);
   const auto truth = simulated::MakeSource(simulated::PlanSuite(ScenesOf(Small())), 0);
   std::vector<simulated::RawFrame> expected;  // rendered first: the sensor does not wait
   while (const std::optional<Frame> frame = truth->Next())

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/loop/clock_watch.hpp"
 
 #include <gtest/gtest.h>
@@ -40,6 +41,13 @@ TEST_F(ClockWatchTest, IsNotTrustedAfterAStepEitherWay) {
   }
   Pass(minutes(5));
   EXPECT_EQ(watch_.held(), minutes(5));
+}
+
+TEST_F(ClockWatchTest, TellsAStepAndItsDirection) {
+  EXPECT_EQ(watch_.Look(wall_, steady_), minutes(0));
+  EXPECT_EQ(watch_.Look(wall_ + seconds(2), steady_), minutes(0));
+  EXPECT_EQ(watch_.Look(wall_ + hours(24), steady_), hours(24));
+  EXPECT_EQ(watch_.Look(wall_, steady_), hours(-24));
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/loop/crash_report.hpp"
 
 #include <sys/resource.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/loop/loop_meter.hpp"
 
 #include <poll.h>
@@ -71,6 +72,10 @@ TEST_F(LoopMeterTest, CountsTurnsOverTheLimitByWallAndByOwnWork) {
   EXPECT_EQ(meter_.all().count, 7);
   EXPECT_EQ(meter_.all().over_limit, 2);
   EXPECT_EQ(meter_.all().cpu_over_limit, 1);
+  Turn("long work", [&] { clocks_.Work(10ms); });
+  ASSERT_EQ(meter_.slow_turns().size(), 1);
+  EXPECT_EQ(meter_.slow_turns().at("long work").times, 1);
+  EXPECT_EQ(meter_.slow_turns().at("long work").of, 2);
   EXPECT_EQ(meter_.longest()->what, "busy machine");
   EXPECT_EQ(meter_.longest_cpu()->what, "long work");
   EXPECT_EQ(meter_.by_name().at("short").count, 5);
@@ -93,6 +98,8 @@ TEST_F(LoopMeterTest, NamesThePartThatTookLongestAndCountsEachByItself) {
   EXPECT_EQ(meter_.longest()->what, "http: GET /b");
   EXPECT_EQ(meter_.longest()->cpu, 13ms);
   EXPECT_EQ(meter_.all().cpu_over_limit, 1) << "the whole turn counts, however it is divided";
+  EXPECT_EQ(meter_.slow_turns().at("http: GET /b").times, 1);
+  EXPECT_EQ(meter_.slow_turns().at("http: GET /b").of, 1);
   EXPECT_EQ(meter_.by_name().at("GET /b").longest_cpu, 9ms);
   EXPECT_EQ(meter_.by_name().at("GET /a").longest_cpu, 2ms);
   EXPECT_EQ(meter_.by_name().at("http").longest_cpu, 1ms);
@@ -119,13 +126,14 @@ TEST_F(LoopMeterTest, TellsASlowTurnAtMostOnceAMinuteAndHowManyWereNotTold) {
 }
 
 TEST_F(LoopMeterTest, ReportsAreWhatTheStatusAndTheDiagnosticsShow) {
-  EXPECT_EQ(LoopJson(meter_)["longest"], nullptr);
+  EXPECT_EQ(LoopJson(meter_), nullptr) << "nothing was measured";
   Turn("tick", [&] { clocks_.Work(250us); });
   Turn("http", [&] { clocks_.Work(12ms), clocks_.Block(3ms); });
   const nlohmann::json json = LoopJson(meter_);
   EXPECT_EQ(json["turns"], 2);
   EXPECT_EQ(json["over_10_ms"], 1);
   EXPECT_EQ(json["cpu_over_10_ms"], 1);
+  EXPECT_EQ(json["slow"]["http"], (nlohmann::json{{"times", 1}, {"of", 1}}));
   EXPECT_EQ(json["longest"], (nlohmann::json{{"what", "http"},
                                              {"ms", 15.0},
                                              {"cpu_ms", 12.0},

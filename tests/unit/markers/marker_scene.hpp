@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Images of markers with exact truth: area-true sampling in linear light, then blur, the sRGB tone
 // curve, noise and 8 bits.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Markers under cameras with other tone curves than the one that detection expects.
 #include "algo/markers/sweep_tone.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // .oni recordings: written through OpenNI2's recorder, read through its player in the child
 // process.
 #include <gmock/gmock.h>
@@ -9,7 +10,6 @@
 #include <random>
 #include <thread>
 
-#include <fmt/format.h>
 #include <opencv2/core.hpp>
 
 #include "algo/base/errors.hpp"
@@ -18,8 +18,8 @@
 #include "drivers/openni/oni_recorder.hpp"
 #include "drivers/openni/oni_recording.hpp"
 #include "drivers/replay/tum_writer.hpp"
-#include "drivers/simulated/suite_plan.hpp"
-#include "drivers/virtual/openni/oni_writer.hpp"
+#include "drivers/simulator/openni/oni_writer.hpp"
+#include "drivers/simulator/suites/suite_plan.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/openni/virtual_rig.hpp"
@@ -66,8 +66,8 @@ TEST(OniTest, ComesBackAsItWasWritten) {
   const auto source = Source();
   const auto recording = OpenOniRecording(Recording());
   EXPECT_EQ(recording->info().intrinsics, source->info().intrinsics);
-  EXPECT_EQ(recording->info().marker_dictionary, source->info().marker_dictionary);
-  EXPECT_EQ(recording->info().reference_marker, source->info().reference_marker);
+  EXPECT_EQ(recording->info().room_markers.dictionary, source->info().room_markers.dictionary);
+  EXPECT_EQ(recording->info().room_markers.reference, source->info().room_markers.reference);
   EXPECT_EQ(recording->info().num_frames, kFrames);
   EXPECT_TRUE(recording->info().warnings.empty());
   const std::vector<Frame> frames = ReadAll(*recording);
@@ -120,7 +120,8 @@ TEST(OniTest, WithoutSideCarTheCameraIsNominalAndThatIsSaid) {
   const auto recording = OpenOniRecording(folder / "foreign.oni");
   EXPECT_TRUE(recording->info().intrinsics_assumed);
   EXPECT_NEAR(recording->info().intrinsics.fx, 570.34 / 2, 0.2);
-  EXPECT_THAT(recording->info().warnings, ::testing::Contains(HasSubstr("no foreign.oni.yaml")));
+  EXPECT_THAT(EnglishTexts(recording->info().warnings),
+              ::testing::Contains(HasSubstr("no foreign.oni.yaml")));
   EXPECT_EQ(ReadAll(*recording).size(), static_cast<std::size_t>(kFrames));
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Drivers of other makers, of which the virtual sensor's plug-in takes the place.
 #include "drivers/openni/openni_driver.hpp"
 
@@ -37,33 +38,33 @@ TEST_F(OpenNiDriverFilesTest, NamesWhatEachDriverServes) {
   const auto drivers = FindOpenNiDrivers(folder_.path());
   ASSERT_EQ(drivers.size(), 3U);
   EXPECT_EQ(drivers[0].file.filename(), "libFreenectDriver.so.0");
-  EXPECT_THAT(drivers[0].serves, HasSubstr("Kinect for Xbox 360"));
-  EXPECT_THAT(drivers[1].serves, HasSubstr("does not know"));
-  EXPECT_THAT(drivers[2].serves, HasSubstr("Orbbec"));
+  EXPECT_THAT(drivers[0].serves.English(), HasSubstr("Kinect for Xbox 360"));
+  EXPECT_THAT(drivers[1].serves.English(), HasSubstr("does not know"));
+  EXPECT_THAT(drivers[2].serves.English(), HasSubstr("Orbbec"));
   for (const OpenNiDriverFile& driver : drivers) {
     EXPECT_FALSE(driver.is_debians);
-    EXPECT_THAT(driver.problem, IsEmpty());
+    EXPECT_THAT(driver.problem.English(), IsEmpty());
   }
 }
 
 TEST_F(OpenNiDriverFilesTest, ANameThatOpenNi2PassesOverIsAProblem) {
   Put("liborbbec.so");
-  EXPECT_THAT(Only().problem, HasSubstr("ln -s liborbbec.so liborbbec.so.0"));
+  EXPECT_THAT(Only().problem.English(), HasSubstr("ln -s liborbbec.so liborbbec.so.0"));
   fs::create_symlink("liborbbec.so", folder_.path() / "liborbbec.so.0");
   EXPECT_EQ(Only().file.filename(), "liborbbec.so.0");
-  EXPECT_THAT(Only().problem, IsEmpty());
+  EXPECT_THAT(Only().problem.English(), IsEmpty());
 }
 
 TEST_F(OpenNiDriverFilesTest, WhatCannotBeLoadedSaysWhy) {
   std::ofstream(folder_.path() / "liborbbec.so.0") << std::string(200, 'x');
-  EXPECT_THAT(Only().problem, AllOf(HasSubstr("cannot be loaded"), HasSubstr("ELF")));
+  EXPECT_THAT(Only().problem.English(), AllOf(HasSubstr("cannot be loaded"), HasSubstr("ELF")));
 }
 
 TEST_F(OpenNiDriverFilesTest, ALibraryThatIsNoDriverSaysSo) {
   Dl_info c_library{};
   ASSERT_NE(::dladdr(reinterpret_cast<void*>(&::getenv), &c_library), 0);
   fs::create_symlink(fs::canonical(c_library.dli_fname), folder_.path() / "libSomething.so.0");
-  EXPECT_THAT(Only().problem, HasSubstr("not an OpenNI 2 driver"));
+  EXPECT_THAT(Only().problem.English(), HasSubstr("not an OpenNI 2 driver"));
 }
 
 TEST_F(OpenNiDriverFilesTest, OtherFilesAndAMissingFolderAreNoDrivers) {
@@ -80,7 +81,7 @@ TEST_F(OpenNiDriverFilesTest, DebiansDriversAreFoundWhereOpenNi2Looks) {
     if (driver.file.filename() != "libPS1080.so.0") continue;
     has_ps1080 = true;
     EXPECT_TRUE(driver.is_debians);
-    EXPECT_THAT(driver.problem, IsEmpty());
+    EXPECT_THAT(driver.problem.English(), IsEmpty());
   }
   EXPECT_TRUE(has_ps1080) << *folder;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The driver of real sensors against OpenNI2 itself and the virtual sensor behind it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +14,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/openni/openni_provider.hpp"
-#include "drivers/simulated/suite_plan.hpp"
+#include "drivers/simulator/suites/suite_plan.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/openni/virtual_rig.hpp"
@@ -45,7 +46,7 @@ TEST(OpenNiSensorTest, GivesTheSimulatorsSweepToTheBit) {
   std::vector<Frame> truth;
   while (auto frame = source->Next()) truth.push_back(std::move(*frame));
   EXPECT_EQ(sensor->info().intrinsics, source->info().intrinsics);
-  EXPECT_EQ(sensor->info().marker_dictionary, source->info().marker_dictionary);
+  EXPECT_EQ(sensor->info().room_markers.dictionary, source->info().room_markers.dictionary);
   EXPECT_FALSE(sensor->info().intrinsics_assumed);
 
   (void)Take(*sensor, 1);
@@ -130,7 +131,8 @@ TEST(OpenNiSensorTest, OpensByTheSerialAmongTwo) {
   EXPECT_EQ(second->description().serial, "VIRTUAL-0002");
   EXPECT_TRUE(second->info().intrinsics_assumed);  // it has no calibration file
   EXPECT_NEAR(second->info().intrinsics.fx, 570.34 / 2, 0.2);
-  EXPECT_THAT(second->info().warnings, ::testing::Contains(HasSubstr("not calibrated")));
+  EXPECT_THAT(EnglishTexts(second->info().warnings),
+              ::testing::Contains(HasSubstr("not calibrated")));
   const auto first = rig.provider.Open("VIRTUAL-0001");
   EXPECT_FALSE(first->info().intrinsics_assumed);
   (void)Take(*first, 2);

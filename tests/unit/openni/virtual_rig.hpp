@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A small virtual sensor for tests: rendered once into the build tree, then reused.
 #pragma once
 
@@ -9,7 +10,7 @@
 #include <thread>
 
 #include "drivers/openni/openni_provider.hpp"
-#include "drivers/virtual/openni/virtual_sensor.hpp"
+#include "tests/devices/openni_driver/virtual_sensor.hpp"
 
 namespace plumb::testing {
 

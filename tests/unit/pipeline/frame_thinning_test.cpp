@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which live frames are left out: the decision on both sides of each limit, and a whole sweep under
 // a clock of the test.
 #include "daemon/pipeline/frame_thinning.hpp"
@@ -111,13 +112,13 @@ Sweep Track(int num_frames, const std::function<double(std::int64_t)>& tracking_
   Sweep sweep;
   while (const std::optional<Frame> frame = feed.Next({})) {
     sweep.taken.push_back(frame->index);
-    sweep.with_fewer.push_back(feed.fewer_keypoints());
-    sensor.now_s += tracking_s(frame->index) * (feed.fewer_keypoints() ? share_of_fewer : 1.0);
+    sweep.with_fewer.push_back(frame->fewer_keypoints);
+    sensor.now_s += tracking_s(frame->index) * (frame->fewer_keypoints ? share_of_fewer : 1.0);
     sweep.dropped += feed.TakeDropped();
   }
   sweep.dropped += feed.TakeDropped();
   sweep.lost = sensor.lost_in_all;
-  sweep.warning = feed.Warning();
+  sweep.warning = feed.Warning().English();
   return sweep;
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // When live frames are tracked with fewer keypoints: the decision on both sides of each limit.
 #include "daemon/pipeline/frame_thinning.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/pipeline/scan_runner.hpp"
 
 #include <atomic>
@@ -6,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
+#include "words/progress.hpp"
 
 namespace plumb {
 namespace {
@@ -17,7 +19,7 @@ class WallSource : public FrameSource {
       : num_frames_(num_frames), fail_at_(fail_at) {
     info_.intrinsics = {.width = 160, .height = 120, .fx = 130, .fy = 130, .cx = 79.5, .cy = 59.5};
     info_.num_frames = num_frames;
-    info_.warnings = {"the wall is only a wall"};
+    info_.warnings = {Message::Verbatim("the wall is only a wall")};
   }
   const StreamInfo& info() const override { return info_; }
   std::optional<Frame> Next() override {
@@ -50,7 +52,7 @@ TEST(ScanRunnerTest, HandsEveryFrameOnAndKeepsTheSourcesWarnings) {
   EXPECT_EQ(last, 12);
   EXPECT_EQ(scene.frames_total, 12);
   EXPECT_EQ(scene.frames_dropped, 0);
-  EXPECT_THAT(scene.warnings, testing::Contains("the wall is only a wall"));
+  EXPECT_THAT(EnglishTexts(scene.warnings), testing::Contains("the wall is only a wall"));
 }
 
 TEST(ScanRunnerTest, PassesOnWhatTheSourceThrows) {
@@ -77,7 +79,7 @@ TEST(ScanRunnerTest, LiveItDropsTheOldestAndCounts) {
   live.realtime = true;
   live.queue_capacity = 1;
   const Scene scene = RunScan(source, live, {}, [&](const ScanProgress& progress) {
-    if (progress.step != "tracking") return;
+    if (!progress.step.Is(say::progress::kTracking)) return;
     const double until_s = SteadySeconds() + 0.03;
     while (SteadySeconds() < until_s) {
     }

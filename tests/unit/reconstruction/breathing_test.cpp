@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/reconstruction/breathing.hpp"
 
 #include <cmath>
@@ -8,7 +9,7 @@
 #include <tbb/global_control.h>
 
 #include "algo/base/units.hpp"
-#include "algo/reconstruction/surface_cloud.hpp"
+#include "algo/surface/surface_cloud.hpp"
 #include "tests/support/analytic_scene.hpp"
 
 namespace plumb {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/reconstruction/reconstructor.hpp"
 
 #include <algorithm>
@@ -106,7 +107,7 @@ TEST_F(ReconstructorTest, WithoutMarkersTheFirstKeyframeIsTheFrame) {
   EXPECT_GT(scene.cloud.size(), 1000U);
   EXPECT_LT(scene.trajectory.front().T_world_camera.translation().norm(), 0.002);
   ASSERT_FALSE(scene.warnings.empty());
-  EXPECT_THAT(scene.warnings.back(), HasSubstr("no marker was seen"));
+  EXPECT_THAT(scene.warnings.back().English(), HasSubstr("no marker was seen"));
 }
 
 TEST_F(ReconstructorTest, KeyframesAreAsFarApartAsAskedFor) {
@@ -253,7 +254,8 @@ TEST_F(ReconstructorTest, NoSurfaceAroundTheReferenceMarkerIsNoHeightMap) {
   EXPECT_FALSE(scene.cloud.empty());
   EXPECT_FALSE(scene.height_map.has_value()) << scene.height_map->grid.width << " columns";
   ASSERT_FALSE(scene.warnings.empty());
-  EXPECT_THAT(scene.warnings.back(), HasSubstr("no surface was measured around reference marker"));
+  EXPECT_THAT(scene.warnings.back().English(),
+              HasSubstr("no surface was measured around reference marker"));
 }
 
 // The first view of the sweep again and again, as from a tripod.
@@ -275,7 +277,7 @@ TEST_F(ReconstructorTest, SensorOnATripodGetsTheReferenceMarkersFrame) {
   EXPECT_EQ(scene.keyframes.size(), 1U) << "else this tests nothing";
   ASSERT_EQ(scene.frame, SceneFrame::kReferenceMarker);
   ASSERT_TRUE(scene.height_map.has_value());
-  EXPECT_THAT(scene.warnings, testing::Contains(HasSubstr("from 1 place only")));
+  EXPECT_THAT(EnglishTexts(scene.warnings), testing::Contains(HasSubstr("from 1 place only")));
   // Measured: 0.78 mm, several times that of a sweep, from the covariance of this one view.
   EXPECT_GT(scene.markers.at(kReferenceBoard).sigma_m, 0.0004);
   EXPECT_LT(scene.markers.at(kReferenceBoard).sigma_m, 0.0016);
@@ -293,7 +295,7 @@ TEST_F(ReconstructorTest, AMarkerOfFewFramesIsNoFrameAndTheWarningSaysHowMany) {
   const Scene scene = reconstructor.Finish();
   EXPECT_EQ(scene.frame, SceneFrame::kFirstKeyframe);
   EXPECT_THAT(
-      scene.warnings,
+      EnglishTexts(scene.warnings),
       testing::Contains(HasSubstr("in 1 keyframes and 4 tracked frames, 3 or 5 are needed")));
 }
 
@@ -306,7 +308,8 @@ TEST_F(ReconstructorTest, PaperPresetWarnsOfItsOwnFrameOnly) {
   const Scene scene = reconstructor.Finish();
   EXPECT_EQ(scene.frame, SceneFrame::kReferenceMarker)
       << "one keyframe is enough for the published means";
-  EXPECT_THAT(scene.warnings, testing::Not(testing::Contains(HasSubstr("first keyframe's frame"))));
+  EXPECT_THAT(EnglishTexts(scene.warnings),
+              testing::Not(testing::Contains(HasSubstr("first keyframe's frame"))));
 }
 
 TEST_F(ReconstructorTest, TimesEveryStage) {
@@ -338,7 +341,8 @@ TEST_F(ReconstructorTest, ImagesThatNeverCameAreTold) {
   const Scene scene = reconstructor.Finish();
   EXPECT_EQ(scene.frames_tracked, 12);
   EXPECT_NEAR(scene.longest_lost_s, 1.5 + 1 / 15.0, 1e-6);
-  EXPECT_THAT(scene.warnings, testing::Contains(HasSubstr("no image came for 1.57 s")));
+  EXPECT_THAT(EnglishTexts(scene.warnings),
+              testing::Contains(HasSubstr("no image came for 1.57 s")));
 }
 
 TEST_F(ReconstructorTest, StopsOnRequest) {

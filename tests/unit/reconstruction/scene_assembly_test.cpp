@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/reconstruction/scene_assembly.hpp"
 
 #include <cstdint>
@@ -16,17 +17,20 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TEST(SceneAssemblyTest, ALengthThatDepthAndMarkersDisagreeAboutIsAWarning) {
-  const auto warnings_at = [](double depth_scale, bool has_markers = true) {
-    Scene scene;
-    if (has_markers) scene.markers[7] = {};
-    WarnOfScale(depth_scale, scene);
-    return scene.warnings;
-  };
-  for (const double usual : {1.0, 1.0199, 0.9801}) EXPECT_THAT(warnings_at(usual), IsEmpty());
-  EXPECT_THAT(warnings_at(1.0201), ElementsAre(HasSubstr("disagree by 2.0 %")));
-  EXPECT_THAT(warnings_at(0.9799), ElementsAre(HasSubstr("disagree by 2.0 %")));
-  EXPECT_THAT(warnings_at(1.05, false), IsEmpty()) << "nothing to disagree with";
+TEST(SceneAssemblyTest, WhatIsWrongWithASweepStaysWithItsScene) {
+  Symptoms symptoms;
+  symptoms.marker_depths = {{.id = 7, .ratio = 0.97, .scatter = 0.01, .num_views = 9}};
+  symptoms.marker_length_m = 0.104;
+  Scene scene;
+  AddFindings(symptoms, scene);
+  EXPECT_THAT(EnglishTexts(scene.warnings), ElementsAre(HasSubstr("disagree by 3.0 %")));
+  EXPECT_THAT(scene.refusals, IsEmpty());
+  EXPECT_NEAR(scene.scale_doubt, 0.03 + 0.01, 1e-9);
+  symptoms.marker_depths[0].ratio = 5.0;
+  Scene refused;
+  AddFindings(symptoms, refused);
+  EXPECT_THAT(EnglishTexts(refused.refusals), ElementsAre(HasSubstr("depth_scale")));
+  EXPECT_EQ(refused.warnings, refused.refusals);
 }
 
 // Warnings of a scene from this many keyframes, of which each sees a landmark together with the
@@ -48,7 +52,8 @@ std::vector<std::string> Warnings(int num_keyframes, std::int64_t num_dropped, b
     frames[i].reference_keyframe = 0;
     frames[i].fewer_keypoints = i < num_fewer_keypoints;
   }
-  return MakeScene({}, Preset::kBest, num_dropped, frames, map, {}, {}, Pose::Identity()).warnings;
+  return EnglishTexts(
+      MakeScene({.info = {}, .num_dropped = num_dropped, .frames = frames, .map = map}).warnings);
 }
 
 TEST(SceneAssemblyTest, ASweepThatNeverReturnsToAPlaceIsAWarning) {
@@ -63,9 +68,10 @@ TEST(SceneAssemblyTest, AMarkerWithoutAVarianceIsVague) {
   map.keyframes.resize(1);
   map.markers[3] = map.markers[4] = {.num_views = 2};
   StreamInfo info;
-  info.marker_length_m = 0.104;
-  const Scene scene = MakeScene(info, Preset::kBest, 0, std::vector<TrackedFrame>(1), map, {},
-                                {{3, 0.0004}}, Pose::Identity());
+  info.room_markers.length_m = 0.104;
+  const std::vector<TrackedFrame> frames(1);
+  const Scene scene =
+      MakeScene({.info = info, .frames = frames, .map = map, .marker_sigmas_m = {{3, 0.0004}}});
   EXPECT_EQ(scene.markers.at(3).sigma_m, 0.0004);
   EXPECT_EQ(scene.markers.at(4).sigma_m, 0.01);
 }
@@ -86,7 +92,7 @@ TEST(SceneAssemblyTest, BreathingOfOverTwoMillimetresIsAWarning) {
     Scene scene;
     scene.breathing = Breathing{.amplitude_m = rise_m, .period_s = 3.9};
     WarnOfBreathing(scene);
-    return scene.warnings;
+    return EnglishTexts(scene.warnings);
   };
   EXPECT_THAT(warnings_at(0.002), IsEmpty());
   EXPECT_THAT(warnings_at(0.0042),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The n-th call to the system fails, for every n and every kind of call, while a scan is stored,
 // while a store starts after a crash, and while a backup is made or restored: nothing that was
 // finished is lost, and the next start puts the rest right. Then databases that are not what was
@@ -9,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/archive/store_backup.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "tests/support/failing_calls.hpp"
@@ -87,8 +89,8 @@ class FailingDiskTest : public ::testing::Test {
       const auto found = store.scans.Find(scan);
       ASSERT_TRUE(found) << scan;
       EXPECT_EQ(found->outcome, ScanOutcome::kDone);
-      EXPECT_EQ(found->failure, "");
-      EXPECT_EQ(store.integrity.Check(scan, false), "");
+      EXPECT_EQ(found->failure, Message());
+      EXPECT_EQ(store.integrity.Check(scan, false).English(), "");
     }
     EXPECT_EQ(store.audit.FirstBroken(), std::nullopt);
     EXPECT_EQ(store.references.Approved(patient_)->scan_id, reference_);
@@ -175,7 +177,7 @@ TEST_F(FailingDiskTest, WhileABackupIsMade) {
       (void)Arm(fault);
       bool is_made = false;
       try {
-        is_made = store.backup.Make(kAnna, backup()).problems.empty();
+        is_made = StoreBackup(store).Make(kAnna, backup()).problems.empty();
       } catch (const IoError&) {
       }
       failed = Disarm();
@@ -203,7 +205,7 @@ TEST_F(FailingDiskTest, WhileABackupIsMadeInOneFile) {
           (void)Arm(fault);
           bool is_made = false;
           try {
-            is_made = store.backup.Make(kAnna, archive).problems.empty();
+            is_made = StoreBackup(store).Make(kAnna, archive).problems.empty();
           } catch (const IoError&) {
           }
           failed = Disarm();
@@ -328,7 +330,8 @@ TEST(DamagedDatabaseTest, IsOpenedOrRefusedAndNoScanIsDeleted) {
   int opened = 0, refused = 0, unreadable = 0;
   for (int round = 0; round < 200 * Repeats(); ++round) {
     SCOPED_TRACE(round);
-    for (const char* name : {"plumb.db", "plumb.db-wal", "plumb.db-shm"}) fs::remove(state / name);
+    for (const char* name : {"plumb.db", "plumb.db-wal", "plumb.db-shm", "plumb.db-mark"})
+      fs::remove(state / name);
     WriteWholeFile(state / "plumb.db", Damaged(whole, random));
     try {
       Store store(state);
@@ -362,7 +365,7 @@ TEST(DamagedDatabaseTest, IsOpenedOrRefusedAndNoScanIsDeleted) {
   }
   fmt::print("{} databases opened ({} with a record that cannot be read), {} refused\n", opened,
              unreadable, refused);
-  EXPECT_GT(opened, 0);
+  EXPECT_EQ(unreadable, 0) << "each page has a checksum, which is compared before a row is read";
   EXPECT_GT(refused, 0);
 }
 

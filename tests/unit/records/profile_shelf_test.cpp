@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Versions of a sensor unit's profile on the disk.
 #include "daemon/records/profile_shelf.hpp"
 
@@ -41,7 +42,7 @@ TEST(ProfileShelf, GivesBackWhatWasLearnedLastToThatUnitAlone) {
   ProfileShelf shelf(folder / "profiles");
   const ProfileShelf::InUse in_use = shelf.Read("A");
   EXPECT_EQ(Focal(in_use), 0.002);
-  EXPECT_EQ(in_use.fault, "");
+  EXPECT_EQ(in_use.fault.English(), "");
   EXPECT_EQ(in_use.newest->profile->name, "A version 2");
   EXPECT_EQ(in_use.newest->profile->num_sweeps, 3);
   EXPECT_EQ(in_use.newest->profile->covariance, Profile(0).covariance);
@@ -90,13 +91,13 @@ TEST(ProfileShelf, ADamagedVersionIsSetAsideAndScansGoOnWithout) {
     std::ofstream(file) << damaged;
     const ProfileShelf::InUse in_use = shelf.Read("A");
     EXPECT_FALSE(in_use.newest);
-    EXPECT_THAT(in_use.fault, HasSubstr("set-aside"));
+    EXPECT_THAT(in_use.fault.English(), HasSubstr("set-aside"));
     EXPECT_FALSE(fs::exists(file));
     EXPECT_EQ(ReadTextFile(folder / "profiles" / "set-aside" / "A-000002.profile", 4U << 20U),
               damaged);
     // The next scan finds no profile either, and no fault: it was told.
     const ProfileShelf::InUse next = shelf.Read("A");
-    EXPECT_EQ(next.fault, "");
+    EXPECT_EQ(next.fault.English(), "");
     ASSERT_TRUE(next.newest);
     EXPECT_FALSE(next.newest->profile);
     EXPECT_EQ(next.newest->cause, ProfileCause::kUnreadable);
@@ -120,7 +121,7 @@ TEST(ProfileShelf, AnotherUnitsFileIsNotUsed) {
   fs::rename(folder / "profiles" / "A", folder / "profiles" / "B");
   const ProfileShelf::InUse in_use = shelf.Read("B");
   EXPECT_FALSE(in_use.newest);
-  EXPECT_THAT(in_use.fault, HasSubstr("belongs to the unit \"A\""));
+  EXPECT_THAT(in_use.fault.English(), HasSubstr("belongs to the unit \"A\""));
 }
 
 TEST(ProfileShelf, AResetUnitBeginsAgainAndCanBeTakenBack) {

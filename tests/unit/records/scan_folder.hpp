@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scans with files of known content, for tests of what the store keeps.
 #pragma once
 
@@ -12,20 +13,29 @@
 #include "daemon/records/store.hpp"
 #include "drivers/files/file_io.hpp"
 
+#include "tests/support/result_with.hpp"
 namespace plumb::testing {
 
 inline const Actor kAnna{.user = "anna", .address = "::1"};
 inline const Actor kBert{.user = "bert", .address = "::1"};
+
+/// Removals that wait for nothing.
+inline constexpr RemovalRules kAtOnce{
+    .needs_backup = false, .notice = std::chrono::seconds(0), .most_a_day = 1000};
 
 /// What a compared scan leaves.
 inline constexpr const char* kScanFiles[] = {
     "scene/scene.json", "scene/trajectory.txt", "scene/cloud.ply",     "scene/heightmap.tiff",
     "scene/mesh.ply",   "result/result.json",   "result/error_map.png"};
 
+inline std::string ResultOfScan() { return ResultWith(R"({"verdict":"in_tolerance"})"); }
+
 inline void FillScan(const std::filesystem::path& folder) {
   for (const std::string file : kScanFiles) {
     std::filesystem::create_directories((folder / file).parent_path());
-    WriteWholeFile(folder / file, fmt::format("{} of {}", file, folder.string()));
+    WriteWholeFile(folder / file, file == "result/result.json"
+                                      ? ResultOfScan()
+                                      : fmt::format("{} of {}", file, folder.string()));
   }
 }
 
@@ -38,9 +48,11 @@ inline std::string StoreScan(
     Store& store, const std::string& patient,
     const std::function<void(const std::filesystem::path&)>& fill = FillScan) {
   const std::string id = store.scans.Begin(Begun(patient));
-  fill(store.folders.Staging(id));
+  const std::filesystem::path folder = store.folders.Staging(id);
+  fill(folder);
+  const auto result = ReadWholeFile(folder / "result/result.json", std::size_t{1} << 20);
   store.scans.Finish(id, {.outcome = ScanOutcome::kDone,
-                          .result_json = R"({"verdict":"in_tolerance"})",
+                          .result_json = std::string(result.begin(), result.end()),
                           .swept_area_m2 = 1.0});
   return id;
 }
@@ -64,8 +76,20 @@ inline std::map<std::string, std::string> FilesBelow(const std::filesystem::path
   return files;
 }
 
+/// Turns a database into one of the schema of 0.2.0, which stored English sentences only.
+inline void MakeSchema9(const std::filesystem::path& database) {
+  Database(database, Database::Access::kReadWrite)
+      .Execute(
+          "DROP TRIGGER scans_unavailable_message; ALTER TABLE scans DROP COLUMN failure_message; "
+          "ALTER TABLE scans DROP COLUMN unavailable_message; ALTER TABLE refs DROP COLUMN "
+          "approved_digest; ALTER TABLE sessions DROP COLUMN reference_id; DROP TABLE "
+          "backup_scans; DROP TABLE backups; DROP TABLE removals; DROP "
+          "TABLE bin; DROP TABLE second_factors; PRAGMA user_version = 9");
+}
+
 /// Turns a database into one of the schema of 0.1.0, without what that cannot hold.
 inline void MakeSchema3(const std::filesystem::path& database) {
+  MakeSchema9(database);
   Database(database, Database::Access::kReadWrite)
       .Execute(
           "DROP TABLE preferences; DROP TABLE room_calibrations; DROP TABLE templates; DROP TABLE "

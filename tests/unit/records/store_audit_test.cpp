@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the log's entries are about, as people know it.
 #include <gmock/gmock.h>
 

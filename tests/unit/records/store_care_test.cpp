@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Removing scans, keeping sweeps that failed, a database that is held, and records that cannot be
 // read.
 #include <gmock/gmock.h>
@@ -5,11 +6,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "daemon/database/store_json.hpp"
 #include "daemon/records/check_json.hpp"
-#include "daemon/records/store_json.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/result_with.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/records/scan_folder.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -59,8 +62,9 @@ TEST_F(StoreCareTest, AScanIsRemovedForAReasonAndAReferenceIsNot) {
   EXPECT_FALSE(store_->scans.Find(scan));
   EXPECT_FALSE(fs::exists(store_->folders.Scan(scan)));
   const AuditEntry logged = store_->audit.Find({0, 1}).at(0);
-  EXPECT_EQ(logged.user + " " + logged.action + " " + logged.subject + ": " + logged.detail,
-            "bert scan.remove " + scan + ": blurred");
+  EXPECT_EQ(
+      logged.user + " " + logged.action + " " + logged.subject + ": " + logged.detail.English(),
+      "bert scan.remove " + scan + ": blurred");
   EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kNotFound);
 }
 
@@ -75,19 +79,20 @@ TEST_P(FailedSweepTest, KeepsACompleteRecordingOfOneThatFailed) {
     fs::create_directories(recording / "rgb");
     WriteWholeFile(recording / "rgb" / "1.png", std::string_view("image"));
     if (is_complete) WriteWholeFile(recording / "rgb.txt", std::string_view("1 rgb/1.png"));
-    store_->scans.Finish(id, {.outcome = GetParam(), .failure = "marker not seen"});
+    store_->scans.Finish(id,
+                         {.outcome = GetParam(), .failure = Message::Verbatim("marker not seen")});
     EXPECT_FALSE(fs::exists(store_->folders.Staging(id)));
     EXPECT_EQ(testing::FilesBelow(store_->folders.Scan(id)).size(),
               is_kept && is_complete ? 2U : 0U);
-    EXPECT_EQ(store_->scans.Find(id)->failure, "marker not seen");
+    EXPECT_EQ(store_->scans.Find(id)->failure.English(), "marker not seen");
     store_.reset();
     store_ = std::make_unique<Store>(state());
     EXPECT_EQ(store_->recovery().orphaned_folders + store_->recovery().lost_scans, 0);
     EXPECT_EQ(fs::exists(store_->folders.Scan(id)), is_kept && is_complete);
     if (!is_kept || !is_complete) continue;
-    EXPECT_EQ(store_->integrity.Check(id, false), "");
+    EXPECT_EQ(store_->integrity.Check(id, false).English(), "");
     EXPECT_THROW((void)store_->references.Add(kAnna, id, "", {}), StoreRefusal);
-    EXPECT_EQ(store_->removal.KeepWithinQuota(0) > 0, true);
+    EXPECT_EQ(store_->removal.KeepWithinQuota(0, testing::kAtOnce).removed > 0, true);
     EXPECT_FALSE(fs::exists(store_->folders.Scan(id) / "recording"));
   }
 }
@@ -230,7 +235,9 @@ TEST_F(StoreCareTest, TheLogTellsWhichSettingsWereChangedBeforeAndAfter) {
   settings.retention_days = 7;
   settings.posture = "FFS";
   store_->settings.Change(kAnna, settings);
-  const auto detail = [&] { return store_->audit.Find({.before = 0, .limit = 1}).front().detail; };
+  const auto detail = [&] {
+    return store_->audit.Find({.before = 0, .limit = 1}).front().detail.English();
+  };
   EXPECT_EQ(detail(), R"({"posture":["HFS","FFS"],"retention_days":[0,7]})");
   store_->settings.Change(kAnna, settings);
   EXPECT_EQ(detail(), "{}");
@@ -242,20 +249,23 @@ TEST_F(StoreCareTest, TheLogTellsWhichSettingsWereChangedBeforeAndAfter) {
 TEST_F(StoreCareTest, AStoredResultThatCannotBeReadIsAnErrorAndMissingNumbersAreNoZeros) {
   const std::string angles = R"("pitch_deg":1,"roll_deg":2,"yaw_deg":3)";
   const auto with = [](const std::string& correction) {
-    return R"({"verdict":"move","correction":)" + correction + "}";
+    return testing::ResultWith(R"({"verdict":"move","correction":)" + correction + "}");
   };
   const ResultSummary couch = SummaryOf(with("{\"vertical_mm\":null," + angles + "}"));
   EXPECT_EQ(couch.correction->vertical_mm, std::nullopt) << "markers on the couch show no shift";
   EXPECT_EQ(couch.correction->yaw_deg, 3.0);
-  EXPECT_FALSE(couch.u95);
-  EXPECT_EQ(SummaryOf(R"({"verdict":"no_answer","correction":null})").verdict, Verdict::kNoAnswer);
+  EXPECT_FALSE(couch.u95->yaw_deg);
+  EXPECT_EQ(couch.judgements[5], NumberJudgement::kOutside);
+  EXPECT_EQ(couch.judgements[0], NumberJudgement::kUnjudged);
+  EXPECT_EQ(SummaryOf(testing::ResultWith(R"({"verdict":"no_answer","correction":null})")).verdict,
+            Verdict::kNoAnswer);
   for (const std::string& bad :
-       {std::string(), std::string("[]"), std::string("{}"), std::string(R"({"verdict":1})"),
-        std::string(R"({"verdict":"fine"})"), std::string(R"({"verdict":"move","reasons":"one"})"),
-        with("7"), with("{}"), with(R"({"pitch_deg":1,"roll_deg":2})"),
+       {std::string(), std::string("[]"), std::string("{}"),
+        testing::ResultWith(R"({"verdict":1})"), testing::ResultWith(R"({"verdict":"fine"})"),
+        testing::ResultWith(R"({"verdict":"move","reasons":"one"})"), with("7"), with("{}"),
+        with(R"({"pitch_deg":1,"roll_deg":2})"),
         with(R"({"pitch_deg":1,"roll_deg":2,"yaw_deg":null})"),
         with("{\"lateral_mm\":\"4\"," + angles + "}"),
-        with("{" + angles + R"(,"uncertainty":{"vertical_mm":1}})"),
         with("{" + angles + R"(,"uncertainty":[]})")}) {
     EXPECT_THAT(MessageOf<DataError>([&] { (void)SummaryOf(bad); }), HasSubstr("stored result"))
         << bad;
@@ -290,8 +300,8 @@ TEST_F(StoreCareTest, APlanThatCannotBeReadHidesNoOtherOfThePatient) {
   const std::vector<Reference> references = store_->references.List(patient_);
   ASSERT_EQ(references.size(), 2U);
   EXPECT_EQ(references[0].id, second);
-  EXPECT_THAT(references[0].unreadable, HasSubstr("cannot be read"));
-  EXPECT_EQ(references[1].unreadable, "");
+  EXPECT_THAT(references[0].unreadable.English(), HasSubstr("cannot be read"));
+  EXPECT_EQ(references[1].unreadable.English(), "");
   EXPECT_THROW((void)store_->references.Find(second), DataError) << "never used as a default";
   EXPECT_EQ(store_->references.Find(first)->id, first);
 }
@@ -313,11 +323,34 @@ TEST_F(StoreCareTest, AScanThatCannotBeReadHidesNoOtherOfThePatient) {
       EXPECT_EQ(listed[i].patient_id, patient_);
       EXPECT_EQ(listed[i].outcome, ScanOutcome::kFailed);
       EXPECT_FALSE(listed[i].result);
-      EXPECT_THAT(listed[i].failure, HasSubstr("stored"));
+      EXPECT_THAT(listed[i].failure.English(),
+                  ::testing::AnyOf(HasSubstr("stored"), HasSubstr("result.json")));
       EXPECT_THROW((void)store_->scans.Find(listed[i].id), DataError) << "never acted on";
     }
     EXPECT_GT(listed[0].started_at, listed[1].started_at) << "a stamp beyond the clock's range";
   }
+}
+
+TEST_F(StoreCareTest, AResultAndACheckAreReadWithTheirMessages) {
+  const ResultSummary result = SummaryOf(testing::ResultWith(
+      R"({"verdict":"no_answer","reasons":["it has no files","of an older version"],)"
+      R"("reason_messages":[{"id":"store.no_files","arguments":{}},{"id":"none.such"}],)"
+      R"("correction":{"pitch_deg":1,"roll_deg":2,"yaw_deg":3,"words":{"pitch":"note"},)"
+      R"("word_messages":{"pitch":{"id":"store.log_note","arguments":{}}}},)"
+      R"("body":{"parts":[{"words_now":"site","words_after":"as it is",)"
+      R"("words_now_message":{"id":"store.log_site","arguments":{}}}]}})"));
+  EXPECT_THAT(result.reasons, ::testing::ElementsAre(say::store::NoFiles(),
+                                                     Message::Verbatim("of an older version")));
+  EXPECT_EQ(result.words[3], say::store::LogNote());
+  EXPECT_TRUE(result.words[4].empty());
+  EXPECT_THAT(result.body_now, ::testing::ElementsAre(say::store::LogSite()));
+  EXPECT_THAT(result.body_after, ::testing::ElementsAre(Message::Verbatim("as it is")));
+  const CheckRecord check =
+      CheckIn(R"({"status":"failed","reasons":["it has no files"],"reason_messages":[{"id":)"
+              R"("store.no_files","arguments":{}}],"items":[{"name":"moved","note":"site",)"
+              R"("note_message":{"id":"store.log_site","arguments":{}}}]})");
+  EXPECT_THAT(check.reasons, ::testing::ElementsAre(say::store::NoFiles()));
+  EXPECT_EQ(check.items.at(0).note, say::store::LogSite());
 }
 
 TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
@@ -326,7 +359,8 @@ TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
         R"({"status":"passed","items":[1]})", R"({"status":"passed","reasons":7})"}) {
     const CheckRecord record = CheckIn(bad);
     EXPECT_EQ(record.status, MarkerCheckStatus::kFailed) << bad;
-    EXPECT_THAT(record.reasons, ::testing::ElementsAre(HasSubstr("cannot be read"))) << bad;
+    EXPECT_THAT(EnglishTexts(record.reasons), ::testing::ElementsAre(HasSubstr("cannot be read")))
+        << bad;
   }
 }
 

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // The daily checks of the markers and their baseline.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/database/schema.hpp"
 #include "daemon/records/check_json.hpp"
-#include "daemon/records/schema.hpp"
 #include "tests/unit/records/store_fixture.hpp"
 
 namespace plumb {
@@ -16,15 +17,15 @@ using testing::StoreTest;
 
 /// What a check that ended in `status` stores after seeing the markers 1 to n in a row.
 TakenCheck CheckWith(int n, MarkerCheckStatus status) {
-  MarkerBaseline seen{{}, "DICT_6X6_250", 0.104};
+  MarkerBaseline seen{{}, {.dictionary = "DICT_6X6_250", .length_m = 0.104}};
   for (int id = 1; id <= n; ++id) {
     SceneMarker marker{.corners = CornersInMarkerFrame(0.104), .num_views = 9, .sigma_m = 0.0005};
     for (Eigen::Vector3d& corner : marker.corners) corner.x() += 0.3 * id;
     seen.markers[id] = marker;
   }
   return {.check = {.status = status,
-                    .items = {{"moved", 1.25, 5.0, "mm", true, "marker 2"}},
-                    .reasons = {"because"}},
+                    .items = {{"moved", 1.25, 5.0, "mm", true, Message::Verbatim("marker 2")}},
+                    .reasons = {Message::Verbatim("because")}},
           .seen = std::move(seen)};
 }
 
@@ -91,13 +92,14 @@ TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) 
                                                .sensor_serial = serial,
                                                .reason = "",
                                                .daily_check = DailyCheck::kOverdue});
-    store->scans.Finish(id, {.outcome = ScanOutcome::kFailed, .failure = "of this test"});
+    store->scans.Finish(
+        id, {.outcome = ScanOutcome::kFailed, .failure = Message::Verbatim("of this test")});
     return id;
   };
   const std::string early = scan("S1");
   const std::string first =
       store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
-  store->checks.SetBaseline(kBert, first);
+  store->checks.SetBaseline(kBert, first, "the markers are in place");
   store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
   EXPECT_FALSE(store->checks.ConfirmsScan(early)) << "the baseline is younger than the scan";
 
@@ -169,8 +171,9 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
     const std::string first =
         store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
     EXPECT_EQ(store->checks.StateSince(before), DailyCheck::kOverdue) << "there is no baseline";
-    store->checks.SetBaseline(kBert, first);
-    EXPECT_EQ(store->audit.Find({0, 1, "check.baseline"}).at(0).detail, "4 markers");
+    store->checks.SetBaseline(kBert, first, "the markers are in place");
+    EXPECT_EQ(store->audit.Find({0, 1, "check.baseline"}).at(0).detail.English(),
+              "4 markers; reason: the markers are in place");
     store->checks.Add(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kPassed));
   }
   const auto store = Open();
@@ -182,8 +185,8 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_EQ(checks[0].num_markers, 5U);
   ASSERT_THAT(checks[0].items, SizeIs(1));
   EXPECT_EQ(checks[0].items[0].value, 1.25);
-  EXPECT_EQ(checks[0].items[0].note, "marker 2");
-  EXPECT_EQ(checks[1].reasons, std::vector<std::string>{"because"});
+  EXPECT_EQ(checks[0].items[0].note.English(), "marker 2");
+  EXPECT_EQ(EnglishTexts(checks[1].reasons), std::vector<std::string>{"because"});
   EXPECT_EQ(store->checks.StateSince(before), DailyCheck::kPassed);
   EXPECT_EQ(store->checks.StateSince(WallClock::now() + std::chrono::hours(1)),
             DailyCheck::kOverdue);
@@ -196,29 +199,55 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_EQ(baseline->num_markers, 4U);
   const auto markers = store->checks.BaselineMarkers();
   ASSERT_TRUE(markers);
-  EXPECT_EQ(markers->dictionary, "DICT_6X6_250");
+  EXPECT_EQ(markers->room_markers.dictionary, "DICT_6X6_250");
   EXPECT_NEAR(markers->markers.at(3).corners[0].x(), 0.9 - 0.052, 1e-12);
   EXPECT_EQ(markers->markers.at(3).num_views, 9);
   std::vector<std::string> actions;
   for (const AuditEntry& entry : store->audit.Find({0, 10}))
-    actions.push_back(entry.user + " " + entry.action + " " + entry.detail);
-  EXPECT_THAT(actions,
-              ::testing::IsSupersetOf({"anna check.done passed", "anna check.done no_baseline",
-                                       "bert check.baseline 4 markers"}));
-  store->checks.SetBaseline(kBert, checks[0].id);
-  EXPECT_EQ(store->audit.Find({0, 1}).at(0).detail, "5 markers; before: check 1 with 4 markers");
+    actions.push_back(entry.user + " " + entry.action + " " + entry.detail.English());
+  EXPECT_THAT(actions, ::testing::IsSupersetOf(
+                           {"anna check.done passed", "anna check.done no baseline",
+                            "bert check.baseline 4 markers; reason: the markers are in place"}));
+  store->checks.SetBaseline(kBert, checks[0].id, "the markers are in place");
+  EXPECT_EQ(store->audit.Find({0, 1}).at(0).detail.English(),
+            "5 markers; before: check 1 with 4 markers; reason: the markers are in place");
+}
+
+TEST_F(StoreTest, WhatAnotherBaselineChangesIsNamed) {
+  const auto store = Open();
+  const auto changes = [&](const TakenCheck& check) {
+    std::vector<std::string> said;
+    for (const Message& change : store->checks.ChangesBy(store->checks.Add(kAnna, "S1", check)))
+      said.push_back(change.English());
+    return said;
+  };
+  EXPECT_THAT(changes(CheckWith(5, MarkerCheckStatus::kNoBaseline)), ::testing::IsEmpty());
+  store->checks.SetBaseline(
+      kBert, store->checks.Add(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kNoBaseline)), "first");
+  EXPECT_THAT(changes(CheckWith(5, MarkerCheckStatus::kPassed)),
+              ::testing::ElementsAre("every marker lies where it was, within 1 mm"));
+  TakenCheck other = CheckWith(6, MarkerCheckStatus::kFailed);
+  other.seen.markers.erase(5);
+  for (Eigen::Vector3d& corner : other.seen.markers.at(2).corners) corner.y() += 0.03;
+  EXPECT_THAT(changes(other), ::testing::ElementsAre("no longer part of the baseline: markers 5",
+                                                     "new in the baseline: markers 6",
+                                                     "marker 2 lies 30.0 mm from where it was"));
 }
 
 TEST_F(StoreTest, ABaselineNeedsACheckThatSawMarkers) {
   const auto store = Open();
-  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, "77"); }), ChangeResult::kNotFound);
-  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, "x"); }), ChangeResult::kNotFound);
+  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, "77", "the markers are in place"); }),
+            ChangeResult::kNotFound);
+  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, "x", "the markers are in place"); }),
+            ChangeResult::kNotFound);
   const std::string blind =
       store->checks.Add(kAnna, "S1", CheckWith(2, MarkerCheckStatus::kFailed));
-  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kBert, blind); }), ChangeResult::kConflict);
+  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kBert, blind, "the markers are in place"); }),
+            ChangeResult::kConflict);
   const std::string good =
       store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
-  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, good); }), ChangeResult::kRefused)
+  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, good, "the markers are in place"); }),
+            ChangeResult::kRefused)
       << "not by the person who took it";
   EXPECT_FALSE(store->checks.Baseline());
 }

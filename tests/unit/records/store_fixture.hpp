@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A store in a folder of its own, and the calls that most tests of the store begin with.
 #pragma once
 
@@ -10,16 +11,17 @@
 
 #include "daemon/records/store.hpp"
 #include "drivers/files/file_io.hpp"
+#include "tests/support/result_with.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/records/scan_folder.hpp"
 
 namespace plumb::testing {
 
 /// The result of a comparison as plumbd stores it.
-inline constexpr const char* kResult =
+inline const std::string kResult = ResultWith(
     R"({"verdict":"move","reasons":["vertical is off"],"correction":{"vertical_mm":6.5,"longitudinal_mm":null,)"
     R"("lateral_mm":-1,"pitch_deg":0.5,"roll_deg":0,"yaw_deg":2,)"
-    R"("uncertainty":{"vertical_mm":1.2,"pitch_deg":0.2,"roll_deg":0.3,"yaw_deg":0.1}}})";
+    R"("uncertainty":{"vertical_mm":1.2,"pitch_deg":0.2,"roll_deg":0.3,"yaw_deg":0.1}}})");
 
 class StoreTest : public ::testing::Test {
  protected:
@@ -53,6 +55,11 @@ class StoreTest : public ::testing::Test {
     return ChangeResult::kDone;
   }
   [[nodiscard]] std::filesystem::path database() const { return folder_ / "state" / "plumb.db"; }
+  /// With what says that there was one.
+  void RemoveDatabase() const {
+    for (const char* name : {"plumb.db", "plumb.db-mark", "last-scan"})
+      std::filesystem::remove(folder_ / "state" / name);
+  }
 
   TempFolder folder_;
 };

@@ -1,10 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is stored is held against what was stored.
+#include <sstream>
+#include <string>
+
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/records/scan_folder.hpp"
+#include "words/store.hpp"
+#include "words/text.hpp"
 
 namespace plumb {
 namespace {
@@ -50,17 +58,18 @@ TEST_F(StoreIntegrityTest, TheDigestIsSha256) {
 }
 
 TEST_F(StoreIntegrityTest, OneFlippedBitInAnyFileIsFoundAndNamed) {
-  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
+  EXPECT_EQ(store_.integrity.Check(scan_, false).English(), "");
   for (const std::string file : testing::kScanFiles) {
     Flip(file);
-    EXPECT_THAT(store_.integrity.Check(scan_, false), AllOf(HasSubstr(file), HasSubstr("changed")));
+    EXPECT_THAT(store_.integrity.Check(scan_, false).English(),
+                AllOf(HasSubstr(file), HasSubstr("changed")));
     EXPECT_TRUE(store_.scans.Find(scan_)->folder.empty());
-    EXPECT_THAT(store_.scans.Find(scan_)->failure, HasSubstr(file));
+    EXPECT_THAT(store_.scans.Find(scan_)->failure.English(), HasSubstr(file));
     EXPECT_EQ(store_.audit.Find({0, 1}).at(0).action, "scan.unavailable");
     EXPECT_EQ(store_.integrity.Check(scan_, true).empty(), file.starts_with("result/"))
         << "a comparison reads the scene alone";
     Flip(file);
-    EXPECT_EQ(store_.integrity.Check(scan_, false), "");
+    EXPECT_EQ(store_.integrity.Check(scan_, false).English(), "");
     EXPECT_FALSE(store_.scans.Find(scan_)->folder.empty());
     EXPECT_EQ(store_.audit.Find({0, 1}).at(0).action, "scan.available");
   }
@@ -68,24 +77,37 @@ TEST_F(StoreIntegrityTest, OneFlippedBitInAnyFileIsFoundAndNamed) {
 
 TEST_F(StoreIntegrityTest, AFileThatCameLaterIsNotTakenForAStoredOne) {
   WriteWholeFile(File("scene/extra.ply"), std::string_view("x"));
-  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
+  EXPECT_EQ(store_.integrity.Check(scan_, false).English(), "");
   fs::remove(File("scene/extra.ply"));
-  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
+  EXPECT_EQ(store_.integrity.Check(scan_, false).English(), "");
 }
 
 TEST_F(StoreIntegrityTest, ARecordingIsNotedWhenFirstSeenAndMayGoForTheQuota) {
   fs::create_directory(File("recording"));
   for (const char* name : {"rgb.txt", "depth.txt"})
-    WriteWholeFile(File("recording") / name, std::string(1000, name[0]));
-  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
+    WriteWholeFile(File("recording") / name, std::string(10'000, name[0]));
+  EXPECT_EQ(store_.integrity.Check(scan_, false).English(), "");
   Flip("recording/depth.txt");
-  EXPECT_THAT(store_.integrity.Check(scan_, false), HasSubstr("recording"));
-  EXPECT_EQ(store_.integrity.Check(scan_, true), "") << "no comparison reads it";
+  EXPECT_THAT(store_.integrity.Check(scan_, false).English(), HasSubstr("recording"));
+  EXPECT_EQ(store_.integrity.Check(scan_, true).English(), "") << "no comparison reads it";
   Flip("recording/depth.txt");
-  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
-  EXPECT_EQ(store_.removal.KeepWithinQuota(1000), 1);
+  EXPECT_EQ(store_.integrity.Check(scan_, false).English(), "");
+  EXPECT_EQ(store_.removal.KeepWithinQuota(10'000, testing::kAtOnce).removed, 1);
   EXPECT_FALSE(fs::exists(File("recording")));
-  EXPECT_EQ(store_.integrity.Check(scan_, false), "") << "it was removed on purpose";
+  EXPECT_EQ(store_.integrity.Check(scan_, false).English(), "") << "it was removed on purpose";
+}
+
+TEST_F(StoreIntegrityTest, AResultThatIsNotThatOfItsFileIsNeverShown) {
+  ASSERT_TRUE(store_.scans.Find(scan_)->result);
+  store_.database().ForChanges()->Run(
+      "UPDATE results SET json = replace(json, '{', '{ ') WHERE scan_id = ?", scan_);
+  EXPECT_THAT(testing::MessageOf<DataError>([&] { (void)store_.scans.Find(scan_); }),
+              HasSubstr("is not that of its result.json"));
+  const std::vector<Scan> listed = store_.scans.List(patient_, 9);
+  ASSERT_FALSE(listed.empty());
+  EXPECT_FALSE(listed[0].result);
+  EXPECT_THAT(listed[0].failure.English(), HasSubstr("is not that of its result.json"));
+  EXPECT_THROW(store_.scans.Accept(kAnna, scan_, ""), DataError);
 }
 
 TEST_F(StoreIntegrityTest, ScansAreCheckedInTurnAndNotTooOften) {
@@ -98,7 +120,7 @@ TEST_F(StoreIntegrityTest, ScansAreCheckedInTurnAndNotTooOften) {
   const auto checked = store_.integrity.CheckNext(hours(0));
   ASSERT_TRUE(checked);
   EXPECT_EQ(checked->id, scan_);
-  EXPECT_THAT(checked->fault, HasSubstr("scene/cloud.ply"));
+  EXPECT_THAT(checked->fault.English(), HasSubstr("scene/cloud.ply"));
 }
 
 TEST_F(StoreIntegrityTest, AReferenceIsApprovedOnlyAsItWasStored) {
@@ -110,6 +132,25 @@ TEST_F(StoreIntegrityTest, AReferenceIsApprovedOnlyAsItWasStored) {
   EXPECT_FALSE(store_.references.Approved(patient_));
   Flip("scene/heightmap.tiff");
   (void)PlanAndApprove(store_, reference);
+  EXPECT_TRUE(store_.references.Approved(patient_));
+}
+
+TEST_F(StoreIntegrityTest, APlanThatIsNotAsApprovedIsNeverUsed) {
+  const std::string id = PlanAndApprove(store_, store_.references.Add(kAnna, scan_, "first", {}));
+  ASSERT_TRUE(store_.references.Approved(patient_));
+  Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
+  EXPECT_THROW(direct.Execute("UPDATE refs SET approved_digest = 'x'"), ConstraintBroken);
+  direct.Execute("DROP TRIGGER refs_immutable");
+  const auto replace = [&](const char* from, const char* to) {
+    direct.Run("UPDATE refs SET plan = replace(plan, ?, ?)", from, to);
+  };
+  replace("\"shift_tolerance_mm\":", "\"shift_tolerance_mm\":1");  // ten times as much
+  const auto named = HasSubstr("not as it was approved");
+  EXPECT_THAT(testing::MessageOf<DataError>([&] { (void)store_.references.Approved(patient_); }),
+              named);
+  EXPECT_THAT(testing::MessageOf<DataError>([&] { (void)store_.references.Find(id); }), named);
+  EXPECT_THAT(store_.references.List(patient_).front().unreadable.English(), named);
+  replace("\"shift_tolerance_mm\":1", "\"shift_tolerance_mm\":");
   EXPECT_TRUE(store_.references.Approved(patient_));
 }
 
@@ -154,6 +195,36 @@ TEST_F(StoreIntegrityTest, TheAuditLogShowsWhatWasChangedInItOrTakenFromIt) {
               HasSubstr(fmt::format("entry {} is not", number - 1)));
 }
 
+TEST_F(StoreIntegrityTest, TheAuditLogKeepsMessagesUnderTheDigestsOf020) {
+  store_.audit.Log(kAnna, "note", "1", say::store::LogLost(2, 5));
+  store_.audit.Log(kAnna, "note", "2",
+                   "a person's\x1f{\"id\":\"store.log_quota\",\"arguments\":{}}");
+  const auto entries = store_.audit.Find({0, 2, "note"});
+  EXPECT_EQ(entries[1].detail, say::store::LogLost(2, 5));
+  EXPECT_EQ(entries[1].detail.English(), "2 of 5 stored scans were confirmed as lost");
+  EXPECT_TRUE(entries[0].detail.Is(say::text::kVerbatim)) << "never taken for a message";
+  std::string before;
+  std::istringstream lines(store_.audit.Export());
+  for (std::string line; std::getline(lines, line);) {
+    const auto entry = nlohmann::json::parse(line);
+    std::string text = fmt::format("{}\n{}\n{}\n", before, entry.at("number").get<int>(),
+                                   entry.at("time_us").get<std::int64_t>());
+    for (const char* name : {"user", "address", "action", "subject", "detail"}) {
+      const auto field = entry.at(name).get<std::string>();
+      text += fmt::format("{}:{}\n", field.size(), field);
+    }
+    before = Sha256Of(text);
+    EXPECT_EQ(entry.at("chain"), before) << line;
+  }
+  EXPECT_EQ(before, store_.audit.Head().chain);
+  Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
+  direct.Execute(
+      "DROP TRIGGER audit_no_update; UPDATE audit SET detail = replace(detail, '\"missing\":2', "
+      "'\"missing\":3')");
+  EXPECT_EQ(store_.audit.Find({0, 2, "note"})[1].detail, say::store::LogLost(3, 5));
+  EXPECT_EQ(store_.audit.FirstBroken(), entries[1].number) << "the digests cover the message";
+}
+
 TEST_F(StoreIntegrityTest, AnEntryOfTheAuditLogThatIsNotUtf8IsExportedAsItWasWritten) {
   store_.audit.Log(kAnna, "note", "\xC3\xA4", "/media/\xE4\xFF is full");  // a path in Latin-1
   ASSERT_EQ(store_.audit.FirstBroken(), std::nullopt);
@@ -195,21 +266,21 @@ TEST_F(StoreIntegrityTest, UnusableFilesAreCountedUntilTheyAreBackOrTheirPatient
 
 /// A folder that is moved away stands for a disk that is unmounted; DaemonDiskTest has a real one.
 TEST_F(StoreIntegrityTest, AnotherFolderInPlaceOfTheScansIsNoticedAndTheSameOneTakenBack) {
-  EXPECT_EQ(store_.WhyOtherScans(), "");
+  EXPECT_EQ(store_.WhyOtherScans().English(), "");
   EXPECT_NO_THROW(store_.CheckWritable());
   const fs::path scans = store_.folders.scans(), away = folder_ / "away";
   fs::rename(scans, away);
-  EXPECT_THAT(store_.WhyOtherScans(), HasSubstr(scans.string()));
+  EXPECT_THAT(store_.WhyOtherScans().English(), HasSubstr(scans.string()));
   fs::create_directory(scans);  // what a disk was mounted on
   EXPECT_THAT(testing::MessageOf<DiskRefused>([&] { store_.CheckWritable(); }),
               HasSubstr("not the one that was opened"));
   fs::remove(scans);
   fs::rename(away, scans);
-  EXPECT_EQ(store_.WhyOtherScans(), "");
+  EXPECT_EQ(store_.WhyOtherScans().English(), "");
   fs::copy(scans, away, fs::copy_options::recursive);  // the disk under another number
   fs::remove_all(scans);
   fs::rename(away, scans);
-  EXPECT_EQ(store_.WhyOtherScans(), "") << "known by its newest scan";
+  EXPECT_EQ(store_.WhyOtherScans().English(), "") << "known by its newest scan";
   EXPECT_NO_THROW(store_.CheckWritable());
 }
 

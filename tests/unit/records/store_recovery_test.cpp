@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // A start never deletes what once was a finished scan, whatever a look at its files gives.
 #include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/archive/store_backup.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/records/scan_folder.hpp"
@@ -47,7 +49,7 @@ class StoreRecoveryTest : public ::testing::Test {
   static std::vector<std::string> Actions(Store& store) {
     std::vector<std::string> actions;
     for (const AuditEntry& entry : store.audit.Find({0, 1000}))
-      actions.push_back(entry.action + " " + entry.subject + ": " + entry.detail);
+      actions.push_back(entry.action + " " + entry.subject + ": " + entry.detail.English());
     return actions;
   }
 
@@ -127,7 +129,7 @@ TEST_F(StoreRecoveryTest, NoDamageToAFileOfAScanMakesAStartDeleteAnything) {
           const auto scan = store.scans.Find(damaged.hit);
           ASSERT_TRUE(scan);
           EXPECT_TRUE(scan->folder.empty()) << "what cannot be seen whole is not shown";
-          EXPECT_THAT(scan->failure, HasSubstr(file));
+          EXPECT_THAT(scan->failure.English(), HasSubstr(file));
           EXPECT_EQ(scan->outcome, ScanOutcome::kDone);
           EXPECT_TRUE(scan->result) << "its numbers are in the database";
           EXPECT_THAT(Actions(store), Contains(StartsWith("scan.unavailable " + damaged.hit)));
@@ -137,7 +139,7 @@ TEST_F(StoreRecoveryTest, NoDamageToAFileOfAScanMakesAStartDeleteAnything) {
         Store store(state);
         EXPECT_EQ(store.recovery().attached_scans, 1);
         EXPECT_EQ(store.scans.Find(damaged.hit)->folder, store.folders.Scan(damaged.hit));
-        EXPECT_EQ(store.scans.Find(damaged.hit)->failure, "");
+        EXPECT_EQ(store.scans.Find(damaged.hit)->failure.English(), "");
         EXPECT_EQ(testing::FilesBelow(state / "scans"), damaged.before);
         EXPECT_THAT(Actions(store), Contains(StartsWith("scan.available " + damaged.hit)));
         ++rounds;
@@ -212,7 +214,7 @@ TEST_F(StoreRecoveryTest, NoDamageToARecordingMakesAStartDeleteAnything) {
           WriteWholeFile(staging / "recording" / "rgb" / "1.png", std::string_view("image"));
         });
         for (int i = 0; i < 2; ++i) (void)StoreScan(store, patient);
-        ASSERT_EQ(store.integrity.Check(scan, false), "");
+        ASSERT_EQ(store.integrity.Check(scan, false).English(), "");
       }
       const fs::path scans = folder / "state" / "scans", path = scans / scan / file;
       const auto before = testing::FilesBelow(scans);
@@ -224,14 +226,14 @@ TEST_F(StoreRecoveryTest, NoDamageToARecordingMakesAStartDeleteAnything) {
       {
         Store store(folder / "state");
         EXPECT_EQ(store.recovery().lost_scans, file == "recording" ? 1 : 0);
-        EXPECT_THAT(store.integrity.Check(scan, false), StartsWith("recording "));
-        EXPECT_EQ(store.integrity.Check(scan, /*scene_only=*/true), "");
+        EXPECT_THAT(store.integrity.Check(scan, false).English(), StartsWith("recording "));
+        EXPECT_EQ(store.integrity.Check(scan, /*scene_only=*/true).English(), "");
         EXPECT_EQ(testing::FilesBelow(scans), damaged);
       }
       fs::remove_all(path);
       fs::rename(folder / "aside", path);
       Store store(folder / "state");
-      EXPECT_EQ(store.integrity.Check(scan, false), "");
+      EXPECT_EQ(store.integrity.Check(scan, false).English(), "");
       EXPECT_EQ(store.scans.Find(scan)->folder, scans / scan);
       EXPECT_EQ(testing::FilesBelow(scans), before);
     }
@@ -249,7 +251,7 @@ TEST_F(StoreRecoveryTest, TheFolderOfAScanMayBeALinkAndWhatStandsInItsPlaceIsKep
   const fs::path path = state() / "scans" / scan;
   fs::rename(path, folder_ / "away");
   const auto before = testing::FilesBelow(folder_ / "away");
-  const auto failure = [&] { return Open()->scans.Find(scan)->failure; };
+  const auto failure = [&] { return Open()->scans.Find(scan)->failure.English(); };
   fs::create_directory_symlink(folder_ / "away", path);
   EXPECT_EQ(failure(), "");
   fs::remove(path);
@@ -353,7 +355,7 @@ TEST_F(StoreRecoveryTest, TheNumberOfLostScansIsConfirmedAndNoOther) {
     EXPECT_EQ(testing::FilesBelow(state() / "scans"), before) << "nothing is deleted";
     const auto entries = store->audit.Find({0, 10, "scans.lost"});
     ASSERT_EQ(entries.size(), 1U);
-    EXPECT_EQ(entries[0].detail, "3 of 5 stored scans were confirmed as lost");
+    EXPECT_EQ(entries[0].detail.English(), "3 of 5 stored scans were confirmed as lost");
     EXPECT_EQ(store->audit.FirstBroken(), std::nullopt);
   }
   EXPECT_FALSE(fs::exists(state() / "scans-are-lost")) << "it counts once";
@@ -422,7 +424,7 @@ TEST_F(StoreRecoveryTest, TheFolderOfScansMayBeALinkAndAFileInItsPlaceIsSafeMode
   const auto before = testing::FilesBelow(folder_ / "disk");
   fs::create_directory_symlink(folder_ / "disk", scans);
   EXPECT_EQ(Open()->scans.Find(scan)->folder, scans / scan);
-  EXPECT_EQ(Open()->integrity.Check(scan, false), "");
+  EXPECT_EQ(Open()->integrity.Check(scan, false).English(), "");
   fs::remove(scans);
   WriteWholeFile(scans, std::string_view("a file"));
   EXPECT_THROW((void)Open(), DiskRefused);
@@ -446,6 +448,7 @@ TEST_F(StoreRecoveryTest, WhatAnOlderDatabaseSetAsideComesBackWithTheNewerOne) {
   const auto before = testing::FilesBelow(state() / "scans" / scan);
   fs::rename(state() / "plumb.db", folder_ / "newer");
   fs::rename(folder_ / "older", state() / "plumb.db");
+  fs::remove(state() / "plumb.db-mark");  // as a restore leaves it
   {
     const auto store = Open();
     EXPECT_EQ(store->recovery().foreign_folders, 2);
@@ -455,11 +458,12 @@ TEST_F(StoreRecoveryTest, WhatAnOlderDatabaseSetAsideComesBackWithTheNewerOne) {
   WriteWholeFile(state() / "set-aside" / changed / "scene" / "mesh.ply",
                  std::string(before.at("scene/mesh.ply").size(), 'x'));
   fs::rename(folder_ / "newer", state() / "plumb.db");
+  fs::remove(state() / "plumb.db-mark");
   const auto store = Open();
   EXPECT_EQ(store->recovery().attached_scans, 1);
   EXPECT_EQ(store->scans.Find(scan)->folder, store->folders.Scan(scan));
   EXPECT_EQ(testing::FilesBelow(store->folders.Scan(scan)), before);
-  EXPECT_EQ(store->integrity.Check(scan, false), "");
+  EXPECT_EQ(store->integrity.Check(scan, false).English(), "");
   EXPECT_EQ(store->scans.Find(old_scan)->folder, store->folders.Scan(old_scan));
   EXPECT_THAT(Actions(*store),
               Contains(AllOf(StartsWith("folder.return " + scan), HasSubstr("set-aside/" + scan))));
@@ -487,7 +491,7 @@ TEST_F(StoreRecoveryTest, ACompleteFolderOfAScanThatNoRowKnowsToHaveEndedIsSetAs
   const fs::path on_disk = store->folders.scans() / "set-aside" / (id + "-interrupted-2");
   fs::create_directories(on_disk.parent_path());
   fs::copy(state() / "set-aside" / (id + "-interrupted"), on_disk, fs::copy_options::recursive);
-  (void)store->backup.Make(kAnna, folder_ / "backup");
+  (void)StoreBackup(*store).Make(kAnna, folder_ / "backup");
   EXPECT_THAT(testing::FilesBelow(folder_ / "backup" / "scans" / "set-aside"),
               ::testing::SizeIs(7));
   store->removal.WipePatient(kAnna, store->patients.FindByCode("A")->id);
@@ -541,10 +545,10 @@ TEST_F(StoreRecoveryTest, AStoreOfTheFirstVersionKeepsScansThatItHadGivenUp) {
   EXPECT_EQ(store->recovery().attached_scans, 1);
   for (const std::string& scan : {kept, given_up}) {
     EXPECT_EQ(store->scans.Find(scan)->folder, store->folders.Scan(scan));
-    EXPECT_EQ(store->scans.Find(scan)->failure, "");
-    EXPECT_EQ(store->integrity.Check(scan, false), "") << "first seen";
+    EXPECT_EQ(store->scans.Find(scan)->failure.English(), "");
+    EXPECT_EQ(store->integrity.Check(scan, false).English(), "") << "first seen";
     WriteWholeFile(store->folders.Scan(scan) / "scene" / "mesh.ply", std::string_view("another"));
-    EXPECT_THAT(store->integrity.Check(scan, false), HasSubstr("scene/mesh.ply"));
+    EXPECT_THAT(store->integrity.Check(scan, false).English(), HasSubstr("scene/mesh.ply"));
   }
   EXPECT_EQ(store->audit.FirstBroken(), std::nullopt) << "older entries have no chain";
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The room's calibration in the store: from check scans over the board to a signed version.
 #include <filesystem>
 
@@ -42,13 +43,13 @@ class StoreRoomTest : public ::testing::Test {
 
 TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_FALSE(store_->room.Newest());
-  EXPECT_THAT(Candidate().why_not, HasSubstr("not been scanned"));
+  EXPECT_THAT(Candidate().why_not.English(), HasSubstr("not been scanned"));
   Scan(), Scan();
-  EXPECT_THAT(Candidate().why_not, HasSubstr("2 of 3"));
+  EXPECT_THAT(Candidate().why_not.English(), HasSubstr("2 of 3"));
   EXPECT_EQ(Sign(Candidate().digest).first, ChangeResult::kConflict);
   Scan(0.0006);
   const RoomCandidate candidate = Candidate();
-  EXPECT_THAT(candidate.why_not, IsEmpty());
+  EXPECT_THAT(candidate.why_not.English(), IsEmpty());
   EXPECT_NEAR(candidate.fit->shift_m, 0.0006, 1e-6);
   EXPECT_EQ(Sign("something else").first, ChangeResult::kConflict);
   EXPECT_FALSE(store_->room.Newest());
@@ -61,29 +62,30 @@ TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_EQ(room->version, 1);
   EXPECT_EQ(room->signed_by, "eve");
   EXPECT_EQ(room->digest, candidate.digest);
-  EXPECT_EQ(room->reference_marker, 0);
+  EXPECT_EQ(room->room_markers.reference, 0);
   EXPECT_EQ(room->check_ids, (std::vector<std::string>{"3", "2", "1"}));
   // The mean of boards at 0, 0 and 0.6 mm along x.
   EXPECT_TRUE(room->fit.T_iec_reference.isApprox(
       Pose(Eigen::Translation3d(-0.0002, 0, 0)) * SceneFromRoom().inverse(), 1e-6));
   std::vector<std::string> lines;
   for (const AuditEntry& entry : store_->audit.Find({0, 10}))
-    lines.push_back(entry.user + " " + entry.action + " " + entry.subject + " " + entry.detail);
+    lines.push_back(entry.user + " " + entry.action + " " + entry.subject + " " +
+                    entry.detail.English());
   EXPECT_THAT(lines, Contains("eve room.calibrate 1 scans differ by 0.60 mm and 0.00 deg, sha256 " +
                               candidate.digest));
   EXPECT_THAT(Candidate().scans, IsEmpty()) << "scans of before the signature are used up";
   Scan(), Scan(), Scan();
   EXPECT_EQ(Sign(Candidate().digest).first, ChangeResult::kDone);
-  EXPECT_THAT(store_->audit.Find({0, 1, "room.calibrate"}).at(0).detail,
+  EXPECT_THAT(store_->audit.Find({0, 1, "room.calibrate"}).at(0).detail.English(),
               ::testing::EndsWith("; before: version 1, sha256 " + candidate.digest));
 }
 
 TEST_F(StoreRoomTest, ScansThatDifferAreNotSigned) {
   Scan(), Scan(0.00101), Scan();
-  EXPECT_THAT(Candidate().why_not, HasSubstr("1.01 mm"));
+  EXPECT_THAT(Candidate().why_not.English(), HasSubstr("1.01 mm"));
   EXPECT_EQ(Sign(Candidate().digest).first, ChangeResult::kConflict);
   Scan(), Scan();
-  EXPECT_THAT(Candidate().why_not, IsEmpty()) << "the newest three count";
+  EXPECT_THAT(Candidate().why_not.English(), IsEmpty()) << "the newest three count";
 }
 
 TEST_F(StoreRoomTest, OnlyScansOfThisSensorAndTimeCount) {
@@ -94,7 +96,9 @@ TEST_F(StoreRoomTest, OnlyScansOfThisSensorAndTimeCount) {
 }
 
 TEST_F(StoreRoomTest, AScanThatCannotBeUsedSaysWhy) {
-  const auto fault = [](const TakenCheck& check) { return BoardScanIn(CheckJson(check))->fault; };
+  const auto fault = [](const TakenCheck& check) {
+    return BoardScanIn(CheckJson(check))->fault.English();
+  };
   EXPECT_FALSE(BoardScanIn(CheckJson(CheckOver(0, 0)))) << "no board: an ordinary check";
   EXPECT_FALSE(BoardScanIn("no json"));
   EXPECT_THAT(fault(CheckOver(0, 2)), HasSubstr("2 of the board's 4"));
@@ -112,9 +116,9 @@ TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
     for (Eigen::Vector3d& corner : markers.at(4).corners) corner.x() += moved_m;
     for (int id = num_seen; id < 6; ++id) markers.erase(id);
     store_->checks.Add(kEve, "S1", CheckOver(0, 0, markers));
-    return store_->room.WhyDue(room, {});
+    return store_->room.WhyDue(room, {}).English();
   };
-  EXPECT_EQ(store_->room.WhyDue(room, {}), "");
+  EXPECT_EQ(store_->room.WhyDue(room, {}).English(), "");
   EXPECT_EQ(after(0.0049), "");
   EXPECT_EQ(after(0.0081), "marker 4 moved 8 mm since the room was calibrated");
   EXPECT_THAT(after(0, 2), HasSubstr("marker 4")) << "a check that saw too little says nothing";
@@ -138,11 +142,11 @@ TEST_F(StoreRoomTest, ChecksCountEvenIfTheClockWasSetBackAfterTheSignature) {
   MarkerMap markers = MarkersOfRoom();
   for (Eigen::Vector3d& corner : markers.at(4).corners) corner.x() += 0.02;
   store_->checks.Add(kEve, "S1", CheckOver(0, 0, markers));
-  EXPECT_THAT(store_->room.WhyDue(room, {}), HasSubstr("marker 4 moved 20 mm"));
+  EXPECT_THAT(store_->room.WhyDue(room, {}).English(), HasSubstr("marker 4 moved 20 mm"));
   EXPECT_THAT(Candidate().scans, IsEmpty()) << "the signed scans are not used again";
   Scan(), Scan(), Scan();
   const RoomCandidate candidate = Candidate();
-  EXPECT_THAT(candidate.why_not, IsEmpty()) << "the room can be calibrated again";
+  EXPECT_THAT(candidate.why_not.English(), IsEmpty()) << "the room can be calibrated again";
   EXPECT_EQ(Sign(candidate.digest), std::pair(ChangeResult::kDone, std::string("2")));
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Databases of older and newer versions, and damaged ones.
 #include <fstream>
 #include <string>
@@ -6,10 +7,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/database/scan_digests.hpp"
+#include "daemon/database/schema.hpp"
 #include "daemon/records/check_json.hpp"
-#include "daemon/records/schema.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/unit/records/store_fixture.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -87,7 +90,7 @@ TEST_F(StoreTest, ANewerDatabaseThatThisVersionCannotUseIsRefused) {
   for (const std::string& usable_from :
        {std::to_string(kSchemaVersion + 1), std::string("99"), std::string(), std::string("x"),
         std::string("8x"), std::string("0"), std::string("-1")}) {
-    fs::remove(database());
+    RemoveDatabase();
     (void)Open();
     MakeNewer(database(), usable_from);
     EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }), HasSubstr("newer"))
@@ -116,14 +119,60 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionKeepsWhatItHas) {
   EXPECT_EQ(store->patients.Find(patient)->note, "note");
   EXPECT_EQ(store->scans.Find(accepted)->accepted_at, logged.time) << "taken from the log";
   EXPECT_FALSE(store->scans.Find(other)->accepted_at);
-  const MarkerCheck failed{
-      .status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {"no marker was seen"}};
+  const MarkerCheck failed{.status = MarkerCheckStatus::kFailed,
+                           .items = {},
+                           .reasons = {Message::Verbatim("no marker was seen")}};
   EXPECT_EQ(store->checks.Add(kAnna, "S1", {.check = failed}), "1");
+}
+
+TEST_F(StoreTest, WhatVersion020StoredIsReadVerbatim) {
+  std::string failed, compared, damaged;
+  {
+    const auto store = Open();
+    const std::string patient = store->patients.Add(kAnna, "P-1", "thorax");
+    failed = store->scans.Begin({.patient_id = patient, .reference_id = "", .sensor_serial = "S1"});
+    store->scans.Finish(failed, {.failure = Message::Verbatim("no marker was seen")});
+    compared = Scan(*store, patient, "", kResult);
+    damaged = Scan(*store, patient);
+    store->audit.Log(kAnna, "note", "1", "text of then");
+    fs::remove(store->folders.Scan(damaged) / "scene" / "scene.json");
+  }
+  EXPECT_THAT(Open()->scans.Find(damaged)->failure.English(), HasSubstr("scene.json is missing"));
+  testing::MakeSchema9(database());
+  const auto store = Open();
+  EXPECT_EQ(store->scans.Find(failed)->failure, Message::Verbatim("no marker was seen"));
+  EXPECT_EQ(store->scans.Find(compared)->result->reasons,
+            std::vector{Message::Verbatim("vertical is off")});
+  EXPECT_EQ(store->scans.Find(damaged)->failure,
+            say::store::FilesUnusable(Message::Verbatim("scene/scene.json is missing")));
+  EXPECT_EQ(store->audit.Find({0, 1, "note"}).at(0).detail, Message::Verbatim("text of then"));
+  EXPECT_FALSE(store->audit.FirstBroken());
+  const std::string scan =
+      store->scans.Begin({.patient_id = "", .reference_id = "", .sensor_serial = ""});
+  store->scans.Finish(scan, {.failure = say::store::RoomMisfit(3.25)});
+  EXPECT_EQ(store->scans.Find(scan)->failure, say::store::RoomMisfit(3.25));
+}
+
+TEST_F(StoreTest, AVersionThatKnowsSentencesOnlyLeavesNoMessageOfAnotherOne) {
+  std::string scan;
+  {
+    const auto store = Open();
+    const std::string patient = store->patients.Add(kAnna, "P-1", "thorax");
+    scan = Scan(*store, patient);
+    (void)Scan(*store, patient);
+    StoreChange change(store->database());
+    SetUnavailable(*change, 1, "", say::store::NoFiles());
+    change.Commit();
+    EXPECT_EQ(store->scans.Find(scan)->failure, say::store::FilesUnusable(say::store::NoFiles()));
+    change->Run("UPDATE scans SET unavailable = 'it is on fire' WHERE id = 1");  // as 0.2.0 does
+  }
+  Database direct(database(), Database::Access::kReadOnly);
+  EXPECT_EQ(direct.FirstText("SELECT unavailable_message FROM scans WHERE id = 1"), "");
 }
 
 TEST_F(StoreTest, ADatabaseOfASchemaThatWasNeverReleasedIsRefused) {
   for (const int version : {1, 2, 4, 5, 6, 7, 8}) {
-    fs::remove(database());
+    RemoveDatabase();
     (void)Open();
     Database(database(), Database::Access::kReadWrite)
         .Execute(fmt::format("PRAGMA user_version = {}", version));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Treatment sessions, waiting references and paired screens in the store.
 #include <filesystem>
 #include <string>
@@ -6,9 +7,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/database/stored_values.hpp"
 #include "daemon/records/store.hpp"
 #include "drivers/files/file_io.hpp"
+#include "tests/support/result_with.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/records/scan_folder.hpp"
 
 namespace plumb {
 namespace {
@@ -68,13 +72,45 @@ TEST_F(StoreSessionsTest, OneIsOpenAtATime) {
             ChangeResult::kNotFound);
 }
 
+TEST_F(StoreSessionsTest, ASessionKeepsTheReferenceThatItWasOpenedWithUntilAPersonChangesIt) {
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "");
+  const std::string first = testing::PlanAndApprove(
+      store, store.references.Add(kAnna, testing::StoreScan(store, patient), "", {}));
+  const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->reference, (ReferenceVersion{first, 1}));
+  EXPECT_FALSE(store.treatments.Opened()->newer_reference);
+  const std::string second = store.references.Plan(kAnna, first, 2, {});
+  EXPECT_FALSE(store.treatments.Opened()->newer_reference) << "a draft is none";
+  store.references.Approve(kBert, second, 1);
+  EXPECT_EQ(store.references.OfSession(session)->id, first);
+  EXPECT_EQ(store.treatments.Opened()->reference, (ReferenceVersion{first, 1}));
+  EXPECT_EQ(store.treatments.Opened()->newer_reference, (ReferenceVersion{second, 2}));
+  const auto use = [&](const std::string& which, const std::string& reference) {
+    return RefusalOf([&] { store.treatments.UseReference(kAnna, which, reference); });
+  };
+  EXPECT_EQ(use(session, first), ChangeResult::kConflict) << "not the newest";
+  EXPECT_EQ(use("99", second), ChangeResult::kConflict) << "no such session";
+  EXPECT_EQ(use(session, second), ChangeResult::kDone);
+  EXPECT_EQ(store.references.OfSession(session)->id, second);
+  EXPECT_FALSE(store.treatments.Opened()->newer_reference);
+  const AuditEntry logged = store.audit.Find({0, 1}).at(0);
+  EXPECT_EQ(logged.action, "session.reference");
+  EXPECT_EQ(logged.subject, session);
+  EXPECT_EQ(logged.detail.English(), "version 2");
+  store.treatments.CloseAll(kAnna);
+  EXPECT_EQ(use(session, second), ChangeResult::kConflict) << "closed";
+}
+
 TEST_F(StoreSessionsTest, FractionNumbersCountSessionsNotScans) {
   Store store(folder_ / "state");
   const std::string patient = store.patients.Add(kAnna, "P-1", "");
   const std::string first = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
   EXPECT_EQ(store.treatments.Opened()->fraction, 1);
-  const std::string moved = Scan(store, patient, first, R"({"verdict":"move"})");
-  const std::string right = Scan(store, patient, first, R"({"verdict":"in_tolerance"})");
+  const std::string moved =
+      Scan(store, patient, first, testing::ResultWith(R"({"verdict":"move"})"));
+  const std::string right =
+      Scan(store, patient, first, testing::ResultWith(R"({"verdict":"in_tolerance"})"));
   EXPECT_EQ(store.treatments.Opened()->num_scans, 2);
   EXPECT_EQ(store.scans.Find(moved)->fraction, 1);
   EXPECT_EQ(store.scans.Find(right)->fraction, 1);
@@ -87,6 +123,56 @@ TEST_F(StoreSessionsTest, FractionNumbersCountSessionsNotScans) {
   EXPECT_EQ(store.treatments.Opened()->fraction, 2) << "nothing was scanned in the session before";
 }
 
+TEST_F(StoreSessionsTest, AClosedSessionGoesOnWithItsFractionOnTheSameDay) {
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "");
+  const std::string empty = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  store.treatments.CloseAll(kSelf);
+  EXPECT_FALSE(store.patients.Find(patient)->last_session) << "nothing was scanned in it";
+  const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  const std::string scan =
+      Scan(store, patient, session, testing::ResultWith(R"({"verdict":"move"})"));
+  EXPECT_TRUE(store.treatments.Opened()->has_unaccepted);
+  EXPECT_FALSE(store.patients.Find(patient)->last_session) << "it is open";
+  store.treatments.CloseAll(kSelf);  // as after a power cut
+  ASSERT_TRUE(store.patients.Find(patient)->last_session);
+  EXPECT_EQ(store.patients.Find(patient)->last_session->id, session);
+  EXPECT_EQ(store.patients.Find(patient)->last_session->fraction, 1);
+  const auto resume = [&](const std::string& which) {
+    return RefusalOf([&] { store.treatments.Resume(kBert, which); });
+  };
+  EXPECT_EQ(resume(empty), ChangeResult::kConflict) << "not the newest";
+  EXPECT_EQ(resume("99"), ChangeResult::kConflict);
+  EXPECT_EQ(resume(session), ChangeResult::kDone);
+  EXPECT_EQ(store.treatments.Opened()->id, session);
+  EXPECT_EQ(store.treatments.Opened()->fraction, 1);
+  EXPECT_EQ(store.treatments.Opened()->opened_by, "bert");
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "session.resume");
+  store.treatments.CloseAll(kAnna);
+  store.database().ForChanges()->Run("UPDATE sessions SET closed_at = closed_at - ?",
+                                     std::int64_t{kResumable_h} * 3600 * 1'000'000 + 1'000'000);
+  EXPECT_EQ(resume(session), ChangeResult::kConflict) << "it was yesterday's";
+  EXPECT_EQ(store.scans.Find(scan)->fraction, 1);
+}
+
+TEST_F(StoreSessionsTest, AFractionNumberIsCorrectedForAReasonAndTheNextFollowsIt) {
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "");
+  const std::string reference = store.treatments.Open(kAnna, patient, ScanPurpose::kReference);
+  const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  const std::string scan =
+      Scan(store, patient, session, testing::ResultWith(R"({"verdict":"move"})"));
+  store.treatments.CorrectFraction(kAnna, session, 3, "two were given elsewhere");
+  EXPECT_EQ(store.scans.Find(scan)->fraction, 3);
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(),
+            "from 1 to 3; reason: two were given elsewhere");
+  (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->fraction, 4);
+  for (const std::string& none : {reference, std::string("99")})
+    EXPECT_EQ(RefusalOf([&] { store.treatments.CorrectFraction(kAnna, none, 2, "why"); }),
+              ChangeResult::kNotFound);
+}
+
 TEST_F(StoreSessionsTest, FractionNumbersContinueAfterScansWereRemoved) {
   Store store(folder_ / "state");
   const std::string patient = store.patients.Add(kAnna, "P-1", "");
@@ -94,7 +180,7 @@ TEST_F(StoreSessionsTest, FractionNumbersContinueAfterScansWereRemoved) {
   for (int fraction = 1; fraction <= 4; ++fraction) {
     const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
     EXPECT_EQ(store.treatments.Opened()->fraction, fraction);
-    scans.push_back(Scan(store, patient, session, R"({"verdict":"move"})"));
+    scans.push_back(Scan(store, patient, session, testing::ResultWith(R"({"verdict":"move"})")));
   }
   for (std::size_t i = 0; i < 3; ++i) store.removal.RemoveScan(kAnna, scans[i], "room on the disk");
   (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
@@ -116,8 +202,8 @@ TEST_F(StoreSessionsTest, ADiscardedScanHasNoResultAndIsNotAFraction) {
                                               .sensor_serial = "S1",
                                               .session_id = session});
     store.scans.Finish(id, {.outcome = outcome,
-                            .failure = "discarded",
-                            .result_json = R"({"verdict":"move"})",
+                            .failure = Message::Verbatim("discarded"),
+                            .result_json = testing::ResultWith(R"({"verdict":"move"})"),
                             .swept_area_m2 = 1.0});
     EXPECT_FALSE(store.scans.Find(id)->result);
   }
@@ -155,12 +241,12 @@ TEST_F(StoreSessionsTest, SiteAndNoteAreChangedAndTheirTextIsNotInTheLog) {
   const AuditEntry entry = store.audit.Find({0, 1}).at(0);
   EXPECT_EQ(entry.action, "patient.change");
   EXPECT_EQ(entry.user, "bert");
-  EXPECT_EQ((entry.subject + entry.detail).find("knee"), std::string::npos);
-  EXPECT_EQ(entry.detail, "site and note");
+  EXPECT_EQ((entry.subject + entry.detail.English()).find("knee"), std::string::npos);
+  EXPECT_EQ(entry.detail.English(), "site and note");
   store.patients.Change(kBert, patient, "thorax", "");
-  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail, "note");
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(), "note");
   store.patients.Change(kBert, patient, "pelvis", "");
-  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail, "site");
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(), "site");
 }
 
 TEST_F(StoreSessionsTest, AnArchivedPatientKeepsEverythingAndIsNotOpened) {
@@ -218,7 +304,7 @@ TEST_F(StoreSessionsTest, WhatIsSignedIsWhatIsStored) {
             ChangeResult::kConflict);
   const std::string signed_digest = store.references.Find(reference)->digest;
   store.references.Approve(kBert, reference, 2, signed_digest);
-  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail, "sha256 " + signed_digest);
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(), "sha256 " + signed_digest);
   EXPECT_THAT(store.references.Waiting(), SizeIs(0));
   EXPECT_EQ(store.patients.Find(patient)->draft_reference_id, "");
 }
@@ -236,6 +322,40 @@ TEST_F(StoreSessionsTest, PairedScreensStayOverARestart) {
   store.displays.Remove(kBert, store.displays.List()[0].id);
   EXPECT_THAT(store.displays.List(), SizeIs(0));
   EXPECT_EQ(RefusalOf([&] { store.displays.Remove(kBert, "1"); }), ChangeResult::kNotFound);
+}
+
+TEST_F(StoreSessionsTest, ASecondFactorChangesOnlyFromWhatItIsAndStaysOverARestart) {
+  const SecondFactor first{.secret = "ABC", .last_step = 7, .recovery_hashes = {"aa", "bb"}};
+  SecondFactor used = first;
+  used.last_step = 8;
+  used.recovery_hashes = {"bb"};
+  {
+    Store store(folder_ / "state");
+    store.users.Add(kAnna, {.name = "anna",
+                            .role = Role::kEngineer,
+                            .password_hash = "hash",
+                            .disabled = false,
+                            .created_at = {},
+                            .has_second_factor = false});
+    EXPECT_FALSE(store.users.Find("anna")->has_second_factor);
+    EXPECT_EQ(store.users.SecondFactorOf("anna"), std::nullopt);
+    store.users.SetSecondFactor(kAnna, "anna", std::nullopt, first, "user.second_factor_on");
+    EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "user.second_factor_on");
+    EXPECT_EQ(store.audit.Find({0, 1}).at(0).subject, "anna");
+    store.users.SetSecondFactor(kAnna, "anna", first, used, "");
+    EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "user.second_factor_on")
+        << "a use is no entry";
+    EXPECT_EQ(RefusalOf([&] { store.users.SetSecondFactor(kAnna, "anna", first, used, ""); }),
+              ChangeResult::kConflict)
+        << "the same code at the same time";
+    EXPECT_EQ(RefusalOf([&] { store.users.SetSecondFactor(kAnna, "bob", {}, first, ""); }),
+              ChangeResult::kNotFound);
+  }
+  Store store(folder_ / "state");
+  EXPECT_TRUE(store.users.Find("anna")->has_second_factor);
+  EXPECT_EQ(store.users.SecondFactorOf("anna"), used);
+  store.users.SetSecondFactor(kAnna, "anna", used, std::nullopt, "user.second_factor_off");
+  EXPECT_FALSE(store.users.Find("anna")->has_second_factor);
 }
 
 TEST_F(StoreSessionsTest, AProvisionedScreenIsPairedOnceForEachKey) {
@@ -268,7 +388,7 @@ TEST_F(StoreSessionsTest, AProvisionedScreenIsPairedOnceForEachKey) {
   EXPECT_EQ(log[1].action, "display.remove");
   EXPECT_EQ(log[2].action, "display.provision");
   EXPECT_EQ(log[2].user, "plumbd");
-  EXPECT_EQ(log[2].detail, "") << "nothing of the key";
+  EXPECT_EQ(log[2].detail.English(), "") << "nothing of the key";
 }
 
 TEST_F(StoreSessionsTest, AProvisionedScreenThatHasNoPlaceIsPairedOnceThereIsOne) {

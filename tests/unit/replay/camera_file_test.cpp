@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/camera_file.hpp"
 
 #include <gmock/gmock.h>
@@ -47,12 +48,13 @@ TEST(CameraFileTest, ReadsEveryKey) {
   EXPECT_EQ(camera.color.fy, 516.5);
   EXPECT_EQ(camera.color.cx, 318.6);
   EXPECT_EQ(camera.color.cy, 255.3);
-  EXPECT_THAT(camera.color.distortion, ElementsAre(0.2624, -0.9531, -0.0054, 0.0026, 1.1633));
+  EXPECT_THAT(camera.color.distortion,
+              ElementsAre(0.2624, -0.9531, -0.0054, 0.0026, 1.1633, 0, 0, 0));
   EXPECT_EQ(camera.depth_scale, 1000.0);
   EXPECT_FALSE(camera.depth_camera);
-  EXPECT_EQ(camera.marker_dictionary, "DICT_ARUCO_MIP_36h12");
-  EXPECT_EQ(camera.marker_length_m, 0.104);
-  EXPECT_EQ(camera.reference_marker, 7);
+  EXPECT_EQ(camera.room_markers.dictionary, "DICT_ARUCO_MIP_36h12");
+  EXPECT_EQ(camera.room_markers.length_m, 0.104);
+  EXPECT_EQ(camera.room_markers.reference, 7);
   EXPECT_THAT(camera.warnings, IsEmpty());
 }
 
@@ -62,8 +64,9 @@ TEST(CameraFileTest, AbsentKeysKeepTheirDefaults) {
       "]\n",
       "camera.yaml");
   EXPECT_EQ(camera.color.fx, 262.0);
-  EXPECT_EQ(camera.depth_scale, 5000.0);
-  EXPECT_FALSE(camera.marker_dictionary || camera.marker_length_m || camera.reference_marker);
+  EXPECT_FALSE(camera.depth_scale) << "no unit is assumed here";
+  EXPECT_FALSE(camera.room_markers.dictionary || camera.room_markers.length_m ||
+               camera.room_markers.reference);
   EXPECT_FALSE(camera.depth_noise);
   EXPECT_THAT(camera.warnings, SizeIs(1));  // no lens
 }
@@ -135,6 +138,103 @@ TEST(CameraFileTest, MarkerLengthAndIdOutOfRangeAreNamed) {
               HasSubstr("reference_marker is -1"));
 }
 
+TEST(CameraFileTest, AKeyThatIsNotReadIsNamedWithTheNearestOne) {
+  EXPECT_THAT(
+      Refusal(With("depth_scale:", "depth_scales:")),
+      AllOf(HasSubstr("rec/camera.yaml"), HasSubstr("'depth_scales'"), HasSubstr("'depth_scale'")));
+  EXPECT_THAT(Refusal(With("marker_length:", "marker_lenght:")), HasSubstr("'marker_length'"));
+  EXPECT_THAT(Refusal(With("marker_length:", "marker_size:")),
+              AllOf(HasSubstr("unknown key"), HasSubstr("'marker_length'")));
+  for (const char* of_others : {"depth_factor", "DepthMapFactor", "depth_units"})
+    EXPECT_THAT(Refusal(With("depth_scale:", std::string(of_others) + ":")),
+                AllOf(HasSubstr(of_others), HasSubstr("'depth_scale'")));
+  EXPECT_THAT(Refusal(With("reference_marker:", "Reference_Marker:")),
+              HasSubstr("'reference_marker'"));
+}
+
+TEST(CameraFileTest, WhatCalibratorsWriteBesideTheKeysIsLeftAlone) {
+  for (const char* line :
+       {"camera_name: rgb\n", "rectification_matrix: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n",
+        "calibration_time: \"now\"\n", "avg_reprojection_error: 0.2\n", "sensor_serial: \"4711\"\n",
+        "color_begin_us: 0\n"})
+    EXPECT_EQ(ParseCameraFile(std::string(kGood) + line, "camera.yaml").color.fx, 517.3) << line;
+}
+
+TEST(CameraFileTest, TheLensModelIsReadOrRefusedByName) {
+  for (const char* model : {"plumb_bob", "radtan", "brown_conrady"})
+    EXPECT_EQ(
+        ParseCameraFile(std::string(kGood) + "distortion_model: " + model + "\n", "c").color.fx,
+        517.3);
+  EXPECT_THAT(Refusal(std::string(kGood) + "distortion_model: thin_prism\n"),
+              AllOf(HasSubstr("thin_prism"), HasSubstr("plumb_bob")));
+}
+
+constexpr const char* kLens = "0.2624, -0.9531, -0.0054, 0.0026, 1.1633";
+
+TEST(CameraFileTest, ARationalLensHasEightCoefficients) {
+  const std::string text = With(kLens, "0.51, -2.74, 0.0006, -0.0002, 1.64, 0.39, -2.55, 1.56");
+  const auto lens = ElementsAre(0.51, -2.74, 0.0006, -0.0002, 1.64, 0.39, -2.55, 1.56);
+  EXPECT_THAT(ParseCameraFile(text, "c").color.distortion, lens);
+  EXPECT_THAT(
+      ParseCameraFile(text + "distortion_model: rational_polynomial\n", "c").color.distortion,
+      lens);
+  EXPECT_THAT(Refusal(text + "distortion_model: plumb_bob\n"),
+              AllOf(HasSubstr("distortion_model"), HasSubstr("which has 5 coefficients"),
+                    HasSubstr("distortion_coefficients holds more")));
+  // OpenCV's thin prism and tilt are zero, or are not read.
+  const auto twelve = [](const char* last) {
+    return With(kLens, std::string("0.5, -2.7, 0., 0., 1.6, 0.4, -2.5, 1.5, 0., 0., 0., ") + last);
+  };
+  EXPECT_EQ(ParseCameraFile(twelve("0."), "c").color.distortion[7], 1.5);
+  EXPECT_THAT(Refusal(twelve("0.1")), HasSubstr("12 elements"));
+}
+
+TEST(CameraFileTest, NoLensMeansNoCoefficients) {
+  for (const std::string model : {"none", "pinhole"}) {
+    EXPECT_THAT(Refusal(std::string(kGood) + "distortion_model: " + model + "\n"),
+                HasSubstr("which has 0 coefficients"));
+    EXPECT_FALSE(
+        HasLens(ParseCameraFile(
+                    With(kLens, "0., 0., 0., 0., 0.") + "distortion_model: " + model + "\n", "c")
+                    .color));
+  }
+}
+
+TEST(CameraFileTest, AnEquidistantLensIsRead) {
+  const std::string text = With(kLens, "-0.012, 0.031, -0.022, 0.004");
+  for (const char* line : {"distortion_model: equidistant\n", "distortion_model: fisheye\n",
+                           "distortion_model: kannala_brandt\n", "fisheye_model: 1\n"}) {
+    const Intrinsics camera = ParseCameraFile(text + line, "c").color;
+    // A point 35 deg from the axis, as cv::fisheye::projectPoints() places it.
+    const double theta = 35.0 * 3.14159265358979 / 180.0, t2 = theta * theta;
+    const double radius = theta * (1 + t2 * (-0.012 + t2 * (0.031 + t2 * (-0.022 + t2 * 0.004))));
+    const Eigen::Vector2d pixel =
+        Project(camera, {std::sin(theta) * 0.6, std::sin(theta) * 0.8, std::cos(theta)});
+    EXPECT_NEAR(pixel.x(), 318.6 + 517.3 * radius * 0.6, 0.02) << line;
+    EXPECT_NEAR(pixel.y(), 255.3 + 516.5 * radius * 0.8, 0.02) << line;
+  }
+  EXPECT_THAT(Refusal(std::string(kGood) + "distortion_model: equidistant\n"),
+              AllOf(HasSubstr("5 elements"), HasSubstr("the 4 of an equidistant lens")));
+  EXPECT_EQ(ParseCameraFile(text + "fisheye_model: 0\n", "c").color.distortion[1], 0.031);
+}
+
+TEST(CameraFileTest, SettingsOfOtherProgramsAreNamed) {
+  EXPECT_THAT(Refusal("%YAML:1.0\n---\nCamera.type: \"PinHole\"\nCamera.fx: 517.3\n"),
+              HasSubstr("ORB-SLAM"));
+  EXPECT_THAT(Refusal("{\"width\": 640, \"height\": 480, \"intrinsic_matrix\": [525.0, 0, 0]}"),
+              HasSubstr("Open3D"));
+  EXPECT_THAT(Refusal("<?xml version=\"1.0\"?>\n<opencv_storage>\n"), HasSubstr("is XML"));
+}
+
+TEST(CameraFileTest, RegisteredMayBeTrueOrFalse) {
+  EXPECT_FALSE(ParseCameraFile(With("depth_registered: 1", "depth_registered: true"), "c")
+                   .depth_camera_unknown);
+  EXPECT_TRUE(ParseCameraFile(With("depth_registered: 1", "depth_registered: false"), "c")
+                  .depth_camera_unknown);
+  EXPECT_THAT(Refusal(With("depth_registered: 1", "depth_registered: 2")),
+              HasSubstr("expected 0 or 1"));
+}
+
 TEST(CameraFileTest, WhatIsNoYamlIsRefused) {
   EXPECT_THAT(Refusal(""), HasSubstr("rec/camera.yaml"));
   EXPECT_THAT(Refusal("just words"), HasSubstr("rec/camera.yaml"));
@@ -190,7 +290,7 @@ TEST(CameraFileTest, UnregisteredDepthWithoutItsCameraIsTakenAsRegisteredWithAWa
       ParseCameraFile(With("depth_registered: 1", "depth_registered: 0"), "camera.yaml");
   EXPECT_FALSE(camera.depth_camera);
   ASSERT_THAT(camera.warnings, SizeIs(1));
-  EXPECT_THAT(camera.warnings[0], HasSubstr("taken as registered"));
+  EXPECT_THAT(camera.warnings[0].English(), HasSubstr("taken as registered"));
 }
 
 TEST(CameraFileTest, ATransformThatIsNotRigidIsNamed) {
@@ -229,6 +329,37 @@ TEST(CameraFileTest, TheDepthNoiseIsReadAsItIsStated) {
                             "c")
                 .depth_noise,
             expected);
+}
+
+TEST(CameraFileTest, TheClassOfTheDepthSensorBringsItsNoiseAndRange) {
+  StreamInfo info;
+  TakeOver(ParseCameraFile(kGood, "c"), info);
+  EXPECT_EQ(info.depth_sensor, DepthSensor::kStructuredLight);
+  const auto with = [](const std::string& keys) {
+    StreamInfo taken;
+    TakeOver(ParseCameraFile(With("reference_marker: 7", keys), "c"), taken);
+    return taken;
+  };
+  info = with("depth_sensor: active_stereo");
+  EXPECT_EQ(info.depth_sensor, DepthSensor::kActiveStereo);
+  EXPECT_EQ(info.depth_noise, ClassOf(DepthSensor::kActiveStereo).noise);
+  EXPECT_EQ(info.usable_depth, ClassOf(DepthSensor::kActiveStereo).range);
+  // What the file states itself holds, in any order.
+  info = with("depth_range: [0.07, 0.5]\ndepth_sensor: time_of_flight\n" +
+              std::string(kNoise).substr(std::string(kNoise).find("depth_noise")));
+  EXPECT_EQ(info.depth_sensor, DepthSensor::kTimeOfFlight);
+  EXPECT_EQ(info.depth_noise.constant_m, 0.0005);
+  EXPECT_EQ(info.usable_depth, (UsableDepth{.nearest_m = 0.07, .farthest_m = 0.5}));
+}
+
+TEST(CameraFileTest, AnotherClassOrRangeIsNamedWithWhatIsKnown) {
+  EXPECT_THAT(Refusal(With("reference_marker: 7", "depth_sensor: stereo")),
+              AllOf(HasSubstr("rec/camera.yaml: depth_sensor"), HasSubstr("stereo"),
+                    HasSubstr("structured_light, active_stereo, time_of_flight, lidar")));
+  for (const char* range : {"[0.5]", "[4, 0.3]", "[300, 4000]", "[0, 4]", "[0.3, 4, 5]"})
+    EXPECT_THAT(Refusal(With("reference_marker: 7", std::string("depth_range: ") + range)),
+                HasSubstr("rec/camera.yaml: depth_range"))
+        << range;
 }
 
 TEST(CameraFileTest, ADepthNoiseThatIsNotWholeIsNamedWithItsKeys) {

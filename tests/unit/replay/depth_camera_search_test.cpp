@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/depth_camera_search.hpp"
 
 #include <gmock/gmock.h>
@@ -147,7 +148,7 @@ void WriteUnregistered(const std::filesystem::path& folder, const std::vector<Im
 /// Share of the first frame's measured pixels within 1 % of what the colour camera would see.
 double ShareInPlace(const std::filesystem::path& folder, std::vector<std::string>& warnings) {
   const auto source = OpenTumRecording(folder);
-  warnings = source->info().warnings;
+  warnings = EnglishTexts(source->info().warnings);
   const cv::Mat depth_m = source->Next()->depth_m;
   const cv::Mat expected_m = Images(SameAsColor(), 1)[0].depth_m;
   const cv::Mat in_place = cv::abs(depth_m - expected_m) < 0.01 * expected_m;

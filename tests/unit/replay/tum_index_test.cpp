@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/tum_index.hpp"
 
 #include <gmock/gmock.h>
@@ -36,6 +37,28 @@ TEST(TumIndexTest, ReadsStampsAndNamesAroundComments) {
   EXPECT_EQ(entries[1].file, "rgb/b c.png");
   EXPECT_EQ(entries[2].time_s, 1305031102.175304);
   EXPECT_TRUE(ParseIndex("", "rgb.txt").empty());
+}
+
+TEST(TumIndexTest, ReadsWhatEditorsAndOtherSystemsMakeOfAList) {
+  const auto entries = ParseIndex(
+      "\xef\xbb\xbf# color\r\n1.5 rgb\\a.png\r\n2.5 \"rgb/b.png\"\r\n3.5 'rgb/c d.png'\n",
+      "rgb.txt");
+  ASSERT_EQ(entries.size(), 3U);
+  EXPECT_EQ(entries[0].file, "rgb/a.png");
+  EXPECT_EQ(entries[1].file, "rgb/b.png");
+  EXPECT_EQ(entries[2].file, "rgb/c d.png");
+  EXPECT_EQ(ParseIndex("\xef\xbb\xbf"
+                       "1.5 a\n",
+                       "rgb.txt")
+                .size(),
+            1U);
+  EXPECT_THAT(Refusal(std::string("\xff\xfe"
+                                  "1\0.\0",
+                                  6)),
+              HasSubstr("UTF-16"));
+  EXPECT_THAT(Refusal("1.0 ..\\..\\secret\n"), HasSubstr("leaves"));
+  EXPECT_THAT(Refusal("1.0 C:\\rgb\\a.png\n"), HasSubstr("leaves"));
+  EXPECT_THAT(Refusal("1.0 \"../a.png\"\n"), HasSubstr("leaves"));
 }
 
 TEST(TumIndexTest, NanAndGarbageStampsAreNamedWithTheirLine) {

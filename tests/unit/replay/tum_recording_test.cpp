@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/tum_recording.hpp"
 
 #include <gmock/gmock.h>
@@ -38,9 +39,9 @@ StreamInfo SmallCamera() {
                      .cx = 31.7,
                      .cy = 23.6,
                      .distortion = {0.01, -0.02, 0.001, 0, 0}};
-  info.marker_dictionary = "DICT_5X5_100";
-  info.marker_length_m = 0.08;
-  info.reference_marker = 3;
+  info.room_markers.dictionary = "DICT_5X5_100";
+  info.room_markers.length_m = 0.08;
+  info.room_markers.reference = 3;
   return info;
 }
 
@@ -89,9 +90,9 @@ TEST_F(TumRecordingTest, GivesBackWhatWasWritten) {
   const auto source = OpenTumRecording(recording_);
   EXPECT_EQ(source->info().intrinsics, SmallCamera().intrinsics);
   EXPECT_FALSE(source->info().intrinsics_assumed);
-  EXPECT_EQ(source->info().marker_dictionary, "DICT_5X5_100");
-  EXPECT_EQ(source->info().marker_length_m, 0.08);
-  EXPECT_EQ(source->info().reference_marker, 3);
+  EXPECT_EQ(source->info().room_markers.dictionary, "DICT_5X5_100");
+  EXPECT_EQ(source->info().room_markers.length_m, 0.08);
+  EXPECT_EQ(source->info().room_markers.reference, 3);
   EXPECT_EQ(source->info().num_frames, kNumFrames);
   EXPECT_THAT(source->info().warnings, ::testing::IsEmpty());
   for (int i = 0; i < kNumFrames; ++i) {
@@ -108,6 +109,16 @@ TEST_F(TumRecordingTest, GivesBackWhatWasWritten) {
   }
   EXPECT_FALSE(source->Next());
   EXPECT_FALSE(source->Next());
+}
+
+TEST_F(TumRecordingTest, GivesBackARationalLens) {
+  StreamInfo info = SmallCamera();
+  info.intrinsics.distortion = {0.51, -2.74, 0.0006, -0.0002, 1.64, 0.39, -2.55, 1.56};
+  const fs::path rational = folder_ / "rational";
+  TumWriter writer(rational, info, {.jpeg_quality = 0});
+  for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i));
+  writer.Finish();
+  EXPECT_EQ(OpenTumRecording(rational)->info().intrinsics, info.intrinsics);
 }
 
 TEST_F(TumRecordingTest, StoppingEarlyEndsTheThread) {
@@ -128,6 +139,23 @@ TEST_F(TumRecordingTest, ReadsJpegColour) {
   EXPECT_LE(cv::norm(frame->color_rgb, NumberedFrame(4).color_rgb, cv::NORM_INF), 2);
 }
 
+TEST_F(TumRecordingTest, GivesBackWhichFramesWereFollowedWithFewerKeypoints) {
+  EXPECT_FALSE(fs::exists(recording_ / "fewer_keypoints.txt"));
+  const fs::path slow = folder_ / "slow_computer";
+  TumWriter writer(slow, SmallCamera(), {.jpeg_quality = 0});
+  for (int i = 0; i < kNumFrames; ++i) {
+    Frame frame = NumberedFrame(i);
+    frame.fewer_keypoints = i % 3 == 1;
+    writer.Add(frame);
+  }
+  writer.Finish();
+  const auto source = OpenTumRecording(slow);
+  for (int i = 0; i < kNumFrames; ++i)
+    EXPECT_EQ(source->Next().value().fewer_keypoints, i % 3 == 1) << i;
+  WriteWholeFile(slow / "fewer_keypoints.txt", std::string_view("1000 ../depth/0.png\n"));
+  EXPECT_THROW((void)OpenTumRecording(slow), DataError) << "checked as the other lists are";
+}
+
 TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
   std::string index = ReadTextFile(recording_ / "depth.txt", 1 << 20);
   const std::size_t line = index.find("1000.106");  // frame 3
@@ -135,7 +163,7 @@ TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
   WriteWholeFile(recording_ / "depth.txt", index);
   const auto source = OpenTumRecording(recording_);
   EXPECT_EQ(source->info().num_frames, kNumFrames - 1);
-  EXPECT_THAT(source->info().warnings,
+  EXPECT_THAT(EnglishTexts(source->info().warnings),
               Contains(HasSubstr("1 of 12 colour and 0 of 11 depth images")));
   for (int i = 0; i < 3; ++i) (void)source->Next();
   const auto after_gap = source->Next();
@@ -185,16 +213,83 @@ TEST_F(TumRecordingTest, SlowStreamsDoNotPairAcrossALostImage) {
 TEST_F(TumRecordingTest, WithoutCameraFileTumsCameraIsAssumedAtTheImagesSize) {
   fs::remove(recording_ / "camera.yaml");
   const auto source = OpenTumRecording(
-      recording_,
-      {.marker_dictionary = "DICT_4X4_50", .marker_length_m = 0.1, .reference_marker = 9});
+      recording_, {.room_markers = {.dictionary = "DICT_4X4_50", .length_m = 0.1, .reference = 9}});
   EXPECT_TRUE(source->info().intrinsics_assumed);
   EXPECT_EQ(source->info().intrinsics.width, 64);
   EXPECT_DOUBLE_EQ(source->info().intrinsics.fx, 52.5);
   EXPECT_DOUBLE_EQ(source->info().intrinsics.cx, 31.5);
-  EXPECT_EQ(source->info().marker_dictionary, "DICT_4X4_50");
-  EXPECT_EQ(source->info().reference_marker, 9);
-  EXPECT_THAT(source->info().warnings, Contains(HasSubstr("no camera.yaml: assumed fx 52.5")));
+  EXPECT_EQ(source->info().room_markers.dictionary, "DICT_4X4_50");
+  EXPECT_EQ(source->info().room_markers.reference, 9);
+  EXPECT_THAT(EnglishTexts(source->info().warnings),
+              Contains(HasSubstr("no camera.yaml: assumed fx 52.5")));
   EXPECT_NEAR(source->Next()->depth_m.at<float>(0, 0), 0.5F, 1e-4);  // 5000 units a metre
+}
+
+TEST_F(TumRecordingTest, AUnitThatNothingStatesIsTakenFromTheDepthAndSaid) {
+  for (const double units : {1000.0, 5000.0}) {
+    const fs::path folder = folder_ / fmt::format("{:g}", units);
+    TumWriter writer(folder, SmallCamera(), {.depth_scale = units, .jpeg_quality = 0});
+    for (int i = 0; i < kNumFrames; ++i) writer.Add(NumberedFrame(i));
+    writer.Finish();
+    fs::remove(folder / "camera.yaml");
+    const auto source = OpenTumRecording(folder);
+    EXPECT_TRUE(source->info().depth_unit_assumed);
+    EXPECT_THAT(EnglishTexts(source->info().warnings),
+                Contains(HasSubstr(fmt::format("{:g} units of depth", units))));
+    EXPECT_NEAR(source->Next()->depth_m.at<float>(0, 0), 0.5F, 1e-3) << units;
+  }
+  EXPECT_FALSE(OpenTumRecording(recording_)->info().depth_unit_assumed);
+}
+
+TEST_F(TumRecordingTest, ACalibrationOfAnotherNameIsUsedAndSaid) {
+  fs::rename(recording_ / "camera.yaml", recording_ / "camera.yml");
+  EXPECT_THAT(EnglishTexts(OpenTumRecording(recording_)->info().warnings),
+              Contains(HasSubstr("no camera.yaml: the camera is taken from camera.yml")));
+}
+
+TEST_F(TumRecordingTest, LayoutsOfOtherProgramsAreNamed) {
+  for (const char* name : {"color", "associations.txt", "sweep.bag", "frame-000000.color.jpg"}) {
+    const fs::path folder = folder_ / "other" / name;
+    fs::create_directories(folder / name);
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenTumRecording(folder); }),
+                AllOf(HasSubstr("rgb.txt is missing"), HasSubstr(name)));
+  }
+}
+
+TEST_F(TumRecordingTest, StampsThatAreNoSecondsAreNamed) {
+  const auto warnings_or_refusal = [&](double factor) {
+    for (const char* list : {"rgb.txt", "depth.txt"}) {
+      std::string text;
+      for (int i = 0; i < kNumFrames; ++i) {
+        const Frame frame = NumberedFrame(i);
+        const bool color = std::string_view(list) == "rgb.txt";
+        text += fmt::format("{:.9f} {}\n", factor * i + 1,
+                            fs::relative(color ? ColorFile(i) : DepthFile(i), recording_).string());
+      }
+      WriteWholeFile(recording_ / list, std::string_view(text));
+    }
+    try {
+      return EnglishTexts(OpenTumRecording(recording_)->info().warnings);
+    } catch (const DataError& error) {
+      return std::vector<std::string>{error.what()};
+    }
+  };
+  EXPECT_THAT(warnings_or_refusal(0.49), ::testing::IsEmpty());
+  EXPECT_THAT(warnings_or_refusal(1.0), Contains(HasSubstr("numbers of images")));
+  EXPECT_THAT(warnings_or_refusal(66.7), Contains(HasSubstr("milliseconds")));
+  EXPECT_THAT(warnings_or_refusal(0.0005), Contains(HasSubstr("are the stamps seconds")));
+}
+
+TEST_F(TumRecordingTest, ImagesOfOtherKindsAreNamed) {
+  const auto refusal = [&](std::string_view bytes) {
+    WriteWholeFile(DepthFile(2), bytes);
+    return Refusal();
+  };
+  EXPECT_THAT(refusal(std::string_view("II*\0....", 8)), HasSubstr("is TIFF"));
+  EXPECT_THAT(refusal("P5 64 48 65535"), HasSubstr("is PGM"));
+  EXPECT_THAT(refusal("RIFF0000WEBPVP8 "), HasSubstr("is WebP"));
+  EXPECT_THAT(refusal("\x93NUMPY"), HasSubstr("is NumPy"));
+  EXPECT_THAT(refusal("hello"), HasSubstr("68 65 6c 6c"));
 }
 
 TEST_F(TumRecordingTest, WithoutCameraFileOtherShapesNeedOne) {
@@ -364,6 +459,23 @@ TEST_F(TumRecordingTest, DepthBeyondSixteenBitsIsWrittenAsNothing) {
   EXPECT_EQ(units.at<std::uint16_t>(0, 0), 0);
   EXPECT_EQ(units.at<std::uint16_t>(0, 1), 0);
   EXPECT_EQ(units.at<std::uint16_t>(0, 2), 2500);
+}
+
+TEST_F(TumRecordingTest, TheClassOfTheSensorComesBackWithWhatDiffersFromIt) {
+  StreamInfo info = SmallCamera();
+  info.depth_sensor = DepthSensor::kActiveStereo;
+  info.depth_noise = ClassOf(info.depth_sensor).noise;
+  info.usable_depth = {.nearest_m = 0.07, .farthest_m = 0.5};
+  const fs::path folder = folder_ / "stereo";
+  TumWriter writer(folder, info, {.jpeg_quality = 0});
+  for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i));
+  writer.Finish();
+  const std::string text = ReadTextFile(folder / "camera.yaml", 1 << 16);
+  EXPECT_EQ(text.find("depth_noise"), std::string::npos) << "the class has it";
+  const auto recording = OpenTumRecording(folder);
+  EXPECT_EQ(recording->info().depth_sensor, info.depth_sensor);
+  EXPECT_EQ(recording->info().depth_noise, info.depth_noise);
+  EXPECT_EQ(recording->info().usable_depth, info.usable_depth);
 }
 
 TEST_F(TumRecordingTest, TheSensorsDepthNoiseComesBackToTheBit) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/sensor_model/depth_correction.hpp"
 
 #include <cmath>
@@ -29,6 +30,20 @@ TEST(DepthCorrection, SaysOfEveryCellWhatTheModelSays) {
                       model.CorrectedDepth(z_m, centred), 1e-6);
         }
       }
+    }
+  }
+}
+
+TEST(DepthCorrection, SlopeIsTheDerivative) {
+  const CalibrationModel model = SomeCalibration();
+  const DepthCorrection correction(model, 64, 48, 4);
+  constexpr double kStep_m = 1e-5;
+  for (const double z_m : {0.5, 0.9, 1.4, 1.9, 2.5}) {
+    for (std::size_t cell = 0; cell < 16 * 12; cell += 7) {
+      const double difference =
+          correction.Correct(cell, z_m + kStep_m) - correction.Correct(cell, z_m - kStep_m);
+      EXPECT_NEAR(correction.Slope(cell, z_m), difference / (2 * kStep_m), 1e-7);
+      EXPECT_GT(std::abs(correction.Slope(cell, z_m) - correction.Correct(cell, z_m) / z_m), 1e-5);
     }
   }
 }

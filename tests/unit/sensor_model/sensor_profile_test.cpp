@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/sensor_model/sensor_profile.hpp"
 
 #include <cmath>

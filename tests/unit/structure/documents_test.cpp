@@ -1,4 +1,6 @@
-// The files and functions that the guides name, against the sources.
+// SPDX-License-Identifier: Apache-2.0
+// The papers against the sources: files and functions that guides name, links, and what the README
+// repeats of the manual.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,7 +32,7 @@ struct Checked {
 Checked Check(const std::string& guide) {
   static const std::regex kQuoted(R"((\(?)`([^`\n]+)`)");
   static const std::regex kPath(
-      R"((?:algo|daemon|drivers|systemd|tests|toolchain|web)(?:/[a-z0-9_.-]+)+/?)");
+      R"((?:algo|daemon|docs|drivers|systemd|tests|toolchain|web)(?:/[a-z0-9_.-]+)+/?)");
   static const std::regex kFile(R"([a-z0-9_]+\.(?:cpp|hpp))");
   static const std::regex kName("[A-Za-z_]+");
   const fs::path root = PLUMB_SOURCE_DIR;
@@ -56,7 +58,7 @@ Checked Check(const std::string& guide) {
 }
 
 TEST(DocumentsTest, WhatTheGuidesNameIsThere) {
-  for (const char* guide : {"CONTRIBUTING.md", "toolchain/site/extending.md"}) {
+  for (const char* guide : {"CONTRIBUTING.md", "docs/extending.md"}) {
     const Checked checked = Check(TextOf(fs::path(PLUMB_SOURCE_DIR) / guide));
     EXPECT_THAT(checked.missing, ::testing::IsEmpty()) << guide;
     EXPECT_GE(checked.num_files, 20) << guide << ": far fewer means that nothing was read";
@@ -65,14 +67,84 @@ TEST(DocumentsTest, WhatTheGuidesNameIsThere) {
 }
 
 TEST(DocumentsTest, AFileOrNameThatIsGoneIsFound) {
-  EXPECT_THAT(Check("`algo/acceptance/acceptance.cpp` (`Decide`) and `verdict.hpp`").missing,
+  EXPECT_THAT(Check("`algo/acceptance/gates.cpp` (`Decide`) and `verdict.hpp`").missing,
               ::testing::IsEmpty());
   EXPECT_THAT(
-      Check("`algo/acceptance/gates.cpp`; `algo/acceptance/acceptance.cpp` (`Resolve`), "
+      Check("`algo/acceptance/judge.cpp`; `algo/acceptance/gates.cpp` (`Resolve`), "
             "`vertict.cpp`")
           .missing,
-      ::testing::ElementsAre("algo/acceptance/gates.cpp", "algo/acceptance/acceptance.cpp: Resolve",
+      ::testing::ElementsAre("algo/acceptance/judge.cpp", "algo/acceptance/gates.cpp: Resolve",
                              "algo/acceptance/vertict.cpp"));
+}
+
+/// Every paper of the project, relative to its root.
+std::vector<fs::path> Papers() {
+  const fs::path root = PLUMB_SOURCE_DIR;
+  std::vector<fs::path> papers;
+  const auto add = [&](const fs::path& file) {
+    if (file.extension() == ".md") papers.push_back(fs::relative(file, root));
+  };
+  for (const auto& entry : fs::directory_iterator(root)) add(entry.path());
+  for (const char* top :
+       {".github", "algo", "daemon", "docs", "drivers", "systemd", "tests", "toolchain", "web"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+      if (entry.path().string().find("node_modules") == std::string::npos) add(entry.path());
+    }
+  }
+  return papers;
+}
+
+/// Links and pictures of a paper that lead to nothing. The site also looks for pictures in its own
+/// folder of pictures.
+std::vector<std::string> DeadLinks(const fs::path& paper, const std::string& text) {
+  static const std::regex kLink(R"(\]\(([^)\s#]+)(?:#[^)]*)?\))");
+  const fs::path root = PLUMB_SOURCE_DIR;
+  std::vector<std::string> dead;
+  for (std::sregex_iterator match(text.begin(), text.end(), kLink), end; match != end; ++match) {
+    const std::string target = (*match)[1];
+    if (target.find("://") != std::string::npos) continue;
+    if (!fs::exists(root / paper.parent_path() / target) &&
+        !(paper.parent_path() == "docs" && fs::exists(root / "docs/pictures" / target)))
+      dead.push_back(target);
+  }
+  return dead;
+}
+
+TEST(DocumentsTest, EveryLinkLeadsSomewhere) {
+  const std::vector<fs::path> papers = Papers();
+  EXPECT_GE(papers.size(), 30U) << "far fewer means that they were not found";
+  for (const fs::path& paper : papers)
+    EXPECT_THAT(DeadLinks(paper, TextOf(fs::path(PLUMB_SOURCE_DIR) / paper)), ::testing::IsEmpty())
+        << paper;
+  EXPECT_THAT(DeadLinks("docs/a.md", "[a](page.md#b), ![b](no.png) [c](https://e.org/f)"),
+              ::testing::ElementsAre("no.png"));
+}
+
+std::vector<std::string> LinesOf(const fs::path& file) {
+  std::ifstream in(file);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+TEST(DocumentsTest, TheReadmeIsShortAndItsFiguresAreThoseOfTheManual) {
+  static const std::regex kFigure(R"(\d+\.\d+)");
+  const fs::path root = PLUMB_SOURCE_DIR;
+  const std::vector<std::string> readme = LinesOf(root / "README.md");
+  EXPECT_LE(readme.size(), 150U);
+  const std::string owner = TextOf(root / "docs/accuracy.md");
+  int num_figures = 0;
+  bool is_inside = false;
+  for (const std::string& line : readme) {
+    if (line.starts_with("## ")) is_inside = line == "## Accuracy";
+    if (!is_inside || !line.starts_with('|')) continue;
+    for (std::sregex_iterator match(line.begin(), line.end(), kFigure), end; match != end;
+         ++match) {
+      ++num_figures;
+      EXPECT_NE(owner.find(match->str()), std::string::npos) << match->str() << " in: " << line;
+    }
+  }
+  EXPECT_GE(num_figures, 20);
 }
 
 }  // namespace

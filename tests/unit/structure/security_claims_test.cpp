@@ -1,4 +1,5 @@
-// SECURITY.md names a test for each control: they must exist.
+// SPDX-License-Identifier: Apache-2.0
+// docs/threats.md names a test for each control: they must exist.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -41,9 +42,9 @@ std::set<std::string> ExistingTests() {
   return names;
 }
 
-/// The rows of SECURITY.md's tables whose last column is named "test".
+/// The rows of the tables of threats and hazards whose last column is named "test".
 std::vector<std::string> RowsWithTests() {
-  std::ifstream in(PLUMB_SOURCE_DIR "/SECURITY.md");
+  std::ifstream in(PLUMB_SOURCE_DIR "/docs/threats.md");
   std::vector<std::string> rows;
   bool is_inside = false;
   for (std::string line; std::getline(in, line);) {
@@ -73,7 +74,7 @@ TEST(SecurityClaimsTest, EveryControlNamesTestsThatExist) {
 }
 
 TEST(SecurityClaimsTest, EveryHazardThatMattersHasARow) {
-  const std::string text = TextOf(PLUMB_SOURCE_DIR "/SECURITY.md");
+  const std::string text = TextOf(PLUMB_SOURCE_DIR "/docs/threats.md");
   for (const char* hazard : {"wrong side", "stale result", "wrong patient", "wrong reference",
                              "moved marker", "overconfidence", "lost data"}) {
     EXPECT_NE(text.find(std::string("\n| ") + hazard + " |"), std::string::npos) << hazard;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Numbers that have one owner in the product's sources.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,7 +56,7 @@ std::vector<std::string> LinesThat(const std::function<bool(const std::string&)>
 TEST(SingleOwnerTest, TheDefaultLengthOfMarkersIsWrittenOnce) {
   // A body's coordinates have nothing to do with it.
   EXPECT_THAT(LinesThat([](const std::string& line) { return Spells(line, kMarkerLength_m); },
-                        {"drivers/simulated/body.cpp"}),
+                        {"drivers/simulator/world/body.cpp"}),
               ::testing::ElementsAre(::testing::StartsWith("algo/types/marker.hpp:")))
       << "use kDefaultMarkerLength_m, or let the caller state the room's length";
 }
@@ -66,7 +67,7 @@ TEST(SingleOwnerTest, TheDefaultDictionaryOfMarkersIsWrittenOnce) {
                   [](const std::string& line) {
                     return line.find("\"DICT_6X6_250\"") != std::string::npos;
                   },
-                  {"algo/types/marker_dictionary.cpp", "drivers/simulated/world.hpp"}),
+                  {"algo/types/marker_dictionary.cpp", "drivers/simulator/world/world.hpp"}),
               ::testing::ElementsAre(::testing::StartsWith("algo/types/marker.hpp:")))
       << "use kDefaultMarkerDictionary";
 }

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/unit/tracking/ball_sweep.hpp"
 
-#include "drivers/simulated/simulated_source.hpp"
+#include "drivers/simulator/sensor/simulated_source.hpp"
 
 namespace plumb {
 

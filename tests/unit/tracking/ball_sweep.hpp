@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A short simulated sweep over a ball between four boards, rendered in memory; its truth beside it.
 #pragma once
 

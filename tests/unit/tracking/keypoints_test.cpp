@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/tracking/keypoints.hpp"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "algo/tracking/dense_view.hpp"
+#include "algo/map/dense_view.hpp"
 
 namespace plumb {
 namespace {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/tracking/pose_optimizer.hpp"
 
 #include <random>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/unit/tracking/synthetic_map.hpp"
 
 #include <algorithm>

@@ -1,11 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keyframes over a known landscape with a known sensor: everything is projected here, by no code of
 // the method.
 #pragma once
 
 #include <vector>
 
+#include "algo/map/map.hpp"
 #include "algo/sensor_model/calibration_model.hpp"
-#include "algo/tracking/map.hpp"
 
 namespace plumb::synthetic {
 

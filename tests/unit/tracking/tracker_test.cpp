@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "algo/tracking/tracker.hpp"
 
 #include <algorithm>
@@ -89,11 +90,13 @@ TEST_F(TrackerTest, FollowsWithFewerKeypointsToo) {
   double num_all = 0, num_fewer = 0;
   for (std::size_t i = 0; i < kNumFrames; ++i) {
     num_all += all.Track(sweep().frames[i]).num_keypoints;
-    const TrackedFrame result = fewer.Track(sweep().frames[i], true);
+    Frame marked = sweep().frames[i];
+    marked.fewer_keypoints = true;
+    const TrackedFrame result = fewer.Track(marked);
     EXPECT_TRUE(result.tracked) << "frame " << i;
     EXPECT_TRUE(result.fewer_keypoints);
     num_fewer += result.num_keypoints;
-    (void)at_first.Track(sweep().frames[i], i < kNumFrames / 2);
+    (void)at_first.Track(i < kNumFrames / 2 ? marked : sweep().frames[i]);
   }
   fmt::print("{:.0f} keypoints instead of {:.0f}, worst {:.2e} m\n", num_fewer, num_all,
              WorstError(fewer));
@@ -169,7 +172,7 @@ TEST_F(TrackerTest, RefusesWhatItCannotUse) {
   small.color_rgb = small.color_rgb(cv::Rect(0, 0, 100, 100));
   EXPECT_THROW(tracker.Track(small), std::invalid_argument);
   StreamInfo unknown = sweep().info;
-  unknown.marker_dictionary = "DICT_NO_SUCH";
+  unknown.room_markers.dictionary = "DICT_NO_SUCH";
   EXPECT_THROW(Tracker(unknown, {}), DataError);
 }
 

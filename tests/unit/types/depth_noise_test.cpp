@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The noise of a depth camera: the default to the bit, what may be stated, and what holds for it.
 #include "algo/types/depth_noise.hpp"
 
@@ -9,8 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "algo/reconstruction/view_surface.hpp"
-#include "algo/tracking/dense_view.hpp"
+#include "algo/map/dense_view.hpp"
+#include "algo/surface/view_surface.hpp"
+#include "words/sensor.hpp"
 
 namespace plumb {
 namespace {
@@ -33,6 +35,11 @@ float FormerSigmaOfSurfaces(float depth_m, float cos_incidence) {
     sigma += 0.0001F / std::sqrt(depth_m) * ratio * ratio;
   }
   return sigma;
+}
+
+std::string FaultText(const DepthNoise& noise) {
+  const std::optional<Message> fault = FaultOf(noise);
+  return fault ? fault->English() : "none";
 }
 
 TEST(DepthNoiseTest, TheDefaultGivesTheFormerValuesToTheBit) {
@@ -68,10 +75,10 @@ TEST(DepthNoiseTest, EveryValueIsAcceptedAtItsLimitsAndRefusedBeyond) {
                         const DepthNoise& others) {
     DepthNoise noise = others;
     noise.*member = inside;
-    EXPECT_FALSE(FaultOf(noise).has_value()) << name << " " << inside << *FaultOf(noise);
+    EXPECT_FALSE(FaultOf(noise).has_value()) << name << " " << inside << FaultText(noise);
     for (const double bad : {outside, std::nan(""), kInfinity, -kInfinity}) {
       noise.*member = bad;
-      EXPECT_THAT(FaultOf(noise).value_or("none"),
+      EXPECT_THAT(FaultText(noise),
                   AllOf(HasSubstr(std::string(name) + " is"), HasSubstr("expected")));
     }
   };
@@ -96,32 +103,32 @@ TEST(DepthNoiseTest, NothingBelowTheSmallestNoiseIsAccepted) {
   noise.constant_m = kLeastDepthNoise_m;
   EXPECT_EQ(FaultOf(noise), std::nullopt);
   noise.constant_m = std::nextafter(kLeastDepthNoise_m, 0);
-  EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("falls to"));
+  EXPECT_THAT(FaultText(noise), HasSubstr("falls to"));
   // It decreases with the distance without end.
   noise = {.constant_m = 0.1, .linear_m_per_m = -1e-6, .quadratic_m_per_m2 = 0.0};
-  EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("falls to -inf"));
+  EXPECT_THAT(FaultText(noise), HasSubstr("falls to -inf"));
   noise.quadratic_m_per_m2 = 1e-320;
-  EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("falls to"));
+  EXPECT_THAT(FaultText(noise), HasSubstr("falls to"));
   // Smallest at 2 m, where it is constant_m - linear^2 / (4 quadratic) = 0.0001, and then 0.
   noise = {
       .constant_m = 0.0041, .linear_m_per_m = -0.004, .quadratic_m_per_m2 = 0.001, .origin_m = 0.0};
   EXPECT_EQ(FaultOf(noise), std::nullopt);
   noise.constant_m = 0.004;
-  EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("falls to"));
+  EXPECT_THAT(FaultText(noise), HasSubstr("falls to"));
   // Its smallest value lies behind the camera, where nothing is measured.
   noise = {
       .constant_m = 0.0001, .linear_m_per_m = 0.01, .quadratic_m_per_m2 = 0.001, .origin_m = 0};
   EXPECT_EQ(FaultOf(noise), std::nullopt);
   noise.origin_m = 0.1;
-  EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("falls to"));
+  EXPECT_THAT(FaultText(noise), HasSubstr("falls to"));
 }
 
 TEST(DepthNoiseTest, MillimetresAreRefused) {
   DepthNoise noise = {.constant_m = 0.05, .quadratic_m_per_m2 = 0.05, .origin_m = 0.0};
   EXPECT_EQ(FaultOf(noise), std::nullopt);
   noise.quadratic_m_per_m2 = 0.0501;
-  EXPECT_THAT(FaultOf(noise).value_or("none"), HasSubstr("at 1 m"));
-  EXPECT_THAT(FaultOf({.constant_m = 1.2}).value_or("none"), HasSubstr("constant_m is 1.2"));
+  EXPECT_THAT(FaultText(noise), HasSubstr("at 1 m"));
+  EXPECT_THAT(FaultText({.constant_m = 1.2}), HasSubstr("constant_m is 1.2"));
 }
 
 // Whatever is accepted can be divided by at every distance, in both precisions, and grows with the
@@ -139,7 +146,7 @@ TEST(DepthNoiseTest, WhateverIsAcceptedIsPositiveAndFiniteEverywhere) {
                               .quadratic_m_per_m2 = value(1.0),
                               .origin_m = value(10.0),
                               .grazing_m = value(0.1)};
-    const std::optional<std::string> fault = FaultOf(noise);
+    const std::optional<Message> fault = FaultOf(noise);
     num_accepted += fault ? 0 : 1;
     double smallest_m = 1e9;
     for (double z_m = 0.0; z_m < 70.0; z_m = 1.05 * z_m + 0.001) {
@@ -156,13 +163,13 @@ TEST(DepthNoiseTest, WhateverIsAcceptedIsPositiveAndFiniteEverywhere) {
     }
     if (!fault) continue;
     EXPECT_FALSE(fault->empty());
-    if (fault->find("falls to") == std::string::npos ||
-        fault->find("-inf") != std::string::npos)  // may be too small far away only
+    if (!fault->Is(say::sensor::kNoiseFalls) ||
+        fault->English().find("-inf") != std::string::npos)  // may be too small far away only
       continue;
     ++num_too_small;
     const double vertex_m = noise.origin_m - noise.linear_m_per_m / (2 * noise.quadratic_m_per_m2);
     if (vertex_m > 0) smallest_m = std::min(smallest_m, noise.SigmaFacing_m(vertex_m));
-    EXPECT_LT(smallest_m, 1.001 * kLeastDepthNoise_m) << *fault;
+    EXPECT_LT(smallest_m, 1.001 * kLeastDepthNoise_m) << fault->English();
   }
   EXPECT_GT(num_accepted, 1000) << "otherwise nothing is tested";
   EXPECT_GT(num_too_small, 1000);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A RAUC of the tests' own, on a bus of their own.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/update/last_update.hpp"
 
 #include <fstream>
@@ -8,6 +9,7 @@
 #include "daemon/update/bundle_check.hpp"
 #include "daemon/update/updater.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "words/update.hpp"
 
 namespace plumb {
 namespace {
@@ -16,12 +18,13 @@ TEST(LastUpdateTest, WhatIsNotKnownIsNoRollBack) {
   const testing::TempFolder folder;
 
   const LastUpdate update{.version = "2", .from_slot = "A", .boot = "first"};
-  EXPECT_NE(WhyRolledBack(update, "A", "second", "1"), "");
-  EXPECT_EQ(WhyRolledBack(update, "A", "first", "1"), "");
-  EXPECT_EQ(WhyRolledBack(update, "B", "second", "1"), "");
-  EXPECT_EQ(WhyRolledBack(update, "", "second", "1"), "");
-  EXPECT_EQ(WhyRolledBack(update, "A", "", "1"), "");
-  EXPECT_EQ(WhyRolledBack({.version = "2", .from_slot = "A", .boot = ""}, "A", "second", "1"), "");
+  EXPECT_TRUE(WhyRolledBack(update, "A", "second", "1").Is(say::update::kRolledBack));
+  EXPECT_TRUE(WhyRolledBack(update, "A", "first", "1").empty());
+  EXPECT_TRUE(WhyRolledBack(update, "B", "second", "1").empty());
+  EXPECT_TRUE(WhyRolledBack(update, "", "second", "1").empty());
+  EXPECT_TRUE(WhyRolledBack(update, "A", "", "1").empty());
+  EXPECT_TRUE(
+      WhyRolledBack({.version = "2", .from_slot = "A", .boot = ""}, "A", "second", "1").empty());
   for (const char* text : {"", "[]", "{", "{\"version\": 2}", "\xff\xfe"}) {
     std::ofstream(folder / "last-update.json") << text;
     EXPECT_FALSE(ReadLastUpdate(folder.path())) << text;
@@ -55,11 +58,11 @@ TEST(VersionTest, ASystemOfAnotherFormCanBeUpdated) {
 
 TEST(VersionTest, OnlyNumbersWithDotsBetweenThemAreAVersion) {
   for (const char* good : {"0", "7", "0.2", "0.2.1", "10.20.30.40", "99999999999999999999"})
-    EXPECT_EQ(WhyNoVersion(good), "") << good;
+    EXPECT_TRUE(WhyNoVersion(good).empty()) << good;
   for (const char* bad : {"", ".", "1.", ".1", "1..2", "v1.0.0", "0.2.1-rc1", "0.2.1~git1", "1.0a",
                           "0.2+b", " 1", "1 ", "-1", "\xd9\xa1"})
-    EXPECT_NE(WhyNoVersion(bad), "") << bad;
-  EXPECT_EQ(WhyNoVersion("0.2.1-rc1"),
+    EXPECT_FALSE(WhyNoVersion(bad).empty()) << bad;
+  EXPECT_EQ(WhyNoVersion("0.2.1-rc1").English(),
             "this bundle holds version '0.2.1-rc1': expected numbers separated by dots, such "
             "as 0.2.1; ask who made it");
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The restart through a logind of the test's own.
 #include "daemon/update/system_restart.hpp"
 
@@ -70,8 +71,8 @@ class SystemRestartTest : public ::testing::Test {
   std::string Restart() {
     std::optional<std::string> answer;
     const auto restart = MakeLogindRestart(loop_, bus_.address());
-    restart->Restart([&](const std::string& failure) {
-      answer = failure;
+    restart->Restart([&](const Message& failure) {
+      answer = failure.English();
       loop_.Quit(0);
     });
     EventLoop::Source limit = loop_.MakeTimer("limit", [&] { loop_.Quit(1); });

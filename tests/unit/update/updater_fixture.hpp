@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The updater on its loop, with a RAUC that does what a test says.
 #pragma once
 
@@ -48,25 +49,30 @@ class UpdaterTest : public UpdaterOnLoop {
   void Start() {
     On([this] {
       updater_ = std::make_unique<Updater>(
-          loop_,
-          UpdaterOptions{
-              .folder = folder_ / "updates",
-              .max_bytes = 1 << 20,
-              .bus_address = bus_.address(),
-              .version = "0.1.0",
-              .boot = boot_,
-              .blocking_reason = [this] { return blocking_reason_; },
-              .changed = [this] { ++num_changes_; },
-              .run_in_background = {},
-              .ended = [this](const std::string& bundle,
-                              const std::string& failure) { ended_ = bundle + ": " + failure; },
-              .rolled_back = [this](const std::string& text) { roll_backs_ += text; },
-              .look_every = std::chrono::milliseconds(1),
-              .now =
-                  [this] {
-                    ++num_looks_;
-                    return EventLoop::Clock::time_point() + passed_.load();
-                  }});
+          loop_, UpdaterOptions{
+                     .folder = folder_ / "updates",
+                     .max_bytes = 1 << 20,
+                     .bus_address = bus_.address(),
+                     .version = "0.1.0",
+                     .boot = boot_,
+                     .blocking_reason =
+                         [this] {
+                           return blocking_reason_.empty() ? Message()
+                                                           : Message::Verbatim(blocking_reason_);
+                         },
+                     .changed = [this] { ++num_changes_; },
+                     .run_in_background = {},
+                     .ended =
+                         [this](const std::string& bundle, const Message& failure) {
+                           ended_ = bundle + ": " + failure.English();
+                         },
+                     .rolled_back = [this](const Message& why) { roll_backs_ += why.English(); },
+                     .look_every = std::chrono::milliseconds(1),
+                     .now =
+                         [this] {
+                           ++num_looks_;
+                           return EventLoop::Clock::time_point() + passed_.load();
+                         }});
     });
   }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The progress of an installation, and an installation without any.
 #include <chrono>
 
@@ -20,7 +21,7 @@ class StandstillTest : public UpdaterTest {
     rauc.first_step = step;
     rauc.first_percent = percent;
     EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
-    EXPECT_TRUE(Becomes([&] { return StatusNow().message == step; }));
+    EXPECT_TRUE(Becomes([&] { return StatusNow().message.English() == step; }));
   }
   /// Whether it goes on although that much time has passed and been looked at.
   bool GoesOnAt(std::chrono::seconds passed) {
@@ -40,9 +41,9 @@ TEST_F(StandstillTest, AStepThatDoesNotEndIsAFailureAndAnotherAttemptCanBeMade) 
     BeginAt(rauc, "Determining slot states", 0);
     EXPECT_TRUE(GoesOnAt(kLongestOtherStep - std::chrono::seconds(1)));
     EXPECT_TRUE(EndsAt(kLongestOtherStep));
-    EXPECT_THAT(StatusNow().message,
+    EXPECT_THAT(StatusNow().message.English(),
                 HasSubstr("no progress for 5 minutes, at 0 % of 'Determining"));
-    EXPECT_EQ(Ended(), "plumb-9.0.raucb: " + StatusNow().failure);
+    EXPECT_EQ(Ended(), "plumb-9.0.raucb: " + StatusNow().failure.English());
     EXPECT_FALSE(StatusNow().restart_needed);
     BeginAt(rauc, "Copying image to rootfs.1", 40);
     rauc.Release();
@@ -60,7 +61,8 @@ TEST_F(StandstillTest, ACopyHasLongerAndProgressBeginsTheTimeAnew) {
     EXPECT_TRUE(Becomes([&] { return StatusNow().fraction == 0.6; }));
     EXPECT_TRUE(GoesOnAt(first + first));
     EXPECT_TRUE(EndsAt(first + kLongestCopy));
-    EXPECT_THAT(StatusNow().failure, HasSubstr("no progress for 30 minutes, at 60 % of 'Copying"));
+    EXPECT_THAT(StatusNow().failure.English(),
+                HasSubstr("no progress for 30 minutes, at 60 % of 'Copying"));
   });
 }
 
@@ -84,7 +86,7 @@ TEST_F(StandstillTest, AnInstallationThatEndsAfterItWasGivenUpIsStillTold) {
     rauc.Release();
     EXPECT_TRUE(Becomes([&] { return StatusNow().restart_needed; }))
         << "the next start is one of the new system";
-    EXPECT_EQ(StatusNow().failure, "");
+    EXPECT_EQ(StatusNow().failure.English(), "");
   });
 }
 

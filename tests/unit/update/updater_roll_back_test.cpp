@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether the machine kept what was installed.
 #include <functional>
 
@@ -24,7 +25,7 @@ class RollBackTest : public UpdaterTest {
     rauc_->Release();
     EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
     EXPECT_TRUE(StatusNow().restart_needed);
-    EXPECT_EQ(StatusNow().failure, "");
+    EXPECT_EQ(StatusNow().failure.English(), "");
     On([&] { updater_.reset(); });
   }
   /// After InstallAndEnd(): another attempt in the same start, which RAUC takes up and cannot
@@ -34,7 +35,7 @@ class RollBackTest : public UpdaterTest {
     EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
     rauc_->Release();
     EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
-    EXPECT_THAT(StatusNow().failure, HasSubstr("Failed writing to the slot"));
+    EXPECT_THAT(StatusNow().failure.English(), HasSubstr("Failed writing to the slot"));
   }
   void StartAs(const std::string& boot) {
     boot_ = boot;
@@ -49,7 +50,7 @@ TEST_F(RollBackTest, TheSameStartStillNeedsItsRestart) {
     InstallAndEnd();
     StartAs("first");
     EXPECT_TRUE(StatusNow().restart_needed);
-    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(StatusNow().rolled_back.English(), "");
     EXPECT_EQ(roll_backs_, "");
   });
 }
@@ -59,17 +60,17 @@ TEST_F(RollBackTest, AMachineThatStartsTheSystemBeforeSaysSoUntilSomebodyHasSeen
     InstallAndEnd();
     StartAs("second");
     EXPECT_FALSE(StatusNow().restart_needed);
-    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("version 9.0 was installed, but"));
-    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("0.1.0"));
-    On([&] { EXPECT_EQ(roll_backs_, updater_->status().rolled_back) << "once"; });
+    EXPECT_THAT(StatusNow().rolled_back.English(), HasSubstr("version 9.0 was installed, but"));
+    EXPECT_THAT(StatusNow().rolled_back.English(), HasSubstr("0.1.0"));
+    On([&] { EXPECT_EQ(roll_backs_, updater_->status().rolled_back.English()) << "once"; });
     On([&] { updater_.reset(); });
     StartAs("third");
-    EXPECT_NE(StatusNow().rolled_back, "") << "a second restart does not hide it";
+    EXPECT_NE(StatusNow().rolled_back.English(), "") << "a second restart does not hide it";
     On([&] { updater_->ForgetRollBack(); });
-    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(StatusNow().rolled_back.English(), "");
     On([&] { updater_.reset(); });
     StartAs("fourth");
-    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(StatusNow().rolled_back.English(), "");
   });
 }
 
@@ -80,14 +81,14 @@ TEST_F(RollBackTest, AMachineThatStartsTheNewSystemHasNothingToSay) {
     StartAs("second");
     EXPECT_EQ(StatusNow().slot, "B");
     EXPECT_FALSE(StatusNow().restart_needed);
-    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(StatusNow().rolled_back.English(), "");
     On([&] {
       updater_->ForgetRollBack();
       updater_.reset();
     });
     rauc_->slot = "A";  // the boot counter gave up on it later
     StartAs("third");
-    EXPECT_NE(StatusNow().rolled_back, "");
+    EXPECT_NE(StatusNow().rolled_back.English(), "");
   });
 }
 
@@ -100,7 +101,7 @@ TEST_F(RollBackTest, AnUpdateThatAnotherOneBeganToOverwriteIsForgotten) {
     EXPECT_FALSE(StatusNow().restart_needed);
     On([&] { updater_.reset(); });
     StartAs("second");
-    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(StatusNow().rolled_back.English(), "");
     EXPECT_EQ(roll_backs_, "");
   });
 }
@@ -113,7 +114,7 @@ TEST_F(RollBackTest, ItIsForgottenBeforeTheInstallationEnds) {
     EXPECT_FALSE(std::filesystem::exists(folder_ / "updates" / "last-update.json"));
     On([&] { updater_.reset(); });  // as a power cut would
     StartAs("second");
-    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(StatusNow().rolled_back.English(), "");
   });
 }
 
@@ -126,7 +127,7 @@ TEST_F(RollBackTest, ABundleThatIsRefusedLeavesTheUpdateBeforeItInPlace) {
     EXPECT_TRUE(StatusNow().restart_needed);
     On([&] { updater_.reset(); });
     StartAs("second");
-    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("version 9.0 was installed, but"));
+    EXPECT_THAT(StatusNow().rolled_back.English(), HasSubstr("version 9.0 was installed, but"));
   });
 }
 
@@ -135,7 +136,7 @@ TEST_F(RollBackTest, ARollBackThatNobodyHasSeenOutlivesAnotherAttempt) {
     InstallAndEnd();
     StartAs("second");
     FailToInstallAgain();
-    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("version 9.0 was installed, but"));
+    EXPECT_THAT(StatusNow().rolled_back.English(), HasSubstr("version 9.0 was installed, but"));
     EXPECT_FALSE(StatusNow().restart_needed);
   });
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Updates through a RAUC of our own making on a bus of our own.
 #include "daemon/update/updater.hpp"
 #include "daemon/update/bundle_check.hpp"
@@ -26,7 +27,7 @@ TEST_F(UpdaterTest, WithoutABusItSaysThatThereIsNoInstaller) {
     bus_.Stop();
     Start();
     EXPECT_FALSE(StatusNow().supported);
-    EXPECT_THAT(StatusNow().message, HasSubstr("no installer (RAUC) on this machine"));
+    EXPECT_THAT(StatusNow().message.English(), HasSubstr("no installer (RAUC) on this machine"));
     EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kConflict);
   });
 }
@@ -34,9 +35,9 @@ TEST_F(UpdaterTest, WithoutABusItSaysThatThereIsNoInstaller) {
 TEST_F(UpdaterTest, ABusWithoutRaucIsTheSame) {
   RunBesideLoop([&] {
     Start();
-    ::usleep(200000);  // for an answer that does not come: the status must hold
+    ::usleep(200000);  // time without an answer is what is tested: the status must hold
     EXPECT_FALSE(StatusNow().supported);
-    EXPECT_THAT(Install("plumb-9.0.raucb").message, HasSubstr("on this machine"));
+    EXPECT_THAT(Install("plumb-9.0.raucb").message.English(), HasSubstr("on this machine"));
   });
 }
 
@@ -48,11 +49,11 @@ TEST_F(UpdaterTest, AGoodBundleIsInstalledWithProgress) {
     EXPECT_EQ(rauc.installed(), (folder_ / "updates" / "plumb-9.0.raucb").string());
     EXPECT_TRUE(Becomes([&] { return StatusNow().fraction == 0.4; }));
     EXPECT_TRUE(StatusNow().installing);
-    EXPECT_EQ(StatusNow().message, "Copying image to rootfs.1");
-    EXPECT_THAT(Install("plumb-9.0.raucb").message, HasSubstr("being installed"));
+    EXPECT_EQ(StatusNow().message.English(), "Copying image to rootfs.1");
+    EXPECT_THAT(Install("plumb-9.0.raucb").message.English(), HasSubstr("being installed"));
     rauc.Release();
     EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
-    EXPECT_THAT(StatusNow().message, HasSubstr("restart the appliance"));
+    EXPECT_THAT(StatusNow().message.English(), HasSubstr("restart the appliance"));
     EXPECT_EQ(Ended(), "plumb-9.0.raucb: ");
     EXPECT_GE(num_changes_, 4);
   });
@@ -66,8 +67,8 @@ TEST_F(UpdaterTest, ABundleOfAStrangersKeyIsRefusedInRaucsWords) {
     WaitForRauc();
     const Change answer = Install("plumb-9.0.raucb");
     EXPECT_EQ(answer.result, ChangeResult::kInvalid);
-    EXPECT_THAT(answer.message, HasSubstr("signature verification failed"));
-    EXPECT_EQ(StatusNow().failure, answer.message);
+    EXPECT_THAT(answer.message.English(), HasSubstr("signature verification failed"));
+    EXPECT_EQ(StatusNow().failure.English(), answer.message.English());
     EXPECT_FALSE(StatusNow().restart_needed);
     EXPECT_EQ(rauc.installed(), "");
     EXPECT_FALSE(StatusNow().installing);
@@ -80,7 +81,7 @@ TEST_F(UpdaterTest, AnOlderVersionIsRefused) {
     rauc.version = "0.0.9";
     Start();
     WaitForRauc();
-    EXPECT_THAT(Install("plumb-9.0.raucb").message, HasSubstr("older than 0.1.0"));
+    EXPECT_THAT(Install("plumb-9.0.raucb").message.English(), HasSubstr("older than 0.1.0"));
     EXPECT_EQ(rauc.installed(), "");
   });
 }
@@ -93,7 +94,7 @@ TEST_F(UpdaterTest, AVersionThatCannotBeComparedIsRefused) {
     WaitForRauc();
     const Change answer = Install("plumb-9.0.raucb");
     EXPECT_EQ(answer.result, ChangeResult::kInvalid);
-    EXPECT_THAT(answer.message, HasSubstr("holds version '9.0-rc1': expected numbers"));
+    EXPECT_THAT(answer.message.English(), HasSubstr("holds version '9.0-rc1': expected numbers"));
     EXPECT_EQ(rauc.installed(), "");
   });
 }
@@ -103,7 +104,7 @@ TEST_F(UpdaterTest, AScanThatBeganWhileTheBundleWasLookedAtGoesFirst) {
   PlayWithRauc([&](FakeRauc& rauc) {
     const Change answer = Install("plumb-9.0.raucb");
     EXPECT_EQ(answer.result, ChangeResult::kConflict);
-    EXPECT_EQ(answer.message, blocking_reason_);
+    EXPECT_EQ(answer.message.English(), blocking_reason_);
     EXPECT_EQ(rauc.installed(), "");
     EXPECT_FALSE(StatusNow().installing);
   });
@@ -118,7 +119,7 @@ TEST_F(UpdaterTest, AFailureInTheMiddleIsSaid) {
     EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
     rauc.Release();
     EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
-    EXPECT_THAT(StatusNow().message, HasSubstr("Failed writing to the slot"));
+    EXPECT_THAT(StatusNow().message.English(), HasSubstr("Failed writing to the slot"));
     EXPECT_EQ(Ended(), "plumb-9.0.raucb: Failed writing to the slot");
   });
 }
@@ -143,7 +144,7 @@ TEST_F(UpdaterTest, AnInstallerThatDiesInTheMiddleEndsTheInstallation) {
     ASSERT_TRUE(Becomes([&] { return !Ended().empty(); }));
     EXPECT_THAT(Ended(), HasSubstr("the installer ended before it was done"));
     EXPECT_FALSE(StatusNow().installing);
-    EXPECT_THAT(StatusNow().message, HasSubstr("plumb-9.0.raucb was not installed"));
+    EXPECT_THAT(StatusNow().message.English(), HasSubstr("plumb-9.0.raucb was not installed"));
     rauc = std::make_unique<FakeRauc>(bus_.address());
     WaitForRauc();
     EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone) << "again, once it is back";
@@ -178,7 +179,8 @@ TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
     WriteBundle(".upload-2", "GIF8");
     const Change picture = add(".upload-2", "picture.raucb");
     EXPECT_EQ(picture.result, ChangeResult::kInvalid);
-    EXPECT_EQ(picture.message, "picture.raucb is not a bundle: expected a squashfs image");
+    EXPECT_EQ(picture.message.English(),
+              "picture.raucb is not a bundle: expected a squashfs image");
     for (const char* name : {"c.raucb", "d.raucb", "e.raucb"}) {
       WriteBundle(".upload-3");
       EXPECT_EQ(add(".upload-3", name).result,
@@ -246,7 +248,7 @@ TEST_F(UpdaterTest, ACopyIsRemovedWhenTheBusGoesAway) {
 
 TEST_F(UpdaterTest, WhatIsNoBundleIsRefusedBeforeRaucIsAsked) {
   const auto why = [&](const std::string& name) {
-    return WhyNoBundle(folder_ / "updates" / name, 1 << 20);
+    return WhyNoBundle(folder_ / "updates" / name, 1 << 20, name).English();
   };
   EXPECT_EQ(why("plumb-9.0.raucb"), "");
   WriteBundle("zip.raucb", "PK\x03\x04");

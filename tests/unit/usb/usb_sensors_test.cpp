@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // libusb itself on an emulated bus (umockdev).
 #include "drivers/usb/usb_sensors.hpp"
 
@@ -102,14 +103,14 @@ TEST_F(UsbSensorsTest, ADeviceNodeThatCannotBeOpenedIsDiagnosed) {
   const std::vector<UsbSensor> sensors = ListUsbSensors();
   ASSERT_EQ(sensors.size(), 1U);
   EXPECT_EQ(sensors[0].permitted, false);
-  EXPECT_THAT(sensors[0].problems, Contains(HasSubstr("udev rule")));
+  EXPECT_THAT(EnglishTexts(sensors[0].problems), Contains(HasSubstr("udev rule")));
 }
 
 TEST_F(UsbSensorsTest, ASlowPortIsDiagnosed) {
   (void)Plug(2, "12");
   const std::vector<UsbSensor> sensors = ListUsbSensors();
   ASSERT_EQ(sensors.size(), 1U);
-  EXPECT_THAT(sensors[0].problems, Contains(HasSubstr("12 Mbit/s only")));
+  EXPECT_THAT(EnglishTexts(sensors[0].problems), Contains(HasSubstr("12 Mbit/s only")));
 }
 
 TEST_F(UsbSensorsTest, OtherDevicesAreNotSensors) {
@@ -124,6 +125,15 @@ TEST(UsbModelTest, NamesTheFamily) {
   EXPECT_EQ(UsbSensorModel(0x045e, 0x02ae), "Kinect for Xbox 360");
   EXPECT_FALSE(UsbSensorModel(0x045e, 0x0040));  // a mouse of the same maker
   EXPECT_FALSE(UsbSensorModel(0x1d6b, 0x0601));
+}
+
+TEST(UsbSensorModelTest, CamerasWithoutAnOpenNi2DriverAreNamedWithTheirMakersLibrary) {
+  EXPECT_EQ(UsbSensorModel(0x8086, 0x0b07), "RealSense D435");
+  EXPECT_EQ(SdkOf(0x8086, 0x0b07), "librealsense2");
+  EXPECT_EQ(SdkOf(0x045e, 0x097c), "libk4a");
+  EXPECT_EQ(UsbSensorModel(0x8086, 0x1234), std::nullopt) << "Intel makes other devices, too";
+  EXPECT_EQ(SdkOf(0x1d27, 0x0601), "");
+  EXPECT_EQ(SdkOf(0x045e, 0x02ae), "");
 }
 
 }  // namespace

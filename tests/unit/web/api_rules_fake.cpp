@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The rules on the fake appliance.
 #include <fmt/format.h>
 
@@ -14,7 +15,7 @@ namespace {
 class FakeRuledAppliance : public RuledAppliance {
  public:
   FakeRuledAppliance() {
-    service_.SetOverdue("No daily check has passed today: open Daily check.");
+    service_.SetOverdue(Message::Verbatim("No daily check has passed today: open Daily check."));
     web::HttpServerOptions options;
     options.password_memory_bytes = 1 << 20;
     options.password_operations = 1;
@@ -48,7 +49,7 @@ class FakeRuledAppliance : public RuledAppliance {
     loop_->Do([&] {
       check.id = fmt::format("c{}", ++num_checks_);
       service_.checks.checks.push_back(check);
-      service_.SetOverdue("");
+      service_.SetOverdue({});
     });
     return check.id;
   }

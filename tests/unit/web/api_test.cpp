@@ -1,9 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 
 #include <fstream>
 
+#include "algo/base/message_json.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/web/web_fixture.hpp"
+#include "words/audit.hpp"
+#include "words/room.hpp"
+#include "words/scan.hpp"
+#include "words/text.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb::test {
 namespace {
@@ -49,23 +56,93 @@ TEST_F(ApiTest, NothingUnderTheApiAnswersWithoutLogin) {
 }
 
 TEST_F(ApiTest, HealthSaysWhyItIsNotWell) {
-  loop_->Do([&] { service_.health = {false, "the disk is full"}; });
+  loop_->Do([&] {
+    service_.health = {false, say::upkeep::StorageUnhealthy(say::upkeep::ReadOnlyDisk())};
+  });
   const HttpAnswer answer = HttpClient(port_).Get("/health");
   EXPECT_EQ(answer.status, 503);
-  EXPECT_THAT(answer.body, HasSubstr("the disk is full"));
+  EXPECT_EQ(answer.json()["reason"], "storage: the state folder is on a read-only disk");
+  EXPECT_EQ(answer.json()["reason_message"]["arguments"]["why"]["id"], "upkeep.read_only_disk");
+}
+
+/// The message beside an English sentence says the same.
+void ExpectBeside(const nlohmann::json& json, const std::string& key) {
+  ASSERT_TRUE(json.contains(key + "_message")) << key << " in " << json;
+  const Message message = MessageFromJson(json[key + "_message"], "");
+  EXPECT_EQ(message.English(), json[key]) << json[key + "_message"];
+  EXPECT_FALSE(message.Is(say::text::kVerbatim)) << json[key + "_message"];
+}
+
+TEST_F(ApiTest, ARefusalIsAMessageBesideItsEnglishSentence) {
+  HttpClient technician = LoggedIn("technician");
+  for (const HttpAnswer& refused :
+       {HttpClient(port_).Get("/api/v1/status"), HttpClient(port_).Get("/nowhere"),
+        technician.Post("/api/v1/backup"), technician.Post("/api/v1/press", {{"a", 1}}),
+        technician.Get("/api/v1/scans/x1"), technician.Get("/api/v1/scans?limit=many"),
+        technician.Post("/api/v1/patients", {{"code", 1}}),
+        technician.Post("/api/v1/patients", {{"code", "P 1"}, {"site", ""}}),
+        technician.Post("/api/v1/session/password",
+                        {{"old_password", kPassword}, {"password", "1234567890"}}),
+        HttpClient(port_).Post("/api/v1/login", {{"name", "x"}, {"password", "y"}})}) {
+    EXPECT_GE(refused.status, 400) << refused.body;
+    ExpectBeside(refused.json(), "error");
+  }
+  const nlohmann::json range = technician.Get("/api/v1/scans?limit=201").json()["error_message"];
+  EXPECT_EQ(range, nlohmann::json({{"id", "web.field_whole_range"},
+                                   {"arguments", {{"field", "limit"}, {"most", 200}}}}));
+}
+
+TEST_F(ApiTest, TheStatusHasAMessageBesideEachSentence) {
+  loop_->Do([&] {
+    service_.status.fault = say::upkeep::DiskFull(24, 40);
+    service_.status.rolled_back = say::upkeep::RestartNotCarriedOut();
+    service_.status.reference_block = say::scan::IsWarmingUp(20);
+    service_.status.warnings = {say::room::ConfigurationIgnored(), say::upkeep::PageWithoutTls()};
+    service_.status.storage.warnings = {say::upkeep::ScansUnusable(3)};
+  });
+  HttpClient technician = LoggedIn("technician");
+  const nlohmann::json status = technician.Get("/api/v1/status").json();
+  for (const char* key : {"fault", "rolled_back", "reference_block"}) ExpectBeside(status, key);
+  EXPECT_EQ(status["fault_message"]["arguments"]["free"],
+            nlohmann::json({{"value", 24.0}, {"unit", "MB"}}));
+  for (const auto& [of, count] : {std::pair{status, 2U}, std::pair{status["storage"], 1U}}) {
+    ASSERT_EQ(of["warnings"].size(), count);
+    ASSERT_EQ(of["warning_messages"].size(), count);
+    for (std::size_t i = 0; i < count; ++i)
+      EXPECT_EQ(MessageFromJson(of["warning_messages"][i], "").English(), of["warnings"][i]);
+  }
+  loop_->Do([&] { service_.status = Status(); });
+  const nlohmann::json well = technician.Get("/api/v1/status").json();
+  EXPECT_EQ(well["fault"], nullptr);
+  EXPECT_EQ(well["fault_message"], nullptr);
+  EXPECT_EQ(well["warning_messages"], nlohmann::json::array());
+}
+
+TEST_F(ApiTest, ADetailOfTheLogIsAMessageUnlessItIsAPersonsTextOrAnIdentifier) {
+  HttpClient physicist = LoggedIn("physicist");
+  loop_->Do([&] {
+    service_.Log({"anna", "10.0.0.2"}, "system.factory_reset_request", "",
+                 say::audit::RecordsKept());
+    service_.Log({"anna", "10.0.0.2"}, "scan.remove", "1", Message::Verbatim("blurred"));
+  });
+  const nlohmann::json entries = physicist.Get("/api/v1/audit?limit=2").json()["entries"];
+  ASSERT_EQ(entries.size(), 2U);
+  EXPECT_EQ(entries[0]["detail"], "blurred");
+  EXPECT_EQ(entries[0]["detail_message"], nullptr);
+  ExpectBeside(entries[1], "detail");
 }
 
 TEST_F(ApiTest, AReportComesInTheLanguageThatIsAskedFor) {
   HttpClient client = LoggedIn("technician");
   const std::string patient = AddPatient(client, "P-1");
   const std::string path = "/api/v1/patients/" + patient + "/report.pdf";
-  EXPECT_EQ(client.Get(path + "?language=es").status, 200);
-  loop_->Do([&] { EXPECT_EQ(service_.report_language, web::Language::kSpanish); });
+  EXPECT_EQ(client.Get(path + "?language=" + std::string(Catalogues().back()->code)).status, 200);
+  loop_->Do([&] { EXPECT_EQ(service_.report_language, Catalogues().back()->code); });
   EXPECT_EQ(client.Get(path).status, 200);
-  loop_->Do([&] { EXPECT_EQ(service_.report_language, web::Language::kEnglish); });
+  loop_->Do([&] { EXPECT_EQ(service_.report_language, "en"); });
   const HttpAnswer unknown = client.Get(path + "?language=xx");
   EXPECT_EQ(unknown.status, 400);
-  EXPECT_THAT(unknown.body, HasSubstr("expected en or es"));
+  EXPECT_THAT(unknown.body, HasSubstr("expected one of en"));
   EXPECT_EQ(client.Get("/api/v1/scans/x1/report.pdf?language=../etc").status, 400);
 }
 
@@ -114,7 +191,8 @@ TEST_F(ApiTest, ABackupIsMadeByTheEngineerAndWarningsReachTheStatus) {
   EXPECT_EQ(LoggedIn("technician").Post("/api/v1/backup").status, 403);
   EXPECT_EQ(LoggedIn("physicist").Post("/api/v1/backup").status, 403);
   EXPECT_EQ(LoggedIn("engineer").Post("/api/v1/backup").status, 200);
-  loop_->Do([&] { service_.status.storage.warnings = {"The disk is 83 % full."}; });
+  loop_->Do(
+      [&] { service_.status.storage.warnings = {Message::Verbatim("The disk is 83 % full.")}; });
   EXPECT_EQ(LoggedIn("technician").Get("/api/v1/status").json()["storage"]["warnings"][0],
             "The disk is 83 % full.");
 }
@@ -142,9 +220,10 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
   EXPECT_EQ(first["baseline"], nullptr);
   const std::string baseline =
       "/api/v1/checks/" + first["checks"][0]["id"].get<std::string>() + "/baseline";
-  EXPECT_EQ(technician.Post(baseline).status, 403);
-  EXPECT_EQ(physicist.Post(baseline).status, 200);
-  EXPECT_EQ(physicist.Post("/api/v1/checks/none/baseline").status, 404);
+  const nlohmann::json reason = {{"reason", "first of this room"}, {"password", kPassword}};
+  EXPECT_EQ(technician.Post(baseline, reason).status, 403);
+  EXPECT_EQ(physicist.Post(baseline, reason).status, 200);
+  EXPECT_EQ(physicist.Post("/api/v1/checks/none/baseline", reason).status, 404);
   EXPECT_EQ(technician.Post("/api/v1/checks/open").status, 200);
   scan();
   const nlohmann::json status = technician.Get("/api/v1/status").json();
@@ -166,6 +245,9 @@ TEST_F(ApiTest, AReferenceStatesWhereTheRoomLiesOnItsOwnMaps) {
       {"gantry_xy", {-1.0, 0.0}}, {"right_xy", {0.0, 1.0}}, {"known", true}};
   EXPECT_EQ(physicist.Get("/api/v1/references/r7").json()["room"], turned);
   EXPECT_NE(physicist.Get("/api/v1/status").json()["room"], turned);
+  loop_->Do([&] { service_.room_of_references->lasers_m = {0.5, 0.25, 0.125}; });
+  EXPECT_EQ(physicist.Get("/api/v1/references/r7").json()["room"]["lasers_m"],
+            nlohmann::json({0.5, 0.25, 0.125}));
   EXPECT_EQ(physicist.Get("/api/v1/references/r8").status, 404);
 }
 
@@ -187,6 +269,11 @@ TEST_F(ApiTest, PlansOutOfRangeAreRefusedWithTheField) {
   refused("region_m", {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}});
   refused("region_m", std::vector<std::array<double, 2>>(501, {0.0, 0.0}));
   refused("isocentre_m", {1, 2});
+  nlohmann::json crossing = Plan();
+  crossing["region_m"] = {{0, 0}, {1, 1}, {1, 0}, {0, 1}};
+  const HttpAnswer answer = physicist.Put("/api/v1/references/r1/plan", crossing);
+  EXPECT_EQ(answer.status, 400);
+  EXPECT_THAT(answer.body, HasSubstr("crosses itself"));
 }
 
 TEST_F(ApiTest, BodiesMustBeSmallShallowWholeJsonInUtf8) {
@@ -248,12 +335,13 @@ TEST_F(FilesTest, ResultsAreDownloadedUnderASafeName) {
 
 TEST_F(FilesTest, APictureIsDrawnInTheLanguageThatIsAskedFor) {
   HttpClient client = LoggedIn("technician");
+  const std::string code(Catalogues().back()->code);
   const std::string files = "/api/v1/scans/s1/files/";
-  EXPECT_EQ(client.Get(files + "overlay.png?language=es").status, 404)
+  EXPECT_EQ(client.Get(files + "overlay.png?language=" + code).status, 404)
       << "it cannot be drawn, and the stored one is a link";
   loop_->Do([&] { service_.draws_pictures = true; });
-  const HttpAnswer overlay = client.Get(files + "overlay.png?download&language=es");
-  EXPECT_EQ(overlay.body, "overlay in Spanish");
+  const HttpAnswer overlay = client.Get(files + "overlay.png?download&language=" + code);
+  EXPECT_EQ(overlay.body, "overlay in " + std::string(Catalogues().back()->name));
   EXPECT_EQ(overlay.Header("content-type"), "image/png");
   EXPECT_EQ(overlay.Header("content-disposition"), "attachment; filename=\"s1_overlay.png\"");
   const HttpAnswer map = client.Get(files + "error_map.png?language=en");
@@ -261,7 +349,7 @@ TEST_F(FilesTest, APictureIsDrawnInTheLanguageThatIsAskedFor) {
   EXPECT_EQ(map.Header("content-disposition"), "");
   EXPECT_EQ(client.Get(files + "overlay.png?language=xx").status, 400);
   EXPECT_EQ(client.Get(files + "overlay.png").status, 404) << "without a language the stored one";
-  EXPECT_EQ(client.Get(files + "result.json?language=es").body, R"({"format": 1})");
+  EXPECT_EQ(client.Get(files + "result.json?language=" + code).body, R"({"format": 1})");
 }
 
 TEST_F(FilesTest, NoPathLeadsOutOfAScan) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What takes its time is done beside the loop: lists, files, and writing what is sent. Here the
 // work stands still until the test does it.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is reported about a certificate, on both sides of each limit; openssl makes them.
 #include "web/security/certificate_care.hpp"
 
@@ -52,37 +53,73 @@ TEST_F(CertificateCareTest, ItsEndIsToldFromThirtyDaysBefore) {
   const std::string pem = Made(kCurve, 100);
   const std::chrono::hours day(24);
   const std::chrono::minutes late(1);
-  EXPECT_THAT(CertificateWarnings(pem, now_), IsEmpty());
-  EXPECT_THAT(CertificateWarnings(pem, begin_ + 70 * day - late), IsEmpty());
-  EXPECT_THAT(CertificateWarnings(pem, begin_ + 70 * day + late),
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(pem, now_)), IsEmpty());
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(pem, begin_ + 70 * day - late)), IsEmpty());
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(pem, begin_ + 70 * day + late)),
               ElementsAre(AllOf(HasSubstr("CN=room 1"), HasSubstr(" ends on "))));
-  EXPECT_THAT(CertificateWarnings(pem, begin_ + 100 * day - late),
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(pem, begin_ + 100 * day - late)),
               ElementsAre(HasSubstr(" ends on ")));
-  EXPECT_THAT(CertificateWarnings(pem, begin_ + 100 * day + late),
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(pem, begin_ + 100 * day + late)),
               ElementsAre(HasSubstr(" ended on ")));
-  EXPECT_THAT(CertificateWarnings(pem, begin_ - late), ElementsAre(HasSubstr("valid only from")));
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(pem, begin_ - late)),
+              ElementsAre(HasSubstr("valid only from")));
 }
 
 TEST_F(CertificateCareTest, TheEndOfEachOfAChainIsTold) {
   const std::string first = Made(kCurve, 100, "the page"), second = Made(kCurve, 20, "authority");
-  EXPECT_THAT(CertificateWarnings(first + second, now_),
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(first + second, now_)),
               ElementsAre(AllOf(HasSubstr("CN=authority"), HasSubstr(" ends on "))));
 }
 
 TEST_F(CertificateCareTest, AWeakKeyIsTold) {
-  EXPECT_THAT(CertificateWarnings(Made("rsa:1024", 100), now_),
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(Made("rsa:1024", 100), now_)),
               ElementsAre(AllOf(HasSubstr("too weak"), HasSubstr("1024 bits"))));
-  EXPECT_THAT(CertificateWarnings(Made("rsa:2047", 100), now_),
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(Made("rsa:2047", 100), now_)),
               ElementsAre(HasSubstr("2047 bits")));
-  EXPECT_THAT(CertificateWarnings(Made("rsa:2048", 100), now_), IsEmpty());
-  EXPECT_THAT(CertificateWarnings(Made("ec -pkeyopt ec_paramgen_curve:P-192", 100), now_),
-              ElementsAre(HasSubstr("192 bits")));
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(Made("rsa:2048", 100), now_)), IsEmpty());
+  EXPECT_THAT(
+      EnglishTexts(CertificateWarnings(Made("ec -pkeyopt ec_paramgen_curve:P-192", 100), now_)),
+      ElementsAre(HasSubstr("192 bits")));
+}
+
+TEST_F(CertificateCareTest, AKindOfKeyThatBrowsersDoNotOpenIsTold) {
+  for (const char* kind : {"ed25519", "ec -pkeyopt ec_paramgen_curve:P-521"})
+    EXPECT_THAT(EnglishTexts(CertificateWarnings(Made(kind, 100), now_)),
+                ElementsAre(HasSubstr("browsers do not open")))
+        << kind;
+  for (const char* kind : {"rsa:3072", "ec -pkeyopt ec_paramgen_curve:P-384"})
+    EXPECT_THAT(EnglishTexts(CertificateWarnings(Made(kind, 100), now_)), IsEmpty()) << kind;
+}
+
+TEST_F(CertificateCareTest, ItsOwnIsRenewedBeforeItsEndAndWhatAPersonSetNever) {
+  const std::chrono::hours day(24);
+  const std::vector<std::string> names = OwnNames();
+  const std::string own = MakeTlsIdentity({}, begin_).certificate_pem;
+  EXPECT_FALSE(IsDueForRenewal(own, begin_, names));
+  EXPECT_FALSE(IsDueForRenewal(own, begin_ + 758 * day, names));
+  EXPECT_TRUE(IsDueForRenewal(own, begin_ + 760 * day, names)) << "before it is warned of";
+  EXPECT_TRUE(IsDueForRenewal(own, begin_ - 2 * day, names)) << "made while the clock was wrong";
+  EXPECT_TRUE(IsDueForRenewal(own, begin_, {"another-name"})) << "the machine was renamed";
+  EXPECT_FALSE(
+      IsDueForRenewal(MakeTlsIdentity({"another-name"}).certificate_pem, begin_, {"another-name"}));
+  // As 0.2.0 made them: longer than Safari takes.
+  EXPECT_TRUE(IsDueForRenewal(Made(kCurve, 31000, "Plumb scan appliance"), begin_, {}));
+  EXPECT_FALSE(IsDueForRenewal(Made(kCurve, 31000), begin_ + 30990 * day, {}));
+}
+
+TEST_F(CertificateCareTest, ItsOwnIsValidForNoLongerThanBrowsersTake) {
+  const TlsIdentity own = MakeTlsIdentity({}, begin_);
+  const auto left =
+      system_clock::from_time_t(FactsOfCertificate(own.certificate_pem).valid_until) - begin_;
+  EXPECT_GT(left, std::chrono::hours(24 * 800));
+  EXPECT_LE(left + std::chrono::hours(24), std::chrono::hours(24 * 825));
 }
 
 TEST_F(CertificateCareTest, TheAppliancesOwnIsNothingToTellOf) {
   const TlsIdentity own = MakeTlsIdentity({});
-  EXPECT_THAT(CertificateWarnings(own.certificate_pem, now_), IsEmpty());
-  EXPECT_THAT(CertificateWarnings(own.key_pem + own.certificate_pem, now_), IsEmpty());
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(own.certificate_pem, now_)), IsEmpty());
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(own.key_pem + own.certificate_pem, now_)),
+              IsEmpty());
 }
 
 TEST_F(CertificateCareTest, WhatIsNoCertificateIsRefused) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/http/checks.hpp"
 
 #include <gtest/gtest.h>
@@ -65,6 +66,19 @@ TEST(ChecksTest, AnIpv6NetworkCountsAsOneAddress) {
   EXPECT_EQ(NetworkOf("fe80::1"), "fe80::");
   for (const char* same : {"::1", "::ffff:10.0.0.1", "10.0.0.1", "127.0.0.1", ""})
     EXPECT_EQ(NetworkOf(same), same);
+}
+
+TEST(ChecksTest, NamesOfHeadersAreTokens) {
+  for (const char* good : {"Host", "X-CSRF-Token", "a!#$%&'*+-.^_`|~9"}) EXPECT_TRUE(IsToken(good));
+  for (const char* bad : {"", "Host ", " Host", "a b", "a:b", "a\tb", "\xC3\xA4", "a(b)"})
+    EXPECT_FALSE(IsToken(bad)) << bad;
+}
+
+TEST(ChecksTest, OneCodingIsTaken) {
+  EXPECT_TRUE(IsChunked("chunked"));
+  EXPECT_TRUE(IsChunked(" Chunked\t"));
+  for (const char* bad : {"", "xchunked", "chunked, identity", "gzip, chunked", "chunked;q=1"})
+    EXPECT_FALSE(IsChunked(bad)) << bad;
 }
 
 TEST(ChecksTest, HtmlIsEscaped) {

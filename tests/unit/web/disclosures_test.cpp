@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who saw and took what is in the log: read back through the API, as an engineer would.
 #include "web/api/disclosures.hpp"
 
@@ -34,7 +35,10 @@ const std::set<std::string> kWithoutPatients = {
     "/api/v1/sensor-profile",
     "/api/v1/sensor-profile/{version}/file",
     "/api/v1/displays",
+    "/api/v1/displays/presence",
+    "/api/v1/session/list",
     "/api/v1/users",
+    "/api/v1/monitor",
     "/api/v1/settings",
     "/api/v1/update",
     "/api/v1/backup",

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a paired display in the room may read: what the status names.
 #include "web/api/display_view.hpp"
 
@@ -40,9 +41,11 @@ class DisplayViewTest : public WebTest {
     display_ = std::make_unique<HttpClient>(port_);
     HttpClient engineer = LoggedIn("engineer");
     const nlohmann::json pairing = display_->Post("/api/v1/displays/pair").json();
-    ASSERT_EQ(
-        engineer.Post("/api/v1/displays", {{"code", pairing["code"]}, {"name", "room"}}).status,
-        201);
+    ASSERT_EQ(engineer
+                  .Post("/api/v1/displays",
+                        {{"code", pairing["code"]}, {"name", "room"}, {"password", kPassword}})
+                  .status,
+              201);
     ASSERT_EQ(display_->Post("/api/v1/displays/claim", {{"secret", pairing["secret"]}}).status,
               200);
     technician_ = std::make_unique<HttpClient>(LoggedIn("technician"));
@@ -70,6 +73,7 @@ class DisplayViewTest : public WebTest {
     TreatmentSession& open = service_.status.session.emplace();
     open.id = session;
     open.patient_id = patient;
+    open.reference = {.id = "r" + patient.substr(1), .version = 1};
   }
 
   /// The answers to a display and to a person.
@@ -91,19 +95,22 @@ class DisplayViewTest : public WebTest {
 };
 
 TEST_F(DisplayViewTest, ItReadsWhatTheStatusNames) {
-  for (const char* path : {"status", "patients/p1", "references/r1", "scans/s1", "results/s1",
-                           "scans/s1/files/scene.json", "scans/s1/files/result.json",
-                           "scans/s1/maps/deviation", "scans/s10/files/scene.json"})
+  for (const char* path :
+       {"status", "patients/p1", "references/r1", "scans/s1", "results/s1",
+        "scans/s1/files/scene.json", "scans/s1/files/result.json", "scans/s1/maps/deviation",
+        "scans/s1/quality", "scans/s10/files/scene.json"})
     ExpectShown(path);
 }
 
 TEST_F(DisplayViewTest, AnythingElseIsAsIfItDidNotExist) {
   for (const char* path :
        {"patients/p2", "references/r2", "scans/s2", "results/s2", "scans/s2/files/scene.json",
-        "scans/s2/files/result.json", "scans/s2/maps/deviation", "scans/s20/files/scene.json"})
+        "scans/s2/files/result.json", "scans/s2/maps/deviation", "scans/s2/quality",
+        "scans/s20/files/scene.json"})
     ExpectHidden(path);
   // Of the reference's scan it needs the grid of the map alone.
-  for (const char* path : {"scans/s10", "scans/s10/files/mesh.ply", "scans/s10/maps/heightmap"})
+  for (const char* path :
+       {"scans/s10", "scans/s10/quality", "scans/s10/files/mesh.ply", "scans/s10/maps/heightmap"})
     ExpectHidden(path);
 }
 
@@ -140,7 +147,7 @@ TEST_F(DisplayViewTest, ThePageWithoutScriptShowsTheLastResultInItsOwnSessionOnl
     service_.scans.push_back(*service_.FindScan("s1"));
     service_.scans.back().id = "s3";
     service_.scans.back().outcome = ScanOutcome::kFailed;
-    service_.scans.back().failure = "tracking was lost";
+    service_.scans.back().failure = Message::Verbatim("tracking was lost");
   });
   EXPECT_THAT(page(), HasSubstr("racking was lost"));
   loop_->Do([&] { Open("p2", "t2"); });

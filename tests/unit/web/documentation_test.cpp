@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // web/openapi.yaml and the page's own limits against the server's.
 #include <gmock/gmock.h>
 
@@ -6,6 +7,7 @@
 #include <regex>
 #include <set>
 
+#include "algo/base/default_tolerance.hpp"
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/scan.hpp"
@@ -50,6 +52,31 @@ TEST_F(DocumentationTest, OpenApiListsExactlyWhatTheServerAnswers) {
   EXPECT_EQ(DocumentedOperations(), answered);
 }
 
+std::string TextOf(const std::string& file);
+
+/// The keys of messages anywhere in it.
+void AddMessageKeys(const nlohmann::json& json, std::set<std::string>& keys) {
+  for (const auto& [key, value] : json.items()) {
+    if (json.is_object() && (key.ends_with("_message") || key.ends_with("_messages")))
+      keys.insert(key);
+    if (value.is_structured()) AddMessageKeys(value, keys);
+  }
+}
+
+TEST_F(DocumentationTest, OpenApiNamesTheMessagesBesideTheSentences) {
+  Start();
+  SetUpAccounts();
+  HttpClient technician = LoggedIn("technician");
+  std::set<std::string> keys;
+  for (const char* path : {"/api/v1/status", "/api/v1/update", "/api/v1/room-calibration",
+                           "/api/v1/sensor-profile", "/api/v1/nothing"})
+    AddMessageKeys(technician.Get(path).json(), keys);
+  EXPECT_THAT(keys, ::testing::IsSupersetOf({"fault_message", "warning_messages", "due_message",
+                                             "why_none_message", "error_message"}));
+  const std::string api = TextOf("/web/openapi.yaml");
+  for (const std::string& key : keys) EXPECT_THAT(api, HasSubstr(key));
+}
+
 std::string TextOf(const std::string& file) {
   std::ifstream in(PLUMB_SOURCE_DIR + file);
   return {std::istreambuf_iterator<char>(in), {}};
@@ -65,7 +92,7 @@ std::set<double> Stated(const std::string& text, const std::string& name, const 
 }
 
 TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
-  const std::string page = TextOf("/web/assets/limits.js"), api = TextOf("/web/openapi.yaml");
+  const std::string page = TextOf("/web/page/limits.js"), api = TextOf("/web/openapi.yaml");
   for (const auto& [name, limits] : {std::pair{"shift_tolerance_mm", kShiftTolerance_mm},
                                      {"rotation_tolerance_deg", kRotationTolerance_deg},
                                      {"auto_stop_s", kAutoStop_s},
@@ -89,6 +116,9 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
     EXPECT_THAT(Stated(api, of_api, "maxLength"), ElementsAre(most)) << of_api;
   }
   EXPECT_THAT(Stated(page, "kResult", "valid_s"), ElementsAre(kResultValid_s));
+  EXPECT_THAT(Stated(page, "kTolerance", "shift_mm"), ElementsAre(kDefaultShiftTolerance_mm));
+  EXPECT_THAT(Stated(page, "kTolerance", "rotation_deg"),
+              ElementsAre(kDefaultRotationTolerance_deg));
   EXPECT_THAT(Stated(page, "kReason", "minlength"), ElementsAre(kMinReason));
   EXPECT_THAT(Stated(api, "reason", "minLength"), ElementsAre(kMinReason));
   EXPECT_THAT(Stated(page, "kNewPassword", "minlength"), ElementsAre(web::kMinPassword));
@@ -96,10 +126,10 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
 }
 
 TEST(LimitsTest, ThePageOffersThePosturesOfTheServer) {
-  const std::string page = TextOf("/web/assets/strings/en.js");
+  const std::string page = TextOf("/web/words/en.json");
   std::string listed;
   for (const std::string_view posture : kPostures) {
-    EXPECT_THAT(page, HasSubstr(std::string(posture) + ": '"));
+    EXPECT_THAT(page, HasSubstr("\"" + std::string(posture) + "\": \""));
     listed += (listed.empty() ? "" : ", ") + std::string(posture);
   }
   EXPECT_THAT(TextOf("/web/openapi.yaml"), HasSubstr("posture: {type: string, enum: [" + listed));

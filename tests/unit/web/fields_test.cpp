@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
-#include "web/api/json.hpp"
+#include "web/exchange/json.hpp"
 
 namespace plumb::web {
 namespace {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who may guess how often, and who is not kept out by others who guess; which passwords are taken.
 #include <unistd.h>
 
@@ -5,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <atomic>
 #include <numeric>
 
 #include "tests/unit/web/web_fixture.hpp"
@@ -22,10 +24,23 @@ constexpr const char* kWrong = "not this one at all";
 
 class LockoutTest : public WebTest {
  protected:
+  /// The screen in the room.
+  static void Pair(HttpClient& screen, HttpClient& engineer) {
+    const nlohmann::json pairing = screen.Post("/api/v1/displays/pair").json();
+    ASSERT_EQ(engineer
+                  .Post("/api/v1/displays",
+                        {{"code", pairing["code"]}, {"name", "room"}, {"password", kPassword}})
+                  .status,
+              201);
+    ASSERT_EQ(screen.Post("/api/v1/displays/claim", {{"secret", pairing["secret"]}}).status, 200);
+  }
   void SetUp() override {
-    Start();
+    Start([this](web::HttpServerOptions& options) {
+      options.on_guesses = [this](bool are_running) { guessed_ = are_running; };
+    });
     SetUpAccounts();
   }
+  std::atomic<bool> guessed_ = false;
   /// The status of a login from an address, with the cookies of a browser.
   int LogInFrom(const std::string& address, const std::string& name, const std::string& password,
                 const HttpClient* browser = nullptr) {
@@ -68,6 +83,60 @@ TEST_F(LockoutTest, ABrowserThatLoggedInBeforeIsNotLockedOutByOthers) {
   EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword, &browser), 200);
   EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword, &browser), 200)
       << "even beside the one who guesses";
+}
+
+/// The right password from the room is never refused because of others who guess.
+TEST_F(LockoutTest, WhoSeesAScreenInTheRoomIsNotLockedOutByOthers) {
+  HttpClient engineer = LoggedIn("engineer"), screen(port_);
+  Pair(screen, engineer);
+  const auto shown = [&] { return screen.Get("/api/v1/displays/presence").json()["code"]; };
+  EXPECT_TRUE(shown().is_null()) << "nobody guesses";
+  EXPECT_FALSE(guessed_);
+  for (int i = 0; i < 30; ++i)
+    (void)LogInFrom("127.0.1." + std::to_string(1 + i), "technician", kWrong);
+  EXPECT_TRUE(guessed_) << "shown on page and light";
+  const auto log_in = [&](const std::string& presence, const char* password) {
+    return HttpClient(port_)
+        .Post("/api/v1/login",
+              {{"name", "technician"}, {"password", password}, {"presence", presence}})
+        .status;
+  };
+  EXPECT_EQ(log_in("", kPassword), 429);
+  EXPECT_EQ(log_in("2222-2222", kPassword), 429) << "a code that no screen shows";
+  const std::string code = shown();
+  EXPECT_EQ(code.size(), 9U);
+  EXPECT_EQ(log_in(code, kPassword), 200);
+  EXPECT_EQ(HttpClient(port_).Get("/api/v1/displays/presence").status, 401);
+  EXPECT_EQ(engineer.Get("/api/v1/displays/presence").status, 404);
+  std::string on_console;
+  loop_->Do([&] { on_console = server_->presence_code(); });
+  EXPECT_EQ(on_console, code);
+  // Whoever is in the room guesses no faster than others.
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(log_in(code, kWrong), 403) << i;
+  EXPECT_EQ(log_in(code, kPassword), 429);
+  skipped_s_ += 61;
+  // Codes change; the one before is taken for ten more minutes.
+  skipped_s_ += 600;
+  std::string next;
+  loop_->Do([&] { next = server_->presence_code(); });
+  EXPECT_NE(next, code);
+  const auto guess = [&] {
+    for (int i = 0; i < 8; ++i) (void)LogInFrom("127.0.2.1", "technician", kWrong);
+  };
+  guess();
+  EXPECT_EQ(log_in(code, kPassword), 200);
+  skipped_s_ += 600;
+  loop_->Do([&] { (void)server_->presence_code(); });
+  guess();
+  EXPECT_EQ(log_in(code, kPassword), 429);
+}
+
+TEST_F(LockoutTest, ThePairedScreenItselfIsNotLockedOut) {
+  HttpClient engineer = LoggedIn("engineer"), screen(port_);
+  Pair(screen, engineer);
+  for (int i = 0; i < 8; ++i) (void)LogInFrom("127.0.0.2", "technician", kWrong);
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword), 429);
+  EXPECT_EQ(screen.LogIn("technician", kPassword), 200);
 }
 
 /// Passwords that take a few tenths of a second to check, as on the appliance.
@@ -299,7 +368,8 @@ TEST_F(LockoutTest, ASensorProfileIsSeenByAllAndChangedByAnEngineerWithThePasswo
 }
 
 TEST_F(LockoutTest, ARollBackIsShownUntilAnEngineerHasSeenIt) {
-  service_.status.rolled_back = service_.update.rolled_back = "version 2 was installed, but";
+  service_.status.rolled_back = service_.update.rolled_back =
+      Message::Verbatim("version 2 was installed, but");
   HttpClient engineer = LoggedIn("engineer");
   EXPECT_EQ(engineer.Get("/api/v1/status").json()["rolled_back"], "version 2 was installed, but");
   EXPECT_EQ(engineer.Get("/api/v1/update").json()["rolled_back"], "version 2 was installed, but");
@@ -322,8 +392,10 @@ TEST_F(LockoutTest, TheCookieIsOutOfReachOfScriptsAndLastsForAYear) {
 TEST_F(LockoutTest, WhoWasGivenAPasswordChangesItBeforeAnythingElse) {
   HttpClient engineer = LoggedIn("engineer");
   ASSERT_EQ(engineer
-                .Post("/api/v1/users",
-                      {{"name", "dora"}, {"role", "physicist"}, {"password", kFirstPassword}})
+                .Post("/api/v1/users", {{"name", "dora"},
+                                        {"role", "physicist"},
+                                        {"password", kFirstPassword},
+                                        {"own_password", kPassword}})
                 .status,
             201);
   HttpClient dora(port_);
@@ -347,25 +419,92 @@ TEST_F(LockoutTest, WhoWasGivenAPasswordChangesItBeforeAnythingElse) {
   EXPECT_EQ(again.LogIn("dora", kPassword), 200);
   EXPECT_EQ(again.Get("/api/v1/status").status, 200);
   // A password reset by an engineer starts in the same state; one's own change does not.
-  EXPECT_EQ(engineer.Put("/api/v1/users/dora", {{"password", "yet another horse"}}).status, 200);
+  EXPECT_EQ(engineer
+                .Put("/api/v1/users/dora",
+                     {{"password", "yet another horse"}, {"own_password", kPassword}})
+                .status,
+            200);
   EXPECT_EQ(again.LogIn("dora", "yet another horse"), 200);
   EXPECT_EQ(again.Get("/api/v1/status").status, 403);
-  EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"password", "an own new horse"}}).status, 200);
   HttpClient own(port_);
+  EXPECT_EQ(engineer
+                .Post("/api/v1/session/password",
+                      {{"old_password", kPassword}, {"password", "an own new horse"}})
+                .status,
+            200);
   EXPECT_EQ(own.LogIn("engineer", "an own new horse"), 200);
   EXPECT_EQ(own.Get("/api/v1/users").status, 200);
+}
+
+/// An open session alone changes nothing about accounts, passwords and screens.
+TEST_F(LockoutTest, AnOpenSessionWithoutThePasswordChangesNoAccountAndPairsNoScreen) {
+  HttpClient engineer = LoggedIn("engineer"), screen(port_);
+  const nlohmann::json pairing = screen.Post("/api/v1/displays/pair").json();
+  const nlohmann::json user = {
+      {"name", "eve"}, {"role", "physicist"}, {"password", kFirstPassword}};
+  const nlohmann::json display = {{"code", pairing["code"]}, {"name", "room"}};
+  const auto with = [](nlohmann::json body, const char* field, const char* password) {
+    body[field] = password;
+    return body;
+  };
+  const std::vector<User> before = service_.users;
+  for (const auto& [field, password, status] :
+       {std::tuple{"x", "x", 400}, {"own_password", kWrong, 403}}) {
+    EXPECT_EQ(engineer.Post("/api/v1/users", with(user, field, password)).status, status);
+    for (const nlohmann::json& change : {nlohmann::json{{"role", "technician"}},
+                                         {{"disabled", true}},
+                                         {{"password", "yet another horse"}}})
+      EXPECT_EQ(engineer.Put("/api/v1/users/second", with(change, field, password)).status, status);
+    skipped_s_ += 61;
+  }
+  EXPECT_EQ(engineer.Post("/api/v1/displays", display).status, 400);
+  EXPECT_EQ(engineer.Post("/api/v1/displays", with(display, "password", kWrong)).status, 403);
+  EXPECT_EQ(service_.users.size(), before.size());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_EQ(service_.users[i].password_hash, before[i].password_hash);
+    EXPECT_EQ(service_.users[i].role, before[i].role);
+    EXPECT_FALSE(service_.users[i].disabled);
+  }
+  EXPECT_TRUE(service_.displays.empty());
+  EXPECT_EQ(engineer.Post("/api/v1/displays", with(display, "password", kPassword)).status, 201);
+  const std::string paired = "/api/v1/displays/" + service_.displays.at(0).id;
+  EXPECT_EQ(engineer.Ask("DELETE", paired, "").status, 415);
+  EXPECT_EQ(engineer.Ask("DELETE", paired, R"({"password":"not this one at all"})").status, 403);
+  EXPECT_EQ(service_.displays.size(), 1U);
+  EXPECT_EQ(engineer.Ask("DELETE", paired, nlohmann::json{{"password", kPassword}}.dump()).status,
+            200);
+}
+
+TEST_F(LockoutTest, ThePasswordOfOnesOwnIsChangedWithTheOldOneAlone) {
+  HttpClient engineer = LoggedIn("engineer");
+  const auto change = [&](const char* own) {
+    return engineer
+        .Put("/api/v1/users/engineer", {{"password", "an own new horse"}, {"own_password", own}})
+        .status;
+  };
+  EXPECT_EQ(change(kPassword), 400);
+  EXPECT_EQ(change(kWrong), 400);
+  HttpClient again(port_);
+  EXPECT_EQ(again.LogIn("engineer", kPassword), 200) << "it is the old one still";
 }
 
 TEST_F(LockoutTest, CommonPasswordsAreRefusedWhereverOneIsSet) {
   HttpClient engineer = LoggedIn("engineer");
   const auto add = [&](const std::string& name, const std::string& password) {
     return engineer
-        .Post("/api/v1/users", {{"name", name}, {"role", "technician"}, {"password", password}})
+        .Post("/api/v1/users", {{"name", name},
+                                {"role", "technician"},
+                                {"password", password},
+                                {"own_password", kPassword}})
         .status;
   };
   EXPECT_EQ(add("dora", "password12"), 400);
   EXPECT_EQ(add("radiographer", "radiographer"), 400);
-  EXPECT_EQ(engineer.Put("/api/v1/users/technician", {{"password", "Qwertyuiop1!"}}).status, 400);
+  EXPECT_EQ(engineer
+                .Put("/api/v1/users/technician",
+                     {{"password", "Qwertyuiop1!"}, {"own_password", kPassword}})
+                .status,
+            400);
   EXPECT_EQ(engineer
                 .Post("/api/v1/session/password",
                       {{"old_password", kPassword}, {"password", "iloveyou2024"}})
@@ -379,16 +518,16 @@ TEST(PasswordRulesTest, WhatIsTriedFirstIsRefusedAndALengthOfTenIsEnough) {
        {"password12", "PASSWORD12", "Passw0rd!!!", "1234567890", "qwertyuiop", "administrator",
         "Krankenhaus1", "aaaaaaaaaaaa", "abababababab", "12341234123412", "linaclinac",
         "changeme!!!", "mueller2024", "muellermueller", "Mueller!!!!!"}) {
-    EXPECT_NE(web::WhyNotPassword(bad, "mueller"), "") << bad;
+    EXPECT_FALSE(web::WhyNotPassword(bad, "mueller").empty()) << bad;
   }
   for (const char* good : {"correct horse battery", "kx7-tree-boat", "mueller likes tea",
                            "8402 5519 33", "passwordless sea", "\xC3\xA4pfel und birnen"}) {
-    EXPECT_EQ(web::WhyNotPassword(good, "mueller"), "") << good;
+    EXPECT_TRUE(web::WhyNotPassword(good, "mueller").empty()) << good;
   }
-  EXPECT_NE(web::WhyNotPassword("ninebytes", "x"), "");
-  EXPECT_EQ(web::WhyNotPassword("ten bytes!", "x"), "");
-  EXPECT_EQ(web::WhyNotPassword("ab" + std::string(125, 'x') + "c", "x"), "");
-  EXPECT_NE(web::WhyNotPassword("ab" + std::string(126, 'x') + "c", "x"), "");
+  EXPECT_FALSE(web::WhyNotPassword("ninebytes", "x").empty());
+  EXPECT_TRUE(web::WhyNotPassword("ten bytes!", "x").empty());
+  EXPECT_TRUE(web::WhyNotPassword("ab" + std::string(125, 'x') + "c", "x").empty());
+  EXPECT_FALSE(web::WhyNotPassword("ab" + std::string(126, 'x') + "c", "x").empty());
 }
 
 TEST(LoginLimiterTest, FiveFailuresAMinuteAndNotOneMore) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "web/api/look_back.hpp"
 
 #include <gtest/gtest.h>
@@ -39,6 +40,25 @@ TEST_F(LookBackTest, TellsTheLogInBeforeThisOneAndWhatFailedSince) {
   EXPECT_EQ(history.last->time, begun_ - minutes(80));
   EXPECT_EQ(history.last->address, "10.0.0.5");
   EXPECT_EQ(history.failed, 2);
+}
+
+TEST_F(LookBackTest, TellsWhatWasChangedAboutTheAccountSinceTheLogInBefore) {
+  const auto changed = [&](WallClock::time_point time, const char* by, const char* whose,
+                           const char* action) {
+    Add(time, by, action);
+    service_.audit.back().subject = whose;
+  };
+  changed(begun_ - minutes(90), "eve", "anna", "user.change");  // already reported
+  Add(begun_ - minutes(80), "anna", "login");
+  changed(begun_ - minutes(70), "eve", "anna", "user.change");
+  changed(begun_ - minutes(65), "eve", "bob", "user.change");
+  changed(begun_ - minutes(60), "anna", "anna", "user.second_factor_off");
+  Add(begun_, "anna", "login");  // this one
+  const web::LoginHistory history = web::LoginsBefore(service_, "anna", begun_);
+  ASSERT_EQ(history.changes.size(), 2U);
+  EXPECT_EQ(history.changes[0].action, "user.second_factor_off");
+  EXPECT_EQ(history.changes[1].user, "eve");
+  EXPECT_EQ(history.changes[1].time, begun_ - minutes(70));
 }
 
 TEST_F(LookBackTest, OneThatIsAsOldAsTheSessionIsItsOwn) {

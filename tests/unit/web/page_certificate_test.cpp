@@ -1,6 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // Replacing the page's certificate: who may, what is refused, what is logged, and what a browser
 // that connects afterwards is shown. openssl is the browser and makes the certificates.
 #include <gmock/gmock.h>
+
+#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -104,7 +107,7 @@ class PageCertificateTest : public WebTest {
                {{"certificate", chain}, {"key", key}, {"password", password}});
   }
   void ExpectNothingChanged() {
-    EXPECT_FALSE(kept_);
+    EXPECT_TRUE(!kept_ || kept_->fingerprint == own_.fingerprint);
     EXPECT_EQ(Shown(), own_.fingerprint);
     EXPECT_THAT(Ask("GET", "/api/v1/audit"), Not(HasSubstr("\"certificate.")));
   }
@@ -124,6 +127,8 @@ TEST_F(PageCertificateTest, ANewConnectionIsShownTheNewOneAndTheLogHasBothFinger
     EXPECT_THAT(Put(made.chain, made.key), HasSubstr("HTTP/1.1 200"));
     EXPECT_EQ(Shown(), made.fingerprint);
     ASSERT_TRUE(kept_);
+    EXPECT_EQ(kept_->fingerprint, before) << "until a browser has come back";
+    EXPECT_THAT(Ask("GET", "/api/v1/session"), HasSubstr("HTTP/1.1 200"));
     EXPECT_EQ(kept_->key_pem, made.key);
     EXPECT_EQ(kept_->fingerprint, made.fingerprint);
     const std::string certificate = Ask("GET", "/api/v1/certificate");
@@ -159,6 +164,44 @@ TEST_F(PageCertificateTest, ASelfMadeOneIsNewEachTime) {
   EXPECT_EQ(Shown(), kept_->fingerprint);
   EXPECT_THAT(Ask("GET", "/api/v1/audit"),
               HasSubstr(own_.fingerprint + " -> " + kept_->fingerprint));
+}
+
+TEST_F(PageCertificateTest, OneThatNoBrowserComesBackWithIsTakenBackAfterTwoMinutes) {
+  const Certificate made = Made("rsa:2048");
+  ASSERT_THAT(Put(made.chain, made.key), HasSubstr("\"trial_s\":120"));
+  skipped_s_ = 115;
+  EXPECT_EQ(Shown(), made.fingerprint) << "a handshake is no browser that came back";
+  EXPECT_EQ(kept_->fingerprint, own_.fingerprint) << "a restart would end the trial, too";
+  skipped_s_ = 121;
+  for (int i = 0; i < 20 && Shown() != own_.fingerprint; ++i) sleep(1);
+  EXPECT_EQ(Shown(), own_.fingerprint);
+  EXPECT_EQ(kept_->fingerprint, own_.fingerprint);
+  EXPECT_THAT(Ask("GET", "/api/v1/audit"), HasSubstr("certificate.revert"));
+}
+
+TEST_F(PageCertificateTest, OneThatABrowserCameBackWithStays) {
+  const Certificate made = Made("rsa:2048");
+  ASSERT_THAT(Put(made.chain, made.key), HasSubstr("HTTP/1.1 200"));
+  EXPECT_EQ(JsonOf(Ask("GET", "/api/v1/certificate"))["on_trial"], false);
+  skipped_s_ = 200;
+  sleep(7);
+  EXPECT_EQ(Shown(), made.fingerprint);
+  EXPECT_EQ(kept_->fingerprint, made.fingerprint);
+  EXPECT_THAT(Ask("GET", "/api/v1/audit"), Not(HasSubstr("certificate.revert")));
+}
+
+TEST_F(PageCertificateTest, KindsThatBrowsersDoNotOpenAreRefusedWithTheCause) {
+  for (const char* key : {"ed25519", "ec -pkeyopt ec_paramgen_curve:P-521",
+                          "ec -pkeyopt ec_paramgen_curve:secp256k1"}) {
+    const Certificate made = Made(key);
+    EXPECT_THAT(Put(made.chain, made.key), HasSubstr("HTTP/1.1 400")) << key;
+  }
+  const Certificate other = Made("ed25519"), page = Made("ec -pkeyopt ec_paramgen_curve:P-384");
+  EXPECT_THAT(Put(other.chain, other.key), HasSubstr("browsers do not open"));
+  EXPECT_THAT(Put(page.chain + other.chain, page.key), HasSubstr("browsers do not open"))
+      << "an authority in the chain";
+  ExpectNothingChanged();
+  EXPECT_THAT(Put(page.chain, page.key), HasSubstr("HTTP/1.1 200"));
 }
 
 TEST_F(PageCertificateTest, AWrongPasswordChangesNothing) {
@@ -215,7 +258,9 @@ TEST_F(FixedCertificateTest, ItIsRefusedAndSaysWhy) {
 }
 
 TEST(UsableTlsIdentityTest, IsOnlyOneThatIsValidNow) {
-  const web::TlsIdentity own = web::MakeTlsIdentity({});  // from 2020 on
+  const std::time_t made = 1'800'000'000, begin = made - 86'400;
+  const web::TlsIdentity own =
+      web::MakeTlsIdentity({}, std::chrono::system_clock::from_time_t(made));
   const auto at = [&](std::time_t time) {
     return web::UsableTlsIdentity(own.certificate_pem, own.key_pem,
                                   std::chrono::system_clock::from_time_t(time))
@@ -223,8 +268,8 @@ TEST(UsableTlsIdentityTest, IsOnlyOneThatIsValidNow) {
   };
   const std::time_t end = web::FactsOfCertificate(own.certificate_pem).valid_until;
   using plumb::testing::MessageOf;
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)at(1577836799); }), HasSubstr("valid only from"));
-  EXPECT_EQ(at(1577836800), own.fingerprint);
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)at(begin - 1); }), HasSubstr("valid only from"));
+  EXPECT_EQ(at(begin), own.fingerprint);
   EXPECT_EQ(at(end - 1), own.fingerprint);
   EXPECT_THAT(MessageOf<DataError>([&] { (void)at(end); }), HasSubstr("ended on"));
 }

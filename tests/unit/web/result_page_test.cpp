@@ -1,8 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 // The result for browsers without script: when it says that it is old.
 #include <gmock/gmock.h>
 
 #include "tests/unit/web/web_fixture.hpp"
-#include "web/api/result_words.hpp"
+#include "web/exchange/preferred_language.hpp"
+#include "words/acceptance.hpp"
+#include "words/body.hpp"
+#include "words/direction.hpp"
+#include "words/number.hpp"
 
 namespace plumb::test {
 namespace {
@@ -28,7 +33,7 @@ class ResultPageTest : public WebTest {
       Scan scan;
       scan.id = id;
       scan.outcome = outcome;
-      scan.failure = outcome == ScanOutcome::kFailed ? "tracking was lost" : "";
+      if (outcome == ScanOutcome::kFailed) scan.failure = Message::Verbatim("tracking was lost");
       scan.started_at = WallClock::now() - age - seconds(20);
       scan.finished_at = WallClock::now() - age;
       scan.result = ResultSummary{};
@@ -65,7 +70,7 @@ TEST_F(ResultPageTest, TheNumbersHaveTheNamesThatTheResultGivesThem) {
   Add("s1", seconds(10));
   loop_->Do([&] {
     service_.scans.back().result->correction.emplace().longitudinal_mm = 1.0;
-    service_.axis_names[1] = "Patient <head>";
+    service_.scans.back().result->axes[1] = Message::Verbatim("Patient <head>");
   });
   EXPECT_THAT(Page(), AllOf(HasSubstr("<th scope=\"row\">Patient &lt;head&gt;</th>"),
                             Not(HasSubstr("Longitudinal"))));
@@ -120,19 +125,25 @@ TEST_F(ResultPageTest, AResultOfTheFutureIsOldUnlessTheSteadyClockKnowsItsAge) {
   EXPECT_THAT(Page(), HasSubstr(kOld));
 }
 
-TEST_F(ResultPageTest, OnlyTheResultOfThePatientWhoseSessionIsOpenIsNotOld) {
+TEST_F(ResultPageTest, OnlyTheResultOfTheSessionThatIsOpenIsNotOld) {
   Add("s1", seconds(10));
-  const auto open = [&](const std::string& patient) {
+  const auto open = [&](const std::string& session, const std::string& patient) {
     loop_->Do([&] {
-      service_.status.session.reset();
-      if (!patient.empty()) service_.status.session.emplace().patient_id = patient;
+      TreatmentSession& opened = service_.status.session.emplace();
+      opened.id = session;
+      opened.patient_id = patient;
     });
   };
-  loop_->Do([&] { service_.scans.back().patient_id = "p1"; });
+  loop_->Do([&] {
+    service_.scans.back().patient_id = "p1";
+    service_.scans.back().session_id = "t1";
+  });
   EXPECT_THAT(Page(), HasSubstr(kOld)) << "the session is closed";
-  open("p1");
+  open("t1", "p1");
   EXPECT_THAT(Page(), Not(HasSubstr(kOld)));
-  open("p2");
+  open("t2", "p1");
+  EXPECT_THAT(Page(), HasSubstr(kOld)) << "the same patient, on another day";
+  open("t3", "p2");
   EXPECT_THAT(Page(), HasSubstr(kOld)) << "another patient is on the couch";
 }
 
@@ -157,29 +168,35 @@ TEST_F(ResultPageTest, ItSpeaksTheBrowsersLanguageOrTheOneThatIsAskedFor) {
   loop_->Do([&] {
     ResultSummary& result = *service_.scans.back().result;
     result.verdict = Verdict::kMove;
+    result.judgements[0] = NumberJudgement::kOutside;
     result.correction.emplace().vertical_mm = -8.04;
+    result.correction->pitch_deg = 0.0;
     result.u95.emplace().vertical_mm = 0.9;
     result.u95->pitch_deg = 0.14;
     result.correction->yaw_deg = 0.05;
     result.u95->yaw_deg = 0.04;
-    result.reasons = {"outside 3 mm and 1 deg: vertical -8.0 mm (down)"};
-    result.words[0] = "down";
-    result.body_after = {"left shoulder 9 mm high"};
+    result.reasons = {say::acceptance::Outside(
+        3, 1,
+        {say::acceptance::OutsideShift(say::number::Vertical(), -8, say::direction::Down())})};
+    result.words[0] = say::direction::Down();
+    result.body_after = {say::body::High(say::body::LeftShoulder(), 9)};
   });
   EXPECT_THAT(Page(), AllOf(HasSubstr("<html lang=\"en\">"), HasSubstr("<td>\u22128.0 mm</td>"),
                             HasSubstr(">\u00b10.9 mm</td>"), HasSubstr(">\u00b13 mm</td>"),
                             HasSubstr("<td>+0.05\u00b0</td>"), HasSubstr(">\u00b10.04\u00b0</td>"),
                             HasSubstr("outside 3 mm and 1\u00b0: vertical \u22128.0 mm (down)"),
                             HasSubstr("<td>down</td>"), HasSubstr(">MOVE<")));
-  client_->extra_headers["Accept-Language"] = "fr, es-MX;q=0.9, en;q=0.8";
+  EXPECT_THAT(client_->Get("/result?language=xx").body, HasSubstr("<html lang=\"en\">"));
+  client_->extra_headers["Accept-Language"] = "xx, es-MX;q=0.9, en;q=0.8";
   const std::string spanish = Page();
   EXPECT_THAT(
       spanish,
       AllOf(HasSubstr("<html lang=\"es\">"), HasSubstr("\u22128,0 mm"),
-            HasSubstr("\u00b10,14\u00b0"), HasSubstr("<td>abajo</td>"), HasSubstr(">MOVER<"),
-            HasSubstr("hombro izquierdo: 9 mm demasiado alto"), HasSubstr("hace 1 min"),
-            HasSubstr("No es un producto sanitario"), HasSubstr("refresh")));
-  for (const char* english : {"MOVE<", "tolerance<", "Scan ", "Patient", "down", "high"})
+            HasSubstr("\u00b10,14\u00b0"), HasSubstr(">MOVER<"), HasSubstr("hace 1 min"),
+            HasSubstr("No es un producto sanitario"), HasSubstr("refresh"),
+            HasSubstr("fuera de 3 mm y 1\u00b0: vertical \u22128,0 mm (abajo)"),
+            HasSubstr("<td>abajo</td>"), HasSubstr("hombro izquierdo: 9 mm demasiado alto")));
+  for (const char* english : {"MOVE<", "tolerance<", "Scan ", "Patient"})
     EXPECT_THAT(spanish, Not(HasSubstr(english)));
   EXPECT_THAT(client_->Get("/result?language=en").body, HasSubstr(">MOVE<"));
   // The page that asks for itself again stays in the language that was chosen.
@@ -198,6 +215,7 @@ TEST_F(ResultPageTest, WhatIsNotSurelyWithinAsksForAnotherScan) {
   loop_->Do([&] {
     ResultSummary& result = *service_.scans.back().result;
     result.verdict = Verdict::kUnsure;
+    result.judgements = {NumberJudgement::kUnsure, NumberJudgement::kWithin};
     result.correction.emplace().vertical_mm = 2.8;
     result.correction->longitudinal_mm = 0.5;
     result.u95.emplace().vertical_mm = 1.2;
@@ -208,18 +226,36 @@ TEST_F(ResultPageTest, WhatIsNotSurelyWithinAsksForAnotherScan) {
                             HasSubstr("Measured difference"), Not(HasSubstr("to apply"))));
 }
 
+TEST_F(ResultPageTest, AnAbsentUncertaintyIsNotKnownAndAsksForAnotherScan) {
+  Add("s1", seconds(30));
+  loop_->Do([&] {
+    ResultSummary& result = *service_.scans.back().result;
+    result.verdict = Verdict::kUnsure;
+    result.correction.emplace().vertical_mm = 0.8;
+    result.u95.emplace().longitudinal_mm = 0.3;
+  });
+  EXPECT_THAT(Page(), AllOf(HasSubstr("\">not known</td>"),
+                            HasSubstr("<td>not known</td><td>scan again</td>"),
+                            Not(HasSubstr("<td>in tolerance</td>"))));
+}
+
 TEST(PreferredLanguage, TheHigherWeightCounts) {
-  using web::Language;
-  using web::PreferredLanguage;
-  EXPECT_EQ(PreferredLanguage(""), Language::kEnglish);
-  EXPECT_EQ(PreferredLanguage("fr"), Language::kEnglish);
-  EXPECT_EQ(PreferredLanguage("es"), Language::kSpanish);
-  EXPECT_EQ(PreferredLanguage("ES-ar"), Language::kSpanish);
-  EXPECT_EQ(PreferredLanguage("est"), Language::kEnglish) << "Estonian";
-  EXPECT_EQ(PreferredLanguage("en;q=0.5, es;q=0.6"), Language::kSpanish);
-  EXPECT_EQ(PreferredLanguage("en;q=0.6, es;q=0.5"), Language::kEnglish);
-  EXPECT_EQ(PreferredLanguage("es;q=0"), Language::kEnglish);
-  EXPECT_EQ(PreferredLanguage("es;q=x,,;"), Language::kEnglish);
+  const Catalogue spanish{"es", "Espa\u00f1ol", "es-ES", ',', false, {}};
+  const Catalogue french{"fr", "Fran\u00e7ais", "fr-FR", ',', true, {}};
+  const std::vector<const Catalogue*> known = {&EnglishCatalogue(), &spanish, &french};
+  const auto preferred = [&](std::string_view header) {
+    return web::PreferredLanguage(header, known).code;
+  };
+  EXPECT_EQ(preferred(""), "en");
+  EXPECT_EQ(preferred("xx"), "en");
+  EXPECT_EQ(preferred("es"), "es");
+  EXPECT_EQ(preferred("ES-ar"), "es");
+  EXPECT_EQ(preferred("est"), "en") << "Estonian";
+  EXPECT_EQ(preferred("en;q=0.5, es;q=0.6"), "es");
+  EXPECT_EQ(preferred("en;q=0.6, es;q=0.5"), "en");
+  EXPECT_EQ(preferred("en;q=0.5, es;q=0.6, fr-CA;q=0.7"), "fr");
+  EXPECT_EQ(preferred("es;q=0"), "en");
+  EXPECT_EQ(preferred("es;q=x,,;"), "en");
 }
 
 TEST_F(ResultPageTest, AChangeWhoseSessionEndsWhileItsBodyComesIsRefused) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who may ask for what: a table written by hand, against the answers of the server.
 #include <gmock/gmock.h>
 
@@ -30,6 +31,10 @@ const std::map<std::string, std::string> kWhoMay = {
     {"GET /api/v1/preview", "TPED"},
     {"GET /api/v1/scan/surface", "TPED"},
     {"POST /api/v1/press", "TPE"},
+    {"GET /api/v1/monitor", "TPED"},
+    {"POST /api/v1/monitor/start", "TPE"},
+    {"POST /api/v1/monitor/stop", "TPE"},
+    {"GET /api/v1/monitor/record.csv", "TPE"},
     {"POST /api/v1/scan/start", "TPE"},
     {"POST /api/v1/scan/end", "TPE"},
     {"POST /api/v1/cancel", "TPE"},
@@ -50,6 +55,9 @@ const std::map<std::string, std::string> kWhoMay = {
     {"GET /api/v1/patients/{id}/numbers.csv", "TPE"},
     {"GET /api/v1/patients/{id}/numbers.json", "TPE"},
     {"POST /api/v1/treatment/close", "TPE"},
+    {"POST /api/v1/treatment/resume", "TPE"},
+    {"POST /api/v1/treatment/reference", "TPE"},
+    {"POST /api/v1/treatment/fraction", "TP"},
     {"POST /api/v1/references", "P"},
     {"GET /api/v1/references/{id}", "TPED"},
     {"PUT /api/v1/references/{id}/plan", "P"},
@@ -61,6 +69,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/scans/{id}/accept-outside", "TP"},
     {"GET /api/v1/scans/{id}/report.pdf", "TPE"},
     {"GET /api/v1/scans/{id}/maps/{name}", "TPED"},
+    {"GET /api/v1/scans/{id}/quality", "TPED"},
     {"GET /api/v1/scans/{id}/files/{name}", "TPED"},
     {"GET /api/v1/results/{id}", "TPED"},
     {"GET /api/v1/checks", "TPE"},
@@ -73,6 +82,13 @@ const std::map<std::string, std::string> kWhoMay = {
     {"GET /api/v1/sensor-profile/{version}/file", "TPE"},
     {"POST /api/v1/sensor-profile/reset", "E"},
     {"POST /api/v1/sensor-profile/roll-back", "E"},
+    {"GET /api/v1/displays/presence", "TPED"},
+    {"GET /api/v1/session/list", "TPE"},
+    {"DELETE /api/v1/session/list/{id}", "TPE"},
+    {"POST /api/v1/session/end-others", "TPE"},
+    {"POST /api/v1/session/second-factor/offer", "TPE"},
+    {"POST /api/v1/session/second-factor", "TPE"},
+    {"DELETE /api/v1/session/second-factor", "TPE"},
     {"GET /api/v1/displays", "E"},
     {"POST /api/v1/displays", "E"},
     {"DELETE /api/v1/displays/{id}", "E"},
@@ -113,9 +129,11 @@ class RolesTest : public WebTest {
     if (role == 'E') return LoggedIn("engineer");
     HttpClient display(port_), engineer = LoggedIn("engineer");
     const nlohmann::json pairing = display.Post("/api/v1/displays/pair").json();
-    EXPECT_EQ(
-        engineer.Post("/api/v1/displays", {{"code", pairing["code"]}, {"name", "room"}}).status,
-        201);
+    EXPECT_EQ(engineer
+                  .Post("/api/v1/displays",
+                        {{"code", pairing["code"]}, {"name", "room"}, {"password", kPassword}})
+                  .status,
+              201);
     EXPECT_EQ(display.Post("/api/v1/displays/claim", {{"secret", pairing["secret"]}}).status, 200);
     display.FetchToken();
     return display;

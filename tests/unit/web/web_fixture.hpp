@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The real server over a fake appliance, on a separate thread.
 #pragma once
 

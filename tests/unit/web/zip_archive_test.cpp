@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // Archives read back by the library and, from outside, what a browser gets of a course.
-#include "web/api/zip_archive.hpp"
+#include "web/exchange/zip_archive.hpp"
 
 #include <gmock/gmock.h>
 #include <zip.h>
@@ -87,17 +88,18 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   service_.scans.push_back(scan);
   scan.id = "s6";  // compared, but its files are out of sight
   scan.folder.clear();
-  scan.failure = "its files cannot be used now: its folder is missing";
+  scan.failure = Message::Verbatim("its files cannot be used now: its folder is missing");
   service_.scans.push_back(scan);
   scan.folder = folder.path();
-  scan.failure.clear();
+  scan.failure = {};
   scan.id = "s8";  // a reference has no result
   scan.result.reset();
   service_.scans.push_back(scan);
   Start();
   SetUpAccounts();
   HttpClient client = LoggedIn("technician");
-  const auto answer = client.Get("/api/v1/patients/p1/course.zip?language=es");
+  const auto answer = client.Get("/api/v1/patients/p1/course.zip?language=" +
+                                 std::string(Catalogues().back()->code));
   ASSERT_EQ(answer.status, 200);
   const auto files = Unzipped(answer.body);
   EXPECT_THAT(files, ElementsAre(Key("course.pdf"), Key("left_out.txt"), Key("numbers.csv"),
@@ -110,10 +112,11 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",-8.2500,")) << "a number stays one";
   EXPECT_THAT(files.at("numbers.csv"), HasSubstr(R"("'=cmd|'/C calc'!A0, ""really""")"))
       << "what a person typed is no formula";
-  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",check_overdue,check_failed\r\n"));
-  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",yes,yes\r\n"));
-  EXPECT_EQ(service_.report_language, web::Language::kSpanish);
-  EXPECT_EQ(client.Get("/api/v1/patients/p1/course.zip?language=fr").status, 400);
+  EXPECT_THAT(files.at("numbers.csv"),
+              HasSubstr(",check_overdue,check_failed,judgement_vertical,"));
+  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",yes,yes,"));
+  EXPECT_EQ(service_.report_language, Catalogues().back()->code);
+  EXPECT_EQ(client.Get("/api/v1/patients/p1/course.zip?language=xx").status, 400);
   EXPECT_EQ(client.Get("/api/v1/patients/p2/course.zip").status, 404);
 }
 

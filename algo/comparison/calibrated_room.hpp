@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "algo/base/pose.hpp"
+#include "algo/types/marker.hpp"
+
+namespace plumb {
+
+/// A room's calibration, as configured.
+struct CalibratedRoom {
+  std::optional<Pose> T_iec_reference;  ///< From the frame of the room's reference marker.
+  /// Half-widths of its 95 % interval at the isocentre. Not set: exact, with a warning.
+  std::optional<double> u95_m, u95_rad;
+  /// The taught markers, in the frame that T_iec_reference maps from. Empty: that frame is found by
+  /// a scan's reference marker alone.
+  MarkerMap markers = {};
+};
+
+}  // namespace plumb

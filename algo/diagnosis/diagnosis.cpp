@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algo/diagnosis/diagnosis.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "algo/base/statistics.hpp"
+#include "algo/base/units.hpp"
+#include "words/diagnosis.hpp"
+
+namespace plumb {
+namespace {
+
+// Depth of consumer sensors errs by about 1 %, prints that were fitted to the page by 3 to 6 %.
+constexpr double kSensorScale = 0.01;
+constexpr double kUsualScale = 2 * kSensorScale;
+// From here on neither a print nor a sensor explains the factor: a number was entered wrongly.
+constexpr double kWrongNumber = 0.1;
+// Two ratios of one sweep that differ by more are not of the same print: the ratio of a marker that
+// is seen well scatters by less than 1 %.
+constexpr double kSameSize = 0.05;
+// Scatter of the ratios of one marker from view to view. The two images of a sweep whose clocks
+// differ by a frame scatter by 2 to 4 %, those of two different sweeps by 20 % and more.
+constexpr double kNotTogether = 0.15;
+constexpr int kViewsForRatio = 3;
+// Below, an offset does no harm: 15 ms moved a result by less than its interval, 33 ms by 6 mm.
+constexpr double kHarmfulOffset_s = 0.020;
+constexpr double kOffsetSigmas = 4.0;
+constexpr double kRepeatedToReport = 0.05;
+constexpr double kOutOfRangeToReport = 0.2, kOutOfRangeToRefuse = 0.6;
+// Chi-square for each term: a prior that holds gives 1 at most, since the sweep does not determine
+// every term.
+constexpr double kChi2ToReport = 2.0, kChi2ToRefuse = 4.0;
+// Units of depth for a metre that recordings have, beside the usual 1000: 5000 (TUM), 10000 and
+// 4000 (RealSense), 256 (KITTI), 100.
+constexpr std::array kDepthUnits = {5000.0, 10000.0, 4000.0, 256.0, 100.0};
+
+// Whether the factor is one between millimetres and another unit of depth.
+bool IsFactorOfUnits(double ratio) {
+  return std::ranges::any_of(kDepthUnits, [&](double unit) {
+    const double factor = unit / 1000;
+    return std::abs(ratio / factor - 1) < 0.5 * kSameSize ||
+           std::abs(ratio * factor - 1) < 0.5 * kSameSize;
+  });
+}
+
+// The largest group of ratios that agree with one of them, of equal ones that which is nearer to
+// what is stated: its median.
+double CommonRatio(const std::vector<MarkerDepth>& markers) {
+  std::size_t most = 0;
+  std::vector<double> best;
+  for (const MarkerDepth& centre : markers) {
+    std::vector<double> group;
+    for (const MarkerDepth& other : markers)
+      if (std::abs(other.ratio / centre.ratio - 1) < kSameSize) group.push_back(other.ratio);
+    const bool nearer = best.empty() || std::abs(centre.ratio - 1) < std::abs(best.front() - 1);
+    if (group.size() < most || (group.size() == most && !nearer)) continue;
+    most = group.size();
+    best = std::move(group);
+  }
+  return TakeMedian(best);
+}
+
+std::vector<MarkerDepth> WellMeasured(const Symptoms& symptoms) {
+  std::vector<MarkerDepth> markers;
+  for (const MarkerDepth& marker : symptoms.marker_depths)
+    if (marker.num_views >= kViewsForRatio) markers.push_back(marker);
+  return markers;
+}
+
+// @return whether the units are wrong, so that nothing else can be judged.
+bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings) {
+  const std::vector<MarkerDepth> markers = WellMeasured(symptoms);
+  if (markers.empty()) {
+    if (symptoms.depth_unit_assumed)
+      findings.push_back({FindingLevel::kRefusal, say::diagnosis::DepthUnitUnknown()});
+    return false;
+  }
+  std::vector<double> scatter;
+  for (const MarkerDepth& marker : markers) scatter.push_back(marker.scatter / marker.ratio);
+  if (TakeMedian(scatter) > kNotTogether) {
+    findings.push_back({FindingLevel::kRefusal, say::diagnosis::ImagesApart()});
+    return true;
+  }
+  const double common = CommonRatio(markers);
+  std::vector<std::int64_t> apart;
+  for (const MarkerDepth& marker : markers)
+    if (std::abs(marker.ratio / common - 1) >= kSameSize) apart.push_back(marker.id);
+  if (!apart.empty()) {
+    // A few of them do no harm, since the solve weighs each against the others.
+    const FindingLevel level =
+        3 * apart.size() >= markers.size() ? FindingLevel::kRefusal : FindingLevel::kWarning;
+    const auto count = static_cast<std::int64_t>(apart.size());
+    findings.push_back({level, say::diagnosis::MarkersApart(count, std::move(apart))});
+  }
+  if (std::abs(common - 1) <= kUsualScale) return false;
+  const double side_mm = symptoms.marker_length_m * common / kMillimetre;
+  if (std::abs(common - 1) <= kWrongNumber) {
+    findings.push_back({FindingLevel::kWarning,
+                        say::diagnosis::PrintOrSensor(100 * std::abs(common - 1), side_mm)});
+    return false;
+  }
+  findings.push_back({FindingLevel::kRefusal, IsFactorOfUnits(common)
+                                                  ? say::diagnosis::DepthUnit(common)
+                                                  : say::diagnosis::UnitOrSide(common, side_mm)});
+  return true;
+}
+
+void JudgeStreams(const Symptoms& symptoms, std::vector<Finding>& findings) {
+  if (symptoms.stream_offset) {
+    const auto& [offset_s, sigma_s] = *symptoms.stream_offset;
+    if (std::abs(offset_s) > kHarmfulOffset_s && std::abs(offset_s) > kOffsetSigmas * sigma_s)
+      findings.push_back({FindingLevel::kRefusal, offset_s > 0
+                                                      ? say::diagnosis::DepthLate(offset_s)
+                                                      : say::diagnosis::DepthEarly(-offset_s)});
+  }
+  const auto repeated = [&](std::int64_t count, Message which) {
+    if (static_cast<double>(count) <= kRepeatedToReport * static_cast<double>(symptoms.num_frames))
+      return;
+    findings.push_back({FindingLevel::kWarning,
+                        say::diagnosis::Repeated(count, symptoms.num_frames, std::move(which))});
+  };
+  repeated(symptoms.num_repeated_depth, say::diagnosis::ImagesDepth());
+  repeated(symptoms.num_repeated_color, say::diagnosis::ImagesColor());
+}
+
+void JudgeRange(const Symptoms& symptoms, std::vector<Finding>& findings) {
+  const double outside = symptoms.share_near + symptoms.share_far;
+  if (outside <= kOutOfRangeToReport) return;
+  const FindingLevel level =
+      outside > kOutOfRangeToRefuse ? FindingLevel::kRefusal : FindingLevel::kWarning;
+  findings.push_back({level, symptoms.share_near >= symptoms.share_far
+                                 ? say::diagnosis::TooNear(100 * outside, symptoms.nearest_m)
+                                 : say::diagnosis::TooFar(100 * outside, symptoms.farthest_m)});
+}
+
+void JudgeForeignMarkers(const Symptoms& symptoms, std::vector<Finding>& findings) {
+  if (!symptoms.foreign_markers) return;
+  const ForeignMarkers& foreign = *symptoms.foreign_markers;
+  using Kind = ForeignMarkers::Kind;
+  // A scene without markers is not compared anyway; this is why.
+  if (foreign.kind == Kind::kMirrored)
+    findings.push_back({FindingLevel::kRefusal, say::diagnosis::Mirrored()});
+  if (foreign.kind == Kind::kInverted)
+    findings.push_back({FindingLevel::kRefusal, say::diagnosis::Inverted()});
+  if (foreign.kind == Kind::kOtherDictionary)
+    findings.push_back(
+        {FindingLevel::kRefusal, say::diagnosis::OtherDictionary(foreign.dictionary)});
+}
+
+void JudgeCalibration(const CalibrationFit& fit, std::vector<Finding>& findings) {
+  if (fit.num_terms == 0) return;
+  const double chi2_per_term = fit.chi2 / fit.num_terms;
+  if (!(chi2_per_term > kChi2ToReport)) return;
+  const FindingLevel level =
+      chi2_per_term > kChi2ToRefuse ? FindingLevel::kRefusal : FindingLevel::kWarning;
+  findings.push_back({level, say::diagnosis::Calibration(chi2_per_term, fit.worst_term,
+                                                         fit.worst_value, fit.worst_sigma)});
+}
+
+}  // namespace
+
+double ScaleDoubt(const Symptoms& symptoms) {
+  const std::vector<MarkerDepth> markers = WellMeasured(symptoms);
+  if (markers.empty()) return 0.0;
+  const double off = std::abs(CommonRatio(markers) - 1);
+  return off > kUsualScale ? off + kSensorScale : 0.0;
+}
+
+std::vector<Finding> Diagnose(const Symptoms& symptoms) {
+  std::vector<Finding> findings;
+  JudgeForeignMarkers(symptoms, findings);
+  const std::size_t before = findings.size();
+  JudgeStreams(symptoms, findings);
+  const bool clocks_differ =
+      findings.size() > before && findings[before].level == FindingLevel::kRefusal;
+  // Depth of another moment disagrees with the markers because of its time.
+  const bool wrong_numbers = !clocks_differ && JudgeMarkerDepths(symptoms, findings);
+  if (!wrong_numbers) JudgeRange(symptoms, findings);
+  if (!clocks_differ && !wrong_numbers) JudgeCalibration(symptoms.calibration, findings);
+  std::ranges::stable_sort(findings,
+                           [](const Finding& a, const Finding& b) { return a.level > b.level; });
+  return findings;
+}
+
+}  // namespace plumb

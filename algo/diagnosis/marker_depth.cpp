@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algo/diagnosis/marker_depth.hpp"
+
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include <opencv2/calib3d.hpp>
+
+#include "algo/base/statistics.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr int kSamplesPerSide = 7;
+constexpr double kFace = 0.8;  // Fraction of the side that is sampled: edges mix two surfaces.
+
+// Depth over expected depth, median over the face; nothing without a pose or enough depth.
+std::optional<double> RatioOnFace(const MarkerObservation& marker, const cv::Mat& depth_m,
+                                  const Intrinsics& intrinsics, const CalibrationModel& known,
+                                  double length_m) {
+  std::vector<cv::Point2d> ideal;
+  for (const Eigen::Vector2d& corner : marker.corners) {
+    const Eigen::Vector2d xy = Undistort(intrinsics, corner);
+    ideal.emplace_back(xy.x(), xy.y());
+  }
+  std::vector<cv::Point3d> square;
+  for (const Eigen::Vector3d& corner : CornersInMarkerFrame(length_m))
+    square.emplace_back(corner.x(), corner.y(), corner.z());
+  cv::Vec3d turn, place;
+  if (!cv::solvePnP(square, ideal, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, place, false,
+                    cv::SOLVEPNP_IPPE_SQUARE))
+    return std::nullopt;
+  cv::Matx33d rotation;
+  cv::Rodrigues(turn, rotation);
+  std::vector<double> ratios;
+  for (int i = 0; i < kSamplesPerSide; ++i) {
+    for (int j = 0; j < kSamplesPerSide; ++j) {
+      const auto at = [&](int k) {
+        return kFace * length_m * (static_cast<double>(k) / (kSamplesPerSide - 1) - 0.5);
+      };
+      const cv::Vec3d p = rotation * cv::Vec3d(at(i), at(j), 0) + place;
+      if (!(p[2] > 0)) return std::nullopt;
+      const Eigen::Vector2d pixel = Project(intrinsics, {p[0], p[1], p[2]});
+      const auto column = static_cast<int>(std::lround(pixel.x()));
+      const auto row = static_cast<int>(std::lround(pixel.y()));
+      if (column < 0 || row < 0 || column >= depth_m.cols || row >= depth_m.rows) continue;
+      if (const float z = depth_m.at<float>(row, column); z > 0)
+        ratios.push_back(
+            known.CorrectedDepth(z, CentredCoordinates(column, row, depth_m.cols, depth_m.rows)) /
+            p[2]);
+    }
+  }
+  if (2 * ratios.size() < std::size_t{kSamplesPerSide} * kSamplesPerSide) return std::nullopt;
+  return TakeMedian(ratios);
+}
+
+}  // namespace
+
+std::vector<MarkerDepth> MeasureMarkerDepths(const TrackingMap& map, const Intrinsics& intrinsics,
+                                             const CalibrationModel& known, double length_m) {
+  std::map<int, std::vector<double>> ratios;
+  for (const MapKeyframe& keyframe : map.keyframes) {
+    if (keyframe.data.view.depth_m.empty()) continue;
+    for (const MarkerObservation& marker : keyframe.data.markers)
+      if (const auto ratio =
+              RatioOnFace(marker, keyframe.data.view.depth_m, intrinsics, known, length_m))
+        ratios[marker.id].push_back(*ratio);
+  }
+  std::vector<MarkerDepth> measured;
+  for (auto& [id, values] : ratios) {
+    MarkerDepth marker{.id = id, .num_views = static_cast<int>(values.size())};
+    marker.ratio = TakeMedian(values);
+    for (double& value : values) value = std::abs(value - marker.ratio);
+    marker.scatter = kMadToSigma * TakeMedian(values);
+    measured.push_back(marker);
+  }
+  return measured;
+}
+
+}  // namespace plumb

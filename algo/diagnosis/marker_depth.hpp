@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Depth on a marker's face against the distance that its size shows, before anything is solved.
+#pragma once
+
+#include <vector>
+
+#include "algo/base/intrinsics.hpp"
+#include "algo/map/map.hpp"
+#include "algo/sensor_model/calibration_model.hpp"
+
+namespace plumb {
+
+struct MarkerDepth {
+  int id = 0;
+  /// Measured depth over the distance at which a square of the stated side appears as large; median
+  /// over the views.
+  double ratio = 1.0;
+  double scatter = 0.0;  ///< Standard deviation of one view's ratio, from the median deviation.
+  int num_views = 0;     ///< Keyframes with depth on the marker's face.
+};
+
+/// The markers in the keyframes that still have their depth image, by ascending id.
+/// @param known  Errors of the sensor's depth that are known before the sweep.
+/// @param length_m  Stated side of the black square, positive.
+[[nodiscard]] std::vector<MarkerDepth> MeasureMarkerDepths(const TrackingMap& map,
+                                                           const Intrinsics& intrinsics,
+                                                           const CalibrationModel& known,
+                                                           double length_m);
+
+}  // namespace plumb

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// A surface as a camera above sees it, from the contours of its slices.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "algo/base/units.hpp"
+#include "algo/types/height_map.hpp"
+
+namespace plumb {
+
+/// A closed contour in the plane of its slice; metres, x to the right and z up.
+using FlatContour = std::vector<Eigen::Vector2d>;
+
+struct ContourSlice {
+  double y_m = 0.0;  ///< Place of the slice.
+  std::vector<FlatContour> contours;
+};
+
+struct ContourSurfaceOptions {
+  double step_m = 2 * kMillimetre;
+  double min_area_m2 = 100e-6;                ///< Smaller contours are crumbs.
+  double max_step_m = 10 * kMillimetre;       ///< Between neighbouring cells: more is a flank.
+  double max_spacing_m = 6 * kMillimetre;     ///< Of slices between which heights are interpolated.
+  double above_support_m = 15 * kMillimetre;  ///< What is lower may be the couch.
+  /// A side that is straight and vertical over this height, in one column of many slices, is the
+  /// edge of the CT's field of view.
+  double straight_side_m = 60 * kMillimetre;
+};
+
+struct ContourSurface {
+  HeightMap heights;  ///< z over x and y; cells that are no sure part of the surface are empty.
+  double support_m = 0.0;       ///< Height of what the body lies on.
+  double spacing_m = 0.0;       ///< The usual one of the slices.
+  std::size_t parts_apart = 0;  ///< Contours beside the largest of their slice that were kept.
+  std::size_t crumbs = 0;       ///< Contours that are too small.
+  std::size_t couch_parts = 0;  ///< Parts apart that do not rise above the height of the couch.
+  std::size_t holes = 0;        ///< Contours inside another one.
+  std::size_t gaps = 0;         ///< Places where slices are missing; nothing is interpolated there.
+  bool cut_at_side = false;     ///< Arms or shoulders end at the edge of the field of view.
+};
+
+/// Each column of each slice takes its topmost crossing by the even-odd rule, so that holes and
+/// keyholes need no care, and rows between neighbouring slices are interpolated. Empty remain: the
+/// first and the last slice, which are the ends of the scan; rows in a gap; steps; what is not
+/// higher than the couch; and the field of view's edges.
+/// @param slices  In any order. Those at one place (to 0.01 mm) are joined.
+/// @throws std::invalid_argument with fewer than three places, or none with an area.
+[[nodiscard]] ContourSurface SurfaceFromAbove(std::vector<ContourSlice> slices,
+                                              const ContourSurfaceOptions& options = {});
+
+/// Area, positive whichever way it turns.
+[[nodiscard]] double AreaOf(const FlatContour& contour);
+
+}  // namespace plumb

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Constraints on the poses and the sensor's calibration from overlapping depth images and markers'
+// faces: the dense part of RegisterJointly().
+#pragma once
+
+#include <stop_token>
+#include <vector>
+
+#include "algo/registration/depth_views.hpp"
+#include "algo/registration/registration_options.hpp"
+
+namespace plumb::dense {
+
+struct KeyframePair {
+  int a = 0;  ///< View whose cells are projected.
+  int b = 0;  ///< View into which they are projected.
+  double overlap = 0;
+};
+
+/// Pairs of views that overlap enough, at most JointRegistrationOptions::max_pairs for each view.
+/// @throws Interrupted on a stop request
+std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,
+                                    const std::vector<View>& views, const std::stop_token& stop);
+
+/// How many of the cells are used. Coarse: a quarter of those of fine, each with four times the
+/// weight; for the early rounds, whose terms only provide a start for the fine ones.
+enum class Density { kCoarse, kFine };
+
+/// Point-to-plane residuals of each pair, and of the depth on each marker's face, linearised.
+/// @param gate_m  Larger residuals are not correspondences.
+/// Where images have errors of their own, the terms are as uncertain as these leave them.
+/// @param errors  With which the views were made; empty: none.
+/// @param terms  Replaced; its memory is used again.
+/// @throws Interrupted on a stop request
+void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
+               const TrackingMap& map, const std::vector<View>& views,
+               const std::vector<KeyframePair>& pairs, double gate_m, Density density,
+               const std::vector<ImageError>& errors, const std::stop_token& stop,
+               std::vector<QuadraticTerm>& terms);
+
+/// The error of each view's depth image, from overlapping views and markers' faces where the poses
+/// are, and from the prior of the options. Empty if that says that there are none.
+/// @param views  Made without errors.
+[[nodiscard]] std::vector<ImageError> FindImageErrors(const Sensor& sensor,
+                                                      const JointRegistrationOptions& options,
+                                                      const TrackingMap& map,
+                                                      const std::vector<View>& views,
+                                                      const std::vector<KeyframePair>& pairs,
+                                                      double gate_m, const std::stop_token& stop);
+
+/// Median absolute point-to-plane distance of the cells that MakeTerms() never uses, metres; 0
+/// without any.
+double Consistency(const Sensor& sensor, const std::vector<View>& views,
+                   const std::vector<KeyframePair>& pairs, double gate_m);
+
+}  // namespace plumb::dense

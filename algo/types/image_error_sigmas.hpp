@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each depth image of a sensor errs by on its own.
+#pragma once
+
+#include "algo/types/depth_sensor.hpp"
+
+namespace plumb {
+
+/// Standard deviations of the error of one depth image beside the calibration that all images of a
+/// sweep share. 0: the class has none.
+struct ImageErrorSigmas {
+  double offset_m = 0.0;
+  double tilt = 0.0;  ///< Fraction of the depth per half image width.
+};
+
+/// Part of the table of classes, see ClassOf().
+[[nodiscard]] const ImageErrorSigmas& ImageErrorSigmasOf(DepthSensor sensor);
+
+}  // namespace plumb

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Live monitoring of the body that was scanned last.
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/plan_options.hpp"
+#include "daemon/loop/log.hpp"
+#include "words/monitoring.hpp"
+
+namespace plumb {
+
+Appliance::Answer Appliance::WhyNotMonitor() const {
+  if (Message why = WhyNotScan(); !why.empty()) return why;
+  // The body lies as it was scanned only in the session of that scan.
+  const bool goes_on = last_result_ && last_result_->outcome.kind == EndedScan::Kind::kDone &&
+                       last_result_->session_id == session_.id() &&
+                       last_result_->patient_id == session_.patient_id() && !session_.check();
+  return goes_on ? Message() : say::monitoring::NoScan();
+}
+
+MonitorJob Appliance::MakeMonitorJob() {
+  MonitorJob job;
+  job.info = sensors_.snapshot().info;
+  job.compare = parts_.config.compare;
+  job.room = room_.OfJob();
+  job.scene = store_->folders.Scan(last_result_->id) / "scene";
+  if (last_result_->reference_id.empty()) return job;
+  const std::optional<Reference> reference = store_->references.Approved(last_result_->patient_id);
+  // Another one than the scan was compared with is another question.
+  if (!reference || reference->id != last_result_->reference_id) return job;
+  job.reference_scene = store_->folders.Scan(reference->scan_id) / "scene";
+  job.check_reference = [this, scan = reference->scan_id](const std::stop_token& stop) {
+    return store_->integrity.Check(scan, /*scene_only=*/true, stop);
+  };
+  job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
+  return job;
+}
+
+void Appliance::StartMonitor() {
+  monitor_end_ = {};
+  try {
+    const std::shared_ptr<LiveFeed> feed =
+        monitoring_.Begin(MakeMonitorJob(), last_result_->id, last_result_->patient_id);
+    sensors_.BeginScan(feed, /*is_sweep=*/false);
+  } catch (const std::exception& error) {
+    loop_.Post("monitoring failed", [this, why = MessageOf(error)] { OnMonitorFailed(why); });
+  }
+}
+
+void Appliance::EndMonitor() {
+  monitored_ = monitoring_.End(std::exchange(monitor_end_, {}));
+  sensors_.EndScan();
+  session_.ArmTimer();
+}
+
+void Appliance::OnMonitorFailed(const Message& why) {
+  monitor_end_ = why;
+  Log(LogLevel::kError, say::monitoring::Failed(why).English());
+  (void)Handle(ScanEvent::kMonitorEnded);
+}
+
+}  // namespace plumb

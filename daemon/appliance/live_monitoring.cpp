@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/appliance/live_monitoring.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "algo/base/statistics.hpp"
+#include "algo/base/units.hpp"
+#include "words/audit.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr double kGrey_s = 0.2;
+constexpr double kGone_s = 1.0;
+constexpr std::chrono::milliseconds kLookAtAge{50};
+constexpr std::size_t kLatencies = 100;
+
+// From the order of couch::Component to that of kNumberAxes.
+MotionNumbers NumbersOf(const LiveNumbers& numbers) {
+  constexpr std::array<Eigen::Index, 6> kComponents = {2, 1, 0, 3, 4, 5};
+  MotionNumbers shown;
+  for (std::size_t i = 0; i < kComponents.size(); ++i) {
+    const double unit = kNumberAxes[i].is_shift() ? kMillimetre : kDegree;
+    shown.value[i] = numbers.value[kComponents[i]] / unit;
+    shown.u95[i] = numbers.u95[kComponents[i]] / unit;
+  }
+  return shown;
+}
+
+}  // namespace
+
+LiveMonitoring::LiveMonitoring(EventLoop& loop, const Notices& notices, WorkThread& store_thread)
+    : loop_(loop), notices_(notices), store_thread_(store_thread) {
+  tick_ = loop_.MakeTimer("monitoring", [this] { OnTick(); });
+}
+
+LiveMonitoring::~LiveMonitoring() {
+  if (session_) session_->End();
+}
+
+std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::string& scan_id,
+                                                const std::string& patient_id) {
+  scan_id_ = scan_id;
+  patient_id_ = patient_id;
+  limits_ = job.compare.limits;
+  judges_reference_ = !job.reference_scene.empty();
+  warnings_.clear();
+  ended_ = {};
+  last_.reset();
+  latencies_s_.clear();
+  was_stale_ = false;
+  began_s_ = SteadySeconds();
+  const std::uint64_t epoch = ++epoch_;
+  MonitorCallbacks callbacks;
+  callbacks.begun = [this, epoch](const std::vector<Message>& warnings) {
+    loop_.Post("monitoring begun", [this, epoch, warnings] {
+      if (epoch == epoch_) warnings_ = warnings;
+    });
+  };
+  callbacks.update = [this, epoch](const MonitorUpdate& update) {
+    loop_.Post("monitoring", [this, epoch, update] {
+      if (epoch == epoch_ && session_) OnUpdate(update);
+    });
+  };
+  callbacks.failed = [this, epoch](const Message& why) {
+    loop_.Post("monitoring failed", [this, epoch, why] {
+      if (epoch == epoch_ && session_) hooks_.failed(why);
+    });
+  };
+  session_ = std::make_shared<MonitorSession>(std::move(job), std::move(callbacks));
+  std::shared_ptr<MonitorSession> before = session_;
+  {
+    const std::lock_guard lock(record_mutex_);
+    std::swap(before, recorded_);
+  }
+  // The thread of the session before may still be ending; the loop does not wait for it.
+  (void)store_thread_.Post([ended = std::move(before)]() mutable { ended.reset(); });
+  tick_.ArmAfter(kLookAtAge);
+  return session_->feed();
+}
+
+Message LiveMonitoring::End(const Message& why) {
+  ended_ = why;
+  if (!session_) return {};
+  tick_.Disarm();
+  ++epoch_;
+  session_->End();
+  const auto shares = session_->Shares();
+  session_.reset();  // kept for its record
+  last_.reset();
+  if (gate_) gate_(false);
+  Tell();
+  const double seconds = SteadySeconds() - began_s_;
+  return shares ? say::audit::Monitored(seconds, 100 * (*shares)[0], 100 * (*shares)[1],
+                                        100 * (*shares)[2])
+                : say::audit::Monitored(seconds, 0, 0, 100);
+}
+
+std::shared_ptr<const MonitorSession> LiveMonitoring::Record() const {
+  const std::lock_guard lock(record_mutex_);
+  return recorded_;
+}
+
+MonitorStatus LiveMonitoring::status() const {
+  MonitorStatus status;
+  status.scan_id = scan_id_;
+  status.ended = ended_;
+  status.has_record = Record() != nullptr;
+  status.active = IsActive();
+  if (!IsActive()) return status;
+  status.patient_id = patient_id_;
+  status.state = Name(MonitorState::kMounting);
+  status.judges_reference = judges_reference_;
+  status.shift_tolerance_mm = limits_.shift_tolerance_m / kMillimetre;
+  status.rotation_tolerance_deg = limits_.rotation_tolerance_rad / kDegree;
+  status.elapsed_s = SteadySeconds() - began_s_;
+  status.warnings = warnings_;
+  if (!last_) return status;
+  const MonitorLine& line = last_->line;
+  const double age_s = SteadySeconds() - last_->arrived_s;
+  status.age_s = age_s;
+  status.state = Name(line.state);
+  status.reason = Name(line.reason);
+  status.frames = last_->frames;
+  status.frames_dropped = last_->frames_dropped;
+  status.has_breathing = last_->has_breathing;
+  status.couch_moved = line.couch_moved;
+  if (!latencies_s_.empty()) {
+    std::vector<double> latencies(latencies_s_.begin(), latencies_s_.end());
+    status.latency_ms = 1e3 * TakeQuantile(latencies, 0.95);
+  }
+  status.is_old = age_s > kGrey_s;
+  if (age_s > kLongestGap_s) {
+    status.reason = "no_image";
+    if (line.state >= MonitorState::kMonitoring && line.state != MonitorState::kMovedSensor)
+      status.state = Name(MonitorState::kBlind);
+  } else {
+    status.advice = Name(line.advice);
+  }
+  if (age_s > kGone_s) return status;
+  if (line.since_zero) status.since_zero = NumbersOf(*line.since_zero);
+  if (line.against_reference) status.against_reference = NumbersOf(*line.against_reference);
+  if (line.breathing_m) status.breathing_mm = *line.breathing_m / kMillimetre;
+  return status;
+}
+
+IndicatorPattern LiveMonitoring::Pattern() const {
+  const MonitorStatus now = status();
+  if (now.state == Name(MonitorState::kMounting) || now.state == Name(MonitorState::kZeroing))
+    return IndicatorPattern::kMonitorStarting;
+  if (now.advice == Name(LiveAdvice::kIn)) return IndicatorPattern::kMonitorIn;
+  return now.advice == Name(LiveAdvice::kOut) ? IndicatorPattern::kMonitorOut
+                                              : IndicatorPattern::kMonitorUnknown;
+}
+
+void LiveMonitoring::OnUpdate(const MonitorUpdate& update) {
+  last_ = update;
+  was_stale_ = false;
+  latencies_s_.push_back(update.done_s - update.arrived_s);
+  if (latencies_s_.size() > kLatencies) latencies_s_.pop_front();
+  // Once for each group of frames, and only as long as it is new.
+  if (gate_) gate_(status().advice == Name(LiveAdvice::kIn));
+  Tell();
+}
+
+void LiveMonitoring::OnTick() {
+  tick_.ArmAfter(kLookAtAge);
+  if (!last_) return;
+  const double age_s = SteadySeconds() - last_->arrived_s;
+  if (age_s <= kLongestGap_s) return;
+  // Once when it becomes unknown, and then, until the number is gone, as it grows old.
+  if (was_stale_ && age_s > kGone_s + 2 * std::chrono::duration<double>(kLookAtAge).count()) return;
+  if (!was_stale_ && gate_) gate_(false);
+  was_stale_ = true;
+  Tell();
+}
+
+void LiveMonitoring::Tell() {
+  if (hooks_.changed) hooks_.changed();
+  nlohmann::json event = MonitorJson(status());
+  event["event"] = "monitor";
+  notices_.TellWatchers(event);
+  notices_.TellPage(web::EventKind::kMonitor);
+}
+
+}  // namespace plumb

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Live monitoring of one body, from the sensor's mounting on: its thread and its record.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "algo/base/message.hpp"
+#include "algo/comparison/comparison.hpp"
+#include "algo/monitoring/monitor.hpp"
+#include "daemon/appliance/scan_session.hpp"
+#include "daemon/files/monitoring_folder.hpp"
+#include "daemon/pipeline/live_feed.hpp"
+
+namespace plumb {
+
+struct MonitorJob {
+  StreamInfo info;  ///< From the sensor.
+  CompareOptions compare;
+  std::optional<RoomAxes> room;           ///< As ScanJob has it.
+  std::filesystem::path scene;            ///< Of the body as it lies.
+  std::filesystem::path reference_scene;  ///< Empty: there is none to judge against.
+  /// As ScanJob has it.
+  std::function<Message(const std::stop_token&)> check_reference;
+  std::size_t queue_capacity = 4;    ///< Frames that may wait: an old number is of no use.
+  std::size_t most_lines = 108'000;  ///< Of the record: an hour at 30 Hz; the oldest leave.
+};
+
+/// One judged frame.
+struct MonitorUpdate {
+  MonitorLine line;
+  double arrived_s = 0.0;  ///< Steady time.
+  double done_s = 0.0;
+  bool has_breathing = false;
+  std::int64_t frames = 0, frames_dropped = 0;
+};
+
+/// Called on the thread; they post to the loop.
+struct MonitorCallbacks {
+  /// Once scene and reference are read.
+  std::function<void(const std::vector<Message>& warnings)> begun;
+  /// Ten times a second, and at once where state or advice change.
+  std::function<void(const MonitorUpdate&)> update;
+  std::function<void(const Message& why)> failed;
+};
+
+/// All functions but the constructor are thread-safe.
+class MonitorSession {
+ public:
+  MonitorSession(MonitorJob job, MonitorCallbacks callbacks);
+  ~MonitorSession();
+  MonitorSession(const MonitorSession&) = delete;
+  MonitorSession& operator=(const MonitorSession&) = delete;
+
+  [[nodiscard]] const std::shared_ptr<LiveFeed>& feed() const { return feed_; }
+  /// Ends the thread soon; the destructor waits for that.
+  void End();
+  /// What was said so far, as monitor.csv has it.
+  [[nodiscard]] std::string Csv() const;
+  /// Shares of in, out and unknown, 0 to 1, since the first numbers; nothing without any.
+  [[nodiscard]] std::optional<std::array<double, 3>> Shares() const;
+
+ private:
+  void Run(const std::stop_token& stop);
+  void Watch(const std::stop_token& stop);
+  void Note(const MonitorLine& line);
+
+  const MonitorJob job_;
+  const MonitorCallbacks callbacks_;
+  const std::shared_ptr<LiveFeed> feed_;
+  mutable std::mutex mutex_;
+  MonitoringRecord record_;               ///< Guarded.
+  std::array<std::int64_t, 3> advice_{};  ///< Guarded: frames of each since the first numbers.
+  std::jthread thread_;                   ///< Last: starts when the members above are initialised.
+};
+
+}  // namespace plumb

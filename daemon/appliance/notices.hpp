@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Passes the events of the appliance on to the page and to the watchers of the control socket.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "web/service/appliance_service.hpp"
+
+namespace plumb {
+
+/// Used on the loop's thread. A listener that throws is logged and changes nothing else.
+class Notices {
+ public:
+  /// @param data_changed  Called before the page is told that stored data has changed.
+  explicit Notices(std::function<void()> data_changed);
+
+  void SetPage(std::function<void(web::EventKind)> listener);
+  /// Gets each event as one JSON object ({"event", "time", ...}).
+  void SetWatchers(std::function<void(const std::string& line)> listener);
+
+  void TellPage(web::EventKind kind) const;
+  void TellWatchers(const nlohmann::json& event) const;
+
+ private:
+  const std::function<void()> data_changed_;
+  std::function<void(web::EventKind)> page_;
+  std::function<void(const std::string&)> watchers_;
+};
+
+}  // namespace plumb

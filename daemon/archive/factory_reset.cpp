@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/archive/factory_reset.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "algo/base/bounded_json.hpp"
+#include "algo/base/errors.hpp"
+#include "daemon/database/scan_folders.hpp"
+#include "daemon/records/store.hpp"
+#include "daemon/scan_files/file_copy.hpp"
+#include "daemon/state_folder/old_copies.hpp"
+#include "drivers/files/file_io.hpp"
+#include "words/backup.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMaxRequestBytes = 4096;
+constexpr const char* kKeep = "keep_records";
+constexpr const char* kWipe = "wipe";
+constexpr const char* kOfFileSystem = "lost+found";  // root's, on the root of a disk
+/// Items beside the database that are neither records nor belong to the sensor.
+constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", "provisioned-display",
+                                          "updates"};
+
+struct Request {
+  FactoryReset kind = FactoryReset::kKeepRecords;
+  Actor actor;
+};
+
+/// @throws DataError
+Request ReadRequest(const fs::path& file) {
+  const Json json = ParseBoundedJsonOrNothing(ReadTextFile(file, kMaxRequestBytes));
+  try {
+    const std::string kind = json.at("kind").get<std::string>();
+    if (kind != kKeep && kind != kWipe)
+      throw DataError(say::backup::ResetKind(kKeep, kWipe, kind.substr(0, 32)));
+    return {.kind = kind == kWipe ? FactoryReset::kWipe : FactoryReset::kKeepRecords,
+            .actor = {.user = json.at("user").get<std::string>(),
+                      .address = json.at("address").get<std::string>()}};
+  } catch (const std::exception& error) {
+    throw DataError(say::backup::ResetUnreadable(file.string(), MessageOf(error)));
+  }
+}
+
+void Remove(const fs::path& path) {
+  std::error_code error;
+  fs::remove_all(path, error);
+  // The root of a mounted disk stays; its contents are removed.
+  if (error && !(fs::is_directory(path) && fs::is_empty(path)))
+    throw DiskRefused(say::backup::ResetNotRemoved(path.string(), error.message()));
+}
+
+std::vector<fs::path> EntriesOf(const fs::path& folder) {
+  std::vector<fs::path> entries;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    entries.push_back(entry.path());
+  return entries;
+}
+
+/// The files of scans are removed before the database, so that an interrupted wipe never looks like
+/// a lost database.
+void Wipe(const fs::path& state) {
+  FolderLock lock;
+  lock.Take(state);
+  const fs::path scans = state / kScansFolder;
+  if (fs::is_directory(scans)) {  // or a link to one, on another disk
+    for (const fs::path& entry : EntriesOf(scans)) {
+      if (entry.filename() != kOfFileSystem) Remove(entry);
+    }
+    std::error_code kept;  // it stays where it is the root of a disk
+    fs::remove(scans, kept);
+  } else if (fs::is_symlink(scans)) {
+    throw DiskRefused(say::backup::ResetNoDisk(scans.string()));
+  } else {
+    Remove(scans);
+  }
+  for (const fs::path& entry : EntriesOf(state)) {
+    if (entry != scans && entry.filename() != kFactoryResetFile &&
+        entry.filename() != kOfFileSystem)
+      Remove(entry);
+  }
+  SyncToDisk(state);
+}
+
+/// With its entry in the log; a store that cannot be opened is not changed.
+Message KeepRecords(const fs::path& state, const Actor& actor) {
+  Message done;
+  {
+    Store store(state);
+    StoreChange change(store.database());
+    change->Run("DELETE FROM users");
+    done = say::backup::ResetKept(change->num_changed());
+    change->Run("DELETE FROM displays");
+    change->Run("DELETE FROM settings WHERE name = 'settings'");
+    change.Log(actor, "system.factory_reset", "", done);
+    change.Commit();
+  }
+  for (const fs::path& copy : OldCopies(state)) RemoveAccountsFromCopy(copy);
+  for (const char* name : kOfPageAndUpdates) Remove(state / name);
+  return done;
+}
+
+}  // namespace
+
+void RequestFactoryReset(const fs::path& state, FactoryReset kind, const Actor& actor) {
+  const Json json = {{"kind", kind == FactoryReset::kWipe ? kWipe : kKeep},
+                     {"user", actor.user},
+                     {"address", actor.address}};
+  PlaceFile(state, kFactoryResetFile, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+void CancelFactoryReset(const fs::path& state) {
+  if (::unlink((state / kFactoryResetFile).c_str()) != 0 && errno != ENOENT)
+    throw IoError(DescribeWriteError(state / kFactoryResetFile, errno));
+  SyncToDisk(state);
+}
+
+std::optional<Message> CarryOutFactoryReset(const fs::path& state) {
+  const fs::path file = state / kFactoryResetFile;
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(file, error))) return std::nullopt;
+  const Request request = ReadRequest(file);
+  Message done = say::backup::ResetWiped();
+  if (request.kind == FactoryReset::kWipe) {
+    Wipe(state);
+    Store(state).audit.Log(request.actor, "system.factory_reset", "", done);
+  } else {
+    done = KeepRecords(state, request.actor);
+  }
+  CancelFactoryReset(state);
+  return done;
+}
+
+}  // namespace plumb

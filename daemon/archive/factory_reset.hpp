@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reset to the state of delivery: requested on the page or the command line, carried out at the
+// next start, before anything else opens the state folder.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "algo/base/message.hpp"
+#include "web/model/account.hpp"
+#include "web/model/settings.hpp"
+
+namespace plumb {
+
+/// In the state folder; systemd/factory-reset reads its kind too.
+inline constexpr const char* kFactoryResetFile = "factory-reset.json";
+
+/// Records the request and who made it, durably. The file gets the folder's owner.
+/// @throws IoError
+void RequestFactoryReset(const std::filesystem::path& state, FactoryReset kind, const Actor& actor);
+
+/// Withdraws a request that has not been carried out.
+void CancelFactoryReset(const std::filesystem::path& state);
+
+/// Carries out a request; an interrupted one starts again. Keeping the records removes accounts,
+/// paired displays, settings, uploaded bundles, and the keys of page and browsers; wiping removes
+/// everything in the folder. The (new) audit log records who requested it.
+/// @returns what was done, as a sentence; nothing without a request.
+/// @throws DataError for a request that cannot be read, which changes nothing; IoError and its
+///         kinds, after which the next start continues.
+std::optional<Message> CarryOutFactoryReset(const std::filesystem::path& state);
+
+}  // namespace plumb

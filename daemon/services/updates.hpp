@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// System updates, the restart after them and the factory reset, for page and control socket.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "algo/base/message.hpp"
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/control/attached_file.hpp"
+#include "daemon/loop/alive_flag.hpp"
+#include "daemon/update/system_restart.hpp"
+#include "daemon/update/updater.hpp"
+#include "daemon/update/usb_sticks.hpp"
+#include "web/service/upkeep_services.hpp"
+
+namespace plumb {
+
+struct UpdatesOptions {
+  UpdateConfig config;
+  std::filesystem::path state;                           ///< State folder for a factory reset.
+  std::filesystem::path sticks = "/run/plumb-stick";     ///< See UsbSticks.
+  std::filesystem::path release = "/etc/plumb-release";  ///< See VersionOfSystem().
+  std::string bus_address = {};                          ///< Empty: the system bus.
+  std::string boot = {};  ///< Unique for each start of the machine; empty if unknown.
+  std::function<bool(std::function<void()>)> run_in_background;  ///< See UpdaterOptions.
+  std::function<void()> changed;  ///< Called when GetUpdate() has changed.
+  std::function<void(const Actor& actor, const char* action, const std::string& subject,
+                     const Message& detail)>
+      log;  ///< Writes to the audit log.
+};
+
+/// Used on the loop's thread. Nothing is installed or restarted during a scan, and no scan begins
+/// during an update.
+class Updates : public web::UpdateService {
+ public:
+  /// The first three are borrowed. @param restart  Restarts the machine.
+  Updates(EventLoop& loop, Appliance& appliance, CurrentSession& session,
+          std::unique_ptr<SystemRestart> restart, UpdatesOptions options);
+  ~Updates() override;
+  Updates(const Updates&) = delete;
+  Updates& operator=(const Updates&) = delete;
+
+  [[nodiscard]] UpdateStatus GetUpdate() override { return updater_.status(); }
+  void AddBundle(const Actor& actor, const std::filesystem::path& file, const std::string& name,
+                 Done done) override;
+  void RemoveBundle(const Actor& actor, const std::string& name, Done done) override;
+  void InstallUpdate(const Actor& actor, const std::string& bundle, Done done) override;
+  /// Copies the open file to the bundles, off the loop, then installs it. The copy is removed
+  /// when the installation has ended or was refused.
+  void InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile> file,
+                   const std::string& name, Done done);
+  [[nodiscard]] std::vector<std::string> StickBundles() override { return sticks_.Bundles(); }
+  void InstallFromStick(const Actor& actor, const std::string& bundle, Done done) override;
+  void RestartSystem(const Actor& actor, Done done) override;
+  void ResetToFactory(const Actor& actor, FactoryReset kind, Done done) override;
+  void ForgetRollBack(const Actor& actor, Done done) override;
+
+ private:
+  /// Passes the answer on to `done` and writes it to the audit log.
+  [[nodiscard]] Done LogInstall(const Actor& actor, const std::string& bundle, Done done);
+  /// Why no update may begin now, during which no scan can begin: a scan runs, or a patient's
+  /// session is open (the demo's does not count). Empty if it may.
+  [[nodiscard]] Message WhyNotInstall() const;
+  /// The same for a restart of the machine.
+  [[nodiscard]] Message WhyNotRestart() const;
+  /// Why no scan may begin now; empty if it may.
+  [[nodiscard]] Message WhyNotScan() const;
+  /// Requests the restart; `restarting_` is set.
+  void GoDown(const Actor& actor, Done done);
+  /// The machine still runs although its restart was accepted: scans are possible again, and no
+  /// later restart carries out a factory reset that was requested with this one.
+  void OnStillRunning();
+
+  EventLoop& loop_;
+  Appliance& appliance_;
+  CurrentSession& session_;
+  std::unique_ptr<SystemRestart> restart_;
+  UpdatesOptions options_;
+  UsbSticks sticks_;
+  bool restarting_ = false, copying_ = false;
+  Actor restarted_by_;
+  EventLoop::Source restart_limit_;
+  AliveFlag alive_;
+  Updater updater_;  // Declared last, so destroyed first: its callbacks use the members above.
+};
+
+}  // namespace plumb

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page's service for backups and diagnostics.
+#include "daemon/services/web_services.hpp"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/errors.hpp"
+#include "daemon/loop/loop_report.hpp"
+#include "daemon/unit/diagnostics.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/temporary.hpp"
+#include "words/upkeep.hpp"
+
+namespace plumb {
+
+namespace {
+
+class WebMaintenance final : public web::MaintenanceService {
+ public:
+  WebMaintenance(Appliance& appliance, StorageUpkeep& upkeep, const LoopMeter& meter,
+                 StoreAccess& store)
+      : appliance_(appliance), upkeep_(upkeep), meter_(meter), store_(store) {}
+
+  void MakeBackup(const Actor& actor, Done done) override {
+    const std::filesystem::path folder = upkeep_.BackupTarget();
+    if (folder.empty()) return done(Refused(ChangeResult::kInvalid, say::upkeep::NoBackupFolder()));
+    upkeep_.BackUp(
+        actor, folder, alive_.WhileAlive([done](const Message& error, const BackupReport&) {
+          done(Refused(error.empty() ? ChangeResult::kDone : ChangeResult::kFailed, error));
+        }));
+  }
+
+  void WriteDiagnostics(const Actor& actor, Done done) override {
+    const nlohmann::json status = appliance_.StatusJson();
+    const std::string loop = LoopTable(meter_);
+    const Health health = appliance_.health();
+    const auto report = [done = std::move(done)](const Change& change) {
+      Change answer = change;
+      answer.file = std::exchange(answer.id, {});
+      done(answer);
+    };
+    store_.Write(&Store::audit, report, [=](AuditStore& audit) {
+      const std::string text =
+          DiagnosticsText(status, health, loop, audit.Find({0, 500, "", /*views=*/false}));
+      std::string name;
+      try {
+        const UniqueFile file =
+            MakeUniqueFile(std::filesystem::temp_directory_path(), "plumb-diagnostics-", ".txt");
+        ::close(file.descriptor);
+        name = file.path.string();
+        WriteWholeFile(name, text);
+      } catch (const IoError& error) {
+        throw DiskRefused(error.message());
+      }
+      audit.Log(actor, "diagnostics.write", "", Message());
+      return name;
+    });
+  }
+
+ private:
+  Appliance& appliance_;
+  StorageUpkeep& upkeep_;
+  const LoopMeter& meter_;
+  StoreAccess& store_;
+  AliveFlag alive_;
+};
+
+}  // namespace
+
+std::unique_ptr<web::MaintenanceService> MakeWebMaintenance(Appliance& appliance,
+                                                            StorageUpkeep& upkeep,
+                                                            const LoopMeter& meter,
+                                                            StoreAccess& store) {
+  return std::make_unique<WebMaintenance>(appliance, upkeep, meter, store);
+}
+
+}  // namespace plumb

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page's services for the daily check, the room's calibration and the sensor's profile.
+#include "daemon/services/web_services.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/loop/log.hpp"
+#include "words/audit.hpp"
+
+namespace plumb {
+
+namespace {
+
+class WebChecks final : public web::CheckService {
+ public:
+  WebChecks(Appliance& appliance, const ReferenceGate& references, StoreAccess& store)
+      : appliance_(appliance), references_(references), store_(store) {}
+
+  CheckStatus GetChecks() override {
+    return store_.Read([this](Store&) { return references_.Checks(); });
+  }
+
+  void OpenCheck(const Actor& actor, Done done) override {
+    if (const Message refusal = appliance_.OpenCheck(actor); !refusal.empty())
+      return done(AnswerOf(refusal));
+    store_.Write(&Store::audit, std::move(done),
+                 [=](AuditStore& audit) { audit.Log(actor, "check.open", "", Message()); });
+  }
+
+  void SetCheckBaseline(const Actor& actor, const std::string& check_id, const std::string& reason,
+                        Done done) override {
+    store_.Write(&Store::checks, std::move(done),
+                 [=](CheckStore& checks) { checks.SetBaseline(actor, check_id, reason); });
+  }
+
+ private:
+  Appliance& appliance_;
+  const ReferenceGate& references_;
+  StoreAccess& store_;
+};
+
+class WebRoomCalibration final : public web::RoomCalibrationService {
+ public:
+  WebRoomCalibration(RoomInUse& room, StoreAccess& store) : room_(room), store_(store) {}
+
+  web::RoomCalibrationStatus GetRoomCalibration() override {
+    web::RoomCalibrationStatus status;
+    if (!store_.IsThere()) return status;
+    try {
+      status = room_.Calibration();
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError,
+          fmt::format("the room's calibration cannot be read from the store: {}", error.what()));
+      status.due = status.why_not_sign = MessageOf(error);
+    }
+    return status;
+  }
+
+  void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) override {
+    const auto [serial, since] = room_.ScansWanted();
+    // StoreAccess calls nothing once the services are destroyed, and the room outlives them.
+    store_.Write(
+        &Store::room,
+        [&room = room_, done = std::move(done)](const Change& answer) {
+          if (answer.result == ChangeResult::kDone) room.Refresh();
+          done(answer);
+        },
+        [=, serial = serial, since = since](RoomStore& room) {
+          return room.Sign(actor, serial, since, digest);
+        });
+  }
+
+  std::optional<std::string> RoomBoardPdf(Message& why_not) override {
+    try {
+      return room_.BoardPdf();
+    } catch (const std::exception& error) {
+      why_not = MessageOf(error);
+      return std::nullopt;
+    }
+  }
+
+ private:
+  RoomInUse& room_;
+  StoreAccess& store_;
+};
+
+class WebSensorProfiles final : public web::SensorProfileService {
+ public:
+  WebSensorProfiles(Appliance& appliance, UnitProfiles& profiles, const Notices& notices,
+                    StoreAccess& store)
+      : appliance_(appliance), profiles_(profiles), notices_(notices), store_(store) {}
+
+  SensorProfiles GetSensorProfiles() override { return profiles_.OfConnected(); }
+
+  std::optional<std::string> SensorProfileFile(int version) override {
+    return profiles_.FileOf(version);
+  }
+
+  void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) override {
+    ChangeProfile(serial, done, [=, shelf = profiles_.shelf()](AuditStore& audit) {
+      const int version = shelf->Reset(serial);
+      audit.Log(actor, "profile.reset", serial, say::audit::ProfileVersion(version));
+    });
+  }
+
+  void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
+                             Done done) override {
+    ChangeProfile(serial, done, [=, shelf = profiles_.shelf()](AuditStore& audit) {
+      try {
+        const int made = shelf->RollBack(serial, version);
+        audit.Log(actor, "profile.roll_back", serial, say::audit::ProfileRolledBack(version, made));
+      } catch (const DataError& error) {
+        throw StoreRefusal(ChangeResult::kNotFound, error.message());
+      }
+    });
+  }
+
+ private:
+  /// As StoreAccess::Change(); afterwards the last scan's objection to the profile is discarded.
+  void ChangeProfile(const std::string& serial, const Done& done,
+                     std::function<void(AuditStore&)> change) {
+    if (RefuseIf(appliance_.WhyNotIdle(), done)) return;
+    if (RefuseIf(profiles_.WhyNotChange(serial), done)) return;
+    store_.Write(
+        &Store::audit,
+        [this, done](const Change& answer) {
+          if (answer.result == ChangeResult::kDone) {
+            profiles_.SetDrift({});
+            notices_.TellPage(web::EventKind::kStatus);
+          }
+          done(answer);
+        },
+        std::move(change));
+  }
+
+  Appliance& appliance_;
+  UnitProfiles& profiles_;
+  const Notices& notices_;
+  StoreAccess& store_;
+};
+
+}  // namespace
+
+std::unique_ptr<web::CheckService> MakeWebChecks(Appliance& appliance,
+                                                 const ReferenceGate& references,
+                                                 StoreAccess& store) {
+  return std::make_unique<WebChecks>(appliance, references, store);
+}
+
+std::unique_ptr<web::RoomCalibrationService> MakeWebRoomCalibration(RoomInUse& room,
+                                                                    StoreAccess& store) {
+  return std::make_unique<WebRoomCalibration>(room, store);
+}
+
+std::unique_ptr<web::SensorProfileService> MakeWebSensorProfiles(Appliance& appliance,
+                                                                 UnitProfiles& profiles,
+                                                                 const Notices& notices,
+                                                                 StoreAccess& store) {
+  return std::make_unique<WebSensorProfiles>(appliance, profiles, notices, store);
+}
+
+}  // namespace plumb

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/services/web_services.hpp"
+
+#include <systemd/sd-id128.h>
+
+#include <array>
+#include <cstdlib>
+#include <string>
+#include <utility>
+
+namespace plumb {
+
+namespace {
+
+/// Identifier of this start of the machine. The unit passes it on, because its sandbox hides the
+/// file.
+std::string BootId() {
+  if (const char* given = std::getenv("PLUMB_BOOT_ID"); given != nullptr) return given;
+  sd_id128_t id{};
+  std::array<char, SD_ID128_STRING_MAX> text{};
+  return sd_id128_get_boot(&id) < 0 ? std::string() : sd_id128_to_string(id, text.data());
+}
+
+}  // namespace
+
+WebServices::WebServices(Appliance& appliance, SharedParts& shared,
+                         std::unique_ptr<SystemRestart> restart)
+    : store_(shared.loop, shared.storage, shared.store_thread, shared.notices),
+      audit_(MakeWebAuditLog(store_)),
+      button_(MakeWebAppliance(appliance, shared.monitoring, shared.sensors, shared.notices)),
+      patients_(MakeWebPatients(appliance, shared.session, shared.references, store_)),
+      references_(MakeWebReferences(shared.references, shared.room, store_)),
+      scans_(MakeWebScans(appliance, shared.references, shared.room, store_)),
+      checks_(MakeWebChecks(appliance, shared.references, store_)),
+      room_(MakeWebRoomCalibration(shared.room, store_)),
+      profiles_(MakeWebSensorProfiles(appliance, shared.profiles, shared.notices, store_)),
+      displays_(MakeWebDisplays(store_)),
+      accounts_(MakeWebAccounts(store_)),
+      settings_(MakeWebSettings(store_)),
+      maintenance_(MakeWebMaintenance(appliance, shared.upkeep, shared.loop.meter(), store_)),
+      updates_(
+          shared.loop, appliance, shared.session, std::move(restart),
+          {.config = shared.given.config.update,
+           .state = shared.storage.state(),
+           .boot = BootId(),
+           .run_in_background =
+               [this](std::function<void()> work) {
+                 return background_.PostToFiles(std::move(work));
+               },
+           .changed = [&notices = shared.notices] { notices.TellPage(web::EventKind::kUpdate); },
+           .log = [this](const Actor& actor, const char* action, const std::string& subject,
+                         const Message& detail) { audit_->Log(actor, action, subject, detail); }}),
+      background_(shared.loop) {}
+
+}  // namespace plumb

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// The services of the page, implemented by the appliance.
+#pragma once
+
+#include <memory>
+
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/shared_parts.hpp"
+#include "daemon/services/background_threads.hpp"
+#include "daemon/services/store_access.hpp"
+#include "daemon/services/updates.hpp"
+#include "web/service/services.hpp"
+
+namespace plumb {
+
+// Make the services, which are implemented in web_*.cpp. They keep references to the arguments.
+[[nodiscard]] std::unique_ptr<web::AccountService> MakeWebAccounts(StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::ApplianceService> MakeWebAppliance(Appliance& appliance,
+                                                                      LiveMonitoring& monitoring,
+                                                                      const SensorThread& sensors,
+                                                                      Notices& notices);
+[[nodiscard]] std::unique_ptr<web::AuditLog> MakeWebAuditLog(StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::CheckService> MakeWebChecks(Appliance& appliance,
+                                                               const ReferenceGate& references,
+                                                               StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::DisplayService> MakeWebDisplays(StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::MaintenanceService> MakeWebMaintenance(Appliance& appliance,
+                                                                          StorageUpkeep& upkeep,
+                                                                          const LoopMeter& meter,
+                                                                          StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance,
+                                                                   CurrentSession& session,
+                                                                   const ReferenceGate& references,
+                                                                   StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::ReferenceService> MakeWebReferences(
+    const ReferenceGate& references, const RoomInUse& room, StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::RoomCalibrationService> MakeWebRoomCalibration(
+    RoomInUse& room, StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::ScanService> MakeWebScans(Appliance& appliance,
+                                                             const ReferenceGate& references,
+                                                             const RoomInUse& room,
+                                                             StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::SensorProfileService> MakeWebSensorProfiles(
+    Appliance& appliance, UnitProfiles& profiles, const Notices& notices, StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(StoreAccess& store);
+
+/// Owns the services, one class for each subject. Used on the loop's thread.
+class WebServices {
+ public:
+  /// Appliance and parts are borrowed and outlive this object. @param restart  Restarts the
+  /// machine.
+  WebServices(Appliance& appliance, SharedParts& shared, std::unique_ptr<SystemRestart> restart);
+
+  /// References to what this object owns.
+  [[nodiscard]] web::Services services() {
+    return {.background = background_,
+            .appliance = *button_,
+            .patients = *patients_,
+            .references = *references_,
+            .scans = *scans_,
+            .checks = *checks_,
+            .room = *room_,
+            .profiles = *profiles_,
+            .displays = *displays_,
+            .accounts = *accounts_,
+            .audit = *audit_,
+            .settings = *settings_,
+            .updates = updates_,
+            .maintenance = *maintenance_};
+  }
+  [[nodiscard]] Updates& updates() { return updates_; }
+
+ private:
+  StoreAccess store_;
+  std::unique_ptr<web::AuditLog> audit_;
+  std::unique_ptr<web::ApplianceService> button_;
+  std::unique_ptr<web::PatientService> patients_;
+  std::unique_ptr<web::ReferenceService> references_;
+  std::unique_ptr<web::ScanService> scans_;
+  std::unique_ptr<web::CheckService> checks_;
+  std::unique_ptr<web::RoomCalibrationService> room_;
+  std::unique_ptr<web::SensorProfileService> profiles_;
+  std::unique_ptr<web::DisplayService> displays_;
+  std::unique_ptr<web::AccountService> accounts_;
+  std::unique_ptr<web::SettingsService> settings_;
+  std::unique_ptr<web::MaintenanceService> maintenance_;
+  // Declared last, so destroyed first: their callbacks and their work use the members above.
+  Updates updates_;
+  BackgroundThreads background_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/dicom/lock_down.hpp"
+
+#include <linux/audit.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <vector>
+
+#include "algo/base/errors.hpp"
+#include "words/dicom.hpp"
+
+namespace plumb {
+namespace {
+
+#if defined(__x86_64__)
+constexpr unsigned kArchitecture = AUDIT_ARCH_X86_64;
+#elif defined(__aarch64__)
+constexpr unsigned kArchitecture = AUDIT_ARCH_AARCH64;
+#endif
+
+constexpr auto kAllowed = std::to_array<unsigned>({
+    SYS_read,           SYS_write,     SYS_close,       SYS_fstat,           SYS_lseek,
+    SYS_mmap,           SYS_munmap,    SYS_mremap,      SYS_mprotect,        SYS_brk,
+    SYS_madvise,        SYS_futex,     SYS_exit,        SYS_exit_group,      SYS_rt_sigreturn,
+    SYS_rt_sigprocmask, SYS_ppoll,     SYS_getpid,      SYS_gettid,          SYS_tgkill,
+    SYS_clock_gettime,  SYS_getrandom, SYS_sched_yield, SYS_restart_syscall,
+#ifdef SYS_poll
+    SYS_poll,
+#endif
+});
+
+sock_filter Load(std::size_t offset) {
+  return BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<unsigned>(offset));
+}
+
+sock_filter Return(unsigned what) { return BPF_STMT(BPF_RET | BPF_K, what); }
+
+/// Skips the next instruction unless the loaded value is this one.
+sock_filter UnlessSkip(unsigned value) { return BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, 0, 1); }
+
+}  // namespace
+
+void LockDown() {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  // The sanitizers' own work needs more.
+#else
+  std::vector<sock_filter> filter = {
+      Load(offsetof(seccomp_data, arch)), BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kArchitecture, 1, 0),
+      Return(SECCOMP_RET_KILL_PROCESS), Load(offsetof(seccomp_data, nr))};
+  for (const unsigned call : kAllowed) {
+    filter.push_back(UnlessSkip(call));
+    filter.push_back(Return(SECCOMP_RET_ALLOW));
+  }
+  filter.push_back(Return(SECCOMP_RET_ERRNO | EPERM));
+  const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
+  if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
+      ::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_TSYNC, &program) != 0)
+    throw IoError(say::dicom::NoSandbox(std::strerror(errno)));
+#endif
+}
+
+}  // namespace plumb

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// What Plumb takes from one DICOM file.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "algo/types/treatment_plan.hpp"
+
+namespace plumb {
+
+/// Neither a structure set nor a plan: a file of another kind, of which only this much is read.
+struct PlanningContent {
+  PlanningFile file;
+  std::string modality;  ///< Such as "RTSTRUCT", as the file states it.
+  std::optional<StructureSet> structures;
+  std::optional<TreatmentPlan> plan;
+};
+
+/// Larger files are refused.
+inline constexpr std::size_t kMostDicomBytes = std::size_t{64} << 20;
+/// So are files with more points in all contours together.
+inline constexpr std::size_t kMostContourPoints = 2'000'000;
+
+}  // namespace plumb

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/dicom/planning_files.hpp"
+
+#include <fcntl.h>
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "algo/base/errors.hpp"
+#include "drivers/dicom/planning_wire.hpp"
+#include "drivers/files/descriptor.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/reader_process.hpp"
+#include "drivers/program_folders.hpp"
+#include "words/dicom.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path DicomReaderProgram() {
+  const std::optional<fs::path> program = FindBesideProgram("lib/plumb/plumb-dicom-reader");
+  if (!program) throw IoError(say::dicom::ReaderMissing());
+  return *program;
+}
+
+void ReadAll(ReaderProcess& reader, void* data, std::size_t size) {
+  switch (reader.Read(data, size)) {
+    case ReaderProcess::Got::kAll:
+      return;
+    case ReaderProcess::Got::kEnd: {
+      const ReaderProcess::End end = reader.Reap();
+      throw DataError(end.crashed ? say::dicom::ReaderCrashed(end.code)
+                                  : say::dicom::ReaderEnded(end.code));
+    }
+    case ReaderProcess::Got::kSilence:
+      throw DataError(say::dicom::ReaderSilent());
+  }
+}
+
+PlanningContent AskReader(const fs::path& file) {
+  ReaderProcess reader(DicomReaderProgram(), {file.string()});
+  PlanningHeader header;
+  ReadAll(reader, &header, sizeof header);
+  if (header.magic != PlanningHeader::kMagic || header.text_bytes > kMostFactBytes ||
+      header.num_numbers > 3 * kMostContourPoints)
+    throw DataError(say::dicom::ReaderVersion());
+  std::string text(static_cast<std::size_t>(header.text_bytes), ' ');
+  ReadAll(reader, text.data(), text.size());
+  if (header.is_error != 0) throw DataError(ReaderErrorOf(text));
+  std::vector<double> numbers(static_cast<std::size_t>(header.num_numbers));
+  ReadAll(reader, numbers.data(), numbers.size() * sizeof(double));
+  return ParsePlanning(text, numbers);
+}
+
+}  // namespace
+
+bool IsDicomFile(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return false;
+  const Descriptor opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  std::array<char, 132> first{};
+  return opened.get() >= 0 &&
+         ReadAllAt(opened.get(), 0, std::as_writable_bytes(std::span(first))) ==
+             static_cast<ssize_t>(first.size()) &&
+         std::string_view(first.data() + 128, 4) == "DICM";
+}
+
+PlanningContent ReadDicomFile(const fs::path& file) {
+  std::error_code error;
+  if (!fs::exists(file, error)) throw DataError(say::dicom::NoFile(file.string()));
+  try {
+    return AskReader(fs::absolute(file));
+  } catch (const DataError& why) {
+    throw DataError(say::dicom::Damaged(file.string(), why.message()));
+  }
+}
+
+StructureSet ReadStructureSet(const fs::path& file) {
+  PlanningContent content = ReadDicomFile(file);
+  if (!content.structures)
+    throw DataError(
+        say::dicom::OtherKind(file.string(), content.modality, say::dicom::KindStructures()));
+  return *std::move(content.structures);
+}
+
+TreatmentPlan ReadTreatmentPlan(const fs::path& file) {
+  PlanningContent content = ReadDicomFile(file);
+  if (!content.plan)
+    throw DataError(say::dicom::OtherKind(file.string(), content.modality, say::dicom::KindPlan()));
+  return *std::move(content.plan);
+}
+
+}  // namespace plumb

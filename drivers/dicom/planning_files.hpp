@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Structure sets, plans and other DICOM files, read by plumb-dicom-reader in a process of its own.
+#pragma once
+
+#include <filesystem>
+
+#include "drivers/dicom/planning_content.hpp"
+
+namespace plumb {
+
+/// True for a file that begins as DICOM files do.
+[[nodiscard]] bool IsDicomFile(const std::filesystem::path& file);
+
+/// @throws DataError if it cannot be read, is damaged, or needs too much memory or time; IoError if
+///         this installation has no reader.
+[[nodiscard]] PlanningContent ReadDicomFile(const std::filesystem::path& file);
+
+/// @throws DataError as above, and if it is a file of another kind.
+[[nodiscard]] StructureSet ReadStructureSet(const std::filesystem::path& file);
+[[nodiscard]] TreatmentPlan ReadTreatmentPlan(const std::filesystem::path& file);
+
+}  // namespace plumb

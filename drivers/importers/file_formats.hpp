@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// The formats of binary recordings that Plumb reads itself, told apart by the files' first bytes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+namespace plumb {
+
+enum class FileFormat { kRosBag, kSens };
+
+/// So many bytes suffice to recognise a file's format.
+inline constexpr std::size_t kFirstBytes = 64;
+
+[[nodiscard]] inline std::optional<FileFormat> FormatOf(std::span<const std::uint8_t> first) {
+  const std::string_view text(reinterpret_cast<const char*>(first.data()), first.size());
+  if (text.starts_with("#ROSBAG V2.0\n")) return FileFormat::kRosBag;
+  // Version 4, then the length of a name in 8 bytes, of which the upper six are 0.
+  constexpr std::string_view kSens("\4\0\0\0", 4), kShort("\0\0\0\0\0\0", 6);
+  if (text.starts_with(kSens) && text.size() >= 12 && text.substr(6, 6) == kShort)
+    return FileFormat::kSens;
+  return std::nullopt;
+}
+
+}  // namespace plumb

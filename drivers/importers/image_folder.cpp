@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/importers/image_folder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <string_view>
+#include <utility>
+
+#include <opencv2/core/mat.hpp>
+
+#include "algo/base/errors.hpp"
+#include "algo/base/parse_number.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
+#include "drivers/importers/recorded_file.hpp"
+#include "drivers/replay/foreign_calibration.hpp"
+#include "words/foreign.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxCameraFile = std::size_t{1} << 16;
+constexpr double kUsualRate_hz = 30.0;
+constexpr std::array kColorFolders = {"color", "colour", "rgb", "image", "images"};
+
+/// Where the images are, relative to the recording's folder.
+struct Layout {
+  std::string format;
+  std::string color, depth;                     ///< Folders; empty: the recording's own.
+  std::string_view color_ending, depth_ending;  ///< Empty: any image.
+};
+
+bool EndsLike(const std::string& name, std::string_view ending, bool is_depth) {
+  if (!ending.empty()) return name.ends_with(ending);
+  return name.ends_with(".png") ||
+         (!is_depth && (name.ends_with(".jpg") || name.ends_with(".jpeg")));
+}
+
+/// The last number in a name, by which colour and depth images are paired.
+std::optional<std::int64_t> NumberOf(std::string_view name) {
+  const std::size_t end = name.find_last_of("0123456789");
+  if (end == std::string_view::npos) return std::nullopt;
+  const std::size_t before = name.find_last_not_of("0123456789", end);
+  const std::size_t begin = before == std::string_view::npos ? 0 : before + 1;
+  return ParseNumber<std::int64_t>(name.substr(begin, end + 1 - begin));
+}
+
+using Numbered = std::map<std::int64_t, std::string>;
+
+Numbered ImagesIn(const fs::path& folder, const std::string& sub, std::string_view ending,
+                  bool is_depth) {
+  Numbered images;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder / sub, error), end; entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!EndsLike(name, ending, is_depth)) continue;
+    const std::string stem = ending.empty() ? entry->path().stem().string()
+                                            : name.substr(0, name.size() - ending.size());
+    const std::optional<std::int64_t> number = NumberOf(stem);
+    if (!number) throw DataError(say::foreign::NameWithoutNumber((folder / sub / name).string()));
+    if (images.size() >= kMostRecordedImages)
+      throw DataError(say::foreign::TooManyImages(kMostRecordedImages));
+    if (!images.emplace(*number, sub.empty() ? name : sub + "/" + name).second)
+      throw DataError(say::foreign::NumberTwice((folder / sub).string(), *number));
+  }
+  if (error) throw DataError(say::foreign::Unreadable());
+  return images;
+}
+
+/// The time that a name states: seconds with decimals, or a whole number of milli-, micro- or
+/// nanoseconds since 1970, told apart by its length.
+std::optional<double> StampOf(std::string_view stem) {
+  if (stem.empty() || stem.find_first_not_of("0123456789.") != std::string_view::npos)
+    return std::nullopt;
+  const std::optional<double> value = ParseNumber<double>(stem);
+  if (!value || stem.find('.') != std::string_view::npos) return value;
+  constexpr std::array<std::pair<std::size_t, double>, 3> kUnits = {
+      {{13, 1e-3}, {16, 1e-6}, {19, 1e-9}}};
+  for (const auto& [digits, unit_s] : kUnits)
+    if (stem.size() == digits) return *value * unit_s;
+  return std::nullopt;
+}
+
+/// The images of a folder by the stamps in their names; empty unless every name has one.
+std::vector<IndexEntry> StampedIn(const fs::path& folder, const std::string& sub, bool is_depth) {
+  std::vector<IndexEntry> images;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder / sub, error), end; entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!EndsLike(name, {}, is_depth)) continue;
+    const std::optional<double> time_s = StampOf(entry->path().stem().string());
+    if (!time_s || images.size() >= kMostRecordedImages) return {};
+    images.push_back({*time_s, sub + "/" + name});
+  }
+  std::ranges::sort(images, {}, &IndexEntry::time_s);
+  const auto same = [](const IndexEntry& a, const IndexEntry& b) { return a.time_s == b.time_s; };
+  if (std::ranges::adjacent_find(images, same) != images.end()) return {};
+  return images;
+}
+
+bool HasImages(const fs::path& folder, const Layout& layout) {
+  const auto has = [&](const std::string& sub, std::string_view ending, bool is_depth) {
+    std::error_code error;
+    for (fs::directory_iterator entry(folder / sub, error), end; entry != end;
+         entry.increment(error))
+      if (EndsLike(entry->path().filename().string(), ending, is_depth)) return true;
+    return false;
+  };
+  return has(layout.color, layout.color_ending, false) &&
+         has(layout.depth, layout.depth_ending, true);
+}
+
+std::optional<Layout> LayoutOf(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return std::nullopt;
+  for (const char* color : kColorFolders) {
+    const Layout layout{"folder of images", color, "depth", {}, {}};
+    if (HasImages(folder, layout)) return layout;
+  }
+  const Layout scenes{"7-Scenes", {}, {}, ".color.png", ".depth.png"};
+  if (HasImages(folder, scenes)) return scenes;
+  return std::nullopt;
+}
+
+/// 7-Scenes' camera, from its web page: the default of its Kinect for colour and depth alike.
+CameraFile SevenScenesCamera() {
+  CameraFile camera;
+  camera.color = {.width = 640, .height = 480, .fx = 585, .fy = 585, .cx = 320, .cy = 240};
+  camera.depth_scale = 1000.0;
+  camera.depth_camera_unknown = true;
+  return camera;
+}
+
+/// The camera, what it is from, and the rate that its file states.
+struct FoundCamera {
+  CameraFile camera;
+  std::string file;
+  bool assumed = false;
+  std::optional<double> rate_hz = {};
+  std::string sensor_name = {}, serial = {};
+};
+
+FoundCamera CameraOf(const fs::path& folder, const Layout& layout, const fs::path& first_image) {
+  if (const fs::path file = folder / "camera.yaml"; fs::exists(fs::symlink_status(file)))
+    return {.camera = ParseCameraFile(ReadTextFile(file, kMaxCameraFile), file.string()),
+            .file = "camera.yaml"};
+  const cv::Mat image = ReadColorImage(first_image);
+  // Some programs keep the calibration beside the images' folders, others among the colour images.
+  for (const fs::path& place : {folder, folder / layout.color}) {
+    if (auto found = FindForeignCalibration(place, image.cols, image.rows))
+      return {.camera = found->camera,
+              .file = found->file,
+              .rate_hz = found->rate_hz,
+              .sensor_name = found->sensor_name,
+              .serial = found->serial};
+  }
+  if (layout.color_ending.empty()) throw DataError(say::foreign::NoCalibration(folder.string()));
+  return {.camera = SevenScenesCamera(), .file = layout.format, .assumed = true};
+}
+
+/// Adds the pairs of equal numbers, with stamps of a steady rate.
+void AddPairs(const Numbered& color, const Numbered& depth, double rate_hz, ImageFolder& contents) {
+  std::int64_t unpaired = 0;
+  const std::int64_t first = std::min(color.begin()->first, depth.begin()->first);
+  for (const auto& [number, file] : color) {
+    const auto partner = depth.find(number);
+    if (partner == depth.end()) {
+      ++unpaired;
+      continue;
+    }
+    const double time_s = static_cast<double>(number - first) / rate_hz;
+    contents.color.push_back({time_s, file});
+    contents.depth.push_back({time_s, partner->second});
+  }
+  unpaired += std::ssize(depth) - std::ssize(contents.depth);
+  if (contents.color.empty()) throw DataError(say::foreign::NoSameNumber(contents.folder.string()));
+  if (unpaired > 0) contents.warnings.push_back(say::foreign::NumbersUnpaired(unpaired));
+}
+
+/// Images that are numbered only, and their camera.
+FoundCamera TakeNumbered(const fs::path& folder, const Layout& layout,
+                         const RecordingDefaults& defaults, ImageFolder& contents) {
+  const Numbered color = ImagesIn(folder, layout.color, layout.color_ending, false);
+  const Numbered depth = ImagesIn(folder, layout.depth, layout.depth_ending, true);
+  FoundCamera found = CameraOf(folder, layout, folder / color.begin()->second);
+  const double rate_hz = defaults.rate_hz.value_or(found.rate_hz.value_or(kUsualRate_hz));
+  contents.warnings.push_back(say::foreign::RateAssumed(rate_hz));
+  contents.color.clear();
+  contents.depth.clear();
+  AddPairs(color, depth, rate_hz, contents);
+  return found;
+}
+
+class ImageFolderRecording : public ImportedRecording {
+ public:
+  ImageFolderRecording(const fs::path& folder, const Layout& layout,
+                       const RecordingDefaults& defaults) {
+    ImageFolder contents;
+    contents.folder = folder;
+    contents.color_list = folder / layout.color;
+    contents.depth_list = folder / layout.depth;
+    if (!layout.color.empty()) {
+      contents.color = StampedIn(folder, layout.color, false);
+      contents.depth = StampedIn(folder, layout.depth, true);
+    }
+    const bool is_stamped = !contents.color.empty() && !contents.depth.empty();
+    const FoundCamera found = is_stamped
+                                  ? CameraOf(folder, layout, folder / contents.color.front().file)
+                                  : TakeNumbered(folder, layout, defaults, contents);
+    contents.camera = found.camera;
+    contents.intrinsics_assumed = found.assumed;
+    if (found.assumed) contents.warnings.push_back(say::foreign::PublishedCamera(layout.format));
+    facts_ = {.format = layout.format,
+              .name = found.sensor_name,
+              .serial = found.serial,
+              .firmware = {},
+              .calibration = found.file,
+              .camera = found.camera,
+              .stereo_baseline_m = {},
+              .color_images = std::ssize(contents.color),
+              .depth_s = {}};
+    for (const IndexEntry& entry : contents.depth) facts_.depth_s.push_back(entry.time_s);
+    frames_ = OpenImageFolder(std::move(contents), defaults);
+  }
+  [[nodiscard]] const StreamInfo& info() const override { return frames_->info(); }
+  [[nodiscard]] const ImportedFacts& facts() const override { return facts_; }
+  [[nodiscard]] std::optional<Frame> Next() override { return frames_->Next(); }
+
+ private:
+  ImportedFacts facts_;
+  std::unique_ptr<FrameSource> frames_;
+};
+
+}  // namespace
+
+bool IsImageFolder(const fs::path& folder) { return LayoutOf(folder).has_value(); }
+
+std::unique_ptr<ImportedRecording> OpenImageFolderRecording(const fs::path& folder,
+                                                            const RecordingDefaults& defaults) {
+  const std::optional<Layout> layout = LayoutOf(folder);
+  if (!layout) throw DataError(say::foreign::NoCalibration(folder.string()));
+  return std::make_unique<ImageFolderRecording>(folder, *layout, defaults);
+}
+
+}  // namespace plumb

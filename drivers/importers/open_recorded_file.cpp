@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/importers/open_recorded_file.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "algo/base/errors.hpp"
+#include "drivers/importers/file_formats.hpp"
+#include "drivers/importers/realsense_bag.hpp"
+#include "drivers/importers/sens_file.hpp"
+#include "words/foreign.hpp"
+
+namespace plumb {
+
+std::unique_ptr<RecordedFile> OpenRecordedFile(FileBytes bytes) {
+  std::vector<std::uint8_t> first(
+      static_cast<std::size_t>(std::min<std::uint64_t>(kFirstBytes, bytes.size)));
+  if (!bytes.read(0, first)) throw DataError(say::foreign::Unreadable());
+  const std::optional<FileFormat> format = FormatOf(first);
+  if (format == FileFormat::kRosBag) return OpenRealSenseBag(std::move(bytes));
+  if (format == FileFormat::kSens) return OpenSensFile(std::move(bytes));
+  throw DataError(say::foreign::UnknownFormat());
+}
+
+}  // namespace plumb

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings of a sensor at rest over a body that breathes and moves.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "drivers/simulator/suites/planned_scenes.hpp"
+#include "drivers/simulator/suites/suite_options.hpp"
+
+namespace plumb::simulated {
+
+/// Names of the recordings, in order.
+[[nodiscard]] const std::vector<std::string>& LiveNames();
+
+/// Adds them after the plan's sweeps, over the body of the last one as it lies there: `live_still`
+/// (only breathing), `live_steps` (the couch is moved under it in steps), `live_passing` (a gantry
+/// passes, and the body moves behind it), `live_cough` (coughs, slides, a jerk), `live_pushed` (the
+/// sensor is pushed by a millimetre), and `live_two_left` and `live_two_right`, two sensors that
+/// see the same: an arm covers the left one, which is pushed later, while the body moves.
+void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options);
+
+/// Adds `rest`, one breath of four seconds before a sensor at rest over the body of a sweep, which
+/// can be repeated for ever, and `rest_moved`, the same after the body was moved by 5 mm.
+void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t sweep);
+
+}  // namespace plumb::simulated

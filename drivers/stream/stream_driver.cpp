@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/stream/stream_driver.hpp"
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "algo/base/errors.hpp"
+#include "drivers/live/boxed_sensor.hpp"
+#include "drivers/live/sensor_calibration.hpp"
+#include "drivers/replay/registration.hpp"
+#include "drivers/stream/feeder_server.hpp"
+#include "words/sensor.hpp"
+
+namespace plumb {
+namespace {
+
+using stream::Feeder;
+using stream::FeederServer;
+
+/// Less than half a period, so that an image has one partner.
+std::chrono::microseconds LargestGapOf(double rate_hz) {
+  return std::chrono::microseconds(static_cast<std::int64_t>(0.49e6 / rate_hz));
+}
+
+StreamInfo InfoOf(const SensorSettings& settings, const Feeder& feeder) {
+  const std::string& serial = feeder.description.serial;
+  const Intrinsics& color = feeder.hello.camera.color;
+  std::error_code error;
+  if (std::filesystem::exists(CalibrationFile(settings.calibration_folder, serial), error))
+    return LiveStreamInfo(settings, serial, color.width, color.height, 0.0);
+  nlohmann::json camera = feeder.hello.camera_keys;
+  camera.erase("depth_registered");  // Depth is registered here, whatever its camera.
+  return CalibratedStreamInfo(settings, camera.dump(), "camera", serial, color.width, color.height);
+}
+
+class StreamSensor : public BoxedSensor {
+ public:
+  StreamSensor(const SensorSettings& settings, const Feeder& feeder, std::shared_ptr<FrameBox> box,
+               std::shared_ptr<FeederServer> server)
+      : BoxedSensor(feeder.description, std::move(box)),
+        server_(std::move(server)),
+        units_per_metre_(feeder.hello.camera.depth_scale.value()) {
+    SetInfo(InfoOf(settings, feeder));
+    if (const std::optional<DepthCamera>& depth = feeder.hello.camera.depth_camera)
+      registration_.emplace(depth->intrinsics, info().intrinsics, depth->T_color_depth);
+  }
+  [[nodiscard]] std::optional<Frame> Next() override {
+    std::optional<FrameBox::Pair> pair = box().Take();
+    if (!pair) return std::nullopt;
+    Frame frame;
+    frame.index = pair->index;
+    frame.color_time_s = 1e-6 * static_cast<double>(pair->images.color_us);
+    frame.depth_time_s = 1e-6 * static_cast<double>(pair->images.depth_us);
+    frame.color_rgb = std::move(pair->images.color);
+    frame.depth_m = stream::DepthInMetres(pair->images.depth, units_per_metre_);
+    if (registration_) frame.depth_m = registration_->Register(frame.depth_m);
+    return frame;
+  }
+  void LockExposure(bool locked) override { server_->Tell({{"lock_exposure", locked}}); }
+
+ private:
+  const std::shared_ptr<FeederServer> server_;
+  const double units_per_metre_;
+  std::optional<DepthRegistration> registration_;
+};
+
+class StreamProvider : public SensorProvider {
+ public:
+  explicit StreamProvider(SensorSettings settings)
+      : settings_(std::move(settings)),
+        server_(std::make_shared<FeederServer>(settings_.stream_socket)) {}
+  ~StreamProvider() override { server_->events().SetListener({}); }
+
+  [[nodiscard]] std::vector<SensorDescription> List() override {
+    const std::optional<Feeder> feeder = server_->feeder();
+    if (!feeder) return {};
+    return {feeder->description};
+  }
+  void SetListener(std::function<void()> changed) override {
+    server_->events().SetListener(std::move(changed));
+  }
+  [[nodiscard]] std::unique_ptr<LiveSensor> Open(const std::string& serial) override {
+    const std::optional<Feeder> feeder = server_->feeder();
+    (void)ChooseSensor(feeder ? std::vector{feeder->description} : std::vector<SensorDescription>(),
+                       serial);
+    const auto box = std::make_shared<FrameBox>(
+        feeder->description.serial, LargestGapOf(feeder->hello.rate_hz), stream::kPatience);
+    auto sensor = std::make_unique<StreamSensor>(settings_, *feeder, box, server_);
+    box->Begin(0);
+    if (!server_->Deliver(feeder->description.uri, box))
+      throw DeviceError(say::sensor::UnpluggedWhileOpened(feeder->description.serial));
+    return sensor;
+  }
+
+ private:
+  const SensorSettings settings_;
+  const std::shared_ptr<FeederServer> server_;
+};
+
+class StreamSetup : public SensorSetup {
+ public:
+  explicit StreamSetup(SensorSettings settings) : settings_(std::move(settings)) {}
+  [[nodiscard]] std::unique_ptr<SensorProvider> MakeProvider() const override {
+    return std::make_unique<StreamProvider>(settings_);
+  }
+
+ private:
+  const SensorSettings settings_;
+};
+
+}  // namespace
+
+void AddStreamDriver(SensorRegistry& registry) {
+  registry.Add(
+      {.name = "stream",
+       .title = "stream",
+       .is_simulated = false,
+       .set_up = [](const SensorSettings& settings, const SimulatedSweeps&, const std::stop_token&,
+                    const SetUpProgress&) { return std::make_unique<StreamSetup>(settings); }});
+}
+
+}  // namespace plumb

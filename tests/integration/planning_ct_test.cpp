@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// Planning CTs on the command line.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "daemon/files/scene_folder.hpp"
+#include "tests/integration/command_line.hpp"
+#include "tests/unit/dicom/small_files.hpp"
+
+namespace plumb {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+class PlanningCtTest : public CommandLineTest {
+ protected:
+  RunResult Import(const simulated::PlanningCtOptions& options,
+                   const std::vector<std::string>& more = {}) {
+    const auto [structures, plan] = SmallCt(options);
+    std::vector<std::string> arguments = {
+        "import-dicom", Written(folder_ / "structures.dcm", DicomBytes(structures)),
+        Written(folder_ / "plan.dcm", DicomBytes(plan)), "--out", folder_ / "planned"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return Plumb(arguments);
+  }
+};
+
+TEST_F(PlanningCtTest, ASceneIsWrittenOrNothing) {
+  using simulated::CtQuirk;
+  const RunResult several = Import({.quirks = {CtQuirk::kSeveralExternal}});
+  EXPECT_EQ(several.exit_code, 3);
+  EXPECT_THAT(several.err, HasSubstr("--roi"));
+  EXPECT_TRUE(LeftBehind({"structures.dcm", "plan.dcm"}).empty());
+  const RunResult chosen =
+      Import({.quirks = {CtQuirk::kSeveralExternal}}, {"--roi", "BODY", "--json"});
+  ASSERT_EQ(chosen.exit_code, 0) << chosen.err;
+  const json scene = json::parse(chosen.out);
+  EXPECT_EQ(scene.at("source"), "dicom");
+  EXPECT_EQ(scene.at("frame"), "iec");
+  EXPECT_TRUE(scene.at("markers").empty());
+  for (const char* name : {"heightmap.tiff", "cloud.ply", "mesh.ply"})
+    EXPECT_TRUE(fs::exists(folder_ / "planned" / name)) << name;
+  EXPECT_EQ(ReadScene(folder_ / "planned").planning->roi, "BODY");
+}
+
+TEST_F(PlanningCtTest, AnOlderPlanInPlaceOfALaterOneIsSaid) {
+  ASSERT_EQ(Import({}).exit_code, 0);
+  auto [structures, plan] = SmallCt();
+  plan.file.date = "20251231 080000";
+  const RunResult older =
+      Plumb({"import-dicom", Written(folder_ / "structures.dcm", DicomBytes(structures)),
+             Written(folder_ / "plan.dcm", DicomBytes(plan)), "--out", folder_ / "planned"});
+  EXPECT_EQ(older.exit_code, 0) << older.err;
+  EXPECT_THAT(older.out, HasSubstr("is this one superseded?"));
+}
+
+TEST_F(PlanningCtTest, InfoDescribesTheFilesWithoutThePatient) {
+  ASSERT_EQ(Import({}).exit_code, 0);
+  const RunResult structures = Plumb({"info", folder_ / "structures.dcm", "--json"});
+  ASSERT_EQ(structures.exit_code, 0) << structures.err;
+  EXPECT_EQ(json::parse(structures.out).at("rois").at("BODY").at("type"), "EXTERNAL");
+  const RunResult plan = Plumb({"info", folder_ / "plan.dcm", "--json"});
+  const json facts = json::parse(plan.out);
+  EXPECT_EQ(facts.at("positions"), json({"HFS"}));
+  EXPECT_NEAR(facts.at("beams").at("AP").at("isocentre_lps_mm").at(1), -304.3, 1e-9);
+  for (const RunResult* result : {&structures, &plan}) {
+    EXPECT_EQ(result->out.find("SIM-1"), std::string::npos);
+    EXPECT_EQ(result->out.find("Simulated^Body"), std::string::npos);
+  }
+}
+
+TEST_F(PlanningCtTest, WithoutACalibratedRoomThereIsNoAnswer) {
+  ASSERT_EQ(Import({}).exit_code, 0);
+  const RunResult result = Plumb({"compare", folder_ / "planned", SmallScene(SmallNames().back()),
+                                  "--out", folder_ / "result", "--json"});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  const json told = json::parse(result.out);
+  EXPECT_EQ(told.at("verdict"), "no_answer");
+  EXPECT_THAT(told.at("reasons").at(0).get<std::string>(), HasSubstr("T_iec_reference"));
+  EXPECT_EQ(told.at("compared_with").at("source"), "dicom");
+  EXPECT_TRUE(fs::exists(folder_ / "result" / "result.json"));
+}
+
+TEST_F(PlanningCtTest, ARealPlanIsImported) {
+  PLUMB_SHARED_DATA(real, "dicom-real");
+  const RunResult result = Plumb({"import-dicom", real / "rtss.dcm", real / "rtplan.dcm", "--out",
+                                  folder_ / "planned", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json planning = json::parse(result.out).at("planning");
+  EXPECT_EQ(planning.at("roi"), "BODY");
+  EXPECT_EQ(planning.at("posture"), "HFS");
+  EXPECT_EQ(planning.at("slices"), 98);
+  EXPECT_NEAR(planning.at("slice_spacing_m"), 0.003, 1e-9);
+  const std::array<double, 3> isocentre = {72.530, -304.345, -9.309};
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(planning.at("isocentre_lps_mm").at(i), isocentre[i], 5e-4);
+  // The surface lies within the body's box and reaches its top, 115.1 mm above the isocentre.
+  const Scene scene = ReadScene(folder_ / "planned");
+  Eigen::Vector3f low = scene.cloud.points.front(), high = low;
+  for (const Eigen::Vector3f& p : scene.cloud.points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  EXPECT_GE(low.x(), -0.302F);
+  EXPECT_LE(high.x(), 0.1722F);
+  EXPECT_NEAR(low.y(), -0.1131F + 0.003F, 0.003F);
+  EXPECT_NEAR(high.y(), 0.1779F - 0.003F, 0.003F);
+  EXPECT_NEAR(high.z(), 0.1151F, 0.002F);
+}
+
+}  // namespace
+}  // namespace plumb

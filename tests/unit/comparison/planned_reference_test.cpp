@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+// Comparisons with a planning CT.
+#include "algo/comparison/planned_reference.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "algo/base/units.hpp"
+#include "algo/comparison/comparison.hpp"
+#include "algo/comparison/deviation.hpp"
+#include "tests/support/synthetic_scene.hpp"
+#include "words/comparison.hpp"
+
+namespace plumb {
+namespace {
+
+using test::BodyMotionAbout;
+using test::BodyShape;
+using test::MakeSyntheticScene;
+using test::SyntheticOptions;
+using testing::Contains;
+using testing::Not;
+using testing::Truly;
+
+auto Says(const MessageId& id) {
+  return Contains(Truly([id](const Message& message) { return message.Is(id); }));
+}
+
+SyntheticOptions PlacedBody() {
+  SyntheticOptions options;
+  options.T_reference_body =
+      Pose(Eigen::Translation3d(0.6, 0.45, 0) * Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ()));
+  return options;
+}
+
+// The room: the isocentre lies in the body, the head points to the gantry.
+Pose RoomPose() {
+  Eigen::Matrix3d R;
+  R << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  Pose T = Pose::Identity();
+  T.linear() = Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitZ()).toRotationMatrix() * R;
+  T.translation() = -(T.linear() * Eigen::Vector3d(0.62, 0.43, 0.1));
+  return T;
+}
+
+// The body alone, as a CT would show it.
+Scene Planned() {
+  const Scene scan = MakeSyntheticScene(PlacedBody());
+  const Pose T_iec = RoomPose();
+  Scene planned;
+  planned.frame = SceneFrame::kIec;
+  planned.planning.emplace();
+  planned.planning->support_m = (T_iec * Eigen::Vector3d::Zero()).z();
+  planned.planning->slice_spacing_m = 0.003;
+  for (std::size_t i = 0; i < scan.cloud.size(); ++i) {
+    if (scan.cloud.points[i].z() < 0.02F || scan.cloud.normals[i].z() < 0.15F) continue;
+    planned.cloud.points.push_back((T_iec * scan.cloud.points[i].cast<double>()).cast<float>());
+    planned.cloud.normals.push_back(
+        (T_iec.linear() * scan.cloud.normals[i].cast<double>()).cast<float>());
+  }
+  planned.height_map =
+      HeightMapOfCloud(planned.cloud, 0.004,
+                       {.x_min = -0.3, .y_min = -0.45, .step = 0.002, .width = 300, .height = 450});
+  return planned;
+}
+
+const Scene& PlannedScene() {
+  static const Scene scene = Planned();
+  return scene;
+}
+
+Scene Current(const Pose& T_motion, SyntheticOptions options = PlacedBody()) {
+  options.seed += 7;
+  options.T_reference_body = T_motion * options.T_reference_body;
+  return MakeSyntheticScene(options);
+}
+
+Pose SmallMotion() {
+  return BodyMotionAbout({0.6, 0.45, 0.1}, {0.012, -0.008, 0.004}, 2.0, 0.5, -1.0);
+}
+
+CompareOptions InRoom() {
+  CompareOptions options;
+  options.T_iec_reference = RoomPose();
+  options.iec_u95_m = 0.001;
+  options.iec_u95_rad = 0.1 * kDegree;
+  return options;
+}
+
+TEST(PlannedReferenceTest, TheMotionIsThatOfTheBodyInTheMarkersFrame) {
+  const Comparison comparison = Compare(PlannedScene(), Current(SmallMotion()), InRoom());
+  ASSERT_TRUE(comparison.motion && comparison.correction);
+  const Eigen::Vector3d body(0.6, 0.45, 0.1);
+  EXPECT_LT((comparison.motion->T * body - SmallMotion() * body).norm(), 0.3 * kMillimetre);
+  EXPECT_LT(RotationAngle(comparison.motion->T * SmallMotion().inverse()), 0.05 * kDegree);
+  // The correction at the isocentre, which is the origin of IEC axes.
+  const Eigen::Vector3d isocentre(0.62, 0.43, 0.1);
+  EXPECT_LT((comparison.correction->isocentre_m - isocentre).norm(), 1e-9);
+  const Vector6d truth = CouchVector(SmallMotion(), isocentre, RoomPose());
+  EXPECT_NEAR(*comparison.correction->value.lateral_mm, truth[0] / kMillimetre, 0.3);
+  EXPECT_NEAR(*comparison.correction->value.longitudinal_mm, truth[1] / kMillimetre, 0.3);
+  EXPECT_NEAR(*comparison.correction->value.vertical_mm, truth[2] / kMillimetre, 0.3);
+  EXPECT_NEAR(comparison.correction->value.yaw_deg, truth[5] / kDegree, 0.05);
+  ASSERT_TRUE(comparison.planning);
+  // Maps lie on the grid of the planned scene.
+  ASSERT_TRUE(comparison.deviation && comparison.distance);
+  EXPECT_EQ(comparison.deviation->grid, PlannedScene().height_map->grid);
+  EXPECT_EQ(comparison.distance->grid, PlannedScene().height_map->grid);
+}
+
+TEST(PlannedReferenceTest, WithoutARoomThereIsNoAnswer) {
+  CompareOptions options = InRoom();
+  options.T_iec_reference.reset();
+  const Comparison comparison = Compare(PlannedScene(), Current(Pose::Identity()), options);
+  EXPECT_EQ(comparison.verdict, Verdict::kNoAnswer);
+  EXPECT_THAT(comparison.reasons, Says(say::comparison::kRoomNotCalibrated));
+  EXPECT_FALSE(comparison.motion);
+}
+
+TEST(PlannedReferenceTest, FewMarkersInTheScanGiveNoAnswer) {
+  Scene current = Current(Pose::Identity());
+  while (current.markers.size() > 2) current.markers.erase(std::prev(current.markers.end()));
+  const Comparison comparison = Compare(PlannedScene(), current, InRoom());
+  EXPECT_EQ(comparison.verdict, Verdict::kNoAnswer);
+  EXPECT_THAT(comparison.reasons, Says(say::comparison::kFewMarkersForRoom));
+}
+
+TEST(PlannedReferenceTest, MarkersThatAreNotGoodDoNotCount) {
+  for (const int wrong : {0, 1, 2}) {
+    Scene current = Current(Pose::Identity());
+    while (current.markers.size() > 3) current.markers.erase(std::prev(current.markers.end()));
+    SceneMarker& marker = current.markers.rbegin()->second;
+    if (wrong == 0) marker.num_views = 1;
+    if (wrong == 1) marker.sigma_m = 0.006;
+    if (wrong == 2) {
+      for (Eigen::Vector3d& corner : marker.corners)
+        corner = marker.corners[0] + 1.1 * (corner - marker.corners[0]);
+    }
+    EXPECT_THAT(Compare(PlannedScene(), current, InRoom()).reasons,
+                Says(say::comparison::kFewMarkersForRoom))
+        << wrong;
+  }
+}
+
+TEST(PlannedReferenceTest, ARoomWithoutAnUncertaintyIsTakenAsExactAndSaid) {
+  CompareOptions exact = InRoom();
+  exact.iec_u95_m.reset();
+  const Scene current = Current(Pose::Identity());
+  EXPECT_THAT(Compare(PlannedScene(), current, exact).warnings,
+              Says(say::comparison::kRoomTakenAsExact));
+  const Comparison stated = Compare(PlannedScene(), current, InRoom());
+  EXPECT_THAT(stated.warnings, Not(Says(say::comparison::kRoomTakenAsExact)));
+  // Its uncertainty is at the isocentre: 1 mm in each direction.
+  ASSERT_TRUE(stated.motion);
+  EXPECT_GT(stated.motion->uncertainty.room(3, 3), 0.9 * std::pow(0.001 / 1.96, 2));
+  EXPECT_NEAR(stated.motion->uncertainty.room(0, 0), std::pow(0.1 * kDegree / 1.96, 2), 1e-9);
+}
+
+TEST(PlannedReferenceTest, TheSkinCountsMostlyUpwards) {
+  const Comparison comparison = Compare(PlannedScene(), Current(Pose::Identity()), InRoom());
+  ASSERT_TRUE(comparison.motion);
+  const Matrix6d& skin = comparison.motion->uncertainty.skin;
+  const double sigma_m = 0.001 / 1.96;
+  EXPECT_GT(std::sqrt(skin(5, 5)), 0.9 * sigma_m);
+  EXPECT_LT(std::sqrt(skin(5, 5)), 1.8 * sigma_m);
+  EXPECT_LT(std::sqrt(skin(3, 3)), 0.5 * sigma_m);
+  EXPECT_EQ(comparison.motion->uncertainty.Parts().size(), 10U);
+}
+
+TEST(PlannedReferenceTest, TaughtMarkersPlaceTheScanInsteadOfTheReferenceMarker) {
+  // The scan's own frame is turned by 0.5 deg against the taught one: as if its reference marker
+  // had been seen askew.
+  CompareOptions options = InRoom();
+  options.room_markers = MakeSyntheticScene(PlacedBody()).markers;
+  Scene current = Current(SmallMotion());
+  const Pose askew(Eigen::AngleAxisd(0.5 * kDegree, Eigen::Vector3d::UnitX()));
+  for (auto& [id, marker] : current.markers)
+    for (Eigen::Vector3d& corner : marker.corners) corner = askew * corner;
+  current.cloud = TransformedCloud(Eigen::Affine3d(askew.matrix()), current.cloud);
+  current.height_map.reset();
+  const Comparison comparison = Compare(PlannedScene(), current, options);
+  ASSERT_TRUE(comparison.motion);
+  const Eigen::Vector3d body(0.6, 0.45, 0.1);
+  EXPECT_LT((comparison.motion->T * body - SmallMotion() * body).norm(), 0.3 * kMillimetre);
+  EXPECT_THAT(comparison.warnings, Not(Says(say::comparison::kOneMarkerForPlan)));
+  options.room_markers.clear();
+  const Comparison alone = Compare(PlannedScene(), current, options);
+  ASSERT_TRUE(alone.motion);
+  EXPECT_GT((alone.motion->T * body - SmallMotion() * body).norm(), 2 * kMillimetre);
+  EXPECT_THAT(alone.warnings, Says(say::comparison::kOneMarkerForPlan));
+}
+
+TEST(PlannedReferenceTest, AnotherIsocentreIsSaidAndThePlansUsed) {
+  CompareOptions options = InRoom();
+  options.isocentre_m = Eigen::Vector3d(0.62, 0.43, 0.105);
+  const Comparison comparison = Compare(PlannedScene(), Current(Pose::Identity()), options);
+  EXPECT_THAT(comparison.warnings, Says(say::comparison::kIsocentreOfPlan));
+  ASSERT_TRUE(comparison.correction);
+  EXPECT_NEAR(comparison.correction->isocentre_m.z(), 0.1, 1e-9);
+}
+
+// Another room: its reference marker hangs elsewhere.
+Pose OtherRoomPose() {
+  Pose T = Pose(Eigen::AngleAxisd(-0.4, Eigen::Vector3d::UnitZ())) * RoomPose();
+  T.translation() += Eigen::Vector3d(0.13, -0.08, 0.05);
+  return T;
+}
+
+/// The current room as by the options' own fields, the reference's beside them.
+CompareOptions InTwoRooms() {
+  CompareOptions options;
+  options.T_iec_reference = OtherRoomPose();
+  options.iec_u95_m = 0.0006;
+  options.iec_u95_rad = 0.03 * kDegree;
+  options.reference_room =
+      CalibratedRoom{.T_iec_reference = RoomPose(), .u95_m = 0.0008, .u95_rad = 0.05 * kDegree};
+  return options;
+}
+
+/// The body moved by `T_motion` in the frame of the first room's marker, scanned in the other room.
+Scene InOtherRoom(const Pose& T_motion) {
+  SyntheticOptions options = PlacedBody();
+  options.seed += 7;
+  options.T_reference_body =
+      OtherRoomPose().inverse() * RoomPose() * T_motion * options.T_reference_body;
+  return MakeSyntheticScene(options);
+}
+
+const Scene& ReferenceScan() {
+  static const Scene scene = MakeSyntheticScene(PlacedBody());
+  return scene;
+}
+
+TEST(TwoRoomsTest, TheMotionIsThatInTheRoomOfTheReference) {
+  const Comparison comparison = Compare(ReferenceScan(), InOtherRoom(SmallMotion()), InTwoRooms());
+  ASSERT_TRUE(comparison.motion && comparison.correction);
+  const Eigen::Vector3d centroid = comparison.motion->centroid_m;
+  EXPECT_LT((comparison.motion->T * centroid - SmallMotion() * centroid).norm(), 0.0005);
+  EXPECT_LT(
+      Eigen::AngleAxisd(comparison.motion->T.linear() * SmallMotion().linear().transpose()).angle(),
+      0.05 * kDegree);
+  const Vector6d truth = CouchVector(SmallMotion(), comparison.correction->isocentre_m, RoomPose());
+  EXPECT_NEAR(*comparison.correction->value.lateral_mm, truth[0] / kMillimetre, 0.5);
+  EXPECT_NEAR(*comparison.correction->value.longitudinal_mm, truth[1] / kMillimetre, 0.5);
+  EXPECT_NEAR(*comparison.correction->value.vertical_mm, truth[2] / kMillimetre, 0.5);
+  EXPECT_EQ(comparison.deviation->grid, ReferenceScan().height_map->grid);
+}
+
+TEST(TwoRoomsTest, BothCalibrationsAreInTheIntervals) {
+  const Scene current = InOtherRoom(Pose::Identity());
+  const auto room = [&](const CompareOptions& options) {
+    return Compare(ReferenceScan(), current, options).motion.value().uncertainty.room;
+  };
+  CompareOptions without_first = InTwoRooms(), without_second = InTwoRooms();
+  without_first.reference_room->u95_m = without_first.reference_room->u95_rad = 0.0;
+  without_second.iec_u95_m = without_second.iec_u95_rad = 0.0;
+  const Matrix6d both = room(InTwoRooms());
+  EXPECT_TRUE(both.isApprox(room(without_first) + room(without_second), 1e-9));
+  // The translation at the isocentre by itself: (0.8² + 0.6²) mm² / 1.96², and more away from it.
+  EXPECT_GE(both(3, 3), 1e-6 / (1.96 * 1.96) * 0.999);
+  EXPECT_GT(room(without_first)(3, 3), 0.35e-6 / (1.96 * 1.96));
+}
+
+TEST(TwoRoomsTest, ARoomThatIsNotCalibratedIsNamed) {
+  const Scene current = InOtherRoom(Pose::Identity());
+  CompareOptions options = InTwoRooms();
+  options.reference_room->T_iec_reference.reset();
+  Comparison comparison = Compare(ReferenceScan(), current, options);
+  EXPECT_EQ(comparison.verdict, Verdict::kNoAnswer);
+  EXPECT_THAT(comparison.reasons.at(0).English(), testing::StartsWith("the reference scan"));
+  options = InTwoRooms();
+  options.T_iec_reference.reset();
+  comparison = Compare(ReferenceScan(), current, options);
+  EXPECT_EQ(comparison.verdict, Verdict::kNoAnswer);
+  EXPECT_THAT(comparison.reasons.at(0).English(), testing::StartsWith("the current scan"));
+}
+
+TEST(TwoRoomsTest, TheMarkersOfTheRoomsMayDiffer) {
+  Scene current = InOtherRoom(Pose::Identity());
+  MarkerMap renamed;
+  for (auto& [id, marker] : current.markers) renamed[id + 500] = marker;
+  current.markers = renamed;
+  current.room_markers.dictionary = "DICT_ARUCO_MIP_36h12";
+  if (current.room_markers.reference) *current.room_markers.reference += 500;
+  const Comparison comparison = Compare(ReferenceScan(), current, InTwoRooms());
+  ASSERT_TRUE(comparison.motion);
+  EXPECT_LT(
+      (comparison.motion->T * comparison.motion->centroid_m - comparison.motion->centroid_m).norm(),
+      0.0005);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// One and two sensors at rest over a body, from their mounting on.
+#include "algo/monitoring/monitor.hpp"
+
+#include <time.h>
+
+#include <map>
+#include <memory>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/base/units.hpp"
+#include "tests/support/rest_frames.hpp"
+
+namespace plumb {
+namespace {
+
+using test::RestFrames;
+
+constexpr double kFrame_s = 1.0 / RestFrames::kRate_hz;
+
+class MonitorTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { scene_ = new Scene(test::ScannedBody()); }
+  static void TearDownTestSuite() { delete std::exchange(scene_, nullptr); }
+
+  void AddSensor(double side) {
+    sensors_.push_back(std::make_unique<RestFrames>(*scene_, side, 7U + sensors_.size()));
+  }
+  void Begin() {
+    std::vector<StreamInfo> infos;
+    for (const auto& sensor : sensors_) infos.push_back(sensor->info());
+    monitor_ = std::make_unique<Monitor>(*scene_, infos, MonitorOptions{});
+  }
+  /// Until a time; the sensors take turns.
+  std::vector<MonitorLine> RunUntil(double end_s) {
+    std::vector<MonitorLine> lines;
+    for (; time_s_ < end_s; time_s_ += kFrame_s) {
+      for (std::size_t i = 0; i < sensors_.size(); ++i) {
+        const double at_s =
+            time_s_ + kFrame_s * static_cast<double>(i) / static_cast<double>(sensors_.size());
+        const Frame frame = sensors_[i]->At(at_s, covered_ == i);
+        const double begun_s = CpuOfThread_s();
+        const auto line = monitor_->Add(frame, i);
+        longest_s_ = std::max(longest_s_, CpuOfThread_s() - begun_s);
+        if (line) lines.push_back(*line);
+      }
+    }
+    return lines;
+  }
+  void Move(const Eigen::Vector3d& shift_m) {
+    Pose T = Pose::Identity();
+    T.translation() = shift_m;
+    for (const auto& sensor : sensors_) sensor->Move(T);
+  }
+  static double CpuOfThread_s() {
+    timespec now{};
+    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  }
+  static double OffBy(const MonitorLine& line, const Eigen::Vector3d& shift_m) {
+    return (line.since_zero->value.head<3>().norm() - shift_m.norm()) / kMillimetre;
+  }
+
+  static inline Scene* scene_ = nullptr;
+  std::vector<std::unique_ptr<RestFrames>> sensors_;
+  std::unique_ptr<Monitor> monitor_;
+  std::optional<std::size_t> covered_;
+  double time_s_ = 100.0;
+  double longest_s_ = 0.0;  ///< Processor time of one frame.
+};
+
+TEST_F(MonitorTest, OneSensorFollowsTheBodyAndNoFrameTakesLong) {
+  AddSensor(1.0);
+  Begin();
+  const std::vector<MonitorLine> start = RunUntil(110.5);
+  ASSERT_EQ(start.back().state, MonitorState::kMonitoring) << "within ten seconds and a half";
+  EXPECT_NEAR(static_cast<double>(monitor_->sensor().still_times_s().size()), 121, 1)
+      << "eight seconds";
+  const Eigen::Vector3d shift_m(0.004, -0.003, 0.002);
+  Move(shift_m);
+  const std::vector<MonitorLine> moved = RunUntil(112.0);
+  ASSERT_TRUE(moved.back().since_zero);
+  EXPECT_NEAR(OffBy(moved.back(), shift_m), 0.0, 0.4);
+  EXPECT_EQ(moved.back().sensors_used, 1);
+#ifdef NDEBUG
+  // The 121 fits of the zero in one call take about as long as all frames of a second.
+  EXPECT_LT(longest_s_, 0.25);
+#endif
+  RecordProperty("longest_frame_cpu_ms", std::to_string(1e3 * longest_s_));
+}
+
+TEST_F(MonitorTest, TwoSensorsGoOnWhileOneIsBlindAndAfterOneWasPushed) {
+  AddSensor(1.0);
+  AddSensor(-1.0);
+  Begin();
+  const std::vector<MonitorLine> start = RunUntil(112.0);
+  ASSERT_EQ(start.back().state, MonitorState::kMonitoring);
+  EXPECT_EQ(start.back().sensors_used, 2);
+  const LiveNumbers both = start.back().since_zero.value();
+
+  covered_ = 0;
+  const Eigen::Vector3d shift_m(0.0, 0.004, 0.0);
+  Move(shift_m);
+  const std::vector<MonitorLine> covered = RunUntil(113.5);
+  EXPECT_EQ(covered.back().state, MonitorState::kMonitoring);
+  EXPECT_EQ(covered.back().sensors_used, 1);
+  EXPECT_NEAR(OffBy(covered.back(), shift_m), 0.0, 0.5);
+  EXPECT_GT(covered.back().since_zero->u95.head<3>().norm(), both.u95.head<3>().norm())
+      << "its own uncertainty";
+
+  covered_.reset();
+  EXPECT_EQ(RunUntil(114.0).back().sensors_used, 2) << "it sees again";
+
+  sensors_[0]->Push({0.002, 0.001, 0.0});
+  const std::vector<MonitorLine> pushed = RunUntil(116.5);
+  EXPECT_EQ(pushed.back().state, MonitorState::kMonitoring);
+  EXPECT_EQ(pushed.back().sensors_used, 1);
+  EXPECT_EQ(pushed.back().sensor, 1U) << "the one that was pushed takes no part any more";
+  EXPECT_NEAR(OffBy(pushed.back(), shift_m), 0.0, 0.5);
+
+  sensors_[1]->Push({0.002, 0.001, 0.0});
+  EXPECT_EQ(RunUntil(119.0).back().state, MonitorState::kMovedSensor);
+}
+
+TEST_F(MonitorTest, OneThatIsNotMountedInTimeTakesNoPart) {
+  AddSensor(1.0);
+  AddSensor(-1.0);
+  Begin();
+  // The second one sees no marker at all.
+  std::vector<MonitorLine> lines;
+  for (; time_s_ < 112.0; time_s_ += kFrame_s) {
+    if (const auto line = monitor_->Add(sensors_[0]->At(time_s_), 0)) lines.push_back(*line);
+    Frame dark = sensors_[1]->At(time_s_ + 0.02);
+    dark.color_rgb = cv::Mat::zeros(dark.color_rgb.size(), dark.color_rgb.type());
+    if (const auto line = monitor_->Add(dark, 1)) lines.push_back(*line);
+  }
+  EXPECT_EQ(lines.back().state, MonitorState::kMonitoring);
+  EXPECT_EQ(lines.back().sensors_used, 1);
+  EXPECT_TRUE(monitor_->takes_part(0));
+  EXPECT_FALSE(monitor_->takes_part(1));
+}
+
+TEST_F(MonitorTest, TheZeroIsTheSameInWhateverPortionsItIsMade) {
+  AddSensor(1.0);
+  AddSensor(-1.0);
+  Begin();
+  const std::vector<MonitorLine> start = RunUntil(112.0);
+  ASSERT_EQ(start.back().state, MonitorState::kMonitoring);
+  std::vector<std::pair<std::size_t, const SensorAtRest*>> sensors = {{0, &monitor_->sensor(0)},
+                                                                      {1, &monitor_->sensor(1)}};
+  RestFits at_once(sensors, monitor_->scene().centroid_m);
+  RestFits in_portions(sensors, monitor_->scene().centroid_m);
+  EXPECT_TRUE(at_once.Make(at_once.size()));
+  for (std::size_t made = 7; !in_portions.Make(7); made += 7) ASSERT_LT(made, at_once.size());
+  const auto a = at_once.Statistics(), b = in_portions.Statistics();
+  ASSERT_THAT(a, testing::SizeIs(3)) << "each sensor, and both";
+  for (const auto& [set, statistics] : a) {
+    const RestStatistics& other = b.at(set);
+    EXPECT_EQ(statistics.T_zero.matrix(), other.T_zero.matrix());
+    EXPECT_EQ(statistics.spread, other.spread);
+    EXPECT_EQ(statistics.inflation, other.inflation);
+    EXPECT_EQ(statistics.information, other.information);
+  }
+  EXPECT_LT(a.at({0, 1}).spread.norm(), a.at({0}).spread.norm());
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algo/registration/dense_terms.hpp"
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/tracking/synthetic_map.hpp"
+
+namespace plumb::dense {
+namespace {
+
+constexpr double kGate_m = 0.05;
+
+struct Scene {
+  explicit Scene(const synthetic::MapOptions& options) : truth(synthetic::MakeTrueMap(options)) {}
+
+  void Prepare() {
+    cells = MakeCells(truth.stated, truth.map);
+    sensor = MakeSensor(truth.stated, {});
+    views = MakeViews(sensor, {}, cells, truth.map);
+  }
+  [[nodiscard]] std::vector<QuadraticTerm> Terms(const std::vector<KeyframePair>& pairs,
+                                                 Density density) const {
+    std::vector<QuadraticTerm> terms;
+    MakeTerms(sensor, {.marker_length_m = synthetic::kMarkerLength}, truth.map, views, pairs,
+              kGate_m, density, {}, {}, terms);
+    return terms;
+  }
+
+  synthetic::TrueMap truth;
+  Cells cells;
+  Sensor sensor;
+  std::vector<View> views;
+};
+
+// Information about the first twist of all terms.
+Eigen::Matrix<double, 6, 6> Information(const std::vector<QuadraticTerm>& terms) {
+  Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Zero();
+  for (const QuadraticTerm& term : terms) sum += term.H.topLeftCorner<6, 6>();
+  return sum;
+}
+
+TEST(DenseTerms, CoarseOnesWeighAsMuchAsFineOnes) {
+  Scene scene({.num_keyframes = 8, .num_landmarks = 40, .markers = false, .dense = true});
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  ASSERT_GT(pairs.size(), 16U);
+  const auto fine = Information(scene.Terms(pairs, Density::kFine));
+  const auto coarse = Information(scene.Terms(pairs, Density::kCoarse));
+  for (Eigen::Index i = 0; i < 6; ++i)
+    EXPECT_NEAR(coarse(i, i) / fine(i, i), 1.0, 0.1) << "unknown " << i;
+  EXPECT_NE(coarse, fine) << "the same cells were used";
+}
+
+TEST(DenseTerms, LeaveOutTheCellsThatAreHeldOut) {
+  // A view against itself: every cell is projected onto itself.
+  const std::vector<KeyframePair> itself(64, KeyframePair{1, 1, 1.0});
+  const auto weight_m2 = [&](bool of_held_out, Density density) {
+    Scene scene({.num_keyframes = 2, .num_landmarks = 40, .markers = false, .dense = true});
+    DenseView& view = scene.truth.map.keyframes[1].dense;
+    for (int r = 0; r < view.height; ++r)
+      for (int c = 0; c < view.width; ++c)
+        if ((r % 4 == 2 && c % 4 == 2) != of_held_out)
+          view.normals[static_cast<std::size_t>(r * view.width + c)].setZero();
+    scene.Prepare();
+    return Information(scene.Terms(itself, density)).trace();
+  };
+  for (const Density density : {Density::kFine, Density::kCoarse}) {
+    EXPECT_EQ(weight_m2(true, density), 0.0);
+    EXPECT_GT(weight_m2(false, density), 0.0) << "nothing is used: nothing is tested";
+  }
+}
+
+TEST(DenseTerms, AreTheSameInMemoryThatHeldOthers) {
+  Scene scene({.num_keyframes = 4, .num_landmarks = 40, .dense = true});
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  const auto fresh = scene.Terms(pairs, Density::kFine);
+  ASSERT_GT(fresh.size(), pairs.size()) << "no marker's face";
+  auto used = scene.Terms(pairs, Density::kCoarse);
+  used.resize(used.size() + 5, used.front());
+  MakeTerms(scene.sensor, {.marker_length_m = synthetic::kMarkerLength}, scene.truth.map,
+            scene.views, pairs, kGate_m, Density::kFine, {}, {}, used);
+  ASSERT_EQ(used.size(), fresh.size());
+  for (std::size_t i = 0; i < fresh.size(); ++i) {
+    EXPECT_EQ(used[i].H, fresh[i].H);
+    EXPECT_EQ(used[i].g, fresh[i].g);
+    EXPECT_EQ(used[i].marker, fresh[i].marker);
+  }
+}
+
+TEST(DenseTerms, WeighByTheNoiseThatIsStatedForTheSensor) {
+  Scene scene({.num_keyframes = 4, .num_landmarks = 40, .dense = true});
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  const auto weight_m2 = [&](const DepthNoise& noise) {
+    std::vector<QuadraticTerm> terms;
+    MakeTerms(scene.sensor, {.marker_length_m = synthetic::kMarkerLength, .depth_noise = noise},
+              scene.truth.map, scene.views, pairs, kGate_m, Density::kFine, {}, {}, terms);
+    std::array<double, 2> sums{};  // Between views, and on markers' faces.
+    for (const QuadraticTerm& term : terms)
+      sums[term.marker ? 1 : 0] += term.H.topLeftCorner<6, 6>().trace();
+    return sums;
+  };
+  const auto usual = weight_m2({}), noisy = weight_m2({.constant_m = 0.02});
+  for (const std::size_t i : {0U, 1U}) {
+    EXPECT_GT(usual[i], 0.0) << i;
+    EXPECT_LT(noisy[i], 0.05 * usual[i]) << i;  // sigma of 21 mm instead of 2
+  }
+}
+
+// As a phone's range finder: each image with an offset and a tilt of its own.
+JointRegistrationOptions OfAPhone() {
+  return {.marker_length_m = synthetic::kMarkerLength,
+          .image_offset_sigma_m = 0.008,
+          .image_tilt_sigma = 0.008};
+}
+
+TEST(DenseTerms, FindsWhatEachImageErrsBy) {
+  Scene scene({.num_keyframes = 6, .num_landmarks = 40, .dense = true});
+  scene.Prepare();
+  std::vector<ImageError> wrong;
+  for (std::size_t k = 0; k < scene.views.size(); ++k) {
+    const double sign = k % 2 == 0 ? 1.0 : -1.0;
+    wrong.emplace_back(0.005 * sign, k == 1 ? 0.004 : 0.0, k == 2 ? -0.004 : 0.0);
+    DenseView& view = scene.truth.map.keyframes[k].dense;
+    for (std::size_t i = 0; i < view.size(); ++i)
+      if (float& z_m = view.z_m[i]; z_m > 0)
+        z_m -=
+            static_cast<float>(ImageErrorJacobian(z_m, scene.cells.centred[i]).dot(wrong.back()));
+  }
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  const auto found =
+      FindImageErrors(scene.sensor, OfAPhone(), scene.truth.map, scene.views, pairs, kGate_m, {});
+  ASSERT_EQ(found.size(), wrong.size());
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    EXPECT_NEAR(found[k][0], wrong[k][0], 0.001) << k;
+    EXPECT_NEAR(found[k][1], wrong[k][1], 0.001) << k;
+    EXPECT_NEAR(found[k][2], wrong[k][2], 0.001) << k;
+  }
+  EXPECT_TRUE(FindImageErrors(scene.sensor, {.marker_length_m = synthetic::kMarkerLength},
+                              scene.truth.map, scene.views, pairs, kGate_m, {})
+                  .empty());
+}
+
+TEST(DenseTerms, AreNoSurerOfADistanceThanTheImagesAre) {
+  Scene scene({.num_keyframes = 6, .num_landmarks = 40, .dense = true});
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  const std::vector<ImageError> none(scene.views.size(), ImageError::Zero());
+  std::vector<QuadraticTerm> terms;
+  MakeTerms(scene.sensor, OfAPhone(), scene.truth.map, scene.views, pairs, kGate_m, Density::kFine,
+            none, {}, terms);
+  const auto exact = scene.Terms(pairs, Density::kFine);
+  ASSERT_EQ(terms.size(), exact.size());
+  // Along the axis of the first keyframe, from all its pairs together.
+  double with_errors = 0.0, without = 0.0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (pairs[i].a != 0) continue;
+    with_errors += terms[i].H(5, 5);
+    without += exact[i].H(5, 5);
+  }
+  // What is left is what oblique rays see of the shift: an offset lengthens them, and moves nothing
+  // along the axis alone.
+  EXPECT_GT(with_errors, 0.0);
+  EXPECT_GT(without, 10 * with_errors);
+}
+
+}  // namespace
+}  // namespace plumb::dense

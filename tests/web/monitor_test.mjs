@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Live monitoring on the page and in the room: monitor_test.mjs NODE_MODULES SERVER OUT_FOLDER
+// CHROMIUM
+// The numbers follow, and an old one is never shown as a new one.
+import { Harness } from './harness.mjs';
+
+const [modules, server, folder, chromium] = process.argv.slice(2);
+const h = await Harness.start({ modules, command: [server, 'FOLDER'], folder, chromium });
+const { check, equal } = h;
+
+const engineer = await h.person('engineer');
+const tech = await h.person('tech', { width: 390, height: 844 });
+const room = await h.person('room', { width: 1920, height: 1080 });
+const advice = (page) => page.locator('.live-advice').innerText();
+const first = (page, part) => page.locator(`${part} .live-number strong`).first().innerText();
+
+/// Ten times a second, as the appliance does.
+let saying = null;
+function keepSaying(words) {
+  clearInterval(saying);
+  h.tell(`watch ${words}`);
+  saying = setInterval(() => h.tell(`watch ${words}`), 100);
+}
+const fallSilent = () => clearInterval(saying);
+
+await h.step('accounts', async () => {
+  await h.firstStart(engineer);
+  await h.addAccountByApi(engineer, 'tech', 'technician');
+  await h.logIn(tech, 'tech');
+});
+
+await h.step('it is started on the page', async () => {
+  await tech.goto(`${h.url}#/monitor`);
+  const start = tech.getByRole('button', { name: 'Start monitoring' });
+  await start.waitFor();
+  await start.click();
+  await tech.locator('.live-advice', { hasText: 'Looking for the markers' }).waitFor();
+  equal((await h.api(tech, 'status')).body.state, 'monitoring', 'the state');
+  equal((await h.api(tech, 'monitor/start', 'POST')).status, 409, 'once');
+});
+
+await h.step('the numbers follow, since zero and against the reference apart', async () => {
+  keepSaying('monitoring in none 0.5');
+  await tech.getByText('✓ IN').waitFor();
+  check((await advice(tech)).includes('✓ IN'), `advice: ${await advice(tech)}`);
+  equal(await tech.locator('.live-six').count(), 2, 'two lines of numbers');
+  equal(await tech.locator('.live-six.judged h2').innerText(), 'Against the reference', 'judged');
+  equal(await first(tech, '.live-six.judged'), '+1.5 mm', 'against the reference');
+  equal(await first(tech, '.live-six:not(.judged)'), '+0.5 mm', 'since zero');
+  await tech.locator('.breathing .trace').waitFor();
+  check(!await tech.locator('.live-view.is-old').count(), 'it is new');
+  await h.look(tech, 'monitor-phone-in');
+  keepSaying('monitoring out none 4.2');
+  await tech.getByText('▲ OUT: HOLD').waitFor();
+  equal(await first(tech, '.live-six.judged'), '+5.2 mm', 'the number has followed');
+  await h.look(tech, 'monitor-phone-out', { axe: false });
+});
+
+await h.step('the room shows the same, larger', async () => {
+  await h.logIn(room, 'engineer');
+  await room.goto(`${h.url}room`);
+  await room.getByText('▲ OUT: HOLD').waitFor();
+  keepSaying('monitoring in none -0.8');
+  await room.getByText('✓ IN').waitFor();
+  equal(await first(room, '.live-six.judged'), '+0.2 mm', 'in the room');
+  const sizes = await Promise.all([room, tech].map((page) => page.locator('.live-advice')
+    .evaluate((element) => parseFloat(getComputedStyle(element).fontSize))));
+  check(sizes[0] > 2 * sizes[1], `larger: ${sizes}`);
+  await room.locator('.live-view').getByText('Not connected to a beam').waitFor();
+  equal(await room.evaluate(() => document.documentElement.scrollHeight
+    <= window.innerHeight + 1), true, 'nothing is below the screen');
+  await h.look(room, 'monitor-room-in', { fullPage: false });
+});
+
+await h.step('an unknown state says why', async () => {
+  keepSaying('blind unknown covered 0');
+  await tech.getByText('? UNKNOWN: HOLD').waitFor();
+  await tech.locator('.live-why', { hasText: 'Too little of the body is seen.' }).waitFor();
+  equal(await first(tech, '.live-six.judged'), '–', 'no number');
+  await h.look(room, 'monitor-room-unknown', { axe: false, fullPage: false });
+});
+
+await h.step('an old number is grey, then gone, where no word comes', async () => {
+  keepSaying('monitoring in none 0.5');
+  await tech.getByText('✓ IN').waitFor();
+  fallSilent();
+  await tech.locator('.live-view.is-old').waitFor();
+  check((await advice(tech)).includes('UNKNOWN'), 'what is old is not judged');
+  await tech.locator('.live-why', { hasText: 'No image arrives.' }).waitFor();
+  await tech.waitForFunction(() =>
+    document.querySelector('.live-number strong').textContent === '–');
+  await tech.locator('.breathing strong', { hasText: '–' }).waitFor();
+  await h.picture(tech, 'monitor-phone-old.png');
+});
+
+await h.step('it ends by the button, and its numbers can be had', async () => {
+  await tech.getByRole('button', { name: 'Stop monitoring' }).click();
+  await tech.locator('.live-advice', { hasText: 'Not monitoring' }).waitFor();
+  equal((await h.api(tech, 'status')).body.state, 'ready', 'the state');
+  const answer = await tech.evaluate(async () => {
+    const response = await fetch('/api/v1/monitor/record.csv');
+    return [response.status, response.headers.get('Content-Disposition')];
+  });
+  equal(answer[0], 200, 'the record');
+  check(answer[1].includes('plumb_monitoring.csv'), answer[1]);
+  check(await room.locator('.live-view').count() === 0, 'the room shows it no more');
+});
+
+await h.finish();

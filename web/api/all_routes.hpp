@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// All routes. The API under /api/v1: JSON in, JSON and files out. web/openapi.yaml describes it.
+#pragma once
+
+#include "web/exchange/routes.hpp"
+#include "web/service/services.hpp"
+
+namespace plumb::web {
+
+// The services must outlive the routes.
+
+/// Adds patients, sessions, references and templates of plans.
+void AddPatientApi(Routes& routes, const Services& services);
+/// Adds scans, their files, results and daily checks.
+void AddScanApi(Routes& routes, const Services& services);
+/// Adds status and button, settings, audit log, updates and maintenance.
+void AddUnitApi(Routes& routes, const Services& services);
+
+/// Adds GET /result: the last result as a page without script.
+void AddResultPage(Routes& routes, const Services& services);
+
+/// Adds the reports as PDF files, and the numbers of a patient as CSV and JSON.
+void AddExportRoutes(Routes& routes, const Services& services);
+
+/// Adds the room's calibration and its board as a PDF. Signing needs a password: see Accounts.
+void AddRoomCalibrationRoutes(Routes& routes, const Services& services);
+
+}  // namespace plumb::web

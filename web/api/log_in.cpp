@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// Logging in and out: guesses, presence in the room, password, second factor.
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include "web/api/accounts.hpp"
+#include "web/exchange/json.hpp"
+#include "web/http/checks.hpp"
+#include "web/http/connection_table.hpp"
+#include "web/model/account.hpp"
+#include "web/model/wall_clock.hpp"
+#include "web/security/second_factor.hpp"
+#include "web/security/secrets.hpp"
+#include "web/security/stored_password.hpp"
+#include "words/audit.hpp"
+#include "words/web.hpp"
+
+namespace plumb::web {
+namespace {
+
+constexpr std::chrono::minutes kPresenceValid{10};
+
+std::string UpperCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return text;
+}
+
+Response SecondFactorNeeded(const Message& why) {
+  Json json = {{"second_factor_required", true}};
+  PutMessage(json, "error", why);
+  return JsonResponse(json, /*status=*/403);
+}
+
+Response Redirect(const std::string& where) {
+  Response response = BodyResponse("text/plain; charset=utf-8", "");
+  response.status = 303;
+  response.headers.emplace_back("Location", where);
+  return response;
+}
+
+}  // namespace
+
+Response BusyWithPasswords() {
+  return RetryLater(503, say::web::TooManyLogIns(), std::chrono::seconds(5));
+}
+
+Response Accounts::Welcome(const User& user, const std::string& address, bool form) {
+  if (form && IsFirst(user.password_hash)) return Redirect("/result?first=1");
+  const Sessions::Opened opened = sessions_.Open(user, address, options_.now());
+  opened.session->must_change_password = IsFirst(user.password_hash);
+  Response response =
+      form ? Redirect("/result") : JsonResponse({{"user", user.name}, {"role", Name(user.role)}});
+  SetDeviceCookie(response, user.name, user.password_hash);
+  SetCookie(response, cookie_name(), opened.token, certificate_.has_value());
+  return response;
+}
+
+void Accounts::SetDeviceCookie(Response& response, const std::string& user,
+                               const std::string& stored) const {
+  constexpr std::chrono::hours kYear{365 * 24};
+  SetCookie(response, devices_.NameFor(user), devices_.Make(user, stored), certificate_.has_value(),
+            kYear);
+}
+
+std::string Accounts::presence_code() {
+  const auto now = options_.now();
+  if (presence_.empty() || now - presence_made_ >= kPresenceValid) {
+    const bool is_recent = !presence_.empty() && now - presence_made_ < 2 * kPresenceValid;
+    presence_before_ = is_recent ? presence_ : std::string();
+    presence_ = RandomCode(8);  // 40 bits
+    presence_made_ = now;
+  }
+  return presence_;
+}
+
+bool Accounts::IsInTheRoom(const Request& request, const std::string& presence) {
+  if (displays_.SessionOf(request)) return true;
+  if (presence.empty()) return false;
+  const std::string given = UpperCase(presence), now = presence_code();
+  return IsSameSecret(given, now) ||
+         (!presence_before_.empty() && IsSameSecret(given, presence_before_));
+}
+
+Response Accounts::DescribePresence(const Request& request) {
+  if (request.session->role != Role::kDisplay) return ErrorResponse(404, say::web::NothingHere());
+  return JsonResponse({{"code", guessed_ ? Json(presence_code()) : Json(nullptr)}});
+}
+
+void Accounts::NoteGuesses(bool are_running) {
+  const bool were_running = guessed_.has_value();
+  guessed_ = are_running ? std::optional(options_.now()) : std::nullopt;
+  if (options_.on_guesses && were_running != are_running) options_.on_guesses(are_running);
+}
+
+std::vector<std::string> Accounts::CountersOf(const Request& request, const LogInForm& form,
+                                              const std::string& stored) {
+  const auto cookie = CookieValue(request.Header("cookie"), devices_.NameFor(form.name));
+  if (const auto device = cookie ? devices_.Identify(*cookie, form.name, stored) : std::nullopt)
+    return {"device " + *device};
+  if (IsInTheRoom(request, form.presence)) return {"room " + NetworkOf(request.address)};
+  return {"address " + NetworkOf(request.address), "name " + form.name};
+}
+
+std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& counters) {
+  const auto now = options_.now();
+  std::chrono::seconds wait{0};
+  for (const std::string& counter : counters) wait = std::max(wait, limiter_.Wait(counter, now));
+  if (wait.count() > 0) return RetryLater(429, say::web::WaitAfterPasswords(wait.count()), wait);
+  // Counted before hashing, so that many guesses sent at once are as slow as one after the other.
+  for (const std::string& counter : counters) limiter_.Failed(counter, now);
+  return std::nullopt;
+}
+
+void Accounts::LogIn(const Request& request, LogInForm form, const Respond& respond) {
+  // It is wiped by the worker, and no other copy is kept.
+  std::string password = std::exchange(form.password, {});
+  const auto user = users_.FindUser(form.name);
+  const std::string stored = user && !user->disabled ? user->password_hash : std::string();
+  const std::vector<std::string> counters = CountersOf(request, form, stored);
+  const bool is_known = counters.size() == 1;
+  if (auto refusal = CountGuess(counters)) {
+    if (!is_known) NoteGuesses(true);
+    return respond(std::move(*refusal));
+  }
+  if (!user) {
+    if (const Message why = users_.WhyUnreadable(); !why.empty())
+      return respond(ErrorResponse(503, say::web::NobodyCanLogIn(why)));
+  }
+  const bool accepted = worker_.Verify(
+      std::move(password), HashIn(stored), is_known,
+      [this, actor = Actor{form.name, request.address}, stored, form, counters,
+       respond](bool matches) {
+        RespondGuarded(
+            "login",
+            [&] { FinishLogIn(actor, matches ? stored : std::string(), form, counters, respond); },
+            respond);
+      });
+  if (!accepted) respond(BusyWithPasswords());
+}
+
+void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, const LogInForm& form,
+                           const std::vector<std::string>& counters, const Respond& respond) {
+  const auto still = users_.FindUser(actor.user);
+  const Respond fail = [respond, is_form = form.is_form](Response response) {
+    respond(is_form && response.status == 403 ? Redirect("/result?failed=1") : std::move(response));
+  };
+  if (stored.empty() || !still || still->disabled || still->password_hash != stored) {
+    // The name as typed is not logged, because people type passwords there.
+    audit_.Log({still ? actor.user : std::string(), actor.address}, "login.failed", "", {});
+    return fail(ErrorResponse(403, say::web::WrongLogIn()));
+  }
+  PassSecondFactor(actor, *still, form.second_factor, fail,
+                   [this, actor, user = *still, counters, is_form = form.is_form, respond] {
+                     for (const std::string& counter : counters) limiter_.Succeeded(counter);
+                     audit_.Log(actor, "login", "", {});
+                     respond(Welcome(user, actor.address, is_form));
+                   });
+}
+
+void Accounts::PassSecondFactor(const Actor& actor, const User& user, const std::string& given,
+                                const Respond& fail, const std::function<void()>& then) {
+  if (!user.has_second_factor) return then();
+  if (given.empty()) return fail(SecondFactorNeeded(say::web::SecondFactorMissing()));
+  const std::optional<SecondFactor> factor = users_.FindSecondFactor(user.name);
+  const auto left = factor ? UsedSecondFactor(*factor, given, WallClock::now()) : std::nullopt;
+  if (!left) {
+    audit_.Log(actor, "login.failed", "", say::audit::WrongSecondFactor());
+    return fail(SecondFactorNeeded(say::web::SecondFactorWrong()));
+  }
+  const bool is_recovery = left->recovery_hashes != factor->recovery_hashes;
+  users_.SetSecondFactor(actor, user.name, factor, left, is_recovery ? "user.recovery_code" : "",
+                         WhileAlive([fail, then](const Change& change) {
+                           // The same code twice at once: one of them was too late.
+                           if (change.result != ChangeResult::kDone)
+                             return fail(ChangeResponse(change));
+                           RespondGuarded("second factor", then, fail);
+                         }));
+}
+
+void Accounts::LogOut(const Request& request, const Respond& respond) {
+  sessions_.End(request.session);
+  audit_.Log(request.actor(), "logout", "", {});
+  Response response = JsonResponse(Json::object());
+  SetCookie(response, cookie_name(), "", certificate_.has_value(), std::chrono::seconds(0));
+  respond(std::move(response));
+}
+
+}  // namespace plumb::web

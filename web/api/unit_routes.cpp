@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// The unit: status and button, settings, audit log, updates, maintenance.
+#include "web/api/all_routes.hpp"
+
+#include <filesystem>
+#include <utility>
+
+#include "algo/base/errors.hpp"
+#include "web/api/look_back.hpp"
+#include "web/exchange/json.hpp"
+#include "web/exchange/routes.hpp"
+#include "web/http/checks.hpp"
+#include "web/model/audit.hpp"
+#include "web/model/limits.hpp"
+#include "web/model/settings.hpp"
+#include "web/model/status.hpp"
+#include "web/model/wall_clock.hpp"
+#include "words/web.hpp"
+
+namespace plumb::web {
+namespace {
+
+void AddApplianceRoutes(Routes& routes, ApplianceService& appliance) {
+  routes.Read("/health", Permission::kNone, [&appliance](const Request&) {
+    const Health health = appliance.GetHealth();
+    if (health.ok) return JsonResponse({{"status", "ok"}});
+    Json failed = {{"status", "failed"}};
+    PutMessage(failed, "reason", health.reason);
+    return JsonResponse(failed, /*status=*/503);
+  });
+  routes.Read("/api/v1/status", Permission::kRoom, [&appliance](const Request&) {
+    return JsonResponse(ToJson(appliance.GetStatus(), WallClock::now()));
+  });
+  routes
+      .Read("/api/v1/preview", Permission::kRoom,
+            [&appliance](const Request&) {
+              const auto picture = appliance.Preview();
+              if (!picture) return ErrorResponse(404, say::web::NoCameraImage());
+              return BodyResponse("image/jpeg", *picture);
+            })
+      .Discloses("view.camera");
+  routes
+      .Read("/api/v1/scan/surface", Permission::kRoom,
+            [&appliance](const Request&) {
+              const auto map = appliance.SweptSurface();
+              if (!map) return ErrorResponse(404, say::web::NoSurface());
+              return BodyResponse("application/octet-stream", *map);
+            })
+      .Discloses("view.camera");
+  routes.Write("POST", "/api/v1/press", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.Press(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/scan/start", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.StartSweep(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/scan/end", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.EndSweep(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/cancel", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.Cancel(request.actor(), done);
+               });
+}
+
+void AddMonitorRoutes(Routes& routes, ApplianceService& appliance) {
+  routes.Read("/api/v1/monitor", Permission::kRoom, [&appliance](const Request&) {
+    return JsonResponse(MonitorJson(appliance.GetMonitor()));
+  });
+  routes.Write("POST", "/api/v1/monitor/start", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.StartMonitor(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/monitor/stop", Permission::kScan, BodyKind::kNone,
+               [&appliance](const Request& request, const Done& done) {
+                 appliance.StopMonitor(request.actor(), done);
+               });
+  routes
+      .ReadInBackground("/api/v1/monitor/record.csv", Permission::kView,
+                        [&appliance](const Request&) {
+                          std::string csv = appliance.MonitorRecord();
+                          if (csv.empty()) return ErrorResponse(404, say::web::NothingHere());
+                          return Download("text/csv; charset=utf-8", std::move(csv),
+                                          "plumb_monitoring.csv");
+                        })
+      .Discloses("", "download.monitoring");
+}
+
+void AddSettingsRoutes(Routes& routes, SettingsService& settings, AuditLog& audit) {
+  routes
+      .ReadInBackground(
+          "/api/v1/audit", Permission::kAudit,
+          [&audit](const Request& request) {
+            const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
+            const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
+            const bool views = QueryNumber(request, "views", 1, 1) == 1;
+            return JsonResponse({{"entries", audit.Audit({before, limit, "", views})}});
+          })
+      .Discloses("view.log");
+  routes
+      .ReadInBackground("/api/v1/audit.jsonl", Permission::kAudit,
+                        [&audit](const Request&) {
+                          return Download("application/x-ndjson", audit.ExportAudit(),
+                                          "plumb_log.jsonl");
+                        })
+      .Discloses("", "download.log");
+  routes.Read("/api/v1/settings", Permission::kView, [&settings](const Request&) {
+    return JsonResponse(SettingsAs<Json>(settings.GetSettings()));
+  });
+  routes.Write("PUT", "/api/v1/settings", Permission::kSettings, BodyKind::kJson,
+               [&settings](const Request& request, const Done& done) {
+                 settings.ChangeSettings(request.actor(), ParseSettingsChange(request.body), done);
+               });
+}
+
+void AddUpdateRoutes(Routes& routes, UpdateService& updates) {
+  routes.Read("/api/v1/update", Permission::kView, [&updates](const Request&) {
+    Json answer = updates.GetUpdate();
+    answer["stick"] = updates.StickBundles();
+    return JsonResponse(answer);
+  });
+  routes.Write("POST", "/api/v1/update", Permission::kUpdate, BodyKind::kJson,
+               [&updates](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::string bundle = fields.Text("bundle", 1, 64);
+                 const bool from_stick = fields.Has("from_stick") && fields.Flag("from_stick");
+                 fields.Finish();
+                 if (!IsName(bundle)) throw DataError(say::web::BundleListed());
+                 if (from_stick) return updates.InstallFromStick(request.actor(), bundle, done);
+                 updates.InstallUpdate(request.actor(), bundle, done);
+               });
+  routes.Write("POST", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kFile,
+               [&updates](const Request& request, const Done& done) {
+                 const std::string& name = request.arguments[0];
+                 if (!name.ends_with(".raucb")) throw DataError(say::web::BundleName());
+                 updates.AddBundle(
+                     request.actor(), request.upload->path(), name,
+                     [done, kept = request.upload](const Change& change) { done(change); });
+               });
+  routes.Write("POST", "/api/v1/update/seen", Permission::kUpdate, BodyKind::kNone,
+               [&updates](const Request& request, const Done& done) {
+                 updates.ForgetRollBack(request.actor(), done);
+               });
+  routes.Write("DELETE", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kNone,
+               [&updates](const Request& request, const Done& done) {
+                 updates.RemoveBundle(request.actor(), request.arguments[0], done);
+               });
+}
+
+void AddMaintenanceRoutes(Routes& routes, MaintenanceService& maintenance, AuditLog& audit) {
+  routes.ReadInBackground("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
+    return JsonResponse({{"last", LastBackup(audit)}});
+  });
+  routes.Write("POST", "/api/v1/backup", Permission::kSettings, BodyKind::kNone,
+               [&maintenance](const Request& request, const Done& done) {
+                 maintenance.MakeBackup(request.actor(), done);
+               });
+  routes.Add("POST", "/api/v1/diagnostics", Permission::kDiagnostics, BodyKind::kNone,
+             [&maintenance](const Request& request, const Respond& respond) {
+               maintenance.WriteDiagnostics(request.actor(), [respond](const Change& change) {
+                 if (change.result != ChangeResult::kDone) return respond(ChangeResponse(change));
+                 Response response =
+                     FileResponse(change.file, "application/octet-stream",
+                                  "plumb-diagnostics" + change.file.extension().string());
+                 std::error_code ignored;
+                 std::filesystem::remove(change.file,
+                                         ignored);  // stays readable through the open descriptor
+                 respond(std::move(response));
+               });
+             });
+}
+
+}  // namespace
+
+void AddUnitApi(Routes& routes, const Services& services) {
+  AddApplianceRoutes(routes, services.appliance);
+  AddMonitorRoutes(routes, services.appliance);
+  AddSettingsRoutes(routes, services.settings, services.audit);
+  AddUpdateRoutes(routes, services.updates);
+  AddMaintenanceRoutes(routes, services.maintenance, services.audit);
+}
+
+}  // namespace plumb::web

@@ -1,3 +1,0 @@
-/// Unpacks the zlib stream that begins there.
-export const inflated = (buffer, from) => new Response(new Blob([buffer.slice(from)]).stream()
-  .pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page: who is logged in, which screen is shown, and the bar above it.
+import {
+  currentSession, get, live, loadSession, logOut, may, now, setLoggedOffHandler, since_s, touchedAt,
+} from './api.js';
+import { clear, forgetWarning, h, hint, say, warn } from './dom.js';
+import { languageOf, useLanguage } from './language.js';
+import { lastLogin, lastLoginWords } from './last_login.js';
+import { mayLeave } from './leave.js';
+import { drafts } from './plan_drafts.js';
+import { adoptPreferences, applyTheme } from './preferences.js';
+import { listenToScanners } from './scanner.js';
+import { showAudit } from './screens/audit.js';
+import { showCheck } from './screens/check.js';
+import { stateHere } from './screens/common.js';
+import { showFault, showFirstPassword, showLogin } from './screens/login.js';
+import { showMonitor } from './screens/monitor.js';
+import { showPatient, showPatients } from './screens/patients.js';
+import { showPlan } from './screens/plan/plan.js';
+import { showResult } from './screens/result.js';
+import { showScan } from './screens/scan.js';
+import { showSettings } from './screens/settings.js';
+import { showStatus } from './screens/status.js';
+import { showUpdate } from './screens/update.js';
+import { showUsers } from './screens/users.js';
+import { followReference, followSession, forgetSession } from './treatment.js';
+import { S, said } from './words.js';
+
+const kScreens = {
+  status: { show: showStatus, permission: 'view', nav: true },
+  patients: { show: showPatients, permission: 'view', nav: true },
+  patient: { show: showPatient, permission: 'view', parent: 'patients' },
+  plan: { show: showPlan, permission: 'view', parent: 'patients' },
+  scan: { show: showScan, permission: 'view', nav: true },
+  result: { show: showResult, permission: 'view', nav: true },
+  monitor: { show: showMonitor, permission: 'view', nav: true },
+  check: { show: showCheck, permission: 'view', nav: true },
+  users: { show: showUsers, permission: 'login', nav: true },
+  audit: { show: showAudit, permission: 'audit', nav: true },
+  settings: { show: showSettings, permission: 'view', nav: true },
+  update: { show: showUpdate, permission: 'view', nav: true },
+};
+
+const kAskAgain_ms = 3000;
+const kUseEvery_s = 30;
+const kWarn_s = 120;
+const kSayLeft_s = [10, 30, 60];  // the seconds are announced at these only, and once at the start
+const main = document.getElementById('main');
+const top = document.getElementById('top');
+let cleanUp = null;
+let turn = 0;
+let waiting = false;  // for the appliance, to come in or to leave
+let failed = false;   // the screen could not be shown
+
+const route = () => {
+  const [name, argument] = location.hash.replace(/^#\/?/, '').split('/');
+  return { name: kScreens[name] ? name : 'status', argument };
+};
+
+let drawnFor = null;
+/// Built once per login, so that the focus stays where it is from screen to screen.
+function drawTop() {
+  const session = currentSession();
+  top.hidden = !session;
+  if (drawnFor !== session) {
+    drawnFor = session;
+    if (session) buildTop(session);
+  }
+  if (!session) return;
+  const active = kScreens[route().name].parent ?? route().name;
+  for (const link of top.querySelectorAll('nav a')) {
+    if (link.hash === `#/${active}`) link.setAttribute('aria-current', 'page');
+    else link.removeAttribute('aria-current');
+  }
+  drawChip();
+}
+
+function buildTop(session) {
+  const links = Object.entries(kScreens)
+    .filter(([, screen]) => screen.nav && may(screen.permission))
+    .map(([name]) => h('a', { href: `#/${name}` }, S.nav[name]));
+  const nav = h('nav', { 'aria-label': S.nav.label, id: 'nav' }, links);
+  // On a phone the menu takes no room until it is asked for.
+  const menu = h('button', {
+    class: 'quiet menu', type: 'button', 'aria-expanded': 'false', 'aria-controls': 'nav',
+  }, '☰ ', S.nav.menu);
+  const open = (wanted) => {
+    top.classList.toggle('menu-open', wanted);
+    menu.setAttribute('aria-expanded', String(wanted));
+  };
+  menu.addEventListener('click', () => open(!top.classList.contains('menu-open')));
+  nav.addEventListener('click', () => open(false));
+  clear(top,
+    h('a', { class: 'brand', href: '#/status' }, S.product), menu, nav,
+    h('p', { class: 'chip', id: 'chip' }),
+    h('p', { class: 'who' }, S.loggedInAs(session.user, S.roles[session.role])),
+    h('button', { class: 'quiet log-out', onclick: () => leave().catch(report) }, S.logOut));
+}
+
+let lastState = null;
+function drawChip() {
+  document.body.classList.toggle('disconnected', !live.connected);
+  const chip = document.getElementById('chip');
+  if (!chip || !live.status) return;
+  const state = stateHere(live.status);
+  chip.dataset.state = live.connected ? state : 'offline';
+  const words = live.connected ? S.states[state]
+    : `${S.lastKnown(S.states[state])}${S.lastKnownAge(Math.floor(since_s(live.received)))}`;
+  if (chip.textContent !== words) chip.textContent = words;
+  if (state === lastState) return;
+  lastState = state;
+  say(S.states[state]);
+}
+
+async function show() {
+  const mine = ++turn;
+  cleanUp?.();
+  cleanUp = null;
+  failed = false;
+  warn(live.connected ? '' : S.offline);
+  const { name, argument } = route();
+  drawTop();
+  watchSession();
+  const screen = kScreens[name];
+  const place = h('div', { class: `screen ${name}` }, hint(S.loading));
+  clear(main, place);
+  document.title = `${S.nav[screen.parent ?? name]} · ${S.product}`;
+  try {
+    if (!may(screen.permission)) throw new Error(S.notAllowed);
+    const done = await screen.show(place, argument);
+    if (mine === turn) cleanUp = done ?? null;
+    else done?.();
+  } catch (error) {
+    if (mine !== turn || !currentSession()) return;
+    failed = true;
+    clear(place, h('h1', { class: 'visually-hidden' }, S.nav[screen.parent ?? name]),
+      h('p', { class: 'card' }, error.message));
+  }
+}
+
+/// The focus goes to the new screen at once: later, when its data has come, somebody may have moved
+/// it.
+function showFocused() {
+  const shown = show();
+  // Unless the screen has focused one of its own fields.
+  if (!main.contains(document.activeElement)) main.focus({ preventScroll: true });
+  return shown;
+}
+
+/// The answer to `question`. Until the appliance answers, the page shows only that it does not, and
+/// asks again.
+async function ask(question, text = S.offline) {
+  const mine = ++turn;
+  waiting = true;
+  cleanUp?.();
+  cleanUp = null;
+  try {
+    while (mine === turn) {
+      try {
+        return await question();
+      } catch (error) {
+        if (error.status > 0 && error.status < 500) throw error;
+        top.hidden = true;
+        clear(main, h('h1', { class: 'visually-hidden' }, S.product),
+          h('p', { class: 'card' }, error.status ? error.message : text));
+        await new Promise((ready) => { setTimeout(ready, kAskAgain_ms); });
+      }
+    }
+    return null;  // another question has taken its place
+  } finally {
+    if (mine === turn) waiting = false;
+  }
+}
+
+async function leave() {
+  if (!mayLeave()) return;
+  drafts.removeAll();
+  live.close();
+  forgetSession();
+  await ask(logOut, S.leavingOffline).catch(() => {});
+  await begin();
+}
+
+async function speak(who) {
+  await useLanguage(languageOf(who));
+  document.querySelector('.skip').textContent = S.skip;
+  const notice = document.querySelector('.notice');
+  notice.setAttribute('aria-label', S.notice.label);
+  clear(notice.firstElementChild, h('strong', {}, S.notice.strong), ` ${S.notice.text}`);
+}
+
+async function begin(message) {
+  const found = await ask(loadSession);
+  if (!found) return;
+  const { session, setupRequired, fault, certificate } = found;
+  if (session) adoptPreferences(session);
+  await speak(session?.user ?? 'login');
+  applyTheme(session?.user ?? 'login');
+  drawTop();
+  if (!session || session.role === 'display') {
+    document.title = `${S.login.title} · ${S.product}`;
+    if (fault) {
+      showFault(main, fault).then(() => begin());
+      return;
+    }
+    showLogin(main, setupRequired, certificate, async () => {
+      await begin();
+      const answer = currentSession() && await lastLogin();
+      if (answer?.failed > 0 || answer?.changes.length > 0) warn(lastLoginWords(answer));
+      else if (answer) say(lastLoginWords(answer), true);
+    });
+    if (message) warn(message);
+    return;
+  }
+  if (session.password_change_required) {
+    document.title = `${S.login.firstTitle} · ${S.product}`;
+    showFirstPassword(main, session.user, () => begin());
+    return;
+  }
+  await live.open();  // screens use its settings
+  await showFocused();
+}
+
+/// A result that arrives while the sweep is shown is opened at once. A failed scan is announced,
+/// and no older result is shown in its place.
+async function followScan() {
+  const { state, sensor } = await get('status', true);
+  if (state === 'result') {
+    location.hash = lastPurpose === 'daily_check' ? '#/check' : '#/result';
+    return;
+  }
+  if (state === 'fault') return;  // the screen says it
+  if (!sensor.present) {
+    warn(S.scan.lost);
+    return;
+  }
+  const { scans } = await get('scans?limit=1', true);
+  if (scans[0]?.outcome === 'failed') {
+    warn(`${S.result.failed}: ${said(scans[0], 'failure')}`);
+  }
+}
+
+/// Pointer and keys count as use: who draws a plan is not logged out at Save. Two minutes before
+/// the end the page warns.
+let used = now();
+let saidLeft_s = null;  // the step at which it was announced last; null: no warning is shown
+for (const kind of ['pointerdown', 'keydown', 'wheel', 'input']) {
+  document.addEventListener(kind, () => {
+    if (!currentSession() || since_s(used) < kUseEvery_s) return;
+    used = now();
+    if (since_s(touchedAt()) >= kUseEvery_s) get('session').catch(() => {});
+  }, { capture: true, passive: true });
+}
+function watchIdle() {
+  const session = currentSession();
+  if (!session || !live.wanted) return;
+  const idle_s = 60 * session.idle_logout_min;
+  const left_s = Math.floor(idle_s - since_s(touchedAt()));
+  if (left_s > Math.min(kWarn_s, idle_s / 2) || left_s <= 0) {
+    if (saidLeft_s !== null) endIdle();
+    return;
+  }
+  if (saidLeft_s === null) {
+    const stay = h('button', { type: 'button' }, S.stay);
+    stay.addEventListener('click', () => get('session').catch(() => {}));
+    clear(document.getElementById('idle'),
+      h('section', { class: 'alert', 'aria-label': S.idle }, h('span', { id: 'idle-text' }), stay));
+  }
+  document.getElementById('idle-text').textContent = S.logOffSoon(left_s);
+  const step = kSayLeft_s.find((one) => left_s <= one) ?? Infinity;
+  if (step === saidLeft_s) return;
+  saidLeft_s = step;
+  document.getElementById('idle-said').textContent = S.logOffSoon(left_s);
+}
+function endIdle() {
+  clear(document.getElementById('idle'));
+  clear(document.getElementById('idle-said'));
+  saidLeft_s = null;
+}
+setInterval(() => {
+  watchIdle();
+  if (!live.connected) drawChip();
+}, 1000);
+
+const report = (error) => clear(main, h('p', { class: 'card' }, error.message));
+let lastPurpose = null;
+/// Screens on which users act on the open session: they scan, or use a result. Opening another
+/// patient there asks whether to close this session.
+const kActOnSession = ['scan', 'result'];
+const watchSession = () => {
+  const { name, argument } = route();
+  // A result that was opened from the history is read, not acted on.
+  const acts = kActOnSession.includes(name) && !(name === 'result' && argument);
+  followSession(acts, () => live.notify('acknowledged'));
+  followReference(acts);
+};
+
+function listen() {
+  listenToScanners();
+  live.listen((kind) => {
+    lastPurpose = live.status?.scan?.purpose ?? lastPurpose;
+    if (kind === 'connection') warn(live.connected ? '' : S.offline);
+    if (kind === 'connection' && live.connected && failed) show();
+    if (kind === 'status' || kind === 'connection') drawChip();
+    if (kind === 'status' && live.status.sensor.present) forgetWarning(S.scan.lost);
+    if (kind === 'status') watchSession();
+    if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
+  });
+  setLoggedOffHandler(() => {
+    live.close();
+    forgetSession();
+    endIdle();
+    begin(S.loggedOff).catch(report);
+  });
+  window.addEventListener('plumb-language', async () => {
+    await speak(currentSession().user);
+    drawnFor = null;
+    showFocused();
+  });
+  let shownHash = location.hash;
+  window.addEventListener('hashchange', () => {
+    if (!currentSession() || waiting) return;
+    if (location.hash === shownHash) return;
+    if (!mayLeave()) {
+      history.replaceState(null, '', shownHash || '#/status');
+      return;
+    }
+    shownHash = location.hash;
+    showFocused();
+  });
+}
+
+if (location.pathname === '/room') {
+  import('./screens/room.js').then(({ showRoom }) => showRoom(main, { speak, applyTheme }))
+    .catch(report);
+} else {
+  listen();
+  // Until the user is known, the page is in the language of the login screen.
+  applyTheme('login');
+  speak('login').then(begin).catch(report);
+}

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// Live monitoring: how far the body has moved, now. An old number is never shown as a new one: it
+// is grey after 200 ms and gone after a second, also where the appliance says nothing more.
+import { currentSession, get, live, may, post, since_s } from '../api.js';
+import {
+  action, clear, done, enable, h, hint, saveFrom, say, svg,
+} from '../dom.js';
+import { kAxes, mostDigits, signed, toleranceBar, withUnit } from '../numbers.js';
+import { S, said } from '../words.js';
+import { follow } from './common.js';
+
+const kGrey_s = 0.2;
+const kUnknown_s = 0.15;
+const kGone_s = 1.0;
+const kLook_ms = 100;
+const kTrace_s = 30;
+const kLeastTrace_mm = 4;
+const kMarks = { in: '✓', out: '▲', unknown: '?' };
+
+/// What is known at this moment of what the appliance said last; null before it said anything.
+export function presentOf(monitor, received_s) {
+  if (!monitor) return null;
+  if (!monitor.active) return monitor;
+  const age_s = (monitor.age_s ?? 0) + received_s;
+  const isLate = age_s > kUnknown_s && monitor.age_s !== null;
+  const isGone = age_s > kGone_s;
+  return {
+    ...monitor,
+    age_s,
+    is_old: age_s > kGrey_s,
+    advice: isLate ? 'unknown' : monitor.advice,
+    reason: isLate ? 'no_image' : monitor.reason,
+    since_zero: isGone ? null : monitor.since_zero,
+    against_reference: isGone ? null : monitor.against_reference,
+    breathing_mm: isGone ? null : monitor.breathing_mm,
+  };
+}
+
+function number(axis, numbers, tolerance) {
+  const value = numbers?.[axis.key] ?? null;
+  const u95 = numbers?.[axis.key.replace(/_(mm|deg)$/, '_u95_$1')] ?? null;
+  const digits = mostDigits(axis);
+  const tone = value === null ? 'unknown' : Math.abs(value) > tolerance ? 'outside' : '';
+  return h('div', { class: `live-number ${tone}` },
+    h('span', { class: 'axis' }, S.result.axes[axis.name]),
+    h('strong', {}, value === null ? '–' : withUnit(signed(value, digits), axis.unit)),
+    h('span', { class: 'fine' }, u95 === null ? ''
+      : `± ${withUnit(u95.toFixed(digits).replace('.', S.decimal), axis.unit)}`),
+    toleranceBar(value ?? 0, value === null ? NaN : u95, tolerance, value !== null));
+}
+
+function six(title, numbers, monitor, isJudged) {
+  return h('section', { class: `live-six${isJudged ? ' judged' : ''}` }, h('h2', {}, title),
+    h('div', { class: 'live-numbers' }, kAxes.map((axis) => number(axis, numbers,
+      axis.shift ? monitor.shift_tolerance_mm : monitor.rotation_tolerance_deg))));
+}
+
+/// The belly's height over the last half minute; gaps where it is not known.
+function trace() {
+  const points = [];
+  const element = h('figure', { class: 'breathing' });
+  return {
+    element,
+    add(monitor) {
+      const at = performance.now() / 1000;
+      if (monitor?.active) points.push([at, monitor.breathing_mm]);
+      else points.length = 0;
+      while (points.length && at - points[0][0] > kTrace_s) points.shift();
+      const text = S.monitor;
+      if (!monitor?.has_breathing) {
+        clear(element, h('figcaption', {}, text.breathing), hint(text.noBreathing));
+        return;
+      }
+      const highest = Math.max(kLeastTrace_mm, ...points.map(([, mm]) => mm ?? 0));
+      let path = '';
+      let drawing = false;
+      for (const [time, mm] of points) {
+        if (mm !== null) {
+          path += `${drawing ? 'L' : 'M'}${(1000 * (1 - (at - time) / kTrace_s)).toFixed(1)} `
+            + `${(90 - 80 * (mm / highest)).toFixed(1)}`;
+        }
+        drawing = mm !== null;
+      }
+      const last = monitor.breathing_mm;
+      clear(element, h('figcaption', {}, text.breathing, ' ',
+        h('strong', {}, last === null ? '–' : text.height(last))),
+      svg('svg', { viewBox: '0 0 1000 100', preserveAspectRatio: 'none', 'aria-hidden': 'true' },
+        svg('line', { x1: 0, x2: 1000, y1: 90, y2: 90, class: 'zero' }),
+        svg('path', { d: path, class: 'trace' })));
+    },
+  };
+}
+
+/// The newest state, where no event has brought it yet; what an event brings meanwhile is newer.
+export async function askMonitor() {
+  const before = live.monitorAt;
+  const monitor = await get('monitor', true).catch(() => null);
+  if (monitor && live.monitorAt === before) live.hearMonitor(monitor);
+}
+
+/// Everything that the screen and the display in the room show of it.
+export function monitorView() {
+  const headline = h('p', { class: 'live-advice' });
+  const reason = h('p', { class: 'live-why' });
+  const head = h('div', {}, h('div', { class: 'live-head' }, headline,
+    h('p', { class: 'caution' }, S.monitor.notBeam)), reason);
+  const tell = (tone, words, why) => {
+    headline.className = `live-advice ${tone}`;
+    headline.textContent = words;
+    reason.textContent = why;
+  };
+  const numbers = h('div', { class: 'live-both' });
+  const breath = trace();
+  const element = h('div', { class: 'live-view' }, head, numbers, breath.element);
+  let saidLast = '';
+  let drawn = '';
+  let heard = null;
+  let height_mm = null;
+  const draw = () => {
+    const monitor = presentOf(live.monitor, live.monitor ? since_s(live.monitorAt) : 0);
+    // A height that grows old leaves a gap, and goes.
+    if (live.monitor !== heard || (monitor?.breathing_mm ?? null) !== height_mm) {
+      heard = live.monitor;
+      height_mm = monitor?.breathing_mm ?? null;
+      breath.add(monitor);
+    }
+    const text = S.monitor;
+    const key = JSON.stringify([S.languageName, monitor?.advice, monitor?.state, monitor?.reason,
+      monitor?.is_old, monitor?.since_zero, monitor?.against_reference, monitor?.ended]);
+    if (key === drawn) return;
+    drawn = key;
+    element.classList.toggle('is-old', Boolean(monitor?.active && monitor.is_old));
+    if (!monitor?.active) {
+      tell('unknown', text.off, monitor?.ended ? said(monitor, 'ended') : '');
+      clear(numbers);
+      return;
+    }
+    const { state, advice } = monitor;
+    const isStarting = state === 'mounting' || state === 'zeroing';
+    const word = isStarting ? text.states[state] : text.advice[advice];
+    const why = isStarting ? '' : state === 'moved_sensor' ? text.reasons.moved_sensor
+      : text.reasons[monitor.reason] ?? '';
+    if (isStarting) tell('info', word, '');
+    else {
+      tell(advice, `${kMarks[advice]} ${word}`,
+        [text.states[state], why].filter(Boolean).join(' · '));
+    }
+    const judgesReference = monitor.judges === 'against_reference';
+    clear(numbers,
+      judgesReference && six(text.againstReference, monitor.against_reference, monitor, true),
+      six(text.sinceZero, monitor.since_zero, monitor, !judgesReference));
+    const words = `${word} ${why}`;
+    if (words !== saidLast) say(words);
+    saidLast = words;
+  };
+  const timer = setInterval(draw, kLook_ms);
+  // An event may have come before the stream was there.
+  const unlisten = live.listen((kind) => {
+    if (kind === 'monitor') draw();
+    else {
+      const isOn = live.status?.state === 'monitoring';
+      if (live.status && isOn !== Boolean(live.monitor?.active)) askMonitor();
+    }
+  });
+  draw();
+  return {
+    element,
+    stop() {
+      clearInterval(timer);
+      unlisten();
+    },
+  };
+}
+
+export async function showMonitor(place) {
+  const text = S.monitor;
+  const view = monitorView();
+  const start = action(text.start, () => post('monitor/start'), { class: 'primary giant' });
+  const stop = action(text.stop, async () => {
+    await post('monitor/stop');
+    done(S.monitor.off);
+  }, { class: 'danger giant' });
+  const record = h('button', {
+    class: 'quiet', type: 'button',
+    onclick: () => saveFrom('/api/v1/monitor/record.csv', 'plumb_monitoring.csv'),
+  }, text.record);
+  clear(place, h('h1', {}, text.title),
+    h('section', { class: 'card' }, view.element, hint(text.motion)),
+    may('scan') && h('div', { class: 'controls' }, start, stop), hint(text.hint), record);
+  const draw = () => {
+    const { status } = live;
+    if (!status || !currentSession()) return;
+    const isOn = status.state === 'monitoring';
+    start.hidden = isOn;
+    stop.hidden = !isOn;
+    enable(start, live.connected && (status.state === 'ready' || status.state === 'result'));
+    enable(stop, live.connected);
+    record.hidden = !live.monitor?.has_record;
+  };
+  await askMonitor();
+  draw();
+  const unfollow = follow(draw, draw);
+  return () => {
+    unfollow();
+    view.stop();
+  };
+}

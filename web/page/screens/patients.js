@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: Apache-2.0
+// Patients, their references and scans, and the treatment session that people open here.
+import { get, live, may, post, put, removeFor } from '../api.js';
+import {
+  action, card, clear, done, enable, field, form, h, hint, localTime, redraw, row, say, signedTime,
+  table, warn,
+} from '../dom.js';
+import { kFraction, kName, kNote, kReason, kSite } from '../limits.js';
+import { numbersLine } from '../numbers.js';
+import { lookOf, plainCode } from '../scanner.js';
+import { signedForm } from '../signed_form.js';
+import { S } from '../words.js';
+import { closeSession, openPatient, resumeSession } from '../treatment.js';
+import { acceptanceMark, ageText, blockNote, isAdvice, outcomeBadge } from './common.js';
+
+const waitsFor = ({ planned_by: planner }) =>
+  (planner ? S.patients.waits : S.patients.waitsForPlan);
+
+function referenceState(patient) {
+  const text = S.patients;
+  const draft = patient.draft_reference_id;
+  const told = live.status?.waiting.find(({ reference_id: id }) => id === draft);
+  const approved = patient.approved_reference_id && `✓ ${text.approved}`;
+  const waits = draft && h('a', { href: `#/plan/${draft}`, class: 'badge move' },
+    told ? waitsFor(told) : text.draft);
+  return approved || waits ? [approved, approved && waits && ' ', waits] : text.noReference;
+}
+
+export async function showPatients(place) {
+  const text = S.patients;
+  const list = h('div', {});
+  const search = h('input', { type: 'search', autocomplete: 'off', spellcheck: 'false' });
+  const missed = h('p', { class: 'caution' });
+  const code = h('input', {
+    required: true, pattern: '[A-Za-z0-9_\\-][A-Za-z0-9._\\-]*', autocomplete: 'off',
+    spellcheck: 'false', 'data-code': '',
+  });
+  let confirmed = '';  // a code that looks like another one, and is to be added
+  const site = h('input', { autocomplete: 'off', ...kSite });
+  const archived = h('input', { type: 'checkbox' });
+  let patients = [];
+
+  const wanted = () => search.value.trim().toLowerCase();
+  const matching = () => patients.filter((patient) => (archived.checked || !patient.archived)
+    && patient.code.toLowerCase().includes(wanted()));
+  const patientRow = (patient) => {
+    const isOpen = patient.id === live.status?.session?.patient_id;
+    const element = row([h('a', { href: `#/patient/${patient.id}` }, patient.code),
+      isOpen && h('span', { class: 'badge here' }, text.isOpen),
+      patient.archived && h('span', { class: 'badge' }, text.archived)],
+    patient.site || S.none, patient.num_scans, referenceState(patient),
+    localTime(patient.created_at));
+    element.classList.toggle('chosen', isOpen);
+    return element;
+  };
+  const draw = () => {
+    const rows = matching().map(patientRow);
+    redraw(list, rows.length
+      ? table([text.code, text.site, text.scans, text.reference, text.added], rows, text.title)
+      : hint(wanted() ? text.noMatch(search.value.trim()) : text.empty));
+  };
+  const load = async () => {
+    // The state says which drafts wait for what.
+    [{ patients }] = await Promise.all([get('patients', true), live.refreshed()]);
+    draw();
+  };
+  search.addEventListener('input', () => {
+    missed.textContent = '';
+    draw();
+  });
+  archived.addEventListener('change', draw);
+  // A scanner of wristbands types the code and Enter. Only the whole code opens a patient: a part
+  // of one may be another patient's.
+  search.addEventListener('keydown', (event) => {
+    if (event.key !== 'Enter' || !wanted()) return;
+    const found = patients.find((patient) => patient.code.toLowerCase() === wanted())
+      ?? patients.find((patient) => plainCode(patient.code) === plainCode(wanted()));
+    if (found) {
+      location.hash = `#/patient/${found.id}`;
+      return;
+    }
+    missed.textContent = matching().length ? text.noMatch(search.value.trim()) : '';
+    say(text.noMatch(search.value.trim()));
+    search.select();  // or the next code would be added to this one
+  });
+  clear(place, h('h1', {}, text.title),
+    h('section', { class: 'card' }, field(text.search, search), missed, list,
+      h('label', { class: 'check below' }, archived, ' ', text.showArchived)),
+    may('patients') && card(text.add,
+      form({ class: 'form inline' }, async () => {
+        const body = { code: code.value.trim(), site: site.value.trim() };
+        // Not cut off, which would make another patient's code of it.
+        if (body.code.length > kName.maxlength) {
+          throw new Error(text.codeLong(kName.maxlength, body.code.length));
+        }
+        const alike = patients.filter((one) => lookOf(one.code) === lookOf(body.code)
+          && plainCode(one.code) !== plainCode(body.code));
+        if (alike.length && confirmed !== body.code) {
+          confirmed = body.code;
+          throw new Error(text.alike(body.code, alike.map((one) => one.code).join(', ')));
+        }
+        const { id } = await post('patients', body);
+        location.hash = `#/patient/${id}`;
+      }, field(text.code, code, text.codeHint), field(text.site, site, text.siteHint),
+      h('button', { class: 'primary' }, text.add))));
+  // Not where a keyboard on the screen would cover the list.
+  if (!matchMedia('(pointer: coarse)').matches) search.focus({ preventScroll: true });
+  await load();
+  return live.listen((kind) => { if (kind === 'data') load().catch(() => {}); });
+}
+
+/// If another patient's session is open, it is named and closed by the same tap. A session that is
+/// open already is not offered again.
+/// @return {element, draw}  Call draw() when the connection or the session has changed.
+function openButtons(patient) {
+  const text = S.patients;
+  const reason = h('input', { autocomplete: 'off', maxlength: kReason.maxlength });
+  const question = h('div', {});
+  /// `begin(replaces)`, after a question where another patient's session ends by it.
+  const beginWith = async (begin) => {
+    const session = live.status?.session;
+    if (!session || session.patient_id === patient.id) {
+      await begin(session?.id ?? '');
+      return;
+    }
+    clear(question, h('p', { class: 'lead caution' },
+      S.session.replace(session.patient_code, patient.code)),
+    h('div', { class: 'row' },
+      action(S.session.replaceSubmit(session.patient_code, patient.code),
+        () => begin(session.id), { class: 'danger' }),
+      action(S.cancel, async () => clear(question), {})));
+  };
+  const open = (purpose) => async () => {
+    // The reason for replacing an approved reference is recorded with the new one.
+    const replacesOne = purpose === 'reference' && patient.approved_reference_id;
+    if (replacesOne && reason.value.trim().length < kReason.minlength) {
+      reason.focus();
+      throw new Error(text.reasonNeeded);
+    }
+    await beginWith(async (replaces) => {
+      await openPatient(patient, purpose, purpose === 'reference' ? reason.value.trim() : '',
+        replaces);
+      location.hash = '#/scan';
+    });
+  };
+  const confirm = h('p', { class: 'lead' }, text.confirmWho(patient.code));
+  const why = field(text.reason, reason);
+  const { last_session: last } = patient;
+  const fraction = action(last ? S.session.startNew : text.openFraction, open('fraction'),
+    { class: last ? '' : 'start-session' });
+  const since_s = last && Math.max(0, (Date.now() - Date.parse(last.closed_at)) / 1000);
+  const resume = last && action(S.session.resume(last.fraction, ageText(since_s)),
+    () => beginWith(async (replaces) => {
+      await resumeSession(last, replaces);
+      location.hash = '#/scan';
+    }), { class: 'start-session' });
+  const reference = action(text.openReference, open('reference'), {});
+  let blocked = null;
+  // Without a connection it is not known whose session is open.
+  const draw = () => {
+    enable(fraction, live.connected && Boolean(patient.approved_reference_id));
+    enable(reference, live.connected && !blocked);
+    if (resume) enable(resume, live.connected);
+    const { session, next_purpose: next } = live.status ?? {};
+    const isOpen = (purpose) => session?.patient_id === patient.id && session.purpose === purpose
+      && next === purpose;
+    fraction.hidden = isOpen('fraction');
+    if (resume) resume.hidden = fraction.hidden;
+    reference.hidden = isOpen('reference');
+    confirm.hidden = fraction.hidden;  // who is open stands above
+    why.hidden = reference.hidden;
+  };
+  const block = blockNote((now) => {
+    blocked = now;
+    draw();
+  });
+  const element = h('div', { class: 'form' },
+    confirm,
+    h('div', { class: 'row' }, resume, fraction, reference), block, question,
+    !patient.approved_reference_id && hint(text.needsReference),
+    why);
+  return { element, draw };
+}
+
+/// Site, note and archive: what people say of a course, and whether it is still in the list.
+function aboutPatient(patient, reload) {
+  const text = S.patients;
+  const site = h('input', { autocomplete: 'off', value: patient.site, ...kSite });
+  const note = h('textarea', { rows: 3, ...kNote });
+  note.value = patient.note;
+  const editable = may('patients');
+  return card(text.about,
+    editable ? form({ class: 'form' }, async () => {
+      const body = {
+        site: site.value.trim(), note: note.value.replace(/\s+/g, ' ').trim(),
+        site_before: patient.site, note_before: patient.note,
+      };
+      try {
+        await put(`patients/${patient.id}`, body);
+      } catch (error) {
+        if (error.status === 409) await reload();  // shows what somebody else has saved
+        throw error;
+      }
+      done(S.saved);
+      await reload();
+    }, field(text.site, site, text.siteHint), field(text.note, note, text.noteHint),
+    h('button', {}, S.save))
+      : h('p', { class: 'note' }, patient.note || S.none),
+    patient.archived && h('p', { class: 'caution' }, text.isArchived),
+    may('plan') && h('div', { class: 'row below' },
+      action(patient.archived ? text.unarchive : text.archive, async () => {
+        await post(`patients/${patient.id}/archive`, { archived: !patient.archived });
+        await reload();
+      }, {}), !patient.archived && hint(text.archiveHint)));
+}
+
+function referenceTable(references) {
+  const text = S.patients;
+  if (!references.length) return hint(text.noReferences);
+  const plan = may('plan') ? text.plan : text.planView;
+  const rows = references.map((reference) => row(reference.version,
+    `${localTime(reference.created_at)}, ${reference.created_by}`, reference.reason || S.none,
+    reference.approved_by
+      ? `✓ ${text.approvedBy(reference.approved_by, signedTime(reference.approved_at))}`
+      : h('span', { class: 'badge move' }, `${text.draft}, ${waitsFor(reference)}`),
+    h('a', {
+      class: 'button', href: `#/plan/${reference.id}`,
+      'aria-label': `${plan}, ${text.version} ${reference.version}`,
+    }, plan)));
+  return table([text.version, text.made, text.reasonShort, text.state, S.action], rows,
+    text.references);
+}
+
+function scanTable(scans) {
+  const text = S.patients;
+  if (!scans.length) return hint(S.status.noScans);
+  const signed = (scan) => (scan.accepted_at
+    ? `${scan.accepted_by}, ${signedTime(scan.accepted_at)}` : scan.accepted_by);
+  const accepted = (scan) => (!scan.accepted_by ? S.none : `${acceptanceMark(scan)} ${signed(scan)}`
+    + `${scan.accepted_reason ? `: ${scan.accepted_reason}` : ''}`);
+  const rows = scans.map((scan) => row(
+    h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at)),
+    scan.fraction ?? S.none, S.purposes[scan.purpose],
+    [outcomeBadge(scan), scan.check_overdue && h('span', { class: 'badge move overdue' },
+      `▲ ${scan.check_failed ? text.checkFailed : text.checkOverdue}`)],
+    h('td', { class: 'digits' }, isAdvice(scan) ? numbersLine(scan.result) : S.none),
+    accepted(scan)));
+  const heads = [text.when, text.fraction, text.purpose, text.outcome, text.numbers,
+    text.accepted];
+  return table(heads, rows, text.history);
+}
+
+/// The numbers of sessions in which something was scanned can be corrected, with a signature.
+function correctFraction(scans, reload) {
+  const text = S.session;
+  const sessions = new Map();
+  for (const { session_id: id, fraction, started_at: at } of scans) {
+    if (id && fraction) sessions.set(id, `${text.fraction(fraction)}, ${localTime(at)}`);
+  }
+  if (!sessions.size) return null;
+  const which = h('select', {},
+    ...[...sessions].map(([id, words]) => h('option', { value: id }, words)));
+  const number = h('input', { type: 'number', required: true, ...kFraction });
+  const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
+  return h('details', {}, h('summary', {}, text.correct),
+    signedForm({ class: 'form inline' }, async (sign) => {
+      await post('treatment/fraction', {
+        session_id: which.value, fraction: Number(number.value), reason: reason.value.trim(),
+        ...sign(),
+      });
+      done(S.saved);
+      await reload();
+    }, h('button', {}, text.correctSubmit), field(text.correctWhich, which),
+    field(text.correctTo, number), field(text.correctWhy, reason)));
+}
+
+function wipe(patient) {
+  const text = S.patients;
+  const code = h('input', { required: true, autocomplete: 'off', spellcheck: 'false' });
+  return h('details', { class: 'card' }, h('summary', {}, text.wipe), h('p', {}, text.wipeText),
+    signedForm({ class: 'form inline' }, async (sign) => {
+      const isSame = code.value.trim().toLowerCase() === patient.code.toLowerCase();
+      if (!isSame) throw new Error(text.wipeDiffers);
+      await removeFor(`patients/${patient.id}`, sign());
+      location.hash = '#/patients';
+    }, h('button', { class: 'danger' }, text.wipeSubmit), field(text.code, code)));
+}
+
+function openNow(patient) {
+  const session = live.status?.session;
+  if (session?.patient_id !== patient.id) return null;
+  return h('p', { class: 'lead' }, h('strong', {}, S.patients.isOpen), ' ',
+    session.fraction ? S.session.fraction(session.fraction) : S.purposes.reference, ' ',
+    h('a', { class: 'button primary', href: '#/scan' }, S.status.goScan), ' ',
+    may('scan') && action(S.session.close, () => closeSession(session), {}));
+}
+
+export async function showPatient(place, id) {
+  const text = S.patients;
+  const references = h('div', {});
+  const scans = h('div', {});
+  const opening = h('div', {});
+  const about = h('div', {});
+  const heading = h('h1', {});
+  const correction = h('div', { class: 'below' });
+  let numbered;
+  let approved;
+  let told;
+  let buttons = null;
+  /// The button that begins a session is the primary one only where this patient's is not open.
+  const weigh = () => opening.querySelector('.start-session')
+    ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
+  const load = async () => {
+    const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
+      get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
+    // A reason that was typed stays as long as nothing else is offered.
+    const opens = `${patient.approved_reference_id} ${patient.archived} ${
+      patient.last_session?.id} ${patient.last_session?.fraction}`;
+    if (approved !== opens) {
+      approved = opens;
+      buttons = patient.archived ? null : openButtons(patient);
+      clear(opening, buttons?.element ?? hint(text.isArchived));
+      weigh();
+    }
+    const says = JSON.stringify([patient.site, patient.note, patient.archived]);
+    if (told !== says) {
+      told = says;
+      clear(heading, patient.code, ' ', h('small', {}, patient.site));
+      clear(about, aboutPatient(patient, load));
+    }
+    redraw(references, referenceTable(found.references));
+    redraw(scans, scanTable(history.scans));
+    const sessions = JSON.stringify(history.scans.map((scan) => [scan.session_id, scan.fraction]));
+    if (numbered !== sessions) {  // or a half-typed reason would be lost
+      numbered = sessions;
+      clear(correction, may('accept') && correctFraction(history.scans, load));
+    }
+  };
+  const patient = await get(`patients/${id}`);
+  const session = h('div', {});
+  const file = (name, label) => h('a', {
+    class: 'button', href: `/api/v1/patients/${id}/${name}`, download: '',
+  }, label);
+  clear(place, heading,
+    may('scan') && card(text.open, session, opening),
+    card(text.references, references),
+    card(text.history, scans,
+      h('div', { class: 'row below' },
+        file(`report.pdf?language=${document.documentElement.lang}`, text.report),
+        file('numbers.csv', text.csv), file('numbers.json', text.json),
+        file(`course.zip?language=${document.documentElement.lang}`, text.course)),
+      correction),
+    about, may('wipe') && wipe(patient));
+  let shownSession = null;
+  const drawSession = () => {
+    const now = live.status?.session ?? null;
+    const key = JSON.stringify(now);
+    if (shownSession === key) return;
+    shownSession = key;
+    clear(session, openNow(patient));
+    weigh();
+  };
+  drawSession();
+  await load();
+  return live.listen((kind) => {
+    if (kind === 'status') drawSession();
+    if (kind === 'status' || kind === 'connection') buttons?.draw();
+    if (kind === 'data' || kind === 'result') load().catch((error) => warn(error.message));
+  });
+}

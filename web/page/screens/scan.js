@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sweep: guidance, coverage, the camera, and the button.
+import {
+  currentSession, fetchPicture, get, live, may, now, post, repeat, since_s,
+} from '../api.js';
+import { action, card, clear, done, enable, h, hint, redraw, say } from '../dom.js';
+import { liveSurface } from '../drawings/live_surface.js';
+import { isAcknowledged, sessionLine } from '../treatment.js';
+import { S, said } from '../words.js';
+import { faultWords, follow, lastKnownNote, sentence, stateHere } from './common.js';
+
+const kPreviewEvery_ms = 250;
+const kPreviewAgain_ms = 2000;  // without a picture
+const kSecondTap_s = 0.8;
+
+/// The camera's picture, as long as there is one.
+export function preview() {
+  const text = S.status;
+  const picture = h('img', { alt: text.previewAlt, hidden: true });
+  const none = hint(text.noPreview);
+  let url = null;
+  const stop = repeat(async () => {
+    try {
+      const response = await fetchPicture('preview');
+      if (!response.ok) throw new Error();
+      const fresh = URL.createObjectURL(await response.blob());
+      picture.src = fresh;
+      await picture.decode().catch(() => {});
+      if (url) URL.revokeObjectURL(url);
+      url = fresh;
+      picture.hidden = false;
+      none.hidden = true;
+      return kPreviewEvery_ms;
+    } catch {
+      picture.hidden = true;
+      none.hidden = false;
+      return kPreviewAgain_ms;
+    }
+  });
+  return { element: h('figure', { class: 'preview' }, picture, none), stop };
+}
+
+/// In `place` while a sweep goes on: the surface that grows. `follow(wanted)` with every status.
+export function surfaceIn(place) {
+  let surface = null;
+  return (wanted) => {
+    if (wanted === Boolean(surface)) return;
+    surface?.stop();
+    surface = wanted ? liveSurface() : null;
+    clear(place, surface?.element);
+  };
+}
+
+/// Returns what the large button does now: its words and its request; nothing where it is off.
+function offer(status) {
+  const text = S.scan;
+  const { fault_kind: fault } = status;
+  const state = stateHere(status);
+  if (state === 'scanning') return { label: text.stop, request: 'scan/end' };
+  if (state === 'fault' && fault === 'scan') return { label: text.acknowledge, request: 'press' };
+  if (state === 'working') return { label: S.states.working, request: '' };
+  if (state === 'result') return { label: text.again, request: 'scan/start' };
+  const canStart = state === 'ready' || state === 'monitoring';
+  return { label: text.start, request: canStart ? 'scan/start' : '' };
+}
+
+function buttons() {
+  const text = S.scan;
+  let request = '';
+  let tapped = null;
+  const press = action('', async () => {
+    // The second of two taps was meant for what the button said before.
+    if (tapped && since_s(tapped) < kSecondTap_s) return;
+    tapped = now();
+    await post(request);
+  }, { class: 'primary giant' });
+  const discard = action(text.discard, async () => {
+    await post('cancel');
+    done(text.discarded);
+  }, { class: 'danger' });
+  const draw = (status) => {
+    const next = offer(status);
+    request = next.request;
+    if (press.textContent !== next.label) press.textContent = next.label;
+    press.classList.toggle('stop', status.state === 'scanning');
+    enable(press, Boolean(request) && live.connected && isAcknowledged());
+    enable(discard, live.connected);
+    const isOver = !['scanning', 'working'].includes(status.state);
+    if (isOver && document.activeElement === discard) press.focus();
+    discard.hidden = isOver;
+  };
+  return {
+    draw, element: may('scan') ? h('div', { class: 'controls' }, press, discard) : h('div', {}),
+  };
+}
+
+/// Without a reference, the total area to scan is not known; only whether new surface comes in.
+export const surfaceWords = (still_s = 0) => S.scan.surface(Math.floor(still_s));
+
+/// What is computed now.
+export const stepWords = (scan) => S.scan.step[scan?.step?.replaceAll(' ', '_').toLowerCase()]
+  ?? said(scan, 'step') ?? '';
+
+/// The tone and words of what the person who sweeps should do.
+export function adviceOf(status) {
+  if (status.state !== 'scanning') {
+    return { hint: '', words: S.stateHints[stateHere(status)], tone: '' };
+  }
+  const advice = status.scan?.guidance ?? 'none';
+  return {
+    hint: advice, words: S.scan.guidance[advice], tone: advice === 'none' ? 'good' : 'bad',
+  };
+}
+
+/// @param what  "board" for a check that was opened to calibrate the room.
+export async function showScan(place, what) {
+  const text = S.scan;
+  const camera = preview();
+  const who = h('p', { class: 'lead who-line' });
+  const headline = h('p', { class: 'headline' });
+  const guidance = h('p', { class: 'guidance' });
+  const known = lastKnownNote('old-note');
+  const caution = h('p', { class: 'caution' });
+  const toResult = h('a', { class: 'button', href: '#/result', hidden: true }, text.toResult);
+  const bar = h('progress', { max: 1, 'aria-label': text.coverage });
+  const barText = h('p', { class: 'bar-text' });
+  const facts = h('dl', { class: 'facts' });
+  const seen = h('div', { class: 'seen-so-far' });
+  const showSurface = surfaceIn(seen);
+  const control = buttons();
+  const drawSession = sessionLine(who, { mayClose: may('scan') });
+  const shown = {};
+
+  clear(place, h('h1', { class: 'visually-hidden' }, text.title),
+    h('div', { class: 'scan-grid' },
+      h('section', { class: 'card sweep' }, who, known.element, headline, guidance, caution,
+        toResult, h('div', { class: 'bar' }, bar, barText), control.element),
+      card(S.status.preview, camera.element, seen, facts)));
+
+  const drawWho = (status) => {
+    const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
+    const key = JSON.stringify([isCheck, status.session, status.state === 'scanning'
+      || status.state === 'working']);
+    if (shown.who === key) return;
+    shown.who = key;
+    if (isCheck) {
+      const [name, sweep] = what === 'board' ? [S.room_calibration.title, S.room_calibration.sweep]
+        : [S.purposes.daily_check, S.check.sweep];
+      redraw(who, h('strong', { class: 'code-big' }, name), ` ${sweep}`);
+    } else drawSession();
+  };
+  const drawProgress = (status) => {
+    const { scan, state } = status;
+    const fraction = state === 'working' ? scan?.step_fraction : scan?.coverage;
+    const isKnown = scan && fraction !== null && fraction !== undefined;
+    bar.parentElement.hidden = !scan;
+    if (isKnown) bar.value = fraction;
+    else bar.removeAttribute('value');
+    const percent = `${Math.round((fraction ?? 0) * 100)} %`;
+    barText.textContent = state === 'working'
+      ? `${stepWords(scan)} ${percent}`
+      : isKnown ? `${text.coverage} ${percent}` : surfaceWords(scan?.without_new_surface_s);
+    const advice = adviceOf(status);
+    guidance.textContent = advice.words;
+    guidance.dataset.tone = advice.tone;
+    if (advice.tone === 'bad' && advice.hint !== shown.hint) say(advice.words);
+    shown.hint = advice.hint;
+    const pair = (name, value) => [h('dt', {}, name), h('dd', {}, value)];
+    clear(facts, scan ? [pair(text.time, text.seconds(scan.elapsed_s)),
+      pair(text.keyframes, scan.keyframes),
+      pair(text.tracked, `${scan.frames_tracked} / ${scan.frames + scan.frames_dropped}`),
+      pair(text.dropped, scan.frames_dropped)] : []);
+  };
+  const draw = () => {
+    const { status } = live;
+    if (!status || !currentSession()) return;
+    place.classList.toggle('off', !live.connected);
+    known.draw();
+    const state = stateHere(status);
+    headline.textContent = S.states[state];
+    headline.dataset.state = state;
+    toResult.hidden = state !== 'result' || !status.last_result;
+    control.draw(status);
+    showSurface(status.state === 'scanning');
+    drawProgress(status);
+    if (status.fault) guidance.textContent = faultWords(status);
+    const refused = status.next_purpose === 'reference' && status.state === 'ready';
+    caution.textContent = refused ? sentence(said(status, 'reference_block') ?? '') : '';
+    drawWho(status);
+  };
+  draw();
+  if (!live.status) get('status', true).then((status) => live.take(status), () => {});
+  const stop = follow(draw, known.draw);
+  return () => {
+    stop();
+    showSurface(false);
+    camera.stop();
+  };
+}

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+import { get, live, may, postLong, put } from '../api.js';
+import {
+  action, card, checkbox, clear, done, field, form, h, hint, localTime, select,
+} from '../dom.js';
+import { kBounds } from '../limits.js';
+import { S, said, saidEach } from '../words.js';
+import { certificateCard } from './certificate.js';
+import { profileCard } from './sensor_profile.js';
+
+const kFlags = ['couch_markers', 'keep_recordings'];
+
+/// When the last backup was made and how it went, and one more now.
+function backupCard() {
+  const text = S.settings;
+  const last = h('p', { class: 'last-backup' });
+  const running = h('p', { class: 'hint', role: 'status' });
+  const draw = async () => {
+    const { last: entry } = await get('backup', true);
+    const warnings = saidEach(live.status?.storage, 'warnings');
+    clear(last, entry ? text.backupLast(localTime(entry.time), entry.user || S.product)
+      : text.backupNone, entry && [' ', h('code', {}, said(entry, 'detail'))],
+    warnings.map((one) => h('span', { class: 'caution' }, ' ', one)));
+  };
+  const now = action(text.backupNow, async () => {
+    running.textContent = text.backupRunning;
+    try {
+      await postLong('backup');
+      done(text.backupDone);
+    } finally {
+      running.textContent = '';
+      await draw().catch(() => {});
+    }
+  }, {});
+  draw().catch((error) => clear(last, error.message));
+  return card(text.backup,
+    hint(text.backupHint), last, now, running);
+}
+
+const kCannotRead = /the stored settings cannot be read/;
+
+/// Returns what is stored, or why it cannot be read: then nothing is filled in, since a default
+/// would look like a value that somebody set.
+async function readSettings() {
+  try {
+    return { settings: await get('settings'), fault: null };
+  } catch (error) {
+    if (!kCannotRead.test(error.body?.error ?? '')) throw error;
+    return { settings: {}, fault: error.message };
+  }
+}
+
+export async function showSettings(place) {
+  const text = S.settings;
+  const { settings, fault } = await readSettings();
+  const editable = may('settings');
+  const inputs = {};
+  const numbers = Object.entries(kBounds).map(([name, bounds]) => {
+    inputs[name] = h('input', {
+      type: 'number', ...bounds, value: settings[name], required: true, disabled: !editable,
+    });
+    return field(text[name], inputs[name]);
+  });
+  const flags = kFlags.map((name) => {
+    if (fault) {  // A box is never empty, a choice can be.
+      const choice = select({ true: S.audit.yes, false: S.audit.no }, undefined,
+        { required: true, disabled: !editable });
+      inputs[name] = {
+        isOn: () => choice.value === 'true', turn: (on) => { choice.value = String(on); },
+      };
+      return field(text[name], choice);
+    }
+    const { box, element } = checkbox(text[name], settings[name], { disabled: !editable });
+    inputs[name] = { isOn: () => box.checked, turn: (on) => { box.checked = on; } };
+    return element;
+  });
+  const posture = select(S.plan.postures, settings.posture,
+    { required: true, disabled: !editable });
+  const alert = fault && h('p', { class: 'caution', role: 'alert' }, text.enterAll, ' ',
+    h('code', {}, fault));
+  let stored = settings;
+  const entered = () => ({
+    posture: posture.value,
+    ...Object.fromEntries(Object.keys(kBounds).map((name) => [name, Number(inputs[name].value)])),
+    ...Object.fromEntries(kFlags.map((name) => [name, inputs[name].isOn()])),
+  });
+  /// Sends only what was changed here: somebody else may have changed other settings since they
+  /// were read. Those are then shown, too.
+  const save = async () => {
+    const wanted = entered();
+    const changed = Object.entries(wanted).filter(([name, value]) => value !== stored[name]);
+    if (changed.length) await put('settings', Object.fromEntries(changed));
+    stored = await get('settings').catch(() => ({ ...stored, ...wanted }));
+    posture.value = stored.posture;
+    for (const name of Object.keys(kBounds)) inputs[name].value = stored[name];
+    for (const name of kFlags) inputs[name].turn(stored[name]);
+    alert?.remove();
+    done(S.saved);
+  };
+  clear(place, h('h1', {}, text.title), !editable && h('p', { class: 'lead' }, text.readOnly),
+    alert,
+    h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
+      field(text.posture, posture), flags,
+      editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),
+    profileCard(), editable && backupCard(),
+    editable && certificateCard());
+}
