@@ -50,6 +50,8 @@ const top = document.getElementById('top');
 let cleanUp = null;
 let turn = 0;
 let waiting = false;  // for the appliance, to come in or to leave
+let opening = 0;      // for what screens need before the first of them
+let shownHash = '';
 let failed = false;   // the screen could not be shown
 
 const route = () => {
@@ -117,6 +119,7 @@ async function show() {
   cleanUp?.();
   cleanUp = null;
   failed = false;
+  shownHash = location.hash;
   warn(live.connected ? '' : S.offline);
   const { name, argument } = route();
   drawTop();
@@ -217,7 +220,9 @@ async function begin(message) {
     showFirstPassword(main, session.user, () => begin());
     return;
   }
-  await live.open();  // screens use its settings
+  // Screens use its settings. Who goes to another one meanwhile gets that, once.
+  ++opening;
+  await live.open().finally(() => { --opening; });
   await showFocused();
 }
 
@@ -317,15 +322,13 @@ function listen() {
     drawnFor = null;
     showFocused();
   });
-  let shownHash = location.hash;
   window.addEventListener('hashchange', () => {
-    if (!currentSession() || waiting) return;
+    if (!currentSession() || waiting || opening) return;
     if (location.hash === shownHash) return;
     if (!mayLeave()) {
       history.replaceState(null, '', shownHash || '#/status');
       return;
     }
-    shownHash = location.hash;
     showFocused();
   });
 }

@@ -156,7 +156,8 @@ export function keepFocus(element, change) {
 
 const drawn = new WeakMap();
 /// As clear(), but what is there stays when nothing differs: neither the focus nor what a reader
-/// reads is taken away. A child may be there already: copies are compared, so that it stays.
+/// reads is taken away. A child may be there already: copies are compared, so that it stays. It
+/// has to be a child itself: within a new one it would be gone together with that.
 export function redraw(element, ...children) {
   const all = children.flat(Infinity);
   const copies = all.map((child) => (child instanceof Node ? child.cloneNode(true) : child));

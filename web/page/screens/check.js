@@ -58,7 +58,7 @@ function baselineForm(check, changes, load) {
   const text = S.check;
   if (check.user === currentSession()?.user) return hint(text.secondPerson);
   const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
-  return h('details', { class: 'below take-baseline' }, h('summary', {}, `${text.takeBaseline}…`),
+  return h('details', { class: 'take-baseline' }, h('summary', {}, `${text.takeBaseline}…`),
     h('p', { class: check.status === 'failed' ? 'caution' : 'hint' },
       check.status === 'failed' ? text.takeFailed : text.takeHint),
     changes.length > 0 && [h('p', {}, text.takeChanges), h('ul', { class: 'findings small' },
@@ -70,13 +70,12 @@ function baselineForm(check, changes, load) {
     }, h('button', { 'data-check': check.id }, text.takeBaseline), field(text.takeReason, reason)));
 }
 
-function newest(check, baseline) {
+function newest(check) {
   const text = S.check;
   const more = saidEach(check, 'reasons').slice(1).map((reason) => h('li', {}, sentence(reason)));
   return card(localTime(check.time),
     table([text.number, text.value, text.limit, text.judged], check.items.map(itemRow), text.title),
-    more.length > 0 && h('ul', { class: 'findings small' }, more),
-    baseline);
+    more.length > 0 && h('ul', { class: 'findings small' }, more));
 }
 
 const kWidth = 340;
@@ -146,7 +145,7 @@ function earlier(checks) {
 export async function showCheck(place) {
   const text = S.check;
   const room = roomCard();
-  const baselinePlace = h('div', {});
+  const baselinePlace = h('section', { class: 'card', hidden: true });
   let offered = null;  // the check whose form is there: what was typed in it stays
   let asked = 0;
   const load = async () => {
@@ -159,8 +158,9 @@ export async function showCheck(place) {
     const offer = last && JSON.stringify([last.id, baseline?.check_id, S.languageName]);
     if (last && offered !== offer) {
       offered = offer;
-      clear(baselinePlace, may('plan') && last.num_markers >= 3 && baseline?.check_id !== last.id
-        && baselineForm(last, saidEach(answer, 'changes'), load));
+      const mayTake = may('plan') && last.num_markers >= 3 && baseline?.check_id !== last.id;
+      clear(baselinePlace, mayTake && baselineForm(last, saidEach(answer, 'changes'), load));
+      baselinePlace.hidden = !mayTake;
     }
     const of = baseline
       ? text.baselineOf(baseline.num_markers, baseline.set_by, signedTime(baseline.set_at))
@@ -172,7 +172,7 @@ export async function showCheck(place) {
           await post('checks/open');
           location.hash = '#/scan';
         }, { class: 'primary' })),
-      last && newest(last, baselinePlace), room.place, trends(checks),
+      last && newest(last), baselinePlace, room.place, trends(checks),
       checks.length > 1 && earlier(checks.slice(1)));
   };
   await load();
