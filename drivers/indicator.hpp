@@ -22,6 +22,7 @@ enum class IndicatorPattern {
   kReadyRolledBack,      ///< Ready, but the system before the last update was restored.
   kReadyDiskNearlyFull,  ///< Ready, but there is little room for more scans.
   kReadyGuessed,         ///< Ready, but somebody is guessing passwords of the page.
+  kReadyToMonitor,       ///< The sensor is at rest: a press starts monitoring, not a sweep.
   kMonitorStarting,      ///< Mounting, zeroing.
   kMonitorIn,
   kMonitorOut,

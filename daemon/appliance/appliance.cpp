@@ -61,7 +61,8 @@ Appliance::Appliance(SharedParts& shared)
       store_thread_(shared.store_thread),
       monitoring_(shared.monitoring),
       sensors_(shared.sensors),
-      button_(loop_, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }) {
+      button_(loop_, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }),
+      rest_(loop_, sensors_, [this] { PublishState(); }) {
   shared.sensor_changed = [this](const SensorEvent& event) { OnSensor(event); };
   shared.session_unused = [this] { OnSessionUnused(); };
   monitoring_.SetHooks(
@@ -103,11 +104,14 @@ Appliance::Answer Appliance::WhyNotIdle() const {
   return IsRunning() ? say::scan::WaitForResult() : Message();
 }
 
-/// Without a running scan and a shown result, a long press ends the treatment session.
+/// Without a running scan and a shown result, a long press ends the treatment session. A short one
+/// starts monitoring where the sensor is at rest, as light and screens have said before.
 Appliance::Answer Appliance::Press(ButtonPress press, const Actor& actor) {
   if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady && session_.IsOpen() &&
       session_.IsPatients())
     return CloseSession(actor);
+  if (press == ButtonPress::kShort && PressMonitors())
+    return Handle(ScanEvent::kMonitorStart, &actor);
   return Handle(press == ButtonPress::kShort ? ScanEvent::kShortPress : ScanEvent::kLongPress,
                 &actor);
 }
@@ -164,7 +168,9 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const Actor* actor) {
   }
   if (actor != nullptr && transition.actions.empty())  // a fault or a result was acknowledged
     Audit(*actor, "press", "", say::audit::State(Name(state_.phase)));
-  if (state_ != before) PublishState();
+  if (state_ == before) return answer;
+  WatchRest();
+  PublishState();
   return answer;
 }
 
@@ -354,6 +360,7 @@ void Appliance::OnTick() {
   WatchSpace();
   upkeep_.Tick(IsRunning());
   button_.Tick();
+  WatchRest();
 }
 
 bool Appliance::WorkersAreAlive() const {

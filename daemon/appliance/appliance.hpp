@@ -14,6 +14,7 @@
 #include "algo/base/message.hpp"
 #include "daemon/appliance/button_watch.hpp"
 #include "daemon/appliance/current_scan.hpp"
+#include "daemon/appliance/rest_watch.hpp"
 #include "daemon/appliance/scan_session.hpp"
 #include "daemon/appliance/scan_state.hpp"
 #include "daemon/appliance/shared_parts.hpp"
@@ -110,6 +111,8 @@ class Appliance : private StorageUser {
   [[nodiscard]] MonitorJob MakeMonitorJob();
   void EndMonitor();
   void OnMonitorFailed(const Message& why);
+  void WatchRest();
+  [[nodiscard]] bool PressMonitors() const;
   void BeginSession();
   [[nodiscard]] ScanJob MakeJob(const Settings& settings);
   [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);
@@ -157,6 +160,7 @@ class Appliance : private StorageUser {
   std::function<void()> stopped_;
   EventLoop::Source result_timer_, limit_timer_, tick_timer_;
   ButtonWatch button_;
+  RestWatch rest_;
   Message monitor_end_;                   ///< Why monitoring ends; empty: somebody ends it.
   Message monitored_;                     ///< How it was, for the audit log.
   std::unique_ptr<ScanSession> running_;  // last: its thread uses the members above

@@ -38,6 +38,20 @@ MonitorJob Appliance::MakeMonitorJob() {
   return job;
 }
 
+/// After each change of the state, and now and then, since other things decide, too.
+void Appliance::WatchRest() {
+  const bool is_between =
+      state_.phase == ApplianceState::kReady || state_.phase == ApplianceState::kResult;
+  rest_.Watch(is_between && WhyNotMonitor().empty()
+                  ? store_->folders.Scan(last_result_->id) / "scene"
+                  : std::filesystem::path());
+}
+
+bool Appliance::PressMonitors() const {
+  return rest_.IsAtRest() && WhyNotMonitor().empty() &&
+         (state_.phase == ApplianceState::kReady || state_.phase == ApplianceState::kResult);
+}
+
 void Appliance::StartMonitor() {
   monitor_end_ = {};
   try {

@@ -80,6 +80,7 @@ Json ResultFields(const CurrentScan& scan) {
 }  // namespace
 
 IndicatorPattern Appliance::Pattern() const {
+  if (PressMonitors()) return IndicatorPattern::kReadyToMonitor;
   switch (state_.phase) {
     case ApplianceState::kNoSensor:
       return IndicatorPattern::kNoSensor;
@@ -190,6 +191,7 @@ Json Appliance::StatusJson() {
                  {"last_result", last},
                  {"monitor", MonitorJson(monitoring_.status())},
                  {"light", Name(shown_)},
+                 {"press", PressMonitors() ? "monitoring" : "sweep"},
                  {"page", {{"url", page_.url}, {"certificate", page_.certificate}}},
                  {"loop", LoopJson(loop_.meter())},
                  {"version", Version()}};
@@ -220,6 +222,7 @@ Status Appliance::WebStatus() {
   status.storage.writable = storage_.fault().empty() && !storage_.IsReadOnly();
   status.storage.warnings = StorageWarnings();
   status.light = Name(shown_);
+  status.press_monitors = PressMonitors();
   status.patient_id = session_.check() ? std::string() : session_.patient_id();
   status.next_purpose = session_.purpose();
   if (IsRunning()) {

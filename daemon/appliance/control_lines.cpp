@@ -105,6 +105,7 @@ std::string_view Name(IndicatorPattern pattern) {
                                                                         "ready_rolled_back",
                                                                         "ready_disk_nearly_full",
                                                                         "ready_guessed",
+                                                                        "ready_to_monitor",
                                                                         "monitor_starting",
                                                                         "monitor_in",
                                                                         "monitor_out",

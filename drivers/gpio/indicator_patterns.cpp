@@ -41,6 +41,9 @@ constexpr std::array kPrograms = {
                      {{kGreen, 1500ms}, {kYellow, 150ms}, {kGreen, 150ms}, {kYellow, 150ms}}),
     IndicatorProgram(kReadyGuessed,
                      {{kGreen, 1500ms}, {kRed, 100ms}, {kGreen, 100ms}, {kRed, 100ms}}),
+    // Ready and monitoring, since a press starts the latter.
+    IndicatorProgram(kReadyToMonitor,
+                     {{kGreen, 1500ms}, {kBlue, 200ms}, {kGreen, 200ms}, {kBlue, 200ms}}),
     IndicatorProgram(kMonitorStarting, {{kBlue, 200ms}, {0, 200ms}, {kBlue, 200ms}, {0, 900ms}}),
     IndicatorProgram(kMonitorIn, {{kGreen, 900ms}, {0, 100ms}}),
     IndicatorProgram(kMonitorOut, {{kYellow, 250ms}, {0, 250ms}}),

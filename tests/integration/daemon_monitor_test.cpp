@@ -50,6 +50,23 @@ TEST_F(DaemonMonitorTest, WatchesTheBodyAfterASweepAndHoldsWhenItMoves) {
   plumbd.WaitFor("an unknown state", [](const json& status) {
     return status["monitor"]["advice"] == "unknown" && status["monitor"]["reason"] == "no_image";
   });
+  plumbd.Sim("resume");
+  plumbd.Press();
+  plumbd.WaitForState("ready");
+  // The sensor is where it was: the next press goes on watching. Taken up again, it starts a sweep.
+  plumbd.WaitFor("rest", [](const json& status) {
+    return status["press"] == "monitoring" && status["light"] == "ready_to_monitor";
+  });
+  plumbd.Press();
+  plumbd.WaitForState("monitoring");
+  plumbd.Press();
+  plumbd.WaitForState("ready");
+  plumbd.Sim("next-scene");
+  plumbd.WaitFor("a hand", [](const json& status) { return status["press"] == "sweep"; });
+  plumbd.Sim("mount");
+  plumbd.WaitFor("rest again", [](const json& status) { return status["press"] == "monitoring"; });
+  plumbd.Press();
+  plumbd.WaitForState("monitoring");
   plumbd.Sim("unplug");
   plumbd.WaitForState("no_sensor");
   const json ended = plumbd.Status()["monitor"];

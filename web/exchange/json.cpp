@@ -274,6 +274,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
         {"total_bytes", status.storage.total_bytes},
         {"writable", status.storage.writable}}},
       {"light", status.light},
+      {"press", status.press_monitors ? "monitoring" : "sweep"},
       {"patient_id", TextOrNull(status.patient_id)},
       {"next_purpose", Name(status.next_purpose)},
       {"scans_today", status.scans_today},

@@ -99,7 +99,9 @@ struct Status {
   FaultKind fault_kind = FaultKind::kNone;
   SensorStatus sensor;
   StorageStatus storage;
-  std::string light;       ///< Name of the shown pattern: "ready", "too_fast".
+  std::string light;  ///< Name of the shown pattern: "ready", "too_fast".
+  /// The sensor is at rest: the next press starts monitoring instead of a sweep.
+  bool press_monitors = false;
   std::string patient_id;  ///< Patient of the next scan; empty if there is none.
   ScanPurpose next_purpose = ScanPurpose::kFraction;
   int scans_today = 0;                      ///< Scans of the open patient, rescans included.

@@ -31,6 +31,10 @@ export function stateHere({ state, session, last_result: last }) {
   return isOthers ? 'ready' : state;
 }
 
+/// What to do in that state; where the sensor is at rest, what the next press starts.
+export const stateHint = (status) => (status.press === 'monitoring'
+  ? S.stateHints.at_rest : S.stateHints[stateHere(status)]);
+
 export const verdictIcon = (verdict) =>
   ({ in_tolerance: '✓', unsure: '≈', move: '↔', no_answer: '?' })[verdict] ?? '–';
 

@@ -155,7 +155,8 @@ function resting(status) {
   }
   const closed = saysNoSession(status);
   return [word(closed ? text.noSession : text.ready, closed ? 'bad' : 'good'),
-    h('p', { class: 'room-hint' }, closed ? text.openOne : text.press)];
+    h('p', { class: 'room-hint' }, closed ? text.openOne
+      : status.press === 'monitoring' ? S.stateHints.at_rest : text.press)];
 }
 
 /// Posture comes first: what no move of the couch puts right.
@@ -341,7 +342,8 @@ function display(main) {
     answer.element.hidden = !visible;
     answer.tick();
     if (visible) {
-      clear(body);
+      clear(body, status.press === 'monitoring'
+        && h('p', { class: 'room-hint' }, S.stateHints.at_rest));
       drawn = '';
       return;
     }
@@ -349,7 +351,7 @@ function display(main) {
     const fraction = status.state === 'scanning' ? scan?.coverage : scan?.step_fraction;
     const key = JSON.stringify([S.languageName, status.state, scan?.guidance,
       fraction === null, scan?.step, isCheck && status.last_check, faultWords(status),
-      session?.id, status.next_purpose]);
+      session?.id, status.next_purpose, status.press]);
     if (key === drawn && body.hasChildNodes()) {
       update(fraction);
       return;

@@ -7,7 +7,9 @@ import { action, card, clear, done, enable, h, hint, redraw, say } from '../dom.
 import { liveSurface } from '../drawings/live_surface.js';
 import { isAcknowledged, sessionLine } from '../treatment.js';
 import { S, said } from '../words.js';
-import { faultWords, follow, lastKnownNote, sentence, stateHere } from './common.js';
+import {
+  faultWords, follow, lastKnownNote, sentence, stateHere, stateHint,
+} from './common.js';
 
 const kPreviewEvery_ms = 250;
 const kPreviewAgain_ms = 2000;  // without a picture
@@ -104,7 +106,7 @@ export const stepWords = (scan) => S.scan.step[scan?.step?.replaceAll(' ', '_').
 /// The tone and words of what the person who sweeps should do.
 export function adviceOf(status) {
   if (status.state !== 'scanning') {
-    return { hint: '', words: S.stateHints[stateHere(status)], tone: '' };
+    return { hint: '', words: stateHint(status), tone: '' };
   }
   const advice = status.scan?.guidance ?? 'none';
   return {

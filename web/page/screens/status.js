@@ -7,6 +7,7 @@ import { sessionName } from '../treatment.js';
 import { S, said, saidEach } from '../words.js';
 import {
   faultWords, follow, isCold, lastKnownNote, minutesOf, outcomeBadge, patientCodes, stateHere,
+  stateHint,
 } from './common.js';
 
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
@@ -96,7 +97,7 @@ export async function showStatus(place) {
     const state = stateHere(status);
     headline.textContent = S.states[state];
     headline.dataset.state = state;
-    advice.textContent = live.connected ? faultWords(status) ?? S.stateHints[state] : '';
+    advice.textContent = live.connected ? faultWords(status) ?? stateHint(status) : '';
     redraw(grid, tiles(status));
   };
   const load = async () => {
