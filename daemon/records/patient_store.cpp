@@ -245,7 +245,9 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
       "count(*) FROM scans WHERE session_id = open.id AND outcome = 'done'), kept.id, "
       "kept.version, newest.id, newest.version, ifnull((SELECT accepted_by = '' AND "
       "results.scan_id IS NOT NULL FROM scans LEFT JOIN results ON scan_id = scans.id WHERE "
-      "session_id = open.id AND outcome = 'done' ORDER BY scans.id DESC LIMIT 1), 0) FROM open "
+      "session_id = open.id AND outcome = 'done' ORDER BY scans.id DESC LIMIT 1), 0), "
+      "ifnull((SELECT "
+      "language FROM preferences WHERE user = opened_by), '') FROM open "
       "JOIN patients ON patients.id = "
       "open.patient_id LEFT JOIN refs AS kept ON kept.id = ifnull(reference_id, newest_id) LEFT "
       "JOIN refs AS newest ON newest.id = newest_id",
@@ -263,6 +265,7 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
           return ReferenceVersion{.id = row.Text(column),
                                   .version = static_cast<int>(row.Integer(column + 1))};
         };
+        session.language = row.Text(13);
         if (!row.IsNull(8)) session.reference = version(8);
         if (session.reference && version(10) != *session.reference)
           session.newer_reference = version(10);

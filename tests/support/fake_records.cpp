@@ -151,6 +151,7 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
                                     .num_scans = 0,
                                     .opened_by = actor.user,
                                     .opened_at = WallClock::now()};
+  status.session->language = preferences_[actor.user].language;
   if (const auto approved = FindReference(patient->approved_reference_id);
       approved && purpose == ScanPurpose::kFraction)
     status.session->reference = {.id = approved->id, .version = approved->version};

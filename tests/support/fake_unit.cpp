@@ -65,6 +65,10 @@ void FakeAppliance::SetSecondFactor(const Actor& actor, const std::string& name,
 
 void FakeAppliance::SetPreferences(const Actor& actor, const Preferences& preferences, Done done) {
   preferences_[actor.user] = preferences;
+  if (status.session && status.session->opened_by == actor.user) {
+    status.session->language = preferences.language;
+    Notify(EventKind::kStatus);
+  }
   Finish(done, {});
 }
 

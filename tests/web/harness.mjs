@@ -172,7 +172,7 @@ export class Harness {
       // Not for the navigation: a narrow window folds it away.
       await page.getByLabel('Your own password').waitFor({ state: 'detached' });
     }
-    await page.locator('#top .brand').waitFor();
+    await page.locator('#top a.brand').waitFor();
   }
 
   /// On the screen of accounts.

@@ -719,6 +719,41 @@ await h.step('disconnected: states and buttons are off, and say how old they are
   equal(await open.getAttribute('aria-disabled'), null, 'a session can be opened again');
 });
 
+await h.step('language and theme are on every screen; the room speaks as its session', async () => {
+  const visitor = await h.person('visitor');
+  await visitor.goto(h.url);
+  await visitor.locator('.looks summary').click();
+  const language = visitor.getByLabel('Language', { exact: true });
+  await language.waitFor();
+  await h.look(visitor, 'login-language');
+  await language.selectOption('de');
+  await visitor.getByRole('heading', { name: 'Anmelden' }).waitFor();
+  await visitor.locator('.looks summary').click();
+  await visitor.getByLabel('Darstellung', { exact: true }).selectOption('light');
+  equal(await visitor.locator('html').getAttribute('data-theme'), 'light', 'at once');
+  await visitor.reload();
+  await visitor.getByRole('heading', { name: 'Anmelden' }).waitFor();
+  equal(await visitor.locator('html').getAttribute('data-theme'), 'light', 'it stays');
+  await visitor.context().close();
+
+  await openOnPage(anna, 'P-0042', /^(Start treatment session|Start a new fraction)$/);
+  await room.locator('.room-fraction').getByText('Fraction').waitFor();
+  await anna.goto(`${h.url}#/scan`);
+  await anna.locator('.looks summary').click();
+  const kept = anna.waitForResponse((answer) => answer.url().endsWith('/session/preferences'));
+  await anna.getByLabel('Language', { exact: true }).selectOption('es');
+  await kept;
+  await anna.getByRole('button', { name: 'Empezar el barrido' }).waitFor();
+  equal(new URL(anna.url()).hash, '#/scan', 'the screen stays');
+  await h.look(anna, 'scan-language');
+  await room.locator('.room-fraction').getByText('Fracción').waitFor();
+  await anna.locator('.looks summary').click();
+  await anna.getByLabel('Idioma', { exact: true }).selectOption('en');
+  await anna.getByRole('button', { name: 'Start sweep' }).waitFor();
+  await anna.getByRole('button', { name: 'Close session' }).click();
+  await room.locator('.room-word', { hasText: 'NO SESSION' }).waitFor();
+});
+
 await h.step('Spanish and light: complete, and kept for the account and for the room', async () => {
   await bob.goto(`${h.url}#/users`);
   await bob.getByLabel('Language').selectOption('es');

@@ -241,7 +241,8 @@ Json SessionJson(const TreatmentSession& session) {
           {"opened_at", session.opened_at},
           {"has_unaccepted", session.has_unaccepted},
           {"reference", VersionJson(session.reference)},
-          {"newer_reference", VersionJson(session.newer_reference)}};
+          {"newer_reference", VersionJson(session.newer_reference)},
+          {"language", session.language.empty() ? Json(nullptr) : Json(session.language)}};
 }
 
 Json WaitingJson(const std::vector<WaitingReference>& waiting) {

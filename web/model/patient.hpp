@@ -68,6 +68,7 @@ struct TreatmentSession {
   std::optional<ReferenceVersion> reference = {};
   /// A newer one that was approved since: used once a person says so.
   std::optional<ReferenceVersion> newer_reference = {};
+  std::string language = {};  ///< The choice of the person who opened it; empty: none.
 };
 
 /// Defaults for plans of one site. Letter case of site names is ignored.

@@ -4,11 +4,11 @@ import {
   currentSession, get, live, loadSession, logOut, may, now, setLoggedOffHandler, since_s, touchedAt,
 } from './api.js';
 import { clear, forgetWarning, h, hint, say, warn } from './dom.js';
-import { languageOf, useLanguage } from './language.js';
+import { kNobody, languageOf, useLanguage } from './language.js';
 import { lastLogin, lastLoginWords } from './last_login.js';
 import { mayLeave } from './leave.js';
 import { drafts } from './plan_drafts.js';
-import { adoptPreferences, applyTheme } from './preferences.js';
+import { adoptPreferences, applyTheme, looks } from './preferences.js';
 import { listenToScanners } from './scanner.js';
 import { showAudit } from './screens/audit.js';
 import { showCheck } from './screens/check.js';
@@ -53,22 +53,25 @@ let waiting = false;  // for the appliance, to come in or to leave
 let opening = 0;      // for what screens need before the first of them
 let shownHash = '';
 let failed = false;   // the screen could not be shown
+let faulty = false;   // nobody can log in, and the page says why
 
 const route = () => {
   const [name, argument] = location.hash.replace(/^#\/?/, '').split('/');
   return { name: kScreens[name] ? name : 'status', argument };
 };
 
-let drawnFor = null;
+let drawnFor;  // null: for nobody
 /// Built once per login, so that the focus stays where it is from screen to screen.
 function drawTop() {
   const session = currentSession();
-  top.hidden = !session;
+  const isIn = session && session.role !== 'display' && !session.password_change_required;
+  top.hidden = false;
   if (drawnFor !== session) {
     drawnFor = session;
-    if (session) buildTop(session);
+    if (isIn) buildTop(session);
+    else clear(top, h('p', { class: 'brand' }, S.product), looks(session?.user ?? kNobody));
   }
-  if (!session) return;
+  if (!isIn) return;
   const active = kScreens[route().name].parent ?? route().name;
   for (const link of top.querySelectorAll('nav a')) {
     if (link.hash === `#/${active}`) link.setAttribute('aria-current', 'page');
@@ -96,6 +99,7 @@ function buildTop(session) {
     h('a', { class: 'brand', href: '#/status' }, S.product), menu, nav,
     h('p', { class: 'chip', id: 'chip' }),
     h('p', { class: 'who' }, S.loggedInAs(session.user, S.roles[session.role])),
+    looks(session.user),
     h('button', { class: 'quiet log-out', onclick: () => leave().catch(report) }, S.logOut));
 }
 
@@ -184,26 +188,32 @@ async function leave() {
   await begin();
 }
 
-async function speak(who) {
-  await useLanguage(languageOf(who));
+async function speak(who, language = languageOf(who)) {
+  await useLanguage(language);
   document.querySelector('.skip').textContent = S.skip;
   const notice = document.querySelector('.notice');
   notice.setAttribute('aria-label', S.notice.label);
   clear(notice.firstElementChild, h('strong', {}, S.notice.strong), ` ${S.notice.text}`);
 }
 
+/// @param message  Gives the text to show above the log-in, in its language.
 async function begin(message) {
   const found = await ask(loadSession);
   if (!found) return;
   const { session, setupRequired, fault, certificate } = found;
   if (session) adoptPreferences(session);
-  await speak(session?.user ?? 'login');
-  applyTheme(session?.user ?? 'login');
+  await speak(session?.user ?? kNobody);
+  applyTheme(session?.user ?? kNobody);
+  drawnFor = undefined;
   drawTop();
   if (!session || session.role === 'display') {
     document.title = `${S.login.title} · ${S.product}`;
     if (fault) {
-      showFault(main, fault).then(() => begin());
+      faulty = true;
+      showFault(main, fault).then(() => {
+        faulty = false;
+        return begin();
+      });
       return;
     }
     showLogin(main, setupRequired, certificate, async () => {
@@ -212,7 +222,7 @@ async function begin(message) {
       if (answer?.failed > 0 || answer?.changes.length > 0) warn(lastLoginWords(answer));
       else if (answer) say(lastLoginWords(answer), true);
     });
-    if (message) warn(message);
+    if (message) warn(message());
     return;
   }
   if (session.password_change_required) {
@@ -315,12 +325,17 @@ function listen() {
     live.close();
     forgetSession();
     endIdle();
-    begin(S.loggedOff).catch(report);
+    begin(() => S.loggedOff).catch(report);
   });
   window.addEventListener('plumb-language', async () => {
-    await speak(currentSession().user);
-    drawnFor = null;
-    showFocused();
+    const session = currentSession();
+    await speak(session?.user ?? kNobody);
+    drawnFor = undefined;
+    drawTop();
+    top.querySelector('.looks summary').focus();
+    if (faulty) return;  // it says itself again in a moment
+    if (!session || session.password_change_required) await begin();
+    else await show();
   });
   window.addEventListener('hashchange', () => {
     if (!currentSession() || waiting || opening) return;
@@ -339,6 +354,6 @@ if (location.pathname === '/room') {
 } else {
   listen();
   // Until the user is known, the page is in the language of the login screen.
-  applyTheme('login');
-  speak('login').then(begin).catch(report);
+  applyTheme(kNobody);
+  speak(kNobody).then(begin).catch(report);
 }

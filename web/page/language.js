@@ -5,16 +5,22 @@ import { useCatalogue } from './words.js';
 
 export const kLanguages = PLUMB_LANGUAGES;
 
+/// Whose choice holds before anybody has logged in, and for those who have made none.
+export const kNobody = 'login';
+
 const kAgain_ms = 3000;
 const key = (who) => `plumb-language-${who}`;
 const kept = new Map();  // for this page, where the browser stores nothing
 const stored = (name) => { try { return localStorage.getItem(name); } catch { return null; } };
-const isLanguage = (name) => Object.hasOwn(kLanguages, name ?? '');
+export const isLanguage = (name) => Object.hasOwn(kLanguages, name ?? '');
 
-/// The choice of an account on this browser, or of the room's screen ("room"); else the browser's.
+/// The choice of an account on this browser, or of the room's screen ("room"); else that of the
+/// log-in, else the browser's.
 export function languageOf(who) {
-  const chosen = stored(key(who)) ?? kept.get(who);
-  if (isLanguage(chosen)) return chosen;
+  for (const one of [who, kNobody]) {
+    const chosen = stored(key(one)) ?? kept.get(one);
+    if (isLanguage(chosen)) return chosen;
+  }
   const preferred = navigator.language?.slice(0, 2);
   return isLanguage(preferred) ? preferred : 'en';
 }

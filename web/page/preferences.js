@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // A person's choice of language and theme. They belong to the account; this browser keeps a
 // copy for when the account cannot be read.
-import { put } from './api.js';
-import { field, select } from './dom.js';
-import { kLanguages, keepLanguage, languageOf } from './language.js';
+import { currentSession, put } from './api.js';
+import { clear, field, h, select } from './dom.js';
+import { kLanguages, kNobody, keepLanguage, languageOf } from './language.js';
 import { S } from './words.js';
 
 const key = (who) => `plumb-theme-${who}`;
 const themeOf = (who) => {
-  try { return localStorage.getItem(key(who)) ?? 'dark'; } catch { return 'dark'; }
+  try {
+    return localStorage.getItem(key(who)) ?? localStorage.getItem(key(kNobody)) ?? 'dark';
+  } catch {
+    return 'dark';
+  }
 };
 
 const keepTheme = (who, theme) => {
@@ -46,8 +50,9 @@ export function preferences(who, changed) {
   const language = select(names, languageOf(who));
   const themes = select(S.themes, themeOf(who));
   // Without a connection the choice holds until the account is asked again.
-  const save = () => put('session/preferences', { language: language.value, theme: themes.value })
-    .catch(() => {});
+  const save = () => currentSession()
+    && put('session/preferences', { language: language.value, theme: themes.value })
+      .catch(() => {});
   language.addEventListener('change', () => {
     keepLanguage(who, language.value);
     save();
@@ -60,3 +65,25 @@ export function preferences(who, changed) {
   });
   return [field(S.language, language), field(S.theme, themes)];
 }
+
+/// The same choices behind one small button, for the bar above every screen.
+export function looks(who) {
+  const panel = h('div', { class: 'card looks-panel' });
+  const again = () => window.dispatchEvent(new Event('plumb-language'));
+  const place = h('details', { class: 'looks' },
+    h('summary', {}, h('span', { class: 'visually-hidden' }, S.languageAndTheme),
+      h('span', { 'aria-hidden': 'true' }, `${document.documentElement.lang.toUpperCase()} ◐`)),
+    panel);
+  // Nothing in it while it is closed: My preferences has fields of the same names.
+  place.addEventListener('toggle', () => clear(panel, place.open && preferences(who, again)));
+  place.addEventListener('keydown', ({ key: pressed }) => {
+    if (pressed !== 'Escape' || !place.open) return;
+    place.open = false;
+    place.querySelector('summary').focus();
+  });
+  return place;
+}
+document.addEventListener('pointerdown', ({ target }) => {
+  const open = document.querySelector('.looks[open]');
+  if (open && !open.contains(target)) open.open = false;
+});

@@ -62,6 +62,10 @@ TEST_F(StoreSessionsTest, OneIsOpenAtATime) {
   ASSERT_TRUE(store.treatments.Opened());
   EXPECT_EQ(store.treatments.Opened()->patient_code, "P-1");
   EXPECT_EQ(store.treatments.Opened()->opened_by, "anna");
+  EXPECT_EQ(store.treatments.Opened()->language, "");
+  store.users.Add(kBert, {"anna", Role::kTechnician, "$hash", false, WallClock::now()});
+  store.users.SetPreferences("anna", {.language = "es", .theme = "dark"});
+  EXPECT_EQ(store.treatments.Opened()->language, "es") << "of the person who opened it";
   const std::string second = store.treatments.Open(kBert, b, ScanPurpose::kReference);
   EXPECT_NE(first, second);
   EXPECT_EQ(store.treatments.Opened()->id, second);

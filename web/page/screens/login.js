@@ -9,9 +9,9 @@ const kAskAgain_ms = 5000;
 /// Safe mode in which no account can be looked up: no one can log in, and the page says why.
 /// Returns when the appliance has recovered.
 export async function showFault(main, fault) {
-  const text = S.login;
-  document.title = `${text.faultTitle} · ${S.product}`;
   for (let why = fault; why;) {
+    const text = S.login;  // in a language that may be chosen meanwhile
+    document.title = `${text.faultTitle} · ${S.product}`;
     clear(main, h('section', { class: 'login card', role: 'alert' }, h('h1', {}, text.faultTitle),
       h('p', {}, text.faultText), h('p', { class: 'caution' }, why)));
     await new Promise((done) => { setTimeout(done, kAskAgain_ms); });

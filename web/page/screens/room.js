@@ -5,7 +5,7 @@ import {
 } from '../api.js';
 import { clear, h, hint, say } from '../dom.js';
 import { legend } from '../drawings/error_map.js';
-import { keepLanguage } from '../language.js';
+import { isLanguage, keepLanguage, languageOf } from '../language.js';
 import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../drawings/map_frame.js';
 import { loadMap, paintErrors } from '../drawings/maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
@@ -193,10 +193,10 @@ function result() {
     clear(box, mapFrame({ grid, view, canvas, region, compass }), legend(tolerance_mm),
       marksNote(compass));
   };
-  const load = async (scan) => {
+  const load = async (scan, key) => {
     const received = now();
     const { reference, details, quality } = await partsOf(scan);
-    if (shown !== scan.id) return;
+    if (shown !== key) return;
     const data = { scan, reference, details, quality, received, patient: scan.patient_id };
     note = validityNote(scan, received, false);
     const box = h('div', { class: 'room-map' });
@@ -234,14 +234,14 @@ function result() {
   return {
     element: place,
     show(scan) {
-      const key = scan?.id ?? null;
+      const key = scan ? `${scan.id} ${S.languageName}` : null;
       if (key !== shown) {
         shown = key;
         note = null;
         judge = () => {};
         age = () => {};
         clear(place);
-        if (scan) load(scan);
+        if (scan) load(scan, key);
       }
     },
     tick() {
@@ -270,7 +270,7 @@ function checkResult(check) {
 
 /// Draws what the appliance does now. What changes ten times a second is drawn again, the camera
 /// and the result stay.
-function display(main) {
+function display(main, speak) {
   const head = h('div', {});
   const offline = lastKnownNote('room-offline', 'alert', () => `${S.room.offline}. `);
   const body = h('div', { class: 'room-body' });
@@ -296,10 +296,19 @@ function display(main) {
       camera = null;
     }
   };
+  let spoken = languageOf(kWho);
+  /// In the language of whoever opened the session; without one, in that of this screen.
+  const speakTo = (session) => {
+    const wanted = isLanguage(session?.language) ? session.language : languageOf(kWho);
+    if (wanted === spoken) return;
+    spoken = wanted;
+    speak(kWho, wanted).then(draw);
+  };
   const draw = () => {
     const { status } = live;
     if (!status) return;
     const { session } = status;
+    speakTo(session);
     if ((session?.id ?? null) !== lastSession) lastPurpose = null;
     lastSession = session?.id ?? null;
     lastPurpose = status.scan?.purpose ?? lastPurpose;
@@ -416,5 +425,5 @@ export async function showRoom(main, { speak, applyTheme }) {
     }
   }
   setLoggedOffHandler(() => location.reload());
-  display(main);
+  display(main, speak);
 }
