@@ -144,6 +144,32 @@ void AddTemplateRoutes(Routes& routes, SettingsService& settings) {
                });
 }
 
+std::string QueryText(const Request& request, const std::string& name, std::size_t most) {
+  const auto found = request.query.find(name);
+  if (found == request.query.end()) return {};
+  if (found->second.size() > most)
+    throw DataError(say::web::FieldLength(name, 0, static_cast<std::int64_t>(most),
+                                          static_cast<std::int64_t>(found->second.size())));
+  return found->second;
+}
+
+void AddPlanningRoute(Routes& routes, ReferenceService& references) {
+  Route& route = routes.Write(
+      "POST", "/api/v1/patients/{id}/planning", Permission::kPlan, BodyKind::kFile,
+      [&references](const Request& request, const Done& done) {
+        const auto bytes = QueryNumber(request, "structures_bytes", 0, kMaxPlanningFile);
+        references.AddPlanning(
+            request.actor(), request.arguments[0],
+            {.file = request.upload->path(),
+             .structures_bytes = static_cast<std::uint64_t>(bytes),
+             .roi = QueryText(request, "roi", kMaxPlanningName),
+             .beam = QueryText(request, "isocentre_of", kMaxPlanningName),
+             .reason = QueryText(request, "reason", kMaxReason)},
+            [done, kept = request.upload](const Change& change) { done(change); });
+      });
+  route.most_bytes = 2 * kMaxPlanningFile;
+}
+
 void AddReferenceRoutes(Routes& routes, ReferenceService& references) {
   routes.Write("POST", "/api/v1/references", Permission::kPlan, BodyKind::kJson,
                [&references](const Request& request, const Done& done) {
@@ -179,6 +205,7 @@ void AddPatientApi(Routes& routes, const Services& services) {
   AddSessionRoutes(routes, services.patients);
   AddCourseRoutes(routes, services.patients, services.references, services.scans);
   AddTemplateRoutes(routes, services.settings);
+  AddPlanningRoute(routes, services.references);
   AddReferenceRoutes(routes, services.references);
 }
 

@@ -430,6 +430,27 @@ TEST_F(UploadTest, ABundleGoesToTheDiskAndNothingIsLeftOfIt) {
   EXPECT_EQ(again.Ask("DELETE", "/api/v1/update/bundles/plumb-2.raucb", "").status, 404);
 }
 
+TEST_F(UploadTest, APlanningCtReachesTheServiceWithItsChoicesAndNothingIsLeftOfIt) {
+  service_.patients.push_back({.id = "p1", .code = "A"});
+  HttpClient physicist = LoggedIn("physicist");
+  physicist.extra_headers["Content-Type"] = "application/octet-stream";
+  const std::string path = "/api/v1/patients/p1/planning";
+  const HttpAnswer answer = physicist.Ask(
+      "POST", path + "?structures_bytes=6&roi=BODY%20S&isocentre_of=AP", "structplan");
+  EXPECT_EQ(answer.status, 201) << answer.body;
+  loop_->Do([&] {
+    EXPECT_EQ(service_.uploaded_bytes, 10U);
+    EXPECT_EQ(service_.sent_planning.structures_bytes, 6U);
+    EXPECT_EQ(service_.sent_planning.roi, "BODY S");
+    EXPECT_EQ(service_.sent_planning.beam, "AP");
+    EXPECT_EQ(service_.references.back().id, answer.json()["id"]);
+  });
+  EXPECT_TRUE(BecomesEmpty()) << "it names the patient";
+  EXPECT_EQ(physicist.Ask("POST", path + "?structures_bytes=-1", "x").status, 400);
+  EXPECT_EQ(physicist.Ask("POST", path + "?roi=" + std::string(257, 'x'), "x").status, 400);
+  EXPECT_EQ(physicist.Ask("POST", "/api/v1/patients/p9/planning", "x").status, 404);
+}
+
 TEST_F(UploadTest, WhatIsNoBundleOrTooLargeIsRefused) {
   const HttpClient engineer = LoggedIn("engineer");
   EXPECT_EQ(Send(engineer, "zip.raucb", "PK" + std::string(5000, 'x')).status, 400);
