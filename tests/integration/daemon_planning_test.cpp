@@ -161,6 +161,7 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   // The board lies there and no body: whatever is seen, the room is not calibrated.
   const json without = ScanFraction();
   EXPECT_EQ(without["verdict"], "no_answer") << without.dump().substr(0, 2000);
+  EXPECT_EQ(without["compared_with"]["roi"], "BODY");
 
   CalibrateRoom();
   const json result = ScanFraction();
@@ -172,10 +173,10 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
       kIecWorld * demo.scenes.front().T_world_body * PlannedBody(demo.scenes.front()).inverse();
   const Vector6d couch = CouchVector(T_motion, Eigen::Vector3d::Zero(), Pose::Identity());
   const json& numbers = result["correction"];
-  std::printf("numbers %s\n", numbers.dump().c_str());
-  EXPECT_NEAR(numbers["lateral_mm"].get<double>(), couch(0) / kMillimetre, 3.0);
-  EXPECT_NEAR(numbers["longitudinal_mm"].get<double>(), couch(1) / kMillimetre, 3.0);
-  EXPECT_NEAR(numbers["vertical_mm"].get<double>(), couch(2) / kMillimetre, 3.0);
+  // Measured: 0.84, 0.45 and 0.48 mm off, at intervals of 2.1, 3.0 and 1.7 mm.
+  EXPECT_NEAR(numbers["lateral_mm"].get<double>(), couch(0) / kMillimetre, 1.8);
+  EXPECT_NEAR(numbers["longitudinal_mm"].get<double>(), couch(1) / kMillimetre, 1.8);
+  EXPECT_NEAR(numbers["vertical_mm"].get<double>(), couch(2) / kMillimetre, 1.8);
 }
 
 }  // namespace

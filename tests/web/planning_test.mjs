@@ -60,7 +60,8 @@ await h.step('another physicist signs it', async () => {
   await second.goto(plan);
   await second.locator('.planning-facts').waitFor();
   await second.getByRole('button', { name: 'Review and approve' }).click();
-  await second.locator('.summary').waitFor();
+  await second.locator('.summary .planning-facts', { hasText: 'BODY' }).waitFor();
+  equal(await second.getByText('below the couch').count(), 0, 'a CT shows no couch');
   await h.look(second, 'planning-summary-phone');
 });
 

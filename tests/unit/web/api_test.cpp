@@ -431,7 +431,9 @@ TEST_F(UploadTest, ABundleGoesToTheDiskAndNothingIsLeftOfIt) {
 }
 
 TEST_F(UploadTest, APlanningCtReachesTheServiceWithItsChoicesAndNothingIsLeftOfIt) {
-  service_.patients.push_back({.id = "p1", .code = "A"});
+  Patient patient;
+  patient.id = "p1";
+  service_.patients.push_back(patient);
   HttpClient physicist = LoggedIn("physicist");
   physicist.extra_headers["Content-Type"] = "application/octet-stream";
   const std::string path = "/api/v1/patients/p1/planning";

@@ -122,7 +122,10 @@ function summary(reference, patient, { scan, quality, picture, heights }, approv
   const number = (value) => `${value}`.replace('.', S.decimal);
   const size = measure(plan.region_m);
   const flags = scan && flagList(scan, quality);
-  const doubts = heights && plan.isocentre_m ? doubtsOf(heights, plan.isocentre_m).words : [];
+  const planning = planningFacts(heights?.scene);
+  // The map of a planning CT shows no couch to judge the isocentre by.
+  const doubts = heights && plan.isocentre_m && !planning
+    ? doubtsOf(heights, plan.isocentre_m).words : [];
   const reason = flags && h('input', { required: true, autocomplete: 'off', ...kReason });
   const signature = signedForm({ class: 'form inline below' },
     (sign) => approve({ ...sign(), ...(reason && { reason: reason.value.trim() }) }),
@@ -147,7 +150,7 @@ function summary(reference, patient, { scan, quality, picture, heights }, approv
       quality && row(text.scanQuality, quality.rows.map((one) =>
         `${said(one, 'name')}: ${said(one, 'value')}`).join('; ')),
       row(text.signature, h('code', {}, reference.digest)))),
-    sideViews(heights, plan.isocentre_m),
+    planning, sideViews(heights, plan.isocentre_m),
     doubts.map((words) => h('p', { class: 'caution' }, words)),
     flags, hint(text.approveHint), signature);
 }
@@ -183,7 +186,7 @@ async function draft(place, reference, store, reload) {
     if (shown === drawnPoint) return;
     drawnPoint = shown;
     meant.box.checked = false;
-    doubts = point && loaded ? doubtsOf(loaded, point) : { refused: false, words: [] };
+    doubts = point && loaded && !planning ? doubtsOf(loaded, point) : { refused: false, words: [] };
     clear(sidePlace, sideViews(loaded, point),
       doubts.words.map((words) => h('p', { class: 'caution isocentre-doubt' }, words)),
       doubts.words.length > 0 && !doubts.refused && editable && meant.element);
