@@ -68,17 +68,15 @@ class DaemonPlanningTest : public ::testing::Test {
     return T;
   }
 
-  test::HttpAnswer Upload(const simulated::PlanningCtOptions& options,
-                          const std::string& more = {}) {
+  test::HttpAnswer Upload(const simulated::PlanningCtOptions& options) {
     const simulated::SuitePlan demo = DemoPlan();
     const auto [structures, plan] = simulated::MakePlanningCt(
         demo.scenes.front().body->surface, PlannedBody(demo.scenes.front()), options);
     const std::string first = DicomBytes(structures);
     HttpClient sender = *planner_;
     sender.extra_headers["Content-Type"] = "application/octet-stream";
-    return sender.Ask("POST",
-                      "/api/v1/patients/" + patient_ +
-                          "/planning?structures_bytes=" + std::to_string(first.size()) + more,
+    sender.extra_headers["X-Plumb-Planning"] = "structures_bytes=" + std::to_string(first.size());
+    return sender.Ask("POST", "/api/v1/patients/" + patient_ + "/planning",
                       first + DicomBytes(plan));
   }
 

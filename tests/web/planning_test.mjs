@@ -40,6 +40,9 @@ await h.step('a file that leaves the skin open is refused with the names', async
 });
 
 await h.step('structure set and plan become a draft whose isocentre is read-only', async () => {
+  await planner.getByLabel('Contour of the skin').fill('BODY');
+  await planner.locator('.planning-upload').getByLabel('Reason for the new reference')
+    .fill('größer & neu');
   await send(planner, '');
   await planner.waitForURL(/#\/plan\//);
   await planner.locator('.planning-facts', { hasText: 'BODY' }).waitFor();

@@ -97,11 +97,14 @@ const readFile = async (response) => ({ blob: await response.blob(), name: nameO
 const orNothing = (response) => response.json().catch(() => ({}));
 const api = (path) => `/api/v1/${path}`;
 /// Sends bytes with their progress, which fetch does not report: `onPart(share)`.
-export const sendFile = (path, file, failed, onPart) => new Promise((resolve, reject) => {
+export const sendFile = (path, file, failed, onPart, headers = {}) => new Promise((
+  resolve, reject,
+) => {
   const request = new XMLHttpRequest();
   request.open('POST', api(path));
   request.setRequestHeader('X-CSRF-Token', session.csrf_token);
   request.setRequestHeader('Content-Type', 'application/octet-stream');
+  for (const [name, value] of Object.entries(headers)) request.setRequestHeader(name, value);
   request.upload.onprogress = (event) => onPart(event.loaded / event.total);
   request.onload = () => {
     let answer = null;

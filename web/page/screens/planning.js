@@ -27,8 +27,9 @@ export function planningUpload(patient) {
         for (const [key, input] of Object.entries(more)) {
           if (input.value.trim()) query.set(key, input.value.trim());
         }
-        const { id } = await sendFile(`patients/${patient}/planning?${query}`,
-          new Blob([first, second]), text.failed, (share) => { bar.value = share; });
+        const { id } = await sendFile(`patients/${patient}/planning`,
+          new Blob([first, second]), text.failed, (share) => { bar.value = share; },
+          { 'X-Plumb-Planning': `${query}` });
         location.hash = `#/plan/${id}`;
       } finally {
         bar.hidden = true;
