@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/types/marker.hpp"
 
@@ -16,6 +17,8 @@ struct CalibratedRoom {
   /// The taught markers, in the frame that T_iec_reference maps from. Empty: that frame is found by
   /// a scan's reference marker alone.
   MarkerMap markers = {};
+  /// Why there is no T_iec_reference, where that is known; empty: it was never calibrated.
+  Message why_not = {};
 };
 
 }  // namespace plumb

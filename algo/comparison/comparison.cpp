@@ -248,7 +248,8 @@ class Comparer {
     return {.T_iec_reference = options_.T_iec_reference,
             .u95_m = options_.iec_u95_m,
             .u95_rad = options_.iec_u95_rad,
-            .markers = options_.room_markers};
+            .markers = options_.room_markers,
+            .why_not = options_.why_no_room};
   }
 
   // Where shared markers would have stated the motion.

@@ -46,6 +46,9 @@ struct CompareOptions {
   /// The taught markers of the room, in the frame that T_iec_reference maps from. Empty: that frame
   /// is found by the current scan's reference marker alone.
   MarkerMap room_markers;
+  /// The reason for no answer where the room is needed and T_iec_reference is not set; empty: it
+  /// was never calibrated.
+  Message why_no_room = {};
   /// Set: the reference was scanned in another room than the current scan, and no marker is shared.
   /// Each scan is placed in IEC axes by its own room, the current one by the fields above.
   std::optional<CalibratedRoom> reference_room;

@@ -85,7 +85,7 @@ PlacedScan PlaceInRoom(const Scene& scan, const CalibratedRoom& room, Preset pre
                        const MarkerConsensusOptions& options, int min_markers) {
   PlacedScan result;
   if (!room.T_iec_reference) {
-    result.failure = say::comparison::RoomNotCalibrated();
+    result.failure = room.why_not.empty() ? say::comparison::RoomNotCalibrated() : room.why_not;
     return result;
   }
   if (!room.markers.empty()) {

@@ -56,9 +56,11 @@ std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::strin
   began_s_ = SteadySeconds();
   const std::uint64_t epoch = ++epoch_;
   MonitorCallbacks callbacks;
-  callbacks.begun = [this, epoch](const std::vector<Message>& warnings) {
-    loop_.Post("monitoring begun", [this, epoch, warnings] {
-      if (epoch == epoch_) warnings_ = warnings;
+  callbacks.begun = [this, epoch](const std::vector<Message>& warnings, bool judges) {
+    loop_.Post("monitoring begun", [this, epoch, warnings, judges] {
+      if (epoch != epoch_) return;
+      warnings_ = warnings;
+      judges_reference_ = judges;
     });
   };
   callbacks.update = [this, epoch](const MonitorUpdate& update) {

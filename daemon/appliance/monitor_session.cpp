@@ -46,6 +46,13 @@ void MonitorSession::Watch(const std::stop_token& stop) {
     reference = ReadApprovedScene(job_.reference_scene, job_.check_reference, stop);
   }
   std::vector<Message> warnings;
+  if (reference && reference->planning) {
+    // It shares no marker with the mounted sensor: the accepted scan alone is watched.
+    reference.reset();
+    compare.region_polygon_m.clear();
+    compare.isocentre_m.reset();
+    warnings.push_back(say::scan::MonitorWithoutPlan());
+  }
   if (const auto room = TakeRoom(job_.room, reference ? *reference : scene, compare);
       room && !room->why_not_used.empty())
     warnings.push_back(room->why_not_used);
@@ -56,7 +63,7 @@ void MonitorSession::Watch(const std::stop_token& stop) {
     const std::lock_guard lock(mutex_);
     record_.has_reference = options.judges_reference;
   }
-  callbacks_.begun(warnings);
+  callbacks_.begun(warnings, options.judges_reference);
   (void)feed_->TakeDropped();  // those that came before
   MonitorUpdate told;
   std::optional<double> told_s;

@@ -47,7 +47,7 @@ struct MonitorUpdate {
 /// Called on the thread; they post to the loop.
 struct MonitorCallbacks {
   /// Once scene and reference are read.
-  std::function<void(const std::vector<Message>& warnings)> begun;
+  std::function<void(const std::vector<Message>& warnings, bool judges_reference)> begun;
   /// Ten times a second, and at once where state or advice change.
   std::function<void(const MonitorUpdate&)> update;
   std::function<void(const Message& why)> failed;

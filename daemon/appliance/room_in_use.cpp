@@ -77,7 +77,8 @@ void RoomInUse::Refresh() {
 
 std::optional<RoomAxes> RoomInUse::OfJob() const {
   if (room_.calibration)
-    return RoomAxes{room_.calibration->version, room_.calibration->fit.markers_iec, room_.due};
+    return RoomAxes{room_.calibration->version, room_.calibration->fit.markers_iec, room_.due,
+                    room_.calibration->fit.shift_m, room_.calibration->fit.turn_rad};
   if (!room_.due.empty()) return RoomAxes{0, {}, room_.due};
   return std::nullopt;
 }

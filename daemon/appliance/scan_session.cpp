@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/scan_session.hpp"
 
+#include <cmath>
 #include <future>
 #include <tuple>
 #include <utility>
@@ -49,11 +50,21 @@ Scene ReadApprovedScene(const std::filesystem::path& folder,
 
 std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Scene& reference,
                                    CompareOptions& compare) {
+  if (reference.planning) compare.isocentre_m.reset();  // the origin of its frame
   if (!room) return std::nullopt;
   compare.T_iec_reference.reset();
   ResultRoom used{room->version, {}};
   if (!room->why_not.empty()) {
     used.why_not_used = room->why_not;
+    compare.why_no_room = say::room::NotForPlan(room->why_not);
+    return used;
+  }
+  if (reference.planning) {
+    // What the calibration's scans differ by, beside what the configuration states of the lasers.
+    compare.T_iec_reference = Pose::Identity();
+    compare.room_markers = room->markers_iec;
+    compare.iec_u95_m = std::hypot(compare.iec_u95_m.value_or(0.0), room->shift_m);
+    compare.iec_u95_rad = std::hypot(compare.iec_u95_rad.value_or(0.0), room->turn_rad);
     return used;
   }
   compare.T_iec_reference = RoomOf(room->markers_iec, reference.markers);
@@ -116,6 +127,8 @@ void ScanSession::Scan(const std::stop_token& stop) {
     reference_ = std::async(std::launch::async, [this, stop, grid = surface_.grid()] {
                    Reference reference{
                        ReadApprovedScene(job_.reference_scene, job_.check_reference, stop), {}};
+                   // The live surface lies in the sweep's frame, and a planning CT in the room's.
+                   if (reference.scene.planning) return reference;
                    try {
                      reference.region =
                          RegionToSee(reference.scene, job_.compare.region_polygon_m, grid);

@@ -39,6 +39,8 @@ struct RoomAxes {
   int version = 0;
   MarkerMap markers_iec;
   Message why_not;  ///< Why it is not used at present; empty if it is.
+  /// Largest differences between two of its scans: its uncertainty for a planning CT.
+  double shift_m = 0.0, turn_rad = 0.0;
 };
 
 /// Purpose and input of a scan.
@@ -69,7 +71,8 @@ struct ScanJob {
                                       const std::function<Message(const std::stop_token&)>& check,
                                       const std::stop_token& stop);
 
-/// Puts the room's axes in the reference scene's frame, by the room's markers that it contains.
+/// Puts the room's axes in the reference scene's frame, by the room's markers that it contains. A
+/// reference from a planning CT has none and lies in those axes: the markers are handed on.
 [[nodiscard]] std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room,
                                                  const Scene& reference, CompareOptions& compare);
 

@@ -10,14 +10,12 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
-#include "algo/planning/planned_scene.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/language.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "drivers/dicom/planning_files.hpp"
+#include "daemon/planning/planning_import.hpp"
 #include "words/cli.hpp"
 
 namespace plumb {
@@ -28,19 +26,6 @@ struct ImportDicomArguments {
   PlanningChoice choice;
   bool json = false;
 };
-
-/// Says if the scene that will be replaced is of a later plan.
-void CompareWithOlderScene(const std::filesystem::path& folder, Scene& scene) {
-  if (!IsSceneFolder(folder)) return;
-  try {
-    const StoredScene before = ReadStoredScene(folder);
-    if (before.scene.planning && before.scene.planning->plan_date > scene.planning->plan_date)
-      scene.warnings.push_back(
-          say::cli::OlderPlan(before.scene.planning->plan_date, scene.planning->plan_date));
-  } catch (const DataError&) {
-    // What cannot be read cannot be compared; it is replaced.
-  }
-}
 
 std::string BoxOf(const Scene& scene) {
   std::string text;
@@ -81,11 +66,8 @@ int Run(const ImportDicomArguments& options, const CommandContext& context) {
   { const AtomicFolder check(options.out, SceneOutput()); }  // rejects a bad place before the work
   Progress progress(context.language);
   progress.Update(say::cli::ReadingDicom(), 0.1);
-  const StructureSet structures = ReadStructureSet(options.structures);
-  const TreatmentPlan plan = ReadTreatmentPlan(options.plan);
-  progress.Update(say::cli::ReadingDicom(), 0.5);
-  Scene scene = MakePlannedScene(structures, plan, options.choice);
-  CompareWithOlderScene(options.out, scene);
+  Scene scene = ReadPlanning({options.structures, options.plan}, options.choice);
+  CompareWithEarlierPlan(options.out, scene);
   progress.Update(say::cli::Writing(), 0.9);
   WriteScene(scene, options.out, context.stop);
   progress.Clear();

@@ -216,6 +216,30 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
   }
 }
 
+std::string ScanStore::AddMade(const NewScan& scan, const fs::path& made) {
+  const std::vector<FileDigest> files = DigestsOfScan(made);
+  StoreChange change(database_);
+  const std::int64_t now = StoredNow();
+  change->Run(
+      "INSERT INTO scans (patient_id, purpose, outcome, started_at, finished_at, sensor_serial, "
+      "reason, has_folder) VALUES (?, ?, 'done', ?, ?, '', ?, 1)",
+      ParseId(scan.patient_id).value_or(0), Name(scan.purpose), now, now, scan.reason);
+  const std::int64_t number = change->last_id();
+  const std::string id = ScanId(number);
+  StoreDigests(*change, number, files);
+  NoteScanNumber(folders_.state(), number);
+  if (::rename(made.c_str(), folders_.Scan(id).c_str()) != 0)
+    throw DiskRefused(DescribeWriteError(folders_.Scan(id), errno));
+  try {
+    Flush(folders_.scans(), SyncToDisk);
+    change.Commit();
+  } catch (...) {  // without its row a scan does not exist
+    ::rename(folders_.Scan(id).c_str(), made.c_str());
+    throw;
+  }
+  return id;
+}
+
 void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
                         const FinishedScan& finished, bool has_folder,
                         const std::vector<FileDigest>& files) {

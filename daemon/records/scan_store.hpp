@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -68,6 +69,9 @@ class ScanStore {
   /// kDone: the staging folder becomes the scan's. kFailed: only its recording is kept, if
   /// complete. Otherwise it is removed.
   void Finish(const std::string& scan_id, const FinishedScan& finished);
+  /// Stores a scene that no sensor took, as the done scan of a reference.
+  /// @param made  A staging folder with the scene, which becomes the scan's. Returns the id.
+  std::string AddMade(const NewScan& scan, const std::filesystem::path& made);
   /// Verdict, numbers and reason are logged. kConflict if a newer scan of the patient is done or
   /// running, and for a result that is not in tolerance without a reason.
   void Accept(const Actor& actor, const std::string& id, const std::string& reason = {});

@@ -12,6 +12,7 @@
 #include "daemon/files/scene_folder.hpp"
 #include "web/service/result_terms.hpp"
 #include "words/result.hpp"
+#include "words/text_report.hpp"
 
 namespace plumb {
 namespace {
@@ -40,6 +41,10 @@ class Rows {
 };
 
 void AddComparisonTo(Rows& rows, const StoredResult& result) {
+  if (const auto& planned = result.compared_with)
+    rows.Add(say::text_report::Reference(),
+             say::text_report::PlanningCt(planned->roi, planned->plan_label, planned->plan_date,
+                                          planned->posture));
   if (const auto& alignment = result.alignment) {
     rows.Add(say::result::QualityMarkers(),
              say::result::QualityCount(static_cast<std::int64_t>(alignment->markers_used.size())));
@@ -68,6 +73,7 @@ void AddComparisonTo(Rows& rows, const StoredResult& result) {
 
 void AddSweepTo(Rows& rows, const StoredScene& stored) {
   const Scene& scene = stored.scene;
+  if (scene.planning) return;  // no sweep made it
   rows.Add(say::result::QualityTracked(),
            say::result::QualityTrackedOf(scene.frames_tracked, scene.frames_total));
   const double lost = scene.frames_total > 0 ? static_cast<double>(scene.frames_dropped) /

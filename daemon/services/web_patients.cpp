@@ -2,16 +2,21 @@
 // The page's services for patients and references.
 #include "daemon/services/web_services.hpp"
 
+#include <filesystem>
+#include <memory>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/appliance/plan_options.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/planning/planning_import.hpp"
 #include "daemon/result/scan_quality.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 
@@ -163,10 +168,56 @@ class WebPatients final : public web::PatientService {
   StoreAccess& store_;
 };
 
+/// The files of a planning CT on their way to a scene in the staging folder.
+struct PlanningImport {
+  std::filesystem::path staging, earlier;
+  PatientPosture posture = PatientPosture::kHeadFirstSupine;
+  std::optional<Change> refusal;
+
+  PlanningImport() = default;
+  PlanningImport(const PlanningImport&) = delete;
+  PlanningImport& operator=(const PlanningImport&) = delete;
+  ~PlanningImport() {
+    std::error_code ignored;
+    if (!staging.empty()) std::filesystem::remove_all(staging, ignored);
+  }
+
+  /// Beside the loop; never throws.
+  void Read(const web::SentPlanning& sent) noexcept {
+    try {
+      std::filesystem::remove_all(staging);
+      std::filesystem::create_directories(staging);
+      const std::filesystem::path plan = staging / "plan.dcm";
+      SplitPlanning(sent.file, sent.structures_bytes, plan);
+      PlanningChoice choice;
+      if (!sent.roi.empty()) choice.roi = sent.roi;
+      if (!sent.beam.empty()) choice.beam = sent.beam;
+      Scene scene = ReadPlanning({.structures = sent.file,
+                                  .plan = plan,
+                                  .structures_name = "STRUCTURES",
+                                  .plan_name = "PLAN"},
+                                 choice);
+      std::filesystem::remove(plan);  // it names the patient
+      CompareWithEarlierPlan(earlier, scene);
+      posture = scene.planning->posture;
+      WriteScene(scene, staging / "scene");
+    } catch (const DataError& error) {
+      refusal = Refused(ChangeResult::kInvalid, error.message());
+    } catch (const std::exception& error) {
+      refusal = Refused(ChangeResult::kFailed, MessageOf(error));
+    }
+  }
+};
+
 class WebReferences final : public web::ReferenceService {
  public:
-  WebReferences(const ReferenceGate& references, const RoomInUse& room, StoreAccess& store)
-      : references_(references), room_(room), store_(store) {}
+  WebReferences(const ReferenceGate& references, const CurrentSession& session,
+                const RoomInUse& room, StoreAccess& store, web::BackgroundWork& background)
+      : references_(references),
+        session_(session),
+        room_(room),
+        store_(store),
+        background_(background) {}
 
   std::vector<Reference> References(const std::string& patient_id) override {
     return store_.Read(&Store::references,
@@ -182,7 +233,10 @@ class WebReferences final : public web::ReferenceService {
     const std::optional<Scan> scan = ScanOf(reference.scan_id);
     if (!scan || scan->folder.empty()) return {};
     try {
-      const MarkerMap markers = ReadStoredScene(scan->folder / "scene").scene.markers;
+      const Scene scene = ReadStoredScene(scan->folder / "scene").scene;
+      if (scene.planning)  // its map lies in IEC axes
+        return {.gantry_xy = {0, 1}, .right_xy = {1, 0}, .is_known = true};
+      const MarkerMap& markers = scene.markers;
       const auto ways = room_.In(markers);
       if (!ways) return {};
       RoomOnMap room{.gantry_xy = {ways->gantry.x(), ways->gantry.y()},
@@ -210,38 +264,103 @@ class WebReferences final : public web::ReferenceService {
                  });
   }
 
+  void AddPlanning(const Actor& actor, const std::string& patient_id, const web::SentPlanning& sent,
+                   Done done) override {
+    if (!store_.Read(&Store::patients, [&](PatientStore& all) { return all.Find(patient_id); }))
+      return done(Refused(ChangeResult::kNotFound, say::store::NoPatient()));
+    // The result of an open session could not be accepted any more: a newer scan would be there.
+    if (session_.patient_id() == patient_id) return done(AnswerOf(say::store::SessionOpen()));
+    const Settings settings =
+        store_.Read(&Store::settings, [](SettingsStore& stored) { return stored.Get(); });
+    auto import = std::make_shared<PlanningImport>();
+    import->staging =
+        store_.Read([](Store& store) { return store.folders.Staging("planning");
+  });
+  import->earlier = EarlierPlanning(patient_id);
+  const auto work = [import, sent] { import->Read(sent); };
+  const auto read = [=, this, plan = DefaultPlan(settings)]() mutable {
+    if (import->refusal) return done(*import->refusal);
+    plan.posture = Name(import->posture);
+    plan.isocentre_m = {0, 0, 0};
+    plan.couch_markers = false;
+    store_.Write(&Store::scans, Stored(actor, plan, sent.reason, done), [=](ScanStore& scans) {
+      return scans.AddMade({.patient_id = patient_id,
+                            .reference_id = {},
+                            .purpose = ScanPurpose::kReference,
+                            .sensor_serial = {},
+                            .reason = sent.reason},
+                           import->staging);
+    });
+  };
+  if (!background_.RunInBackground(web::BackgroundPool::kFiles, work, read))
+    done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
+}
+
   void PlanReference(const Actor& actor, const std::string& id, int revision,
                      const ReferencePlan& plan, Done done) override {
-    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
-      const std::string planned = references.Plan(actor, id, revision, plan);
-      return planned == id ? std::string() : planned;  // only a new version was made
+  if (const auto planning = PlanningOf(FindReference(id))) {
+    const bool is_same = plan.posture == Name(planning->posture) && !plan.couch_markers &&
+                         plan.isocentre_m == std::array<double, 3>{0, 0, 0};
+    if (!is_same) return done(Refused(ChangeResult::kInvalid, say::scan::PlanningIsFixed()));
+  }
+  store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
+    const std::string planned = references.Plan(actor, id, revision, plan);
+    return planned == id ? std::string() : planned;  // only a new version was made
+  });
+}
+
+void ApproveReference(const Actor& actor, const std::string& id, int revision,
+                      const std::string& digest, const std::string& reason, Done done) override {
+  const std::optional<Reference> reference = FindReference(id);
+  const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
+  // What no sensor took needs neither a checked room nor a warm sensor.
+  const bool is_sweep = !PlanningOf(reference);
+  if (is_sweep && RefuseIf(references_.WhyNot(scan), done)) return;
+  if (is_sweep && scan && reason.empty() &&
+      !QualityOf(*scan, FilesOf(*scan), references_.warm_up_min()).cautions.empty())
+    return done(AnswerOf(say::store::ReferenceNeedsReason()));
+  store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
+    references.Approve(actor, id, revision, digest, /*two_users=*/true, reason);
+  });
+}
+
+private:
+std::optional<Scan> ScanOf(const std::string& scan_id) {
+  return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
+}
+
+/// The plan that a reference was imported from; nothing for a sweep.
+std::optional<PlanningSource> PlanningOf(const std::optional<Reference>& reference) {
+  const auto scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
+  if (!scan || scan->folder.empty() || !scan->sensor_serial.empty()) return std::nullopt;
+  return ReadStoredScene(scan->folder / "scene").scene.planning;
+}
+
+/// Scene folder of the newest reference of this patient; empty if it has none.
+std::filesystem::path EarlierPlanning(const std::string& patient_id) {
+  const std::vector<Reference> all = References(patient_id);
+  const auto scan = all.empty() ? std::optional<Scan>() : ScanOf(all.front().scan_id);
+  return scan && !scan->folder.empty() ? scan->folder / "scene" : std::filesystem::path();
+}
+
+/// What follows once the scene is a scan: the draft made of it.
+Done Stored(const Actor& actor, const ReferencePlan& plan, const std::string& reason, Done done) {
+  return [=, this, done = std::move(done)](const Change& change) {
+    if (change.result != ChangeResult::kDone) return done(change);
+    store_.Write(&Store::references, done, [=, scan = change.id](ReferenceStore& references) {
+      return references.Add(actor, scan, reason, plan);
     });
-  }
+  };
+}
 
-  void ApproveReference(const Actor& actor, const std::string& id, int revision,
-                        const std::string& digest, const std::string& reason, Done done) override {
-    const std::optional<Reference> reference = FindReference(id);
-    const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
-    if (RefuseIf(references_.WhyNot(scan), done)) return;
-    if (scan && reason.empty() &&
-        !QualityOf(*scan, FilesOf(*scan), references_.warm_up_min()).cautions.empty())
-      return done(AnswerOf(say::store::ReferenceNeedsReason()));
-    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
-      references.Approve(actor, id, revision, digest, /*two_users=*/true, reason);
-    });
-  }
+const ReferenceGate& references_;
+const CurrentSession& session_;
+const RoomInUse& room_;
+StoreAccess& store_;
+web::BackgroundWork& background_;
+};  // namespace
 
- private:
-  std::optional<Scan> ScanOf(const std::string& scan_id) {
-    return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
-  }
-
-  const ReferenceGate& references_;
-  const RoomInUse& room_;
-  StoreAccess& store_;
-};
-
-}  // namespace
+}  // namespace plumb
 
 std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance, CurrentSession& session,
                                                      const ReferenceGate& references,
@@ -250,9 +369,10 @@ std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance, Curre
 }
 
 std::unique_ptr<web::ReferenceService> MakeWebReferences(const ReferenceGate& references,
-                                                         const RoomInUse& room,
-                                                         StoreAccess& store) {
-  return std::make_unique<WebReferences>(references, room, store);
+                                                         const CurrentSession& session,
+                                                         const RoomInUse& room, StoreAccess& store,
+                                                         web::BackgroundWork& background) {
+  return std::make_unique<WebReferences>(references, session, room, store, background);
 }
 
 }  // namespace plumb

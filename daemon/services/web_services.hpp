@@ -33,7 +33,8 @@ namespace plumb {
                                                                    const ReferenceGate& references,
                                                                    StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::ReferenceService> MakeWebReferences(
-    const ReferenceGate& references, const RoomInUse& room, StoreAccess& store);
+    const ReferenceGate& references, const CurrentSession& session, const RoomInUse& room,
+    StoreAccess& store, web::BackgroundWork& background);
 [[nodiscard]] std::unique_ptr<web::RoomCalibrationService> MakeWebRoomCalibration(
     RoomInUse& room, StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::ScanService> MakeWebScans(Appliance& appliance,

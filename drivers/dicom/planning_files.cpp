@@ -58,6 +58,10 @@ PlanningContent AskReader(const fs::path& file) {
   return ParsePlanning(text, numbers);
 }
 
+std::string SaidName(const fs::path& file, const fs::path& name) {
+  return (name.empty() ? file : name).string();
+}
+
 }  // namespace
 
 bool IsDicomFile(const fs::path& file) {
@@ -71,28 +75,29 @@ bool IsDicomFile(const fs::path& file) {
          std::string_view(first.data() + 128, 4) == "DICM";
 }
 
-PlanningContent ReadDicomFile(const fs::path& file) {
+PlanningContent ReadDicomFile(const fs::path& file, const fs::path& name) {
   std::error_code error;
-  if (!fs::exists(file, error)) throw DataError(say::dicom::NoFile(file.string()));
+  if (!fs::exists(file, error)) throw DataError(say::dicom::NoFile(SaidName(file, name)));
   try {
     return AskReader(fs::absolute(file));
   } catch (const DataError& why) {
-    throw DataError(say::dicom::Damaged(file.string(), why.message()));
+    throw DataError(say::dicom::Damaged(SaidName(file, name), why.message()));
   }
 }
 
-StructureSet ReadStructureSet(const fs::path& file) {
-  PlanningContent content = ReadDicomFile(file);
+StructureSet ReadStructureSet(const fs::path& file, const fs::path& name) {
+  PlanningContent content = ReadDicomFile(file, name);
   if (!content.structures)
-    throw DataError(
-        say::dicom::OtherKind(file.string(), content.modality, say::dicom::KindStructures()));
+    throw DataError(say::dicom::OtherKind(SaidName(file, name), content.modality,
+                                          say::dicom::KindStructures()));
   return *std::move(content.structures);
 }
 
-TreatmentPlan ReadTreatmentPlan(const fs::path& file) {
-  PlanningContent content = ReadDicomFile(file);
+TreatmentPlan ReadTreatmentPlan(const fs::path& file, const fs::path& name) {
+  PlanningContent content = ReadDicomFile(file, name);
   if (!content.plan)
-    throw DataError(say::dicom::OtherKind(file.string(), content.modality, say::dicom::KindPlan()));
+    throw DataError(
+        say::dicom::OtherKind(SaidName(file, name), content.modality, say::dicom::KindPlan()));
   return *std::move(content.plan);
 }
 

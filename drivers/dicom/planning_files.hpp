@@ -13,10 +13,14 @@ namespace plumb {
 
 /// @throws DataError if it cannot be read, is damaged, or needs too much memory or time; IoError if
 ///         this installation has no reader.
-[[nodiscard]] PlanningContent ReadDicomFile(const std::filesystem::path& file);
+/// @param name  What messages call the file; empty: its path.
+[[nodiscard]] PlanningContent ReadDicomFile(const std::filesystem::path& file,
+                                            const std::filesystem::path& name = {});
 
 /// @throws DataError as above, and if it is a file of another kind.
-[[nodiscard]] StructureSet ReadStructureSet(const std::filesystem::path& file);
-[[nodiscard]] TreatmentPlan ReadTreatmentPlan(const std::filesystem::path& file);
+[[nodiscard]] StructureSet ReadStructureSet(const std::filesystem::path& file,
+                                            const std::filesystem::path& name = {});
+[[nodiscard]] TreatmentPlan ReadTreatmentPlan(const std::filesystem::path& file,
+                                              const std::filesystem::path& name = {});
 
 }  // namespace plumb

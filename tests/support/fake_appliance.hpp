@@ -157,6 +157,11 @@ class FakeAppliance : public web::BackgroundWork,
   RoomOnMap RoomOfReference(const Reference& reference) override;
   void AddReference(const Actor& actor, const std::string& scan_id, const std::string& reason,
                     Done done) override;
+  /// A draft of a scan whose folder `import_planning` makes, which may refuse the files.
+  void AddPlanning(const Actor& actor, const std::string& patient_id, const web::SentPlanning& sent,
+                   Done done) override;
+  std::function<std::filesystem::path(const web::SentPlanning&)> import_planning;
+  web::SentPlanning sent_planning;  ///< The last one.
   void PlanReference(const Actor& actor, const std::string& id, int revision,
                      const ReferencePlan& plan, Done done) override;
   /// Cautions are asked for where a test judges the quality.

@@ -323,6 +323,32 @@ void FakeAppliance::AddReference(const Actor& actor, const std::string& scan_id,
   Did(actor, "reference.add", id, done, id);
 }
 
+void FakeAppliance::AddPlanning(const Actor& actor, const std::string& patient_id,
+                                const web::SentPlanning& sent, Done done) {
+  if (!FindPatient(patient_id))
+    return Finish(done, Refused(ChangeResult::kNotFound, say::store::NoPatient()));
+  sent_planning = sent;
+  uploaded_bytes = std::filesystem::file_size(sent.file);
+  std::filesystem::path folder;
+  try {
+    if (import_planning) folder = import_planning(sent);
+  } catch (const DataError& error) {
+    return Finish(done, Refused(ChangeResult::kInvalid, error.message()));
+  }
+  Scan scan;
+  scan.id = fmt::format("ct{:04}", next_id_++);
+  scan.patient_id = patient_id;
+  scan.purpose = ScanPurpose::kReference;
+  scan.outcome = ScanOutcome::kDone;
+  scan.started_at = WallClock::now();
+  scan.folder = folder;
+  scans.push_back(scan);
+  Reference& draft = MakeReference(scan, actor.user, sent.reason);
+  draft.plan.isocentre_m = {0, 0, 0};
+  const std::string id = draft.id;
+  Did(actor, "reference.add", id, done, id);
+}
+
 void FakeAppliance::PlanReference(const Actor& actor, const std::string& id, int revision,
                                   const ReferencePlan& plan, Done done) {
   const auto found = std::find_if(references.begin(), references.end(),

@@ -35,7 +35,12 @@
 #include "daemon/files/compact_map.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/planning/planning_import.hpp"
 #include "daemon/result/scan_quality.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/simulator/suites/dicom_writer.hpp"
+#include "drivers/simulator/suites/planning_ct.hpp"
+#include "drivers/simulator/suites/suite_plan.hpp"
 #include "tests/support/fake_appliance.hpp"
 #include "tests/support/result_with.hpp"
 #include "tests/support/synthetic_scene.hpp"
@@ -456,6 +461,37 @@ SensorProfiles KnownSensor() {
           .versions = {learned(4, 0.981), learned(3, 1.0046), learned(2, 1.0045)}};
 }
 
+/// The files of a small planning CT for the browser to send, and the import of what it sends.
+void ServePlanning(FakeAppliance& service, const fs::path& root) {
+  const simulated::SuitePlan demo = simulated::PlanSuite({});
+  const simulated::ScenePlan& scene = demo.scenes.front();
+  Pose T_iec_body = scene.T_world_body;
+  T_iec_body.pretranslate(Eigen::Vector3d(0, 0, -0.1));
+  for (const auto& [name, quirks] :
+       {std::pair{"", std::vector<simulated::CtQuirk>{}},
+        {"several-", std::vector{simulated::CtQuirk::kSeveralExternal}}}) {
+    const auto [structures, plan] =
+        simulated::MakePlanningCt(scene.body->surface, T_iec_body, {.quirks = quirks});
+    WriteWholeFile(root / (std::string(name) + "structures.dcm"),
+                   std::string_view(DicomBytes(structures)));
+    WriteWholeFile(root / (std::string(name) + "plan.dcm"), std::string_view(DicomBytes(plan)));
+  }
+  service.import_planning = [root, number = 0](const web::SentPlanning& sent) mutable {
+    const fs::path folder = root / fmt::format("planned-{}", ++number);
+    fs::create_directories(folder);
+    SplitPlanning(sent.file, sent.structures_bytes, folder / "plan.dcm");
+    PlanningChoice choice;
+    if (!sent.roi.empty()) choice.roi = sent.roi;
+    const Scene read = ReadPlanning({.structures = sent.file,
+                                     .plan = folder / "plan.dcm",
+                                     .structures_name = "STRUCTURES",
+                                     .plan_name = "PLAN"},
+                                    choice);
+    WriteScene(read, folder / "scene");
+    return folder;
+  };
+}
+
 int Serve(const fs::path& root, bool tls) {
   FakeAppliance service;
   Recorder recorder(root);
@@ -479,6 +515,7 @@ int Serve(const fs::path& root, bool tls) {
   service.status.room.right_xy = {kT_iec_reference(0, 0), kT_iec_reference(0, 1)};
   service.status.room.gantry_xy = {kT_iec_reference(1, 0), kT_iec_reference(1, 1)};
   service.status.room.is_known = true;
+  ServePlanning(service, root);
   service.sweep = std::chrono::milliseconds(1500);
   service.profiles = KnownSensor();
   service.update.supported = true;
@@ -489,7 +526,7 @@ int Serve(const fs::path& root, bool tls) {
   options.password_memory_bytes = 1 << 20;
   options.password_operations = 1;
   options.upload_folder = root / "updates";
-  options.max_upload_bytes = 4 << 20;
+  options.max_upload_bytes = 64 << 20;
   if (tls) {
     options.tls = web::MakeTlsIdentity({});
     options.keep_certificate = [](const web::TlsIdentity&) {};

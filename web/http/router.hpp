@@ -38,7 +38,8 @@ struct Route {
   std::string_view view = {}, download = {};
   /// Without a record, a route with path parameters is refused to displays in the room.
   ShownRecord shown = ShownRecord::kNone;
-  Message absent = {};  ///< The refusal to a display: as if there were no such record.
+  std::uint64_t most_bytes = 0;  ///< Of a file; 0: those of the server's options.
+  Message absent = {};           ///< The refusal to a display: as if there were no such record.
 
   [[nodiscard]] std::string Name() const { return method + " " + pattern; }
   [[nodiscard]] bool DisclosesPatientData() const { return !view.empty() || !download.empty(); }

@@ -187,9 +187,11 @@ struct Transport::Callbacks {
     if (options.upload_folder.empty()) return ErrorResponse(409, say::web::NoUploads());
     if (!transport.upload_.expired()) return ErrorResponse(409, say::web::AnotherUpload());
     if (bytes == 0) return ErrorResponse(411, say::web::UploadLength());
-    if (bytes > options.max_upload_bytes)
-      return ErrorResponse(
-          413, say::web::FileTooLarge(static_cast<double>(options.max_upload_bytes >> 20)));
+    const std::uint64_t most = exchange.route->most_bytes > 0
+                                   ? std::min(exchange.route->most_bytes, options.max_upload_bytes)
+                                   : options.max_upload_bytes;
+    if (bytes > most)
+      return ErrorResponse(413, say::web::FileTooLarge(static_cast<double>(most >> 20)));
     constexpr std::uintmax_t kSpare = 64U << 20;
     try {
       // Removing it takes time in proportion to its size.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string_view>
 
 #include "algo/base/posture.hpp"
@@ -35,6 +36,10 @@ inline constexpr Limits kIdleLogout_min{.entered = {1, 240}, .stored = {1, 100'0
 /// Lengths of texts in bytes. A name is that of an account, a display, or a patient (its code).
 inline constexpr std::size_t kMaxName = 32, kMaxSite = 64, kMaxNote = 500;
 inline constexpr std::size_t kMinReason = 3, kMaxReason = 200;
+/// Of a structure set and of a plan, each; a file of a planning CT is smaller.
+inline constexpr std::uint64_t kMaxPlanningFile = std::uint64_t{64} << 20;
+/// Name of a contour or a beam: the longest that DICOM permits, in bytes of UTF-8.
+inline constexpr std::size_t kMaxPlanningName = 4 * 64;
 inline constexpr int kMaxFraction = 999;
 
 /// Head or feet first, supine or prone.

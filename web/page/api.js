@@ -96,6 +96,25 @@ const nameOf = (response) =>
 const readFile = async (response) => ({ blob: await response.blob(), name: nameOf(response) });
 const orNothing = (response) => response.json().catch(() => ({}));
 const api = (path) => `/api/v1/${path}`;
+/// Sends bytes with their progress, which fetch does not report: `onPart(share)`.
+export const sendFile = (path, file, failed, onPart, headers = {}) => new Promise((
+  resolve, reject,
+) => {
+  const request = new XMLHttpRequest();
+  request.open('POST', api(path));
+  request.setRequestHeader('X-CSRF-Token', session.csrf_token);
+  request.setRequestHeader('Content-Type', 'application/octet-stream');
+  for (const [name, value] of Object.entries(headers)) request.setRequestHeader(name, value);
+  request.upload.onprogress = (event) => onPart(event.loaded / event.total);
+  request.onload = () => {
+    let answer = null;
+    try { answer = JSON.parse(request.responseText); } catch { /* no answer of ours */ }
+    if (request.status < 300) resolve(answer);
+    else reject(new Error(said(answer, 'error') ?? failed));
+  };
+  request.onerror = () => reject(new Error(failed));
+  request.send(file);
+});
 export const get = (path, background = false) => ask('GET', api(path), undefined, { background });
 export const getOrNull = (path) => get(path, true).catch(() => null);
 /// For pictures that are asked for again and again.

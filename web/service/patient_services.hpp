@@ -2,6 +2,8 @@
 // Patients with their treatment sessions, and the references that fractions are compared with.
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,6 +60,15 @@ class PatientService {
   virtual void CloseSession(const Actor& actor, const std::string& session_id, Done done) = 0;
 };
 
+/// The files of a planning CT as they were sent.
+struct SentPlanning {
+  std::filesystem::path file;  ///< The structure set, followed by the plan; it may be changed.
+  std::uint64_t structures_bytes = 0;
+  std::string roi;     ///< The contour that is the skin; empty: as the file states it.
+  std::string beam;    ///< Whose isocentre counts; empty: all have the same.
+  std::string reason;  ///< Reason for a new reference; may be empty.
+};
+
 /// The rules of services.hpp hold.
 class ReferenceService {
  public:
@@ -72,6 +83,11 @@ class ReferenceService {
   /// Creates a draft from a scan with a scene. Returns the id.
   virtual void AddReference(const Actor& actor, const std::string& scan_id,
                             const std::string& reason, Done done) = 0;
+  /// Creates a draft from a planning CT: isocentre and posture are the plan's, and no later plan
+  /// changes them. Returns the id. kInvalid for files that do not belong together or must not be
+  /// used, kFailed without a reader, kConflict while a session of the patient is open.
+  virtual void AddPlanning(const Actor& actor, const std::string& patient_id,
+                           const SentPlanning& sent, Done done) = 0;
   /// A draft is changed in place. For an approved reference, creates a new draft with the next
   /// version and returns its id.
   /// @param revision  The revision that was read: kConflict if another has been saved since.

@@ -75,6 +75,32 @@ class ScanSessionTest : public ::testing::Test {
   std::unique_ptr<ScanSession> session_;
 };
 
+TEST(TakeRoomTest, APlanningCtIsMetByTheRoomsMarkersWithTheSpreadOfTheCalibration) {
+  Scene planned;
+  planned.planning.emplace();
+  planned.frame = SceneFrame::kIec;
+  CompareOptions compare;
+  compare.isocentre_m = Eigen::Vector3d(1, 2, 3);
+  compare.T_iec_reference = Pose::Identity();
+  compare.iec_u95_m = 0.003;
+  RoomAxes room{.version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .shift_m = 0.004};
+  const auto used = TakeRoom(room, planned, compare);
+  ASSERT_TRUE(used.has_value());
+  EXPECT_TRUE(used->why_not_used.empty());
+  EXPECT_FALSE(compare.isocentre_m) << "the origin of its frame";
+  EXPECT_TRUE(compare.room_markers.contains(5));
+  EXPECT_NEAR(compare.iec_u95_m.value_or(0), 0.005, 1e-12);
+
+  room.why_not = Message::Verbatim("marker 5 moved");
+  (void)TakeRoom(room, planned, compare);
+  EXPECT_FALSE(compare.T_iec_reference);
+  planned.height_map.emplace();
+  const Comparison refused = Compare(planned, Scene{}, compare);
+  EXPECT_EQ(refused.verdict, Verdict::kNoAnswer);
+  ASSERT_FALSE(refused.reasons.empty());
+  EXPECT_THAT(refused.reasons.front().English(), HasSubstr("marker 5 moved"));
+}
+
 TEST_F(ScanSessionTest, ClosingTheFeedEndsTheSweepWithEveryFrameThatWaited) {
   Start();
   Push(12);

@@ -430,6 +430,34 @@ TEST_F(UploadTest, ABundleGoesToTheDiskAndNothingIsLeftOfIt) {
   EXPECT_EQ(again.Ask("DELETE", "/api/v1/update/bundles/plumb-2.raucb", "").status, 404);
 }
 
+TEST_F(UploadTest, APlanningCtReachesTheServiceWithItsChoicesAndNothingIsLeftOfIt) {
+  Patient patient;
+  patient.id = "p1";
+  service_.patients.push_back(patient);
+  HttpClient physicist = LoggedIn("physicist");
+  physicist.extra_headers["Content-Type"] = "application/octet-stream";
+  const std::string path = "/api/v1/patients/p1/planning";
+  physicist.extra_headers["X-Plumb-Planning"] =
+      "structures_bytes=6&roi=BODY+S%C3%A9&isocentre_of=AP";
+  const HttpAnswer answer = physicist.Ask("POST", path, "structplan");
+  EXPECT_EQ(answer.status, 201) << answer.body;
+  loop_->Do([&] {
+    EXPECT_EQ(service_.uploaded_bytes, 10U);
+    EXPECT_EQ(service_.sent_planning.structures_bytes, 6U);
+    EXPECT_EQ(service_.sent_planning.roi, "BODY S\xC3\xA9");
+    EXPECT_EQ(service_.sent_planning.beam, "AP");
+    EXPECT_EQ(service_.references.back().id, answer.json()["id"]);
+  });
+  EXPECT_TRUE(BecomesEmpty()) << "it names the patient";
+  for (const std::string& bad : {std::string("structures_bytes=-1"), std::string("%GG"),
+                                 "structures_bytes=1&roi=" + std::string(257, 'x')}) {
+    physicist.extra_headers["X-Plumb-Planning"] = bad;
+    EXPECT_EQ(physicist.Ask("POST", path, "x").status, 400) << bad;
+  }
+  physicist.extra_headers["X-Plumb-Planning"] = "structures_bytes=1";
+  EXPECT_EQ(physicist.Ask("POST", "/api/v1/patients/p9/planning", "x").status, 404);
+}
+
 TEST_F(UploadTest, WhatIsNoBundleOrTooLargeIsRefused) {
   const HttpClient engineer = LoggedIn("engineer");
   EXPECT_EQ(Send(engineer, "zip.raucb", "PK" + std::string(5000, 'x')).status, 400);

@@ -48,6 +48,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/patients/{id}/archive", "P"},
     {"DELETE /api/v1/patients/{id}", "P"},
     {"POST /api/v1/patients/{id}/open", "TPE"},
+    {"POST /api/v1/patients/{id}/planning", "P"},
     {"GET /api/v1/patients/{id}/references", "TPE"},
     {"GET /api/v1/patients/{id}/scans", "TPE"},
     {"GET /api/v1/patients/{id}/report.pdf", "TPE"},
@@ -145,7 +146,7 @@ class RolesTest : public WebTest {
     std::string path = route.substr(space + 1);
     for (std::size_t at; (at = path.find('{')) != std::string::npos;)
       path.replace(at, path.find('}') - at + 1, "none");
-    if (path.find("/update/bundles/") != std::string::npos)
+    if (path.find("/update/bundles/") != std::string::npos || path.ends_with("/planning"))
       client.extra_headers["Content-Type"] = "application/octet-stream";
     const std::string method = route.substr(0, space);
     return client.Ask(method, path, method == "GET" || method == "DELETE" ? "" : "{}");

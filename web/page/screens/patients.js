@@ -11,6 +11,7 @@ import { lookOf, plainCode } from '../scanner.js';
 import { signedForm } from '../signed_form.js';
 import { S } from '../words.js';
 import { closeSession, openPatient, resumeSession } from '../treatment.js';
+import { planningUpload } from './planning.js';
 import { acceptanceMark, ageText, blockNote, isAdvice, outcomeBadge } from './common.js';
 
 const waitsFor = ({ planned_by: planner }) =>
@@ -343,7 +344,7 @@ export async function showPatient(place, id) {
   }, label);
   clear(place, heading,
     may('scan') && card(text.open, session, opening),
-    card(text.references, references),
+    card(text.references, references, may('plan') && planningUpload(id)),
     card(text.history, scans,
       h('div', { class: 'row below' },
         file(`report.pdf?language=${document.documentElement.lang}`, text.report),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which system runs, updates of it, the restart into them, and the diagnostics.
-import { currentSession, get, live, may, post, postForFile, remove } from '../api.js';
+import { get, live, may, post, postForFile, remove, sendFile } from '../api.js';
 import {
   action, card, clear, done, enable, field, form, h, hint, redraw, saveBlob,
 } from '../dom.js';
@@ -8,28 +8,13 @@ import { signedForm } from '../signed_form.js';
 import { S, said } from '../words.js';
 import { follow } from './common.js';
 
-function refusalIn(answer) {
-  try { return said(JSON.parse(answer), 'error'); } catch { return undefined; }
-}
-
-/// Sends a bundle with a progress bar; fetch does not report upload progress.
+/// Sends a bundle with a progress bar.
 function upload() {
   const text = S.update;
   const input = h('input', { type: 'file', accept: '.raucb', required: true });
   const bar = h('progress', { max: 1, value: 0, 'aria-label': text.uploading, hidden: true });
-  const send = (file) => new Promise((resolve, reject) => {
-    const request = new XMLHttpRequest();
-    request.open('POST', `/api/v1/update/bundles/${encodeURIComponent(file.name)}`);
-    request.setRequestHeader('X-CSRF-Token', currentSession().csrf_token);
-    request.setRequestHeader('Content-Type', 'application/octet-stream');
-    request.upload.onprogress = (event) => { bar.value = event.loaded / event.total; };
-    request.onload = () => {
-      if (request.status < 300) resolve();
-      else reject(new Error(refusalIn(request.responseText) ?? text.uploadFailed));
-    };
-    request.onerror = () => reject(new Error(text.uploadFailed));
-    request.send(file);
-  });
+  const send = (file) => sendFile(`update/bundles/${encodeURIComponent(file.name)}`, file,
+    text.uploadFailed, (share) => { bar.value = share; });
   return h('section', { class: 'card', hidden: true }, h('h2', {}, text.upload),
     hint(text.uploadHint),
     form({ class: 'form inline' }, async () => {

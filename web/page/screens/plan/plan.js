@@ -16,6 +16,7 @@ import { drafts } from '../../plan_drafts.js';
 import { signedForm } from '../../signed_form.js';
 import { S, said } from '../../words.js';
 import { blockNote, flagList, qualityOf } from '../common.js';
+import { planningFacts } from '../planning.js';
 import { editor, measure } from './plan_editor.js';
 import { templateOf } from './plan_template.js';
 
@@ -121,7 +122,10 @@ function summary(reference, patient, { scan, quality, picture, heights }, approv
   const number = (value) => `${value}`.replace('.', S.decimal);
   const size = measure(plan.region_m);
   const flags = scan && flagList(scan, quality);
-  const doubts = heights && plan.isocentre_m ? doubtsOf(heights, plan.isocentre_m).words : [];
+  const planning = planningFacts(heights?.scene);
+  // The map of a planning CT shows no couch to judge the isocentre by.
+  const doubts = heights && plan.isocentre_m && !planning
+    ? doubtsOf(heights, plan.isocentre_m).words : [];
   const reason = flags && h('input', { required: true, autocomplete: 'off', ...kReason });
   const signature = signedForm({ class: 'form inline below' },
     (sign) => approve({ ...sign(), ...(reason && { reason: reason.value.trim() }) }),
@@ -146,7 +150,7 @@ function summary(reference, patient, { scan, quality, picture, heights }, approv
       quality && row(text.scanQuality, quality.rows.map((one) =>
         `${said(one, 'name')}: ${said(one, 'value')}`).join('; ')),
       row(text.signature, h('code', {}, reference.digest)))),
-    sideViews(heights, plan.isocentre_m),
+    planning, sideViews(heights, plan.isocentre_m),
     doubts.map((words) => h('p', { class: 'caution' }, words)),
     flags, hint(text.approveHint), signature);
 }
@@ -159,6 +163,7 @@ async function draft(place, reference, store, reload) {
   const scan = await get(`scans/${reference.scan_id}`).catch(() => null);
   const quality = scan && await qualityOf(scan);
   const editable = may('plan');
+  let planning = null;
   const kept = editable ? drafts.read(reference) : null;
   const plan = kept ?? storedPlan(reference);
   const lasers = reference.room?.lasers_m?.map((value) => Number(value.toFixed(4))) ?? null;
@@ -181,7 +186,7 @@ async function draft(place, reference, store, reload) {
     if (shown === drawnPoint) return;
     drawnPoint = shown;
     meant.box.checked = false;
-    doubts = point && loaded ? doubtsOf(loaded, point) : { refused: false, words: [] };
+    doubts = point && loaded && !planning ? doubtsOf(loaded, point) : { refused: false, words: [] };
     clear(sidePlace, sideViews(loaded, point),
       doubts.words.map((words) => h('p', { class: 'caution isocentre-doubt' }, words)),
       doubts.words.length > 0 && !doubts.refused && editable && meant.element);
@@ -217,7 +222,7 @@ async function draft(place, reference, store, reload) {
     const edited = isEdited();
     if (edited) drafts.write(reference, inputs.body());
     else drafts.remove(reference);
-    if (sign) enable(sign, !edited && !blocked);
+    if (sign) enable(sign, !edited && (planning || !blocked));
     if (deleteCorner) enable(deleteCorner, drawing.hasCorner());
     unsaved.textContent = edited && sign ? text.unsaved : '';
     if (edited) clear(signPlace);
@@ -233,9 +238,16 @@ async function draft(place, reference, store, reload) {
   const unsaved = h('p', { class: 'caution', role: 'status' });
   try {
     loaded = await loadHeights(reference);
+    planning = planningFacts(loaded.scene);
+    // The file states them.
+    if (planning) {
+      for (const input of [...inputs.axes, inputs.posture, inputs.couch.box]) {
+        input.disabled = true;
+      }
+    }
     const compass = compassFor(plan.posture);
     const marksPlace = h('div', {}, marksNote(compass));
-    drawing = editor({ ...loaded, compass }, model, editable, changed);
+    drawing = editor({ ...loaded, compass }, model, editable, changed, Boolean(planning));
     inputs.posture.addEventListener('change', () => {
       const wanted = compassFor(inputs.posture.value);
       drawing.mark(wanted);
@@ -290,6 +302,7 @@ async function draft(place, reference, store, reload) {
       ` ${localTime(reference.created_at)}, ${reference.created_by}`];
   const deleteCorner = editable && drawing
     && action(text.deleteCorner, async () => drawing.deleteCorner(), {});
+  const movable = editable && !planning;
   const tools = deleteCorner && h('div', { class: 'row' },
     action(text.undo, async () => drawing.undo(), {}), deleteCorner,
     action(text.clear, async () => drawing.clear(), {}));
@@ -309,18 +322,19 @@ async function draft(place, reference, store, reload) {
       card(text.region,
         editable && hint(text.regionHint), mapPlace, corners, tools),
       h('section', { class: 'card form' },
+        planning,
         h('fieldset', {}, h('legend', {}, text.isocentre),
-          hint(text.isocentreHint),
-          editable && hint(text.pickHint),
+          !planning && hint(text.isocentreHint),
+          movable && hint(text.pickHint),
           h('div', { class: 'triple' }, inputs.axes.map((input, i) =>
             field(`${'xyz'[i]} (mm)`, input))), inputs.bad, outside, sidePlace,
           byLasers && hint(text.lasersTaken),
-          editable && drawing && lasers && action(text.lasers, async () => {
+          movable && drawing && lasers && action(text.lasers, async () => {
             inputs.bad.textContent = '';
             drawing.setIsocentre([...lasers]);
           }, {}),
-          editable && drawing && action(text.pick, async () => drawing.pick(), {}),
-          editable && drawing && markerChoice(loaded.scene, (point) => {
+          movable && drawing && action(text.pick, async () => drawing.pick(), {}),
+          movable && drawing && markerChoice(loaded.scene, (point) => {
             inputs.bad.textContent = '';
             drawing.setIsocentre(point);
           })),
@@ -329,7 +343,7 @@ async function draft(place, reference, store, reload) {
         templatePlace, field(text.posture, inputs.posture), inputs.couch.element,
         editable && hint(reference.approved_by ? text.approvedHint : text.approveHint),
         refusal && h('p', { class: 'caution refusal' }, refusal),
-        unsaved, block, h('div', { class: 'row' }, editable && save, sign))),
+        unsaved, !planning && block, h('div', { class: 'row' }, editable && save, sign))),
     signPlace));
   if (editable && drawing) {
     templateOf(patient, loaded.grid, model, inputs, drawing, changed)

@@ -27,7 +27,9 @@ export function measure(region) {
 /// Height map with a polygon and a point that people draw, by pointer or keys. `model` is {region,
 /// isocentre}; `changed` is called after each change.
 /// @param body  The region where no corner is drawn; null: it is not known.
-export function editor({ grid, map, body, compass }, model, editable, changed) {
+/// @param fixedPoint  The isocentre is not changed here.
+export function editor({ grid, map, body, compass }, model, editable, changed,
+  fixedPoint = false) {
   const text = S.plan;
   const canvas = h('canvas', { class: 'map', 'aria-hidden': 'true' });
   paintHeights(canvas, map, grid.step);
@@ -184,7 +186,7 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
       remember();
       state.onIsocentre = false;
       state.crosshair = null;
-      if (state.picking) {
+      if (state.picking && !fixedPoint) {
         model.isocentre = [...point, skinAt(point)];
         state.picking = false;
         overlay.classList.remove('picking');
@@ -214,7 +216,9 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
       const isUndo = key === (event.ctrlKey ? 'z' : 'u');
       // All other shortcuts are the browser's.
       if (event.altKey || event.metaKey || (event.ctrlKey && !isUndo)) return;
-      if (key === 'i' || (state.onIsocentre && model.isocentre && (direction || isDelete))) {
+      const movesPoint = key === 'i'
+        || (state.onIsocentre && model.isocentre && (direction || isDelete));
+      if (!fixedPoint && movesPoint) {
         event.preventDefault();
         keyOnIsocentre(key, direction, by);
         return;

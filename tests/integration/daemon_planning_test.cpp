@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// The planning CT as reference, from its upload to six numbers: a real plumbd, whose simulated room
+// has a board at a known place.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "algo/base/pose.hpp"
+#include "algo/base/units.hpp"
+#include "algo/comparison/correction.hpp"
+#include "drivers/simulator/suites/board_scenes.hpp"
+#include "drivers/simulator/suites/dicom_writer.hpp"
+#include "drivers/simulator/suites/planning_ct.hpp"
+#include "tests/support/http_client.hpp"
+#include "tests/support/plumbd.hpp"
+
+namespace plumb {
+namespace {
+
+using nlohmann::json;
+using simulated::CtQuirk;
+using test::HttpClient;
+using test::kPassword;
+using ::testing::HasSubstr;
+using testing::Plumbd;
+
+/// The room and the body of the virtual sensor's first scene after those of the board.
+simulated::SuitePlan DemoPlan() {
+  SimulateOptions options;
+  options.frames = 120;
+  options.rate_hz = 30;
+  options.width = 320;
+  options.height = 240;
+  return simulated::PlanSuite(options);
+}
+
+const Pose kIecWorld = simulated::CalibrationBoardPose().inverse();
+
+class DaemonPlanningTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    plumbd_ = std::make_unique<Plumbd>(
+        folder_.path(), testing::PlumbdOptions{.arguments = {"--sim-board"}, .scenes = 5});
+    for (int i = 0; i < 10 && !plumbd_->WaitUntilUp(); ++i) {
+    }
+    plumbd_->WaitForState("ready");
+    const std::uint16_t port = plumbd_->port();
+    engineer_ = std::make_unique<HttpClient>(plumbd_->MakeFirstAccount());
+    for (const char* name : {"planner", "approver"})
+      ASSERT_TRUE(test::AddAccount(port, *engineer_, name, "physicist")) << name;
+    planner_ = std::make_unique<HttpClient>(port);
+    approver_ = std::make_unique<HttpClient>(port);
+    ASSERT_EQ(planner_->LogIn("planner", kPassword), 200);
+    ASSERT_EQ(approver_->LogIn("approver", kPassword), 200);
+    const json demo = planner_->Get("/api/v1/status").json()["session"];
+    ASSERT_EQ(planner_->Post("/api/v1/treatment/close", {{"session_id", demo["id"]}}).status, 200);
+    patient_ = planner_->Post("/api/v1/patients", {{"code", "CT-1"}, {"site", "thorax"}})
+                   .json()
+                   .value("id", "");
+  }
+
+  /// The body lies in the plan 4 mm to the side, 3 mm along and 2 mm above where the sweep finds
+  /// it.
+  [[nodiscard]] static Pose PlannedBody(const simulated::ScenePlan& scene) {
+    Pose T = kIecWorld * scene.T_world_body;
+    T.pretranslate(Eigen::Vector3d(0.004, 0.003, 0.002));
+    return T;
+  }
+
+  test::HttpAnswer Upload(const simulated::PlanningCtOptions& options) {
+    const simulated::SuitePlan demo = DemoPlan();
+    const auto [structures, plan] = simulated::MakePlanningCt(
+        demo.scenes.front().body->surface, PlannedBody(demo.scenes.front()), options);
+    const std::string first = DicomBytes(structures);
+    HttpClient sender = *planner_;
+    sender.extra_headers["Content-Type"] = "application/octet-stream";
+    sender.extra_headers["X-Plumb-Planning"] = "structures_bytes=" + std::to_string(first.size());
+    return sender.Ask("POST", "/api/v1/patients/" + patient_ + "/planning",
+                      first + DicomBytes(plan));
+  }
+
+  void CalibrateRoom() {
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_EQ(engineer_->Post("/api/v1/checks/open").status, 200);
+      plumbd_->ScanOnce();
+      ASSERT_EQ(plumbd_->Sim("next-scene")["ok"], true);
+    }
+    const json candidate = planner_->Get("/api/v1/room-calibration").json();
+    ASSERT_EQ(candidate["why_not_sign"], "");
+    ASSERT_EQ(planner_
+                  ->Post("/api/v1/room-calibration/sign",
+                         {{"digest", candidate["digest"]}, {"password", kPassword}})
+                  .status,
+              201);
+  }
+
+  /// Plans the draft as it is, has another person approve it, and opens a fraction.
+  void Approve(const std::string& reference) {
+    const std::string path = "/api/v1/references/" + reference;
+    const json draft = planner_->Get(path).json();
+    json plan = {
+        {"region_m", json::array()},    {"isocentre_m", {0, 0, 0}}, {"shift_tolerance_mm", 3},
+        {"rotation_tolerance_deg", 1},  {"posture", "HFP"},         {"couch_markers", false},
+        {"revision", draft["revision"]}};
+    EXPECT_EQ(planner_->Put(path + "/plan", plan).status, 400) << "the file says HFS";
+    plan["posture"] = "HFS";
+    plan["isocentre_m"] = {0.001, 0, 0};
+    EXPECT_EQ(planner_->Put(path + "/plan", plan).status, 400) << "the isocentre is the plan's";
+    plan["isocentre_m"] = {0, 0, 0};
+    ASSERT_EQ(planner_->Put(path + "/plan", plan).status, 200);
+    const json planned = approver_->Get(path).json();
+    EXPECT_EQ(planned["room"]["gantry_xy"], (json{0.0, 1.0})) << planned.dump();
+    const auto approved = approver_->Post(path + "/approve", {{"revision", planned["revision"]},
+                                                              {"digest", planned["digest"]},
+                                                              {"password", kPassword}});
+    ASSERT_EQ(approved.status, 200) << approved.body;
+  }
+
+  json ScanFraction() {
+    EXPECT_EQ(planner_
+                  ->Post("/api/v1/patients/" + patient_ + "/open",
+                         {{"purpose", "fraction"}, {"reason", ""}})
+                  .status,
+              200);
+    const std::string scan = plumbd_->ScanOnce()["last_result"]["scan"];
+    const json session = planner_->Get("/api/v1/status").json()["session"];
+    EXPECT_EQ(planner_->Post("/api/v1/treatment/close", {{"session_id", session["id"]}}).status,
+              200);
+    EXPECT_THAT(planner_->Get("/api/v1/scans/" + scan + "/quality").body, HasSubstr("BODY"));
+    return planner_->Get("/api/v1/results/" + scan).json();
+  }
+
+  testing::TempFolder folder_;
+  std::unique_ptr<Plumbd> plumbd_;
+  std::unique_ptr<HttpClient> engineer_, planner_, approver_;
+  std::string patient_;
+};
+
+TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
+  const auto refused = Upload({.quirks = {CtQuirk::kSeveralExternal}});
+  EXPECT_EQ(refused.status, 400) << refused.body;
+  EXPECT_EQ(refused.json()["error_message"]["id"], "planning.several_external") << refused.body;
+  EXPECT_EQ(refused.body.find(folder_.path().string()), std::string::npos) << "a path of ours";
+  EXPECT_EQ(Upload({.quirks = {CtQuirk::kOtherPatient}}).status, 400);
+  const auto imported = Upload({});
+  ASSERT_EQ(imported.status, 201) << imported.body;
+  const std::string reference = imported.json()["id"];
+  const json draft = planner_->Get("/api/v1/references/" + reference).json();
+  const json scene =
+      planner_->Get("/api/v1/scans/" + draft["scan_id"].get<std::string>() + "/files/scene.json")
+          .json();
+  EXPECT_EQ(scene["planning"]["roi"], "BODY");
+  EXPECT_EQ(scene["source"], "dicom");
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path()))
+    EXPECT_NE(entry.path().extension(), ".dcm") << "the files name the patient";
+  Approve(reference);
+
+  // The board lies there and no body: whatever is seen, the room is not calibrated.
+  const json without = ScanFraction();
+  EXPECT_EQ(without["verdict"], "no_answer") << without.dump().substr(0, 2000);
+  EXPECT_EQ(without["compared_with"]["roi"], "BODY");
+
+  CalibrateRoom();
+  const json result = ScanFraction();
+  EXPECT_EQ(result["compared_with"]["source"], "dicom");
+  EXPECT_TRUE(result["room_calibration"]["used"].get<bool>());
+  ASSERT_TRUE(result["correction"].is_object()) << result["reasons"].dump();
+  const simulated::SuitePlan demo = DemoPlan();
+  const Pose T_motion =
+      kIecWorld * demo.scenes.front().T_world_body * PlannedBody(demo.scenes.front()).inverse();
+  const Vector6d couch = CouchVector(T_motion, Eigen::Vector3d::Zero(), Pose::Identity());
+  const json& numbers = result["correction"];
+  // Measured: 0.84, 0.45 and 0.48 mm off, at intervals of 2.1, 3.0 and 1.7 mm.
+  EXPECT_NEAR(numbers["lateral_mm"].get<double>(), couch(0) / kMillimetre, 1.8);
+  EXPECT_NEAR(numbers["longitudinal_mm"].get<double>(), couch(1) / kMillimetre, 1.8);
+  EXPECT_NEAR(numbers["vertical_mm"].get<double>(), couch(2) / kMillimetre, 1.8);
+}
+
+}  // namespace
+}  // namespace plumb
