@@ -273,94 +273,93 @@ class WebReferences final : public web::ReferenceService {
     const Settings settings =
         store_.Read(&Store::settings, [](SettingsStore& stored) { return stored.Get(); });
     auto import = std::make_shared<PlanningImport>();
-    import->staging =
-        store_.Read([](Store& store) { return store.folders.Staging("planning");
-  });
-  import->earlier = EarlierPlanning(patient_id);
-  const auto work = [import, sent] { import->Read(sent); };
-  const auto read = [=, this, plan = DefaultPlan(settings)]() mutable {
-    if (import->refusal) return done(*import->refusal);
-    plan.posture = Name(import->posture);
-    plan.isocentre_m = {0, 0, 0};
-    plan.couch_markers = false;
-    store_.Write(&Store::scans, Stored(actor, plan, sent.reason, done), [=](ScanStore& scans) {
-      return scans.AddMade({.patient_id = patient_id,
-                            .reference_id = {},
-                            .purpose = ScanPurpose::kReference,
-                            .sensor_serial = {},
-                            .reason = sent.reason},
-                           import->staging);
-    });
-  };
-  if (!background_.RunInBackground(web::BackgroundPool::kFiles, work, read))
-    done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
-}
+    const auto staging = [](Store& store) { return store.folders.Staging("planning"); };
+    import->staging = store_.Read(staging);
+    import->earlier = EarlierPlanning(patient_id);
+    const auto work = [import, sent] { import->Read(sent); };
+    const auto read = [=, this, plan = DefaultPlan(settings)]() mutable {
+      if (import->refusal) return done(*import->refusal);
+      plan.posture = Name(import->posture);
+      plan.isocentre_m = {0, 0, 0};
+      plan.couch_markers = false;
+      store_.Write(&Store::scans, Stored(actor, plan, sent.reason, done), [=](ScanStore& scans) {
+        return scans.AddMade({.patient_id = patient_id,
+                              .reference_id = {},
+                              .purpose = ScanPurpose::kReference,
+                              .sensor_serial = {},
+                              .reason = sent.reason},
+                             import->staging);
+      });
+    };
+    if (!background_.RunInBackground(web::BackgroundPool::kFiles, work, read))
+      done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
+  }
 
   void PlanReference(const Actor& actor, const std::string& id, int revision,
                      const ReferencePlan& plan, Done done) override {
-  if (const auto planning = PlanningOf(FindReference(id))) {
-    const bool is_same = plan.posture == Name(planning->posture) && !plan.couch_markers &&
-                         plan.isocentre_m == std::array<double, 3>{0, 0, 0};
-    if (!is_same) return done(Refused(ChangeResult::kInvalid, say::scan::PlanningIsFixed()));
-  }
-  store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
-    const std::string planned = references.Plan(actor, id, revision, plan);
-    return planned == id ? std::string() : planned;  // only a new version was made
-  });
-}
-
-void ApproveReference(const Actor& actor, const std::string& id, int revision,
-                      const std::string& digest, const std::string& reason, Done done) override {
-  const std::optional<Reference> reference = FindReference(id);
-  const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
-  // What no sensor took needs neither a checked room nor a warm sensor.
-  const bool is_sweep = !PlanningOf(reference);
-  if (is_sweep && RefuseIf(references_.WhyNot(scan), done)) return;
-  if (is_sweep && scan && reason.empty() &&
-      !QualityOf(*scan, FilesOf(*scan), references_.warm_up_min()).cautions.empty())
-    return done(AnswerOf(say::store::ReferenceNeedsReason()));
-  store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
-    references.Approve(actor, id, revision, digest, /*two_users=*/true, reason);
-  });
-}
-
-private:
-std::optional<Scan> ScanOf(const std::string& scan_id) {
-  return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
-}
-
-/// The plan that a reference was imported from; nothing for a sweep.
-std::optional<PlanningSource> PlanningOf(const std::optional<Reference>& reference) {
-  const auto scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
-  if (!scan || scan->folder.empty() || !scan->sensor_serial.empty()) return std::nullopt;
-  return ReadStoredScene(scan->folder / "scene").scene.planning;
-}
-
-/// Scene folder of the newest reference of this patient; empty if it has none.
-std::filesystem::path EarlierPlanning(const std::string& patient_id) {
-  const std::vector<Reference> all = References(patient_id);
-  const auto scan = all.empty() ? std::optional<Scan>() : ScanOf(all.front().scan_id);
-  return scan && !scan->folder.empty() ? scan->folder / "scene" : std::filesystem::path();
-}
-
-/// What follows once the scene is a scan: the draft made of it.
-Done Stored(const Actor& actor, const ReferencePlan& plan, const std::string& reason, Done done) {
-  return [=, this, done = std::move(done)](const Change& change) {
-    if (change.result != ChangeResult::kDone) return done(change);
-    store_.Write(&Store::references, done, [=, scan = change.id](ReferenceStore& references) {
-      return references.Add(actor, scan, reason, plan);
+    if (const auto planning = PlanningOf(FindReference(id))) {
+      const bool is_same = plan.posture == Name(planning->posture) && !plan.couch_markers &&
+                           plan.isocentre_m == std::array<double, 3>{0, 0, 0};
+      if (!is_same) return done(Refused(ChangeResult::kInvalid, say::scan::PlanningIsFixed()));
+    }
+    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
+      const std::string planned = references.Plan(actor, id, revision, plan);
+      return planned == id ? std::string() : planned;  // only a new version was made
     });
-  };
-}
+  }
 
-const ReferenceGate& references_;
-const CurrentSession& session_;
-const RoomInUse& room_;
-StoreAccess& store_;
-web::BackgroundWork& background_;
-};  // namespace
+  void ApproveReference(const Actor& actor, const std::string& id, int revision,
+                        const std::string& digest, const std::string& reason, Done done) override {
+    const std::optional<Reference> reference = FindReference(id);
+    const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
+    // What no sensor took needs neither a checked room nor a warm sensor.
+    const bool is_sweep = !PlanningOf(reference);
+    if (is_sweep && RefuseIf(references_.WhyNot(scan), done)) return;
+    if (is_sweep && scan && reason.empty() &&
+        !QualityOf(*scan, FilesOf(*scan), references_.warm_up_min()).cautions.empty())
+      return done(AnswerOf(say::store::ReferenceNeedsReason()));
+    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
+      references.Approve(actor, id, revision, digest, /*two_users=*/true, reason);
+    });
+  }
 
-}  // namespace plumb
+ private:
+  std::optional<Scan> ScanOf(const std::string& scan_id) {
+    return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
+  }
+
+  /// The plan that a reference was imported from; nothing for a sweep.
+  std::optional<PlanningSource> PlanningOf(const std::optional<Reference>& reference) {
+    const auto scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
+    if (!scan || scan->folder.empty() || !scan->sensor_serial.empty()) return std::nullopt;
+    return ReadStoredScene(scan->folder / "scene").scene.planning;
+  }
+
+  /// Scene folder of the newest reference of this patient; empty if it has none.
+  std::filesystem::path EarlierPlanning(const std::string& patient_id) {
+    const std::vector<Reference> all = References(patient_id);
+    const auto scan = all.empty() ? std::optional<Scan>() : ScanOf(all.front().scan_id);
+    return scan && !scan->folder.empty() ? scan->folder / "scene" : std::filesystem::path();
+  }
+
+  /// What follows once the scene is a scan: the draft made of it.
+  Done Stored(const Actor& actor, const ReferencePlan& plan, const std::string& reason, Done done) {
+    return [=, this, done = std::move(done)](const Change& change) {
+      if (change.result != ChangeResult::kDone) return done(change);
+      store_.Write(&Store::references, done, [=, scan = change.id](ReferenceStore& references) {
+        return references.Add(actor, scan, reason, plan);
+      });
+    };
+  }
+
+  const ReferenceGate& references_;
+  const CurrentSession& session_;
+  const RoomInUse& room_;
+  StoreAccess& store_;
+  web::BackgroundWork& background_;
+};
+
+}  // namespace
 
 std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance, CurrentSession& session,
                                                      const ReferenceGate& references,
