@@ -16,11 +16,10 @@
 
 namespace plumb {
 
-using Json = nlohmann::json;
-
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using Json = nlohmann::json;
 
 double SecondsSince(Clock::time_point time) {
   return std::chrono::duration<double>(Clock::now() - time).count();

@@ -10,7 +10,11 @@
 
 namespace plumb {
 
+namespace {
+
 using Json = nlohmann::json;
+
+}  // namespace
 
 void PutMessage(Json& json, const std::string& key, const Message& message) {
   json[key] = message.English();

@@ -14,10 +14,9 @@
 #include "words/backup.hpp"
 
 namespace plumb {
+namespace {
 
 using Json = nlohmann::ordered_json;
-
-namespace {
 
 constexpr std::size_t kMaxRows = 200'000, kMaxText = std::size_t{64} << 10,
                       kMaxJson = std::size_t{4} << 20;

@@ -33,9 +33,10 @@
 namespace plumb {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr const char* kAboutExport = "patient.json";
 constexpr const char* kRecord = "record.json";
