@@ -22,8 +22,8 @@ inline constexpr auto kNamesOf<NumberJudgement> =
     NamesUpTo<NumberJudgement::kOutside>({"not_judged", "in_tolerance", "unsure", "outside"});
 
 /// All in one unit; a limit itself is within it. What is not finite is not known. A value outside
-/// tolerance is so whatever its uncertainty. No measurement is exact: an uncertainty of 0 is one
-/// that nobody stated.
+/// tolerance is so whatever its uncertainty. No measurement is exact: an uncertainty of 0
+/// counts as not stated.
 /// @param u95  Half width of the interval of 95 %.
 [[nodiscard]] inline NumberJudgement JudgeNumber(std::optional<double> value,
                                                  std::optional<double> u95, double tolerance) {

@@ -12,7 +12,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Value = MessageArgument::Value;
 
-// Words within words within a sentence; deeper nesting is nobody's message.
+// A sentence with words in it that have words in them; no message nests more deeply.
 constexpr int kMaxMessageDepth = 6;
 
 Json ValueJson(const std::string& text) { return text; }

@@ -22,7 +22,7 @@ class RestDetector {
 
   /// @param color  CV_8UC3 of the camera's size.
   [[nodiscard]] bool Add(double time_s, const cv::Mat& color);
-  /// @param time_s  Later than the one before; a gap of more than a second begins the rest anew.
+  /// @param time_s  Later than the one before; after a gap of over a second the rest starts again.
   /// @param seen    Markers of the image. An image that repeats the one before says nothing of
   ///        rest: no two images of a real sensor have the same corners.
   /// @return Whether at least four of the scene's markers have stood still for two seconds.

@@ -14,7 +14,7 @@ namespace plumb {
 /// Used on the loop's thread. A listener that throws is logged and changes nothing else.
 class Notices {
  public:
-  /// @param data_changed  Called before the page is told that stored data has changed.
+  /// @param data_changed  Called when stored data has changed, before the page is notified.
   explicit Notices(std::function<void()> data_changed);
 
   void SetPage(std::function<void(web::EventKind)> listener);

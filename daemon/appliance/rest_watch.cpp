@@ -13,7 +13,7 @@
 namespace plumb {
 namespace {
 
-// One look takes about 10 ms of one processor (640x480).
+// Two seconds of rest are judged by eight looks.
 constexpr std::chrono::milliseconds kLookEvery{250};
 
 }  // namespace

@@ -44,7 +44,7 @@ class RemovalGate {
 /// store there.
 [[nodiscard]] std::uint64_t DefaultQuota(std::uint64_t disk_bytes);
 
-/// Limits of removals that nobody asked for: each scan needs another copy and a notice in advance,
+/// Limits of automatic removal: each scan needs another copy and a notice in advance,
 /// and only a few go at a time.
 struct RemovalRules {
   bool needs_backup = true;  ///< Only scans in a verified backup (backup_register.hpp).

@@ -19,7 +19,7 @@ namespace {
 
 using web::ScanQuality;
 
-/// From this share on, people are told that frames were lost.
+/// Share of lost frames from which the page and the reports mention them.
 constexpr double kManyLost = 0.05;
 
 /// Collects the rows.
