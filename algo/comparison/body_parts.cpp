@@ -38,6 +38,14 @@ constexpr double kMinHead_m = 0.15;
 constexpr double kMaxHeadWidth_m = 0.24;
 // fraction of the largest width of the whole body; knees behind feet are narrower
 constexpr double kShouldersOfAll = 0.85;
+// A trunk without a head still shows its neck: the end narrows to it within kMinHead_m, and the
+// other end is cut off broad. Three mannequins of two simulators have 0.24 to 0.32 of the largest
+// width at kEndBin_m from the neck's end and 0.65 to 0.95 at the other.
+constexpr double kEndBin_m = 0.03;
+constexpr double kStubRatio = 0.45;
+constexpr double kCutRatio = 0.55;
+// Shoulders with or without arms are 0.36 to 0.5 m wide; two legs side by side are narrower.
+constexpr double kMinShoulders_m = 0.33;
 
 // Ends of the bands below the shoulder line, in shoulder widths (about 0.45 m including the arms);
 // the lower legs follow.
@@ -139,6 +147,11 @@ struct Profile {
   }
   [[nodiscard]] std::size_t size() const { return low.size(); }
   [[nodiscard]] double width(std::size_t bin) const { return high[bin] - low[bin]; }
+  [[nodiscard]] double widest() const {
+    double widest = 0.0;
+    for (std::size_t i = 0; i < size(); ++i) widest = std::max(widest, width(i));
+    return widest;
+  }
   [[nodiscard]] double length_m() const { return static_cast<double>(size()) * kBin_m; }
 };
 
@@ -175,17 +188,31 @@ bool ShowsHead(const Profile& profile) {
        ++i)
     area_m2 += profile.width(i) * kBin_m;
   if (area_m2 > kMaxHeadWidth_m * (shoulders->line_m - profile.begin_m)) return false;
-  double widest = 0.0;
-  for (std::size_t i = 0; i < profile.size(); ++i) widest = std::max(widest, profile.width(i));
-  return shoulders->width_m >= kShouldersOfAll * widest;
+  return shoulders->width_m >= kShouldersOfAll * profile.widest();
 }
 
-// Whether the surface shows a head at that end only which is stated to be the feet's.
-bool HeadAtOtherEnd(const BodyView& view, const Axes& stated) {
-  const auto shows_head = [&](const Axes& axes) {
-    return ShowsHead(Profile(view.reference.grid, view.body_mask, axes));
-  };
-  return !shows_head(stated) && shows_head({-stated.along, stated.side, true});
+// Whether a trunk begins with the stub of a neck and ends cut off.
+bool ShowsNeck(const Profile& profile) {
+  const std::optional<Shoulders> shoulders = FindShoulders(profile);
+  if (!shoulders || shoulders->line_m - profile.begin_m >= kMinHead_m) return false;
+  const double widest = profile.widest();
+  const auto end_bin = static_cast<std::size_t>(std::lround(kEndBin_m / kBin_m));
+  return shoulders->width_m >= std::max(kMinShoulders_m, kShouldersOfAll * widest) &&
+         profile.width(end_bin) <= kStubRatio * widest &&
+         profile.width(profile.size() - 1 - end_bin) >= kCutRatio * widest;
+}
+
+// Whether the head lies at the beginning of an axis; nothing where the outline does not show it.
+std::optional<bool> HeadAtBeginning(const BodyView& view, const Eigen::Vector2d& along) {
+  const Eigen::Vector2d side(along.y(), -along.x());
+  const Profile one(view.reference.grid, view.body_mask, {along, side});
+  const Profile other(view.reference.grid, view.body_mask, {-along, side});
+  for (const auto shows : {ShowsHead, ShowsNeck}) {
+    const bool one_shows = shows(one), other_shows = shows(other);
+    if (one_shows != other_shows) return one_shows;
+    if (one_shows) return std::nullopt;
+  }
+  return std::nullopt;
 }
 
 // Neither the room nor the head end is known, so that only the shape of the body can decide.
@@ -198,13 +225,9 @@ Axes AxesByBody(const BodyView& view, const Outline& outline) {
     const Eigen::Vector2d left_supine(-along.y(), along.x());
     return Axes{along, supine ? left_supine : Eigen::Vector2d(-left_supine), true};
   };
-  const Axes one = axes_along(outline.principal), other = axes_along(-outline.principal);
-  const auto shows_head = [&](const Axes& axes) {
-    return ShowsHead(Profile(view.reference.grid, view.body_mask, axes));
-  };
-  const bool one_shows = shows_head(one), other_shows = shows_head(other);
-  if (one_shows == other_shows) return marker;
-  return one_shows ? one : other;
+  const std::optional<bool> at_beginning = HeadAtBeginning(view, outline.principal);
+  if (!at_beginning) return marker;
+  return axes_along(*at_beginning ? outline.principal : Eigen::Vector2d(-outline.principal));
 }
 
 // Fits a line to the middle of the outline along the body, so that limbs and slant do not move the
@@ -379,7 +402,8 @@ BodyParts DescribeBody(const BodyView& view) {
   const Outline outline = OutlineOf(grid, view.body_mask);
   const bool is_room_known = view.T_iec_reference.has_value();
   Axes axes = is_room_known ? AxesByRoom(view, outline) : AxesByBody(view, outline);
-  const bool contradicted = is_room_known && axes.by_posture && HeadAtOtherEnd(view, axes);
+  const bool contradicted =
+      is_room_known && axes.by_posture && HeadAtBeginning(view, axes.along) == false;
   if (contradicted) axes = AxesOfRoom(*view.T_iec_reference);
   const Profile profile(grid, view.body_mask, axes);
   BodyParts result{

@@ -33,6 +33,21 @@ bool IsTrunk(double down, double left) {
   return down >= 0.30 && down < 0.90 && std::abs(left) < 0.2;
 }
 
+// A mannequin without a head, cut off at the thighs.
+bool IsMannequin(double down, double left) {
+  const double across = std::abs(left);
+  if (down < 0.22 || down > 1.05) return false;
+  if (down < 0.28) return across < 0.06;
+  if (down < 0.30) return across < 0.13;
+  if (down < 0.55) return across < 0.22;
+  return across < (down < 0.8 ? 0.13 : 0.17);
+}
+// Legs from the toes (up) to a cut through the thighs.
+bool IsLegs(double down, double left) {
+  const double across = std::abs(left);
+  return down > 0.7 && down < 1.6 && across > 0.02 && across < (down > 1.1 ? 0.1 : 0.17);
+}
+
 struct Case {
   PatientPosture posture;
   // Where head and left point in the room, from what the postures mean: head first, the head is at
@@ -260,6 +275,19 @@ TEST(BodyPartsTest, NothingIsLeftOrRightWhereTheHeadIsAtTheOtherEnd) {
     EXPECT_FALSE(body.by_posture);
     EXPECT_FALSE(body.patient);
     EXPECT_THAT(NamesOf(body), Each(AllOf(Not(HasSubstr("left")), Not(HasSubstr("right")))));
+  }
+  for (std::size_t i = 0; i < kCases.size(); ++i) {
+    const Lying mannequin(kCases[i], 0.3, IsMannequin, HighLeftShoulder);
+    EXPECT_FALSE(mannequin.Describe(kCases[i].posture).head_at_other_end);
+    EXPECT_TRUE(mannequin.Describe(other[i]).head_at_other_end) << Name(other[i]);
+    const std::optional<PatientAxes> patient =
+        mannequin.DescribeWithoutRoom(kCases[i].posture).patient;
+    ASSERT_TRUE(patient);
+    EXPECT_LT((patient->head - Eigen::Rotation2Dd(-0.3) * kCases[i].head).norm(), 0.02);
+    // Legs have no end that could be a neck, whichever way they lie.
+    const Lying legs(kCases[i], 0.3, IsLegs, HighLeftShoulder);
+    EXPECT_FALSE(legs.Describe(kCases[i].posture).head_at_other_end);
+    EXPECT_FALSE(legs.Describe(other[i]).head_at_other_end);
   }
   const Lying trunk(kCases[0], 0.3, IsTrunk, HighLeftShoulder);
   const BodyParts body = trunk.Describe(PatientPosture::kFeetFirstSupine);
