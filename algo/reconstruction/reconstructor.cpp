@@ -101,6 +101,7 @@ void ApplyClass(DepthSensor sensor, JointRegistrationOptions& options) {
   const ImageErrorSigmas& image = ImageErrorSigmasOf(sensor);
   options.image_offset_sigma_m = image.offset_m;
   options.image_tilt_sigma = image.tilt;
+  options.depth_curve_sigma_m = image.curve_m;
 }
 
 // How far the solved calibration is from its prior.

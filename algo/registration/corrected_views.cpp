@@ -27,14 +27,14 @@ int Rounded(float value, int limit) {
 // Depth after correction by the calibration, as a camera at the stamp would have measured it in one
 // instant: each pixel takes its value from where the moving camera's row saw that point.
 cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction,
-                       const dense::ImageError& error, double readout_s,
+                       const dense::DepthErrors& errors, std::size_t image, double readout_s,
                        const Intrinsics& intrinsics, const RayTable& rays,
                        const Vector6d& velocity_per_s) {
   cv::Mat corrected = cv::Mat::zeros(depth_m.size(), CV_32FC1);
   const Eigen::Vector3f w = velocity_per_s.head<3>().cast<float>();
   const Eigen::Vector3f v = velocity_per_s.tail<3>().cast<float>();
   const bool by_columns = ReadByColumns(intrinsics);
-  const bool has_error = !error.isZero(0.0);
+  const bool has_errors = !errors.images.empty();
   const auto fx = static_cast<float>(intrinsics.fx);
   const auto fy = static_cast<float>(intrinsics.fy);
   for (int r = 0; r < depth_m.rows; ++r) {
@@ -55,10 +55,9 @@ cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction
       if (z <= 0) continue;
       double metric =
           correction.Correct(static_cast<std::size_t>(y * depth_m.cols + x), z) + moved.z();
-      if (has_error)
-        metric += dense::ImageErrorJacobian(
-                      z, CentredCoordinates(x, y, depth_m.cols, depth_m.rows).cast<float>())
-                      .dot(error);
+      if (has_errors)
+        metric += errors.Correction(
+            image, z, CentredCoordinates(x, y, depth_m.cols, depth_m.rows).cast<float>());
       if (metric > 0) out[c] = static_cast<float>(metric);
     }
   }
@@ -72,30 +71,25 @@ std::vector<ViewSurface> PrepareCorrectedViews(TrackingMap& map, const Intrinsic
                                                const Pose& T_scene_world,
                                                const ViewSurfaceOptions& options) {
   const CalibrationModel& calibration = joint.calibration;
-  const std::vector<dense::ImageError>& errors = joint.image_errors;
   const Intrinsics corrected = dense::MakeSensor(stated, calibration).depth;
   const RayTable rays(corrected);
   const auto working_rays = std::make_shared<const RayTable>(WorkingIntrinsics(corrected));
   const DepthCorrection correction(calibration, corrected.width, corrected.height, 1);
-  struct WithError {
-    MapKeyframe* keyframe;
-    dense::ImageError error;
-  };
-  std::vector<WithError> keyframes;
+  std::vector<std::size_t> with_images;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
     MapKeyframe& keyframe = map.keyframes[k];
     keyframe.dense = {};
     if (keyframe.is_bare) continue;
-    keyframes.push_back({&keyframe, errors.empty() ? dense::ImageError::Zero().eval() : errors[k]});
+    with_images.push_back(k);
   }
-  std::vector<ViewSurface> surfaces(keyframes.size());
+  std::vector<ViewSurface> surfaces(with_images.size());
   tbb::parallel_for(std::size_t{0}, surfaces.size(), [&](std::size_t k) {
     CheckStop(options.stop);
-    MapKeyframe& keyframe = *keyframes[k].keyframe;
+    MapKeyframe& keyframe = map.keyframes[with_images[k]];
     DepthView view;
     view.intrinsics = corrected;
     view.depth_m =
-        CorrectedDepth(keyframe.data.view.depth_m, correction, keyframes[k].error,
+        CorrectedDepth(keyframe.data.view.depth_m, correction, joint.depth_errors, with_images[k],
                        calibration.depth[kDepthReadout], corrected, rays, keyframe.velocity_per_s);
     view.color_rgb = std::exchange(keyframe.data.view.color_rgb, {});
     view.T_world_camera = T_scene_world * DepthPose(keyframe, calibration);

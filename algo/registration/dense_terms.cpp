@@ -82,11 +82,13 @@ struct TermMaker {
   int stride;
 
   // @param part  Filled where images have errors of their own.
+  // @param curve  Filled unless null.
   void SumPair(const View& a, const View& b, const KeyframePair& pair, Offset offset, double share,
-               QuadraticTerm& term, ImageErrorPart& part) const;
+               QuadraticTerm& term, ImageErrorPart& part, DepthCurvePart* curve = nullptr) const;
   // @return the number of cells on the face.
   int SumFace(const View& view, int keyframe, const MarkerObservation& observation,
-              const MapMarker& marker, QuadraticTerm& term, ImageErrorPart& part) const;
+              const MapMarker& marker, QuadraticTerm& term, ImageErrorPart& part,
+              DepthCurvePart* curve = nullptr) const;
 };
 
 // Derivative of the distance of a cell along m, in its own camera, with its image's error.
@@ -97,7 +99,8 @@ Eigen::Vector3d AlongImageError(const View& view, std::size_t cell, const Eigen:
 }
 
 void TermMaker::SumPair(const View& a, const View& b, const KeyframePair& pair, Offset offset,
-                        double share, QuadraticTerm& term, ImageErrorPart& part) const {
+                        double share, QuadraticTerm& term, ImageErrorPart& part,
+                        DepthCurvePart* curve) const {
   term = {};
   term.keyframe_a = pair.a;
   term.keyframe_b = pair.b;
@@ -112,6 +115,9 @@ void TermMaker::SumPair(const View& a, const View& b, const KeyframePair& pair, 
     J << AlongImageError(a, plane.cell_a, views.T_b_a.linear().transpose() * n_b),
         -AlongImageError(b, plane.cell_b, n_b);
     part.Add(row, J, weight);
+    if (curve != nullptr)
+      curve->Add(row, J, a.keyframe->dense.z_m[plane.cell_a], b.keyframe->dense.z_m[plane.cell_b],
+                 weight);
   });
   sum.Finish();
 }
@@ -123,7 +129,8 @@ constexpr double kFaceShare = 0.25;  // Neighbouring cells share their noise: fo
 
 // Zero where too few cells lie on the face.
 int TermMaker::SumFace(const View& view, int keyframe, const MarkerObservation& observation,
-                       const MapMarker& marker, QuadraticTerm& term, ImageErrorPart& part) const {
+                       const MapMarker& marker, QuadraticTerm& term, ImageErrorPart& part,
+                       DepthCurvePart* curve) const {
   term = {};
   term.keyframe_a = keyframe;
   term.marker = observation.id;
@@ -152,6 +159,8 @@ int TermMaker::SumFace(const View& view, int keyframe, const MarkerObservation& 
       ImageErrorPart::Errors J = ImageErrorPart::Errors::Zero();
       J.head<3>() = AlongImageError(view, i, T_marker_depth.linear().row(2).transpose());
       part.Add(row, J, weight);
+      const double z_m = view.keyframe->dense.z_m[i];
+      if (curve != nullptr) curve->Add(row, J, z_m, z_m, weight);
     }
   }
   sum.Finish();
@@ -237,6 +246,35 @@ std::vector<KeyframePair> OverlapsOf(std::size_t a, const Sensor& sensor,
   return overlaps;
 }
 
+// Normal equations of the errors of all images, three for each view, and of the curve behind them.
+struct ErrorEquations {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+
+  explicit ErrorEquations(Eigen::Index size)
+      : H(Eigen::MatrixXd::Zero(size, size)), g(Eigen::VectorXd::Zero(size)) {}
+  // A face has one view, so that a = b, and nothing in the second half.
+  void Add(const ImageErrorPart& part, Eigen::Index a, Eigen::Index b) {
+    H.block<3, 3>(a, a) += part.H.topLeftCorner<3, 3>();
+    g.segment<3>(a) += part.g.head<3>();
+    if (a == b) return;
+    H.block<3, 3>(b, b) += part.H.bottomRightCorner<3, 3>();
+    H.block<3, 3>(a, b) += part.H.topRightCorner<3, 3>();
+    H.block<3, 3>(b, a) += part.H.bottomLeftCorner<3, 3>();
+    g.segment<3>(b) += part.g.tail<3>();
+  }
+  void Add(const DepthCurvePart& part, Eigen::Index a, Eigen::Index b, Eigen::Index curve_at) {
+    constexpr int kSize = DepthCurve::kSize;
+    H.block<kSize, kSize>(curve_at, curve_at) += part.H;
+    g.segment<kSize>(curve_at) += part.g;
+    H.block<kSize, 3>(curve_at, a) += part.H_errors.leftCols<3>();
+    H.block<3, kSize>(a, curve_at) += part.H_errors.leftCols<3>().transpose();
+    if (a == b) return;
+    H.block<kSize, 3>(curve_at, b) += part.H_errors.rightCols<3>();
+    H.block<3, kSize>(b, curve_at) += part.H_errors.rightCols<3>().transpose();
+  }
+};
+
 }  // namespace
 
 std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,
@@ -263,7 +301,7 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
 void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
                const TrackingMap& map, const std::vector<View>& views,
                const std::vector<KeyframePair>& pairs, double gate_m, Density density,
-               const std::vector<ImageError>& errors, const std::stop_token& stop,
+               const DepthErrors& errors, const std::stop_token& stop,
                std::vector<QuadraticTerm>& terms) {
   const std::vector<Face> faces = FindFaces(map);
   const std::vector<int> uses = UsesInPairs(views.size(), pairs);
@@ -277,7 +315,7 @@ void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
     const Eigen::Vector3d information = ImageErrorInformation(options);
     ImageErrorPart::Errors of_term, at;
     of_term << information / shared[a], information / shared[b];
-    at << errors[a], errors[b];
+    at << errors.images[a], errors.images[b];
     part.RemoveFrom(term, of_term, at);
   };
   // Terms are large, so the space for links that may be appended is reserved now.
@@ -301,51 +339,50 @@ void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
   });
 }
 
-std::vector<ImageError> FindImageErrors(const Sensor& sensor,
-                                        const JointRegistrationOptions& options,
-                                        const TrackingMap& map, const std::vector<View>& views,
-                                        const std::vector<KeyframePair>& pairs, double gate_m,
-                                        const std::stop_token& stop) {
+DepthErrors FindDepthErrors(const Sensor& sensor, const JointRegistrationOptions& options,
+                            const TrackingMap& map, const std::vector<View>& views,
+                            const std::vector<KeyframePair>& pairs, double gate_m,
+                            const std::stop_token& stop) {
   if (!options.HasImageErrors()) return {};
   const std::vector<Face> faces = FindFaces(map);
   const std::vector<int> uses = UsesInPairs(views.size(), pairs);
   const TermMaker maker{sensor, options, gate_m, kLattice};
+  const bool has_curve = options.depth_curve_sigma_m > 0;
   std::vector<ImageErrorPart> parts(pairs.size() + faces.size());
+  std::vector<DepthCurvePart> curves(has_curve ? parts.size() : 0);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
     CheckStop(stop);
     QuadraticTerm unused;
+    DepthCurvePart* const curve = has_curve ? &curves[i] : nullptr;
     if (i >= pairs.size()) {
       const Face& face = faces[i - pairs.size()];
       maker.SumFace(views[face.view], static_cast<int>(face.view), *face.observation, *face.marker,
-                    unused, parts[i]);
+                    unused, parts[i], curve);
       return;
     }
     const auto a = static_cast<std::size_t>(pairs[i].a);
     const auto b = static_cast<std::size_t>(pairs[i].b);
     maker.SumPair(views[a], views[b], pairs[i], OffsetOfPair(i, kLattice),
-                  ShareOf(options, kLattice, uses[a], uses[b]), unused, parts[i]);
+                  ShareOf(options, kLattice, uses[a], uses[b]), unused, parts[i], curve);
   });
-  const auto size = static_cast<Eigen::Index>(3 * views.size());
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size);
-  Eigen::VectorXd g = Eigen::VectorXd::Zero(size);
-  H.diagonal() =
+  const auto curve_at = static_cast<Eigen::Index>(3 * views.size());
+  ErrorEquations equations(curve_at + (has_curve ? DepthCurve::kSize : 0));
+  equations.H.diagonal().head(curve_at) =
       ImageErrorInformation(options).replicate(static_cast<Eigen::Index>(views.size()), 1);
+  equations.H.diagonal().tail(equations.H.rows() - curve_at).array() =
+      1.0 / (options.depth_curve_sigma_m * options.depth_curve_sigma_m);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const bool is_face = i >= pairs.size();
     const auto a = static_cast<Eigen::Index>(
         3 * (is_face ? faces[i - pairs.size()].view : static_cast<std::size_t>(pairs[i].a)));
-    H.block<3, 3>(a, a) += parts[i].H.topLeftCorner<3, 3>();
-    g.segment<3>(a) += parts[i].g.head<3>();
-    if (is_face) continue;
-    const auto b = static_cast<Eigen::Index>(3 * pairs[i].b);
-    H.block<3, 3>(b, b) += parts[i].H.bottomRightCorner<3, 3>();
-    H.block<3, 3>(a, b) += parts[i].H.topRightCorner<3, 3>();
-    H.block<3, 3>(b, a) += parts[i].H.bottomLeftCorner<3, 3>();
-    g.segment<3>(b) += parts[i].g.tail<3>();
+    const Eigen::Index b = is_face ? a : static_cast<Eigen::Index>(3 * pairs[i].b);
+    equations.Add(parts[i], a, b);
+    if (has_curve) equations.Add(curves[i], a, b, curve_at);
   }
-  const Eigen::VectorXd solution = -H.ldlt().solve(g);
-  std::vector<ImageError> errors;
-  for (Eigen::Index k = 0; k < size; k += 3) errors.emplace_back(solution.segment<3>(k));
+  const Eigen::VectorXd solution = -equations.H.ldlt().solve(equations.g);
+  DepthErrors errors;
+  for (Eigen::Index k = 0; k < curve_at; k += 3) errors.images.emplace_back(solution.segment<3>(k));
+  if (has_curve) errors.curve.knots_m = solution.tail<DepthCurve::kSize>();
   return errors;
 }
 

@@ -29,24 +29,23 @@ enum class Density { kCoarse, kFine };
 /// Point-to-plane residuals of each pair, and of the depth on each marker's face, linearised.
 /// @param gate_m  Larger residuals are not correspondences.
 /// Where images have errors of their own, the terms are as uncertain as these leave them.
-/// @param errors  With which the views were made; empty: none.
+/// @param errors  With which the views were made.
 /// @param terms  Replaced; its memory is used again.
 /// @throws Interrupted on a stop request
 void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
                const TrackingMap& map, const std::vector<View>& views,
                const std::vector<KeyframePair>& pairs, double gate_m, Density density,
-               const std::vector<ImageError>& errors, const std::stop_token& stop,
+               const DepthErrors& errors, const std::stop_token& stop,
                std::vector<QuadraticTerm>& terms);
 
-/// The error of each view's depth image, from overlapping views and markers' faces where the poses
-/// are, and from the prior of the options. Empty if that says that there are none.
+/// The errors of the views' depth images, from overlapping views and markers' faces where the poses
+/// are, and from the prior of the options. None if that says that there are none.
 /// @param views  Made without errors.
-[[nodiscard]] std::vector<ImageError> FindImageErrors(const Sensor& sensor,
-                                                      const JointRegistrationOptions& options,
-                                                      const TrackingMap& map,
-                                                      const std::vector<View>& views,
-                                                      const std::vector<KeyframePair>& pairs,
-                                                      double gate_m, const std::stop_token& stop);
+[[nodiscard]] DepthErrors FindDepthErrors(const Sensor& sensor,
+                                          const JointRegistrationOptions& options,
+                                          const TrackingMap& map, const std::vector<View>& views,
+                                          const std::vector<KeyframePair>& pairs, double gate_m,
+                                          const std::stop_token& stop);
 
 /// Median absolute point-to-plane distance of the cells that MakeTerms() never uses, metres; 0
 /// without any.

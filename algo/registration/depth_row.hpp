@@ -2,6 +2,7 @@
 // Rows of residuals of depth, and their sum in a quadratic term.
 #pragma once
 
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -65,6 +66,31 @@ struct ImageErrorPart {
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(with_prior);
     term.H -= H_x.transpose() * solver.solve(H_x);
     term.g -= H_x.transpose() * solver.solve(g + information.cwiseProduct(at));
+  }
+};
+
+/// The same of the DepthCurve that all images share, beside H and g of the images' errors.
+struct DepthCurvePart {
+  static constexpr int kSize = DepthCurve::kSize;
+  Eigen::Matrix<double, kSize, kSize> H = Eigen::Matrix<double, kSize, kSize>::Zero();
+  Eigen::Matrix<double, kSize, 6> H_errors = Eigen::Matrix<double, kSize, 6>::Zero();
+  DepthCurve::Knots g = DepthCurve::Knots::Zero();
+
+  /// @param J  Derivative of the residual with respect to the images' errors, of which the offsets
+  ///           act as the curve does.
+  /// @param z_a_m, z_b_m  The two cells' measured depths.
+  void Add(const DepthRow& row, const ImageErrorPart::Errors& J, double z_a_m, double z_b_m,
+           double weight) {
+    const DepthCurve::Place a = DepthCurve::At(z_a_m), b = DepthCurve::At(z_b_m);
+    const std::array<int, 4> knots = {a.knot, a.knot + 1, b.knot, b.knot + 1};
+    const std::array<double, 4> along = {J[0] * (1.0 - a.share), J[0] * a.share,
+                                         J[3] * (1.0 - b.share), J[3] * b.share};
+    for (std::size_t i = 0; i < knots.size(); ++i) {
+      for (std::size_t k = 0; k < knots.size(); ++k)
+        H(knots[i], knots[k]) += weight * along[i] * along[k];
+      H_errors.row(knots[i]) += weight * along[i] * J.transpose();
+      g[knots[i]] += weight * row.residual_m * along[i];
+    }
   }
 };
 

@@ -93,8 +93,7 @@ Sensor MakeSensor(const Intrinsics& stated, const CalibrationModel& calibration)
 }
 
 std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibration,
-                            const Cells& cells, const TrackingMap& map,
-                            const std::vector<ImageError>& errors) {
+                            const Cells& cells, const TrackingMap& map, const DepthErrors& errors) {
   std::vector<View> views(map.keyframes.size());
   if (map.keyframes.empty()) return views;
   const DenseView& first = map.keyframes[0].dense;
@@ -134,8 +133,7 @@ std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibr
     for (std::size_t i = 0; i < view.points.size(); ++i) {
       const float z = keyframe.dense.z_m[i];
       if (z <= 0) continue;
-      double metric = correction.Correct(i, z);
-      if (!errors.empty()) metric += ImageErrorJacobian(z, cells.centred[i]).dot(errors[k]);
+      const double metric = correction.Correct(i, z) + errors.Correction(k, z, cells.centred[i]);
       const auto corrected = static_cast<float>(metric);
       const Eigen::Vector3f p(rays[i].x() * corrected, rays[i].y() * corrected, corrected);
       const auto width = static_cast<std::size_t>(view.width);

@@ -8,6 +8,7 @@
 
 #include "algo/bundle/quadratic_term.hpp"
 #include "algo/map/map.hpp"
+#include "algo/registration/depth_errors.hpp"
 #include "algo/sensor_model/calibration_prior.hpp"
 #include "algo/sensor_model/depth_field.hpp"
 
@@ -34,16 +35,6 @@ struct Sensor {
   double scale = 1;      ///< Pixels of this image per pixel of an image of 640 columns.
 };
 
-/// What one depth image errs by beside the calibration that all images share: an offset (metres)
-/// and a tilt (fraction of the depth per half image width), to the right and downwards.
-using ImageError = Eigen::Vector3d;
-
-/// Change of a cell's depth with each part of its ImageError.
-[[nodiscard]] inline Eigen::Vector3d ImageErrorJacobian(double z_m,
-                                                        const Eigen::Vector2f& centred) {
-  return {1.0, z_m * centred.x(), z_m * centred.y()};
-}
-
 /// A keyframe under the calibration of the current round.
 struct View {
   const MapKeyframe* keyframe = nullptr;
@@ -63,10 +54,9 @@ Cells MakeCells(const Intrinsics& stated, const TrackingMap& map);
 Sensor MakeSensor(const Intrinsics& stated, const CalibrationModel& calibration);
 
 /// @param cells, map  Must outlive the views.
-/// @param errors  One for each keyframe; empty: none.
 std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibration,
                             const Cells& cells, const TrackingMap& map,
-                            const std::vector<ImageError>& errors = {});
+                            const DepthErrors& errors = {});
 
 /// Derivative of a cell's point in its own depth camera with the focal lengths, in the first two
 /// columns of the lens, and the depth calibration.

@@ -159,17 +159,17 @@ class JointRegistration {
     for (const MapKeyframe& keyframe : map_.keyframes)
       result_.T_world_depth_sparse.push_back(DepthPose(keyframe, result_.calibration));
     RunDenseRounds();
-    result_.consistency_after_m = Consistency(result_.image_errors);
+    result_.consistency_after_m = Consistency(result_.depth_errors);
     result_.witnesses_after = Witnesses();
     other.Exchange(map_);
     std::swap(other_calibration, result_.calibration);
-    std::vector<dense::ImageError> errors_before;
+    dense::DepthErrors errors_before;
     result_.consistency_before_m = Consistency(errors_before);
     result_.witnesses_before = Witnesses();
     result_.accepted = result_.consistency_after_m <= result_.consistency_before_m &&
                        !ContradictsWitnesses(result_.witnesses_before, result_.witnesses_after);
     if (!result_.accepted) {
-      result_.image_errors = std::move(errors_before);
+      result_.depth_errors = std::move(errors_before);
       return false;
     }
     other.Exchange(map_);
@@ -189,7 +189,7 @@ class JointRegistration {
       CheckStop(stop_);
       const bool is_first = round == 0;
       if (is_first) pairs_ = dense::FindPairs(sensor, options_, views, stop_);
-      const std::vector<dense::ImageError> errors = CorrectImages(sensor, views);
+      const dense::DepthErrors errors = CorrectImages(sensor, views);
       dense::MakeTerms(sensor, options_, map_, views, pairs_, gate_m,
                        is_first ? dense::Density::kCoarse : dense::Density::kFine, errors, stop_,
                        dense_terms_);
@@ -204,11 +204,11 @@ class JointRegistration {
   }
 
   // Finds the errors that images have of their own where the views are, and corrects the views.
-  std::vector<dense::ImageError> CorrectImages(const dense::Sensor& sensor,
-                                               std::vector<dense::View>& views) const {
-    std::vector<dense::ImageError> errors =
-        dense::FindImageErrors(sensor, options_, map_, views, pairs_, options_.max_gate_m, stop_);
-    if (!errors.empty())
+  dense::DepthErrors CorrectImages(const dense::Sensor& sensor,
+                                   std::vector<dense::View>& views) const {
+    dense::DepthErrors errors =
+        dense::FindDepthErrors(sensor, options_, map_, views, pairs_, options_.max_gate_m, stop_);
+    if (!errors.images.empty())
       views = dense::MakeViews(sensor, result_.calibration, cells_, map_, errors);
     return errors;
   }
@@ -226,7 +226,7 @@ class JointRegistration {
 
   // Of the held-out cells, at the present state.
   // @param errors  Of the images at that state.
-  [[nodiscard]] double Consistency(std::vector<dense::ImageError>& errors) const {
+  [[nodiscard]] double Consistency(dense::DepthErrors& errors) const {
     CheckStop(stop_);
     const dense::Sensor sensor = dense::MakeSensor(stated_, result_.calibration);
     std::vector<dense::View> views = dense::MakeViews(sensor, result_.calibration, cells_, map_);

@@ -33,8 +33,8 @@ struct JointRegistrationResult {
   /// cameras' poses at their stamps, by keyframe.
   CalibrationModel sparse_calibration;
   std::vector<Pose> T_world_depth_sparse;
-  /// Of the keyframes' depth images, where their class has such; otherwise empty.
-  std::vector<dense::ImageError> image_errors;
+  /// Of the keyframes' depth images, where their class has such.
+  dense::DepthErrors depth_errors;
   /// MarkerSigmas() of the map as it was left, with or without the dense terms.
   std::map<int, double> marker_sigmas_m;
   SweepEvidence evidence;  ///< Evidence about the sensor's calibration.

@@ -32,6 +32,9 @@ struct JointRegistrationOptions {
   /// width); 0: the images of one sweep err alike.
   double image_offset_sigma_m = 0.0;
   double image_tilt_sigma = 0.0;
+  /// Prior of each knot of the DepthCurve that all images share, metres; 0: there is none. Needs
+  /// errors of single images.
+  double depth_curve_sigma_m = 0.0;
   /// Pixels at 640 columns. Larger than the noise of one observation, because the error of a track
   /// is common to its views.
   double keypoint_sigma_px = 0.4;

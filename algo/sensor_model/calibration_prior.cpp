@@ -95,6 +95,9 @@ void ApplyClass(const ClassSigmas& of_class, CalibrationVector& sigma) {
   set(kDepthScale, of_class.scale);
   set(kDepthOffset, of_class.offset_m);
   set(kDepthBow, of_class.bow_m);
+  set(kDepthShiftX, of_class.shift_px);
+  set(kDepthShiftY, of_class.shift_px);
+  set(kDepthDelay, of_class.delay_s);
   set(kDepthSlopeX, of_class.slope);
   set(kDepthSlopeY, of_class.slope);
   set(kDepthReadout, of_class.readout_s);

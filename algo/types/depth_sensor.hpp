@@ -32,6 +32,8 @@ struct ClassSigmas {
   double scale = 0.01;
   double offset_m = 0.003;
   double bow_m = 0.004;
+  double shift_px = 2.0;    ///< Of the depth image against colour, at 640 columns.
+  double delay_s = 0.004;   ///< By which depth was taken later than stamped, relative to colour.
   double slope = 0.003;     ///< Per half image width.
   double field = 1.0;       ///< Factor of the distortion field's.
   double growth = 1.0;      ///< Factor of its growth with distance.

@@ -6,11 +6,13 @@
 
 namespace plumb {
 
-/// Standard deviations of the error of one depth image beside the calibration that all images of a
-/// sweep share. 0: the class has none.
+/// Standard deviations of the error of depth images beside the calibration: of each image's own,
+/// and of what all images of a sweep share. 0: the class has none.
 struct ImageErrorSigmas {
   double offset_m = 0.0;
   double tilt = 0.0;  ///< Fraction of the depth per half image width.
+  /// Of the error that depends on the depth alone and is the same in all images.
+  double curve_m = 0.0;
 };
 
 /// Part of the table of classes, see ClassOf().

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algo/registration/dense_terms.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -133,23 +136,68 @@ TEST(DenseTerms, FindsWhatEachImageErrsBy) {
   scene.Prepare();
   const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
   const auto found =
-      FindImageErrors(scene.sensor, OfAPhone(), scene.truth.map, scene.views, pairs, kGate_m, {});
-  ASSERT_EQ(found.size(), wrong.size());
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    EXPECT_NEAR(found[k][0], wrong[k][0], 0.001) << k;
-    EXPECT_NEAR(found[k][1], wrong[k][1], 0.001) << k;
-    EXPECT_NEAR(found[k][2], wrong[k][2], 0.001) << k;
+      FindDepthErrors(scene.sensor, OfAPhone(), scene.truth.map, scene.views, pairs, kGate_m, {});
+  ASSERT_EQ(found.images.size(), wrong.size());
+  for (std::size_t k = 0; k < wrong.size(); ++k) {
+    EXPECT_NEAR(found.images[k][0], wrong[k][0], 0.001) << k;
+    EXPECT_NEAR(found.images[k][1], wrong[k][1], 0.001) << k;
+    EXPECT_NEAR(found.images[k][2], wrong[k][2], 0.001) << k;
   }
-  EXPECT_TRUE(FindImageErrors(scene.sensor, {.marker_length_m = synthetic::kMarkerLength},
+  EXPECT_TRUE(found.curve.knots_m.isZero(0.0)) << "this class has none";
+  EXPECT_TRUE(FindDepthErrors(scene.sensor, {.marker_length_m = synthetic::kMarkerLength},
                               scene.truth.map, scene.views, pairs, kGate_m, {})
-                  .empty());
+                  .images.empty());
+}
+
+// As a time-of-flight camera: an error that follows the depth, in waves of half a metre.
+TEST(DenseTerms, FindsTheCurveThatDepthFollows) {
+  Scene scene({.num_keyframes = 6, .num_landmarks = 40, .dense = true});
+  const auto wave_m = [](double z_m) { return 0.003 * std::sin(2 * std::numbers::pi * z_m / 0.5); };
+  double nearest_m = 10.0, farthest_m = 0.0;
+  for (MapKeyframe& keyframe : scene.truth.map.keyframes) {
+    for (float& z_m : keyframe.dense.z_m) {
+      if (z_m <= 0) continue;
+      z_m -= static_cast<float>(wave_m(z_m));
+      nearest_m = std::min<double>(nearest_m, z_m);
+      farthest_m = std::max<double>(farthest_m, z_m);
+    }
+  }
+  scene.Prepare();
+  ASSERT_GT(farthest_m - nearest_m, 0.1);
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  JointRegistrationOptions options = OfAPhone();
+  options.depth_curve_sigma_m = 0.003;
+  const DepthErrors found =
+      FindDepthErrors(scene.sensor, options, scene.truth.map, scene.views, pairs, kGate_m, {});
+  double left_m2 = 0.0, wave_m2 = 0.0;
+  for (std::size_t k = 0; k < scene.views.size(); ++k) {
+    const DenseView& view = scene.truth.map.keyframes[k].dense;
+    for (std::size_t i = 0; i < view.size(); ++i) {
+      const double z_m = view.z_m[i];
+      if (z_m <= 0) continue;
+      const double left = found.Correction(k, z_m, scene.cells.centred[i]) - wave_m(z_m);
+      left_m2 += left * left;
+      wave_m2 += wave_m(z_m) * wave_m(z_m);
+    }
+  }
+  EXPECT_LT(std::sqrt(left_m2 / wave_m2), 0.3);
+}
+
+TEST(DepthCurve, IsLinearBetweenItsKnotsAndConstantBeyond) {
+  DepthCurve curve;
+  for (int k = 0; k < DepthCurve::kSize; ++k) curve.knots_m[k] = 0.001 * k;
+  EXPECT_NEAR(curve.Correction(0.25), 0.0, 1e-12);
+  EXPECT_NEAR(curve.Correction(0.275), 0.0005, 1e-12);
+  EXPECT_NEAR(curve.Correction(1.0), 0.015, 1e-12);
+  EXPECT_NEAR(curve.Correction(0.1), 0.0, 1e-12);
+  EXPECT_NEAR(curve.Correction(9.0), 0.001 * (DepthCurve::kSize - 1), 1e-12);
 }
 
 TEST(DenseTerms, AreNoSurerOfADistanceThanTheImagesAre) {
   Scene scene({.num_keyframes = 6, .num_landmarks = 40, .dense = true});
   scene.Prepare();
   const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
-  const std::vector<ImageError> none(scene.views.size(), ImageError::Zero());
+  const DepthErrors none{{scene.views.size(), ImageError::Zero()}, {}};
   std::vector<QuadraticTerm> terms;
   MakeTerms(scene.sensor, OfAPhone(), scene.truth.map, scene.views, pairs, kGate_m, Density::kFine,
             none, {}, terms);
