@@ -352,6 +352,7 @@ class Comparer {
          .T_motion = motion.T,
          .centroid_m = *centroid,
          .sensor = sensor,
+         .classes = Classes(),
          .scale_doubt = std::max(reference_.scale_doubt, current_.scale_doubt),
          .breathing_m = std::hypot(evidence_.reference_breathing_m, evidence_.current_breathing_m),
          .planned = planned_});
@@ -359,6 +360,13 @@ class Comparer {
     result_.motion = motion;
     Lap("motion", since_s);
     return true;
+  }
+
+  [[nodiscard]] std::vector<DepthSensor> Classes() const {
+    std::vector<DepthSensor> classes;
+    for (const Scene* scene : {&reference_, &current_})
+      if (scene->depth_sensor) classes.push_back(*scene->depth_sensor);
+    return classes;
   }
 
   // What the sensors' calibrations leave uncertain of the motion. Two sweeps are joined by what

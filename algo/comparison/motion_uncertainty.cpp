@@ -5,6 +5,7 @@
 
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
+#include "algo/types/image_error_sigmas.hpp"
 
 namespace plumb {
 namespace {
@@ -169,6 +170,12 @@ MotionUncertainty Uncertainty(const UncertaintyInput& input) {
   parts.frame = FrameOf(alignment, input.T_motion, moved);
   // Both sweeps contribute.
   parts.sensor = input.sensor.value_or(2.0 * Isotropic(kSensorAngle_rad, kSensorShift_m));
+  for (const DepthSensor sensor : input.classes) {
+    const ImageErrorSigmas& left = ImageErrorSigmasOf(sensor);
+    Vector6d sigmas = Vector6d::Zero();
+    sigmas.head<3>() << left.body_tilt_rad, left.body_tilt_rad, left.body_turn_rad;
+    parts.sensor += Matrix6d(sigmas.cwiseAbs2().asDiagonal());
+  }
   parts.breathing =
       Isotropic(kBreathingAngle_per_m * input.breathing_m, kBreathingShift * input.breathing_m);
   if (input.planned) AddPlanned(input, moved, parts);

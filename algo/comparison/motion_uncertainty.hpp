@@ -10,6 +10,7 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/comparison/scene_alignment.hpp"
+#include "algo/types/depth_sensor.hpp"
 
 namespace plumb {
 
@@ -66,6 +67,8 @@ struct UncertaintyInput {
   Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();
   /// SharedSensor::covariance; absent where a scene has no sensitivity.
   std::optional<Matrix6d> sensor;
+  /// Classes of the sensors, where they are known: one for each scan.
+  std::vector<DepthSensor> classes = {};
   double scale_doubt = 0.0;  ///< The larger of the scenes' Scene::scale_doubt.
   double breathing_m = 0.0;  ///< Rise of chest and belly, root of the squares of both sweeps.
   std::optional<PlannedUncertainty> planned = {};  ///< Where rooms join the scans.

@@ -13,6 +13,10 @@ struct ImageErrorSigmas {
   double tilt = 0.0;  ///< Fraction of the depth per half image width.
   /// Of the error that depends on the depth alone and is the same in all images.
   double curve_m = 0.0;
+  /// What the model leaves of a body's angle in one scan: about the two level axes and about the
+  /// upright one, radians.
+  double body_tilt_rad = 0.0;
+  double body_turn_rad = 0.0;
 };
 
 /// Part of the table of classes, see ClassOf().

@@ -130,6 +130,21 @@ TEST(MotionUncertaintyTest, TheSensorsCovarianceTakesThePlaceOfTheUsualOne) {
                                               .centroid_m = kCentroid,
                                               .sensor = sensor});
   EXPECT_EQ(with.sensor, sensor);
+  const auto of_classes = [&](std::vector<DepthSensor> classes) {
+    return Uncertainty({.alignment = alignment,
+                        .surface = surface,
+                        .T_motion = Pose::Identity(),
+                        .centroid_m = kCentroid,
+                        .sensor = sensor,
+                        .classes = std::move(classes)})
+        .sensor;
+  };
+  // Two scans by a time-of-flight camera: 0.1 deg each about a level axis.
+  const Matrix6d flight = of_classes({DepthSensor::kTimeOfFlight, DepthSensor::kTimeOfFlight});
+  EXPECT_NEAR(std::sqrt((flight - sensor)(0, 0)) / kDegree, 0.141, 0.001);
+  EXPECT_LT((flight - sensor)(2, 2), (flight - sensor)(1, 1));
+  EXPECT_TRUE((flight - sensor).bottomRightCorner(3, 3).isZero(0.0));
+  EXPECT_EQ(of_classes({DepthSensor::kStructuredLight, DepthSensor::kStructuredLight}), sensor);
   // 0.4 mm for each of the two sweeps.
   EXPECT_NEAR(std::sqrt(Of(Pose::Identity()).sensor(3, 3)) / kMillimetre, 0.566, 0.001);
 }
