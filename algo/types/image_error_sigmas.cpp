@@ -14,16 +14,18 @@ namespace {
 // cyclic error by 0.15 instead of 0.12; with 3 mm heights scatter by 1.2 mm instead of 0.9.
 // Skin that seems deeper along each ray tilts a body by how it was looked at: 0.12 to 0.17 deg for
 // two scans beyond what the other causes state (units 81 and 84); without skin, hardly any.
+// With 3 mm for each image heights of unit 81 have a sigma of 1.2 mm and scatter by 0.9; with 2 mm,
+// 1.0 mm both.
 // A phone's plane of a flat door wobbled by 13 mm and 0.9 deg below its range. With 8 mm and 0.8 %
 // heights of unit 82 have a sigma of 2.2 mm and scatter by 0.9; with these, 1.4 mm. Angles of two
 // scans are off by 0.04 to 0.10 deg beyond what the other causes state (units 82 and 85).
 constexpr std::array<ImageErrorSigmas, 4> kImageErrors = {{
     {},
     {},
-    {.offset_m = 0.003,
-     .tilt = 0.004,
+    {.offset_m = 0.002,
+     .tilt = 0.003,
      .curve_m = 0.001,
-     .body_tilt_rad = 0.10 * kDegree,
+     .body_tilt_rad = 0.12 * kDegree,
      .body_turn_rad = 0.02 * kDegree},
     {.offset_m = 0.004,
      .tilt = 0.005,

@@ -122,6 +122,7 @@ class Appliance : private StorageUser {
   void LogSensor(const SensorEvent& event);
   void OnUpdate(const ScanUpdate& update);
   void OnEnded(const EndedScan& outcome);
+  void Count(const EndedScan& outcome);
   void OnTick();
   [[nodiscard]] std::uint64_t NeededBytes() const;
   [[nodiscard]] Answer WhyFull() const;
@@ -154,6 +155,7 @@ class Appliance : private StorageUser {
   Message sensor_fault_, scan_fault_, rolled_back_;
   CurrentScan scan_;
   std::optional<CurrentScan> last_result_;
+  ScanCounts counts_;  ///< Since the start.
   std::string last_serial_;  ///< Serial of the last used sensor.
   PageNotes page_;
   IndicatorPattern shown_ = IndicatorPattern::kOff;

@@ -220,8 +220,24 @@ void Appliance::NoteDropped(const ScanUpdate& update) {
   scan_.dropped_fraction += weight * (lost / (lost + seen) - scan_.dropped_fraction);
 }
 
+void Appliance::Count(const EndedScan& outcome) {
+  using Kind = EndedScan::Kind;
+  counts_.frames += outcome.frames;
+  counts_.frames_dropped += outcome.frames_dropped;
+  if (outcome.kind == Kind::kCancelled || outcome.kind == Kind::kFailed) {
+    ++(outcome.kind == Kind::kFailed ? counts_.failed : counts_.cancelled);
+    return;
+  }
+  counts_.answer_s = outcome.after_last_frame_s;
+  if (outcome.verdict && scan_.purpose != ScanPurpose::kDailyCheck)
+    ++counts_.verdicts[static_cast<std::size_t>(*outcome.verdict)];
+  else
+    ++counts_.without_comparison;
+}
+
 void Appliance::OnEnded(const EndedScan& outcome) {
   using Kind = EndedScan::Kind;
+  Count(outcome);
   limit_timer_.Disarm();
   sensors_.EndScan();
   // Its thread has nothing left to do, but may still wait for a processor to end.

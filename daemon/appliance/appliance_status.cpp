@@ -221,6 +221,8 @@ Status Appliance::WebStatus() {
   }
   status.storage.writable = storage_.fault().empty() && !storage_.IsReadOnly();
   status.storage.warnings = StorageWarnings();
+  status.storage.backup_made_at = upkeep_.backup_made_at();
+  status.counts = counts_;
   status.light = Name(shown_);
   status.press_monitors = PressMonitors();
   status.patient_id = session_.check() ? std::string() : session_.patient_id();

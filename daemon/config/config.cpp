@@ -306,6 +306,7 @@ void ReadWeb(Section section, WebConfig& web) {
   section.TakePath("tls_key", web.tls_key);
   section.TakeFlag("plain_http", web.plain_http);
   section.TakeNames("host_names", web.host_names, say::config::ExpectedHostNames(), 16);
+  section.TakePath("metrics_token_file", web.metrics_token_file);
   section.RejectUnknownKeys();
 }
 
@@ -455,6 +456,7 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("web.tls_key", in_use.web.tls_key, next.web.tls_key);
   keep("web.plain_http", in_use.web.plain_http, next.web.plain_http);
   keep("web.host_names", in_use.web.host_names, next.web.host_names);
+  keep("web.metrics_token_file", in_use.web.metrics_token_file, next.web.metrics_token_file);
   keep("update.folder", in_use.update.folder, next.update.folder);
   keep("update.max_bundle_mb", in_use.update.max_bundle_mb, next.update.max_bundle_mb);
   return kept;

@@ -67,6 +67,8 @@ struct WebConfig {
   bool plain_http = false;
   /// Names by which browsers reach it, in addition to addresses.
   std::vector<std::string> host_names;
+  /// File with the token by which a monitoring system reads /metrics; empty: nobody may.
+  std::filesystem::path metrics_token_file;
 };
 
 /// System updates, if the machine has an installer.
@@ -140,7 +142,7 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low
 ///     [monitor]      gate_chip, gate_line, gate_active_low
-///     [web]          listen, tls_certificate, tls_key, plain_http, host_names
+///     [web]          listen, tls_certificate, tls_key, plain_http, host_names, metrics_token_file
 ///     [update]       folder, max_bundle_mb
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed

@@ -198,6 +198,7 @@ class Plumbd {
     web::HttpServerOptions options;
     options.listen_fd = page.fd;
     options.host_names = config.web.host_names;
+    options.metrics_token = MetricsToken(config.web);
     page_ = IdentifyPage(config, options);
     if (!page.warning.empty()) page_.warnings.push_back(page.warning);
     if (options.tls) certificate_pem_ = options.tls->certificate_pem;

@@ -384,20 +384,23 @@ std::filesystem::path StorageUpkeep::BackupTarget() const {
 
 namespace {
 
-/// True if the folder has no backup younger than that.
-bool IsBackupDue(const std::filesystem::path& folder, const AgeRecipients& recipients,
-                 std::chrono::duration<double> every) {
-  using FileClock = std::filesystem::file_time_type::clock;
+/// When the newest backup in the folder was made.
+std::optional<std::chrono::system_clock::time_point> NewestBackup(
+    const std::filesystem::path& folder, const AgeRecipients& recipients) {
+  using std::chrono::system_clock;
+  std::optional<system_clock::time_point> newest;
   for (int day = 1; day <= 7; ++day) {
     std::error_code error;
     const std::filesystem::path plain = folder / fmt::format("plumb-{}", day);
     const auto made = std::filesystem::last_write_time(
         recipients.empty() ? plain / "backup.json" : EncryptedName(plain, recipients), error);
-    const std::chrono::duration<double> age = FileClock::now() - made;
-    if (!error && age.count() >= 0 && age < every)
-      return false;  // a time in the future does not count
+    if (error) continue;
+    const auto at =
+        std::chrono::time_point_cast<system_clock::duration>(std::chrono::file_clock::to_sys(made));
+    // A time in the future does not count.
+    if (at <= system_clock::now() && (!newest || at > *newest)) newest = at;
   }
-  return true;
+  return newest;
 }
 
 }  // namespace
@@ -410,8 +413,11 @@ void StorageUpkeep::BackUpIfDue() {
   const std::chrono::duration<double> every =
       std::chrono::duration<double, std::ratio<3600>>(config_.appliance.backup_hours);
   (void)reads_.Post([this, folder, every, recipients = config_.appliance.backup_recipients] {
-    if (!IsBackupDue(folder, recipients, every)) return;
-    loop_.Post("backup due", [this] {
+    const auto newest = NewestBackup(folder, recipients);
+    const bool is_due = !newest || std::chrono::system_clock::now() - *newest >= every;
+    loop_.Post("backup due", [this, newest, is_due] {
+      backup_made_at_ = newest;
+      if (!is_due) return;
       constexpr int kAgainTicks = 3600;  // a failed backup is not repeated at once
       ticks_to_backup_ = kAgainTicks;
       BackUp(kSelf, BackupTarget(), [this](const Message& error, const BackupReport&) {

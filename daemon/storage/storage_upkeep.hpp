@@ -58,6 +58,10 @@ class StorageUpkeep {
 
   /// What the page warns of. @param is_demo  The demo stores nothing of value.
   [[nodiscard]] std::vector<Message> Warnings(bool is_demo) const;
+  /// When the newest backup in the configured folder was made, as of the last look.
+  [[nodiscard]] const std::optional<std::chrono::system_clock::time_point>& backup_made_at() const {
+    return backup_made_at_;
+  }
 
  private:
   static constexpr int kDiskCheckTicks = 10;  ///< While no scan runs, like the next two.
@@ -103,6 +107,7 @@ class StorageUpkeep {
   bool is_database_checked_ = false;  ///< Once it is open, the check thread's.
   std::int64_t lost_entries_ = 0;     ///< Of the audit log: the state folder was rolled back.
   Message backup_fault_;
+  std::optional<std::chrono::system_clock::time_point> backup_made_at_;
   bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.
   int ticks_to_disk_check_ = kDiskCheckTicks;
   int ticks_to_removal_ = kMaintenanceTicks;

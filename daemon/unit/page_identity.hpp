@@ -38,6 +38,11 @@ void KeepSecret(const std::filesystem::path& file, const std::string& contents);
 ///         cannot be used.
 void CheckPageIdentity(const WebConfig& web);
 
+/// The token of [web] metrics_token_file; empty if none is named.
+/// @throws DataError if the file is missing, or the token too short to be a secret or of other than
+///         letters, digits, '-' and '_'; IoError if the file cannot be read.
+[[nodiscard]] std::string MetricsToken(const WebConfig& web);
+
 /// Stores the identity of the page for the next start, with the owner of the folder.
 /// @throws IoError
 void KeepPageIdentity(const std::filesystem::path& state, const web::TlsIdentity& identity);

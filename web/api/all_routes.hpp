@@ -13,6 +13,8 @@ namespace plumb::web {
 void AddPatientApi(Routes& routes, const Services& services);
 /// Adds scans, their files, results and daily checks.
 void AddScanApi(Routes& routes, const Services& services);
+/// Adds GET /metrics for who knows the token. @param token  Empty: the route does not exist.
+void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::string& token);
 /// Adds status and button, settings, audit log, updates and maintenance.
 void AddUnitApi(Routes& routes, const Services& services);
 

@@ -71,6 +71,7 @@ class HttpServer::Impl {
     AddPatientApi(routes, services);
     AddScanApi(routes, services);
     AddUnitApi(routes, services);
+    AddMetricsRoute(routes, services.appliance, options_.metrics_token);
     AddResultPage(routes, services);
     AddExportRoutes(routes, services);
     AddRoomCalibrationRoutes(routes, services);

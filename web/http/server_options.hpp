@@ -36,6 +36,9 @@ struct HttpServerOptions {
   std::string device_key;
   /// Accepted in the Host header in addition to localhost and numeric addresses.
   std::vector<std::string> host_names;
+  /// What a monitoring system sends as its bearer token to read /metrics; empty: there is no such
+  /// page.
+  std::string metrics_token;
   /// Limits of open connections: strangers may use the first number. Beyond it, or beyond the
   /// second from one address, the oldest connection of the address with the most is closed. The
   /// rest is for logged-in browsers and for this machine itself.

@@ -10,12 +10,16 @@
 
 #include "algo/acceptance/verdict.hpp"
 #include "algo/base/message.hpp"
+#include "algo/base/names.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
 
 /// State of the daily check for one day and sensor, by the newest check that passed or failed.
 enum class DailyCheck : std::uint8_t { kPassed, kOverdue, kFailed };
+template <>
+inline constexpr auto kNamesOf<DailyCheck> = NamesUpTo<DailyCheck::kFailed>({"passed", "overdue",
+                                                                             "failed"});
 
 /// One quantity of a daily check.
 struct CheckItem {

@@ -77,11 +77,22 @@ struct LiveScan {
   double step_fraction = 0.0;  ///< 0..1
 };
 
+/// What was done since the start, for systems that watch the unit.
+struct ScanCounts {
+  std::int64_t failed = 0, cancelled = 0;
+  std::array<std::int64_t, kNamesOf<Verdict>.size()> verdicts = {};  ///< By Verdict.
+  std::int64_t without_comparison = 0;  ///< References, daily checks.
+  std::int64_t frames = 0, frames_dropped = 0;
+  std::optional<double> answer_s = {};  ///< Of the newest scan, from its last frame.
+};
+
 struct StorageStatus {
   std::int64_t free_bytes = 0;
   std::int64_t total_bytes = 0;
   bool writable = true;
   std::vector<Message> warnings = {};  ///< Nearly full, no backup.
+  /// Not set: there is no backup of the last days in the configured folder.
+  std::optional<WallClock::time_point> backup_made_at = {};
 };
 
 /// Directions of the room on maps (x, y of a reference marker's frame): to the gantry, and to the
@@ -118,6 +129,7 @@ struct Status {
   std::string version;
   std::vector<Message> warnings;  ///< About the set-up of the appliance.
   Message rolled_back;            ///< The same as in UpdateStatus.
+  ScanCounts counts;
 };
 
 struct UpdateStatus {

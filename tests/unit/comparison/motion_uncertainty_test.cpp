@@ -139,9 +139,9 @@ TEST(MotionUncertaintyTest, TheSensorsCovarianceTakesThePlaceOfTheUsualOne) {
                         .classes = std::move(classes)})
         .sensor;
   };
-  // Two scans by a time-of-flight camera: 0.1 deg each about a level axis.
+  // Two scans by a time-of-flight camera: 0.12 deg each about a level axis.
   const Matrix6d flight = of_classes({DepthSensor::kTimeOfFlight, DepthSensor::kTimeOfFlight});
-  EXPECT_NEAR(std::sqrt((flight - sensor)(0, 0)) / kDegree, 0.141, 0.001);
+  EXPECT_NEAR(std::sqrt((flight - sensor)(0, 0)) / kDegree, 0.170, 0.001);
   EXPECT_LT((flight - sensor)(2, 2), (flight - sensor)(1, 1));
   EXPECT_TRUE((flight - sensor).bottomRightCorner(3, 3).isZero(0.0));
   EXPECT_EQ(of_classes({DepthSensor::kStructuredLight, DepthSensor::kStructuredLight}), sensor);

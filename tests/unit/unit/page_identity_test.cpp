@@ -132,6 +132,25 @@ TEST_F(PageIdentityTest, WhereNothingCanBeWrittenItIsForThisRunOnly) {
               ElementsAre(HasSubstr("for this run only"), HasSubstr("not known again")));
 }
 
+TEST_F(PageIdentityTest, TheTokenOfMetricsIsASecretOrRefused) {
+  EXPECT_TRUE(MetricsToken(config_.web).empty());
+  config_.web.metrics_token_file = folder_ / "token";
+  const auto token_of = [&](const std::string& text) {
+    std::ofstream(folder_ / "token") << text;
+    return MetricsToken(config_.web);
+  };
+  const std::string shortest(32, 'a');
+  EXPECT_EQ(token_of(shortest + "\n"), shortest);
+  EXPECT_EQ(token_of(std::string(256, '_')).size(), 256U);
+  for (const std::string& bad : {shortest.substr(1), std::string(257, 'a'), shortest + " x",
+                                 shortest + "\n" + shortest, std::string("\n")}) {
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)token_of(bad); }), HasSubstr("32 to 256"));
+    EXPECT_THROW(CheckPageIdentity(config_.web), DataError);
+  }
+  fs::remove(folder_ / "token");
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)MetricsToken(config_.web); }), HasSubstr("token"));
+}
+
 TEST_F(PageIdentityTest, TheConfigurationsCertificateIsUsedOrRefusedByName) {
   const web::TlsIdentity given = web::MakeTlsIdentity({}), other = web::MakeTlsIdentity({});
   std::ofstream(folder_ / "cert.pem") << given.certificate_pem;
