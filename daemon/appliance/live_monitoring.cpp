@@ -9,6 +9,7 @@
 
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/loop/log.hpp"
 #include "words/audit.hpp"
 
 namespace plumb {
@@ -42,24 +43,12 @@ LiveMonitoring::~LiveMonitoring() {
   if (session_) session_->End();
 }
 
-std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::string& scan_id,
-                                                const std::string& patient_id) {
-  scan_id_ = scan_id;
-  patient_id_ = patient_id;
-  limits_ = job.compare.limits;
-  judges_reference_ = !job.reference_scene.empty();
-  warnings_.clear();
-  ended_ = {};
-  last_.reset();
-  latencies_s_.clear();
-  was_stale_ = false;
-  began_s_ = SteadySeconds();
-  const std::uint64_t epoch = ++epoch_;
+MonitorCallbacks LiveMonitoring::CallbacksOf(std::uint64_t epoch) {
   MonitorCallbacks callbacks;
   callbacks.begun = [this, epoch](const std::vector<Message>& warnings, bool judges) {
     loop_.Post("monitoring begun", [this, epoch, warnings, judges] {
       if (epoch != epoch_) return;
-      warnings_ = warnings;
+      warnings_.insert(warnings_.end(), warnings.begin(), warnings.end());
       judges_reference_ = judges;
     });
   };
@@ -73,7 +62,39 @@ std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::strin
       if (epoch == epoch_ && session_) hooks_.failed(why);
     });
   };
-  session_ = std::make_shared<MonitorSession>(std::move(job), std::move(callbacks));
+  callbacks.not_recorded = [this, epoch](const Message& why) {
+    loop_.Post("monitoring not recorded", [this, epoch, why] {
+      Log(LogLevel::kError, why.English());
+      if (epoch != epoch_) return;
+      is_recorded_ = false;
+      warnings_.push_back(why);
+    });
+  };
+  // Also of a session that has ended.
+  callbacks.recorded = [this, scan = scan_id_](const std::string& file) {
+    loop_.Post("monitoring recorded", [this, scan, file] {
+      if (hooks_.recorded) hooks_.recorded(scan, file);
+    });
+  };
+  return callbacks;
+}
+
+std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::string& scan_id,
+                                                const std::string& patient_id,
+                                                const Message& why_no_record) {
+  scan_id_ = scan_id;
+  patient_id_ = patient_id;
+  limits_ = job.compare.limits;
+  judges_reference_ = !job.reference_scene.empty();
+  warnings_.clear();
+  ended_ = {};
+  last_.reset();
+  latencies_s_.clear();
+  was_stale_ = false;
+  began_s_ = SteadySeconds();
+  is_recorded_ = job.record.has_value();
+  if (!why_no_record.empty()) warnings_.push_back(why_no_record);
+  session_ = std::make_shared<MonitorSession>(std::move(job), CallbacksOf(++epoch_));
   std::shared_ptr<MonitorSession> before = session_;
   {
     const std::lock_guard lock(record_mutex_);
@@ -121,6 +142,7 @@ MonitorStatus LiveMonitoring::status() const {
   status.rotation_tolerance_deg = limits_.rotation_tolerance_rad / kDegree;
   status.elapsed_s = SteadySeconds() - began_s_;
   status.warnings = warnings_;
+  status.is_recorded = is_recorded_;
   if (!last_) return status;
   const MonitorLine& line = last_->line;
   const double age_s = SteadySeconds() - last_->arrived_s;

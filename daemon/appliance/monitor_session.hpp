@@ -17,6 +17,7 @@
 #include "algo/base/message.hpp"
 #include "algo/comparison/comparison.hpp"
 #include "algo/monitoring/monitor.hpp"
+#include "daemon/appliance/monitor_recorder.hpp"
 #include "daemon/appliance/scan_session.hpp"
 #include "daemon/files/monitoring_folder.hpp"
 #include "daemon/pipeline/live_feed.hpp"
@@ -31,6 +32,7 @@ struct MonitorJob {
   std::filesystem::path reference_scene;  ///< Empty: there is none to judge against.
   /// As ScanJob has it.
   std::function<Message(const std::stop_token&)> check_reference;
+  std::optional<MonitorRecordPlace> record = {};  ///< Nothing: it is kept in memory only.
   std::size_t queue_capacity = 4;    ///< Frames that may wait: an old number is of no use.
   std::size_t most_lines = 108'000;  ///< Of the record: an hour at 30 Hz; the oldest leave.
 };
@@ -51,6 +53,10 @@ struct MonitorCallbacks {
   /// Ten times a second, and at once where state or advice change.
   std::function<void(const MonitorUpdate&)> update;
   std::function<void(const Message& why)> failed;
+  /// The record on the disk ends although the session goes on.
+  std::function<void(const Message& why)> not_recorded;
+  /// It is complete. @param file  In the scan's folder.
+  std::function<void(const std::string& file)> recorded;
 };
 
 /// All functions but the constructor are thread-safe.
@@ -64,6 +70,8 @@ class MonitorSession {
   [[nodiscard]] const std::shared_ptr<LiveFeed>& feed() const { return feed_; }
   /// Ends the thread soon; the destructor waits for that.
   void End();
+  /// For the record on the disk.
+  void AddEvent(const nlohmann::json& event);
   /// What was said so far, as monitor.csv has it.
   [[nodiscard]] std::string Csv() const;
   /// Shares of in, out and unknown, 0 to 1, since the first numbers; nothing without any.
@@ -71,16 +79,20 @@ class MonitorSession {
 
  private:
   void Run(const std::stop_token& stop);
+  void BeginRecord(const MonitorOptions& options);
+  void EndRecord(const Message& why);
   void Watch(const std::stop_token& stop);
   void Note(const MonitorLine& line);
+  void NoteZero(const Monitor& monitor, const MonitorOptions& options);
 
   const MonitorJob job_;
   const MonitorCallbacks callbacks_;
   const std::shared_ptr<LiveFeed> feed_;
   mutable std::mutex mutex_;
-  MonitoringRecord record_;               ///< Guarded.
-  std::array<std::int64_t, 3> advice_{};  ///< Guarded: frames of each since the first numbers.
-  std::jthread thread_;                   ///< Last: starts when the members above are initialised.
+  MonitoringRecord record_;                    ///< Guarded.
+  std::array<std::int64_t, 3> advice_{};       ///< Guarded: frames of each since the first numbers.
+  std::unique_ptr<MonitorRecorder> recorder_;  ///< Guarded: the pointer.
+  std::jthread thread_;  ///< Last: starts when the members above are initialised.
 };
 
 }  // namespace plumb

@@ -75,6 +75,13 @@ void FakeAppliance::StartMonitor(const Actor& actor, Done done) {
   Did(actor, "monitor.start", monitor.scan_id, done);
 }
 
+nlohmann::json FakeAppliance::MonitorRecords(const std::string& scan_id) {
+  nlohmann::json records = nlohmann::json::array();
+  if (!monitored_scan.empty() && scan_id == monitored_scan)
+    records.push_back({{"number", 1}, {"head", monitor_report["head"]}});
+  return records;
+}
+
 void FakeAppliance::StopMonitor(const Actor& actor, Done done) {
   if (!monitor.active)
     return Finish(done, Refused(ChangeResult::kConflict, "nothing is being monitored"));

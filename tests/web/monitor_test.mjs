@@ -106,4 +106,17 @@ await h.step('it ends by the button, and its numbers can be had', async () => {
   check(await room.locator('.live-view').count() === 0, 'the room shows it no more');
 });
 
+await h.step('a record beside its scan is read, and says that a power cut ended it', async () => {
+  h.tell('recorded 000007');
+  await tech.goto(`${h.url}#/monitoring/000007-1`);
+  await tech.getByText('The record is cut off').waitFor();
+  await tech.getByText('4.5 mm every 3.8 s').waitFor();
+  await tech.locator('dd', { hasText: 'IN: 4.3 min (90 %)' }).waitFor();
+  await tech.locator('li', { hasText: 'Too little of the body is seen.' }).waitFor();
+  await h.look(tech, 'monitor-record-phone');
+  const taken = await tech.evaluate(() => fetch('/api/v1/scans/000007/monitoring/1.csv?download')
+    .then((answer) => answer.headers.get('Content-Disposition')));
+  check(taken.includes('plumb_monitoring_000007_1.csv'), taken);
+});
+
 await h.finish();

@@ -58,6 +58,7 @@ class HttpServer::Impl {
  public:
   Impl(const Services& services, HttpServerOptions options)
       : appliance_(services.appliance),
+        monitoring_(services.monitoring),
         options_(Completed(std::move(options))),
         accounts_(services, options_, CertificateReplacer()),
         hub_({.all = options_.max_event_streams,
@@ -71,6 +72,7 @@ class HttpServer::Impl {
     AddPatientApi(routes, services);
     AddScanApi(routes, services);
     AddUnitApi(routes, services);
+    AddMonitorApi(routes, services);
     AddResultPage(routes, services);
     AddExportRoutes(routes, services);
     AddRoomCalibrationRoutes(routes, services);
@@ -205,7 +207,7 @@ class HttpServer::Impl {
   /// to reload.
   void OnEvent(EventKind kind) {
     if (kind == EventKind::kMonitor) {
-      if (hub_.size() > 0) hub_.Broadcast(Name(kind), Dump(MonitorJson(appliance_.GetMonitor())));
+      if (hub_.size() > 0) hub_.Broadcast(Name(kind), Dump(MonitorJson(monitoring_.GetMonitor())));
       return;
     }
     if (kind != EventKind::kStatus && kind != EventKind::kProgress)
@@ -216,6 +218,7 @@ class HttpServer::Impl {
   }
 
   ApplianceService& appliance_;
+  MonitoringService& monitoring_;
   HttpServerOptions options_;
   Router router_;
   Accounts accounts_;

@@ -44,6 +44,7 @@ struct MonitorStatus {
   std::vector<Message> warnings = {};
   Message ended = {};  ///< Not active: why it could not go on; empty if it was ended.
   bool has_record = false;
+  bool is_recorded = false;  ///< On the disk, beside the scan.
 };
 
 /// Null without numbers; names as in monitor.csv.
@@ -82,6 +83,7 @@ inline nlohmann::json MonitorJson(const MonitorStatus& status) {
           {"elapsed_s", status.elapsed_s},
           {"latency_p95_ms", or_null(status.latency_ms)},
           {"has_record", status.has_record},
+          {"is_recorded", status.is_recorded},
           {"warnings", EnglishTexts(status.warnings)},
           {"warning_messages", MessagesJson(status.warnings)},
           {"ended", status.ended.English()},

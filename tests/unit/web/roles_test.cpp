@@ -69,6 +69,8 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/scans/{id}/accept", "TP"},
     {"POST /api/v1/scans/{id}/accept-outside", "TP"},
     {"GET /api/v1/scans/{id}/report.pdf", "TPE"},
+    {"GET /api/v1/scans/{id}/monitoring", "TPE"},
+    {"GET /api/v1/scans/{id}/monitoring/{name}", "TPE"},
     {"GET /api/v1/scans/{id}/maps/{name}", "TPED"},
     {"GET /api/v1/scans/{id}/quality", "TPED"},
     {"GET /api/v1/scans/{id}/files/{name}", "TPED"},

@@ -3,11 +3,11 @@
 // is grey after 200 ms and gone after a second, also where the appliance says nothing more.
 import { currentSession, get, live, may, post, since_s } from '../api.js';
 import {
-  action, clear, done, enable, h, hint, saveFrom, say, svg,
+  action, clear, done, enable, h, hint, redraw, saveFrom, say, svg,
 } from '../dom.js';
 import { kAxes, mostDigits, signed, toleranceBar, withUnit } from '../numbers.js';
-import { S, said } from '../words.js';
-import { follow } from './common.js';
+import { S, said, saidEach } from '../words.js';
+import { follow, sentence } from './common.js';
 
 const kGrey_s = 0.2;
 const kUnknown_s = 0.15;
@@ -180,12 +180,19 @@ export async function showMonitor(place) {
     await post('monitor/stop');
     done(S.monitor.off);
   }, { class: 'danger giant' });
+  // What it goes on without, such as its record on the disk.
+  const warnings = h('ul', { class: 'caution', hidden: true });
+  const drawWarnings = () => {
+    const words = live.monitor?.active ? saidEach(live.monitor, 'warnings') : [];
+    warnings.hidden = !words.length;
+    redraw(warnings, words.map((one) => h('li', {}, sentence(one))));
+  };
   const record = h('button', {
     class: 'quiet', type: 'button',
     onclick: () => saveFrom('/api/v1/monitor/record.csv', 'plumb_monitoring.csv'),
   }, text.record);
   clear(place, h('h1', {}, text.title),
-    h('section', { class: 'card' }, view.element, hint(text.motion)),
+    h('section', { class: 'card' }, view.element, warnings, hint(text.motion)),
     may('scan') && h('div', { class: 'controls' }, start, stop), hint(text.hint), record);
   const draw = () => {
     const { status } = live;
@@ -196,6 +203,7 @@ export async function showMonitor(place) {
     enable(start, live.connected && (status.state === 'ready' || status.state === 'result'));
     enable(stop, live.connected);
     record.hidden = !live.monitor?.has_record;
+    drawWarnings();
   };
   await askMonitor();
   draw();

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page's service for live monitoring.
+#include "daemon/services/web_services.hpp"
+
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/base/message_json.hpp"
+#include "daemon/files/monitoring_file.hpp"
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+
+namespace {
+
+using nlohmann::json;
+
+void PutFault(auto& entry, const std::exception& error) {
+  const Message why = MessageOf(error);
+  entry["fault"] = why.English();
+  entry["fault_message"] = MessageJson(why);
+}
+
+class WebMonitoring final : public web::MonitoringService {
+ public:
+  WebMonitoring(LiveMonitoring& monitoring, StoreAccess& store)
+      : monitoring_(monitoring), store_(store) {}
+
+  MonitorStatus GetMonitor() override { return monitoring_.status(); }
+
+  void StartMonitor(const Actor& actor, Done done) override {
+    done(AnswerOf(monitoring_.Start(actor)));
+  }
+
+  void StopMonitor(const Actor& actor, Done done) override {
+    done(AnswerOf(monitoring_.Stop(actor)));
+  }
+
+  json MonitorRecords(const std::string& scan_id) override {
+    json records = json::array();
+    const std::filesystem::path folder = FolderOf(scan_id);
+    for (const int number : MonitoringFilesOf(folder)) {
+      json entry = {{"number", number}};
+      try {
+        entry["head"] = ReadMonitoringHead(FileOf(folder, number));
+      } catch (const std::exception& error) {
+        PutFault(entry, error);
+      }
+      records.push_back(std::move(entry));
+    }
+    return records;
+  }
+
+  nlohmann::ordered_json MonitorReport(const std::string& scan_id, int number) override {
+    const std::filesystem::path folder = FolderOf(scan_id);
+    if (!Has(folder, number)) return nullptr;
+    try {
+      return MonitoringReport(ReadMonitoringFile(FileOf(folder, number)));
+    } catch (const std::exception& error) {
+      nlohmann::ordered_json report = nlohmann::ordered_json::object();
+      PutFault(report, error);
+      return report;
+    }
+  }
+
+  std::string MonitorCsv(const std::string& scan_id, int number) override {
+    if (number == 0) {
+      const std::shared_ptr<const MonitorSession> record = monitoring_.Record();
+      return record ? record->Csv() : std::string();
+    }
+    const std::filesystem::path folder = FolderOf(scan_id);
+    if (!Has(folder, number)) return {};
+    try {
+      return MonitoringCsv(ReadMonitoringFile(FileOf(folder, number)).record);
+    } catch (const std::exception& error) {
+      Log(LogLevel::kNotice, MessageOf(error).English());
+      return {};
+    }
+  }
+
+ private:
+  /// Empty if there is no such scan, or its files cannot be used.
+  std::filesystem::path FolderOf(const std::string& scan_id) const {
+    const std::optional<Scan> scan =
+        store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
+    return scan ? scan->folder : std::filesystem::path();
+  }
+  static std::filesystem::path FileOf(const std::filesystem::path& scan, int number) {
+    return scan / kMonitoringFolder / MonitoringFileName(number);
+  }
+  static bool Has(const std::filesystem::path& scan, int number) {
+    std::error_code ignored;
+    return !scan.empty() && std::filesystem::exists(FileOf(scan, number), ignored);
+  }
+
+  LiveMonitoring& monitoring_;
+  StoreAccess& store_;
+};
+
+}  // namespace
+
+std::unique_ptr<web::MonitoringService> MakeWebMonitoring(LiveMonitoring& monitoring,
+                                                          StoreAccess& store) {
+  return std::make_unique<WebMonitoring>(monitoring, store);
+}
+
+}  // namespace plumb
