@@ -9,8 +9,10 @@
 
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/files/monitoring_file.hpp"
 #include "daemon/loop/log.hpp"
 #include "words/audit.hpp"
+#include "words/monitoring.hpp"
 
 namespace plumb {
 namespace {
@@ -87,6 +89,7 @@ std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::strin
   limits_ = job.compare.limits;
   judges_reference_ = !job.reference_scene.empty();
   warnings_.clear();
+  accepted_.reset();
   ended_ = {};
   last_.reset();
   latencies_s_.clear();
@@ -143,6 +146,7 @@ MonitorStatus LiveMonitoring::status() const {
   status.elapsed_s = SteadySeconds() - began_s_;
   status.warnings = warnings_;
   status.is_recorded = is_recorded_;
+  status.accepted = accepted_;
   if (!last_) return status;
   const MonitorLine& line = last_->line;
   const double age_s = SteadySeconds() - last_->arrived_s;
@@ -158,6 +162,11 @@ MonitorStatus LiveMonitoring::status() const {
     status.latency_ms = 1e3 * TakeQuantile(latencies, 0.95);
   }
   status.is_old = age_s > kGrey_s;
+  if (last_->breath_window)
+    status.breath_hold = {
+        .level_mm = last_->breath_window->level_m / kMillimetre,
+        .window_mm = last_->breath_window->width_m / kMillimetre,
+        .advice = std::string(Name(age_s > kLongestGap_s ? LiveAdvice::kUnknown : last_->breath))};
   if (age_s > kLongestGap_s) {
     status.reason = "no_image";
     if (line.state >= MonitorState::kMonitoring && line.state != MonitorState::kMovedSensor)
@@ -179,6 +188,36 @@ IndicatorPattern LiveMonitoring::Pattern() const {
   if (now.advice == Name(LiveAdvice::kIn)) return IndicatorPattern::kMonitorIn;
   return now.advice == Name(LiveAdvice::kOut) ? IndicatorPattern::kMonitorOut
                                               : IndicatorPattern::kMonitorUnknown;
+}
+
+Message LiveMonitoring::TeachBreath(double width_mm, BreathHold& taught) {
+  if (!session_) return say::monitoring::NotRunning();
+  const std::optional<BreathWindow> window = session_->TeachBreath(width_mm * kMillimetre);
+  if (!window) return say::monitoring::BreathNotHeld();
+  taught.level_mm = window->level_m / kMillimetre;
+  taught.window_mm = window->width_m / kMillimetre;
+  session_->AddEvent({{"event", "breath_taught"},
+                      {"time", MonitoringTime()},
+                      {"level_mm", taught.level_mm},
+                      {"window_mm", taught.window_mm}});
+  return {};
+}
+
+Message LiveMonitoring::ForgetBreath() {
+  if (!session_) return say::monitoring::NotRunning();
+  if (!session_->ForgetBreath()) return say::monitoring::NoBreathLevel();
+  session_->AddEvent({{"event", "breath_forgotten"}, {"time", MonitoringTime()}});
+  return {};
+}
+
+void LiveMonitoring::NoteAccepted(const AcceptedLive& accepted, const std::string& advice) {
+  if (!session_) return;
+  accepted_ = accepted;
+  nlohmann::json event = AcceptedJson(accepted_);
+  event["event"] = "accepted";
+  event["advice"] = advice;
+  session_->AddEvent(event);
+  Tell();
 }
 
 void LiveMonitoring::OnUpdate(const MonitorUpdate& update) {

@@ -50,6 +50,12 @@ class LiveMonitoring {
   [[nodiscard]] Message Start(const Actor& actor) { return hooks_.ask(true, actor); }
   [[nodiscard]] Message Stop(const Actor& actor) { return hooks_.ask(false, actor); }
 
+  /// The breath of the last second becomes the level of a hold. @return Why not; empty: it does.
+  [[nodiscard]] Message TeachBreath(double width_mm, BreathHold& taught);
+  [[nodiscard]] Message ForgetBreath();
+  /// A person has signed this position: noted in the record and shown.
+  void NoteAccepted(const AcceptedLive& accepted, const std::string& advice);
+
   /// For the appliance: frames go to the feed from now on.
   /// @param why_no_record  Why the job names no place for one; shown.
   [[nodiscard]] std::shared_ptr<LiveFeed> Begin(MonitorJob job, const std::string& scan_id,
@@ -79,6 +85,7 @@ class LiveMonitoring {
   AcceptanceLimits limits_;
   bool judges_reference_ = false, is_recorded_ = false;
   std::vector<Message> warnings_;
+  std::optional<AcceptedLive> accepted_;
   Message ended_;
   double began_s_ = 0.0;
   std::optional<MonitorUpdate> last_;

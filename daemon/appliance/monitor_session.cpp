@@ -76,6 +76,26 @@ void MonitorSession::AddEvent(const nlohmann::json& event) {
   if (recorder_) recorder_->AddEvent(event);
 }
 
+void MonitorSession::JudgeBreath(MonitorLine& line, MonitorUpdate& update) {
+  const std::lock_guard lock(mutex_);
+  update.breath = breath_.Next(line.time_s, line.breathing_m);
+  update.breath_window = breath_.window();
+  line.advice =
+      WithBreath(line.advice, update.breath_window ? std::optional(update.breath) : std::nullopt);
+}
+
+std::optional<BreathWindow> MonitorSession::TeachBreath(double width_m) {
+  const std::lock_guard lock(mutex_);
+  return breath_.Teach(width_m);
+}
+
+bool MonitorSession::ForgetBreath() {
+  const std::lock_guard lock(mutex_);
+  const bool was_there = breath_.window().has_value();
+  breath_.Forget();
+  return was_there;
+}
+
 void MonitorSession::NoteZero(const Monitor& monitor, const MonitorOptions& options) {
   MonitoringRecord zero;
   zero.Describe(monitor, options);
@@ -114,7 +134,9 @@ void MonitorSession::Watch(const std::stop_token& stop) {
   std::int64_t frames = 0, dropped = 0;
   bool is_zeroed = false;
   while (const std::optional<Frame> frame = feed_->Next(stop)) {
-    const MonitorLine line = monitor.Add(*frame).value();
+    MonitorLine line = monitor.Add(*frame).value();
+    MonitorUpdate next;
+    JudgeBreath(line, next);
     ++frames;
     dropped += feed_->TakeDropped();
     Note(line);
@@ -127,12 +149,13 @@ void MonitorSession::Watch(const std::stop_token& stop) {
                          line.reason != told.line.reason;
     if (told_s && !changed && now_s - *told_s < kTellEvery_s) continue;
     told_s = now_s;
-    told = {.line = line,
-            .arrived_s = feed_->taken_arrived_s(),
-            .done_s = now_s,
-            .has_breathing = monitor.sensor().breathing().has_value(),
-            .frames = frames,
-            .frames_dropped = dropped};
+    next.line = line;
+    next.arrived_s = feed_->taken_arrived_s();
+    next.done_s = now_s;
+    next.has_breathing = monitor.sensor().breathing().has_value();
+    next.frames = frames;
+    next.frames_dropped = dropped;
+    told = next;
     callbacks_.update(told);
   }
 }

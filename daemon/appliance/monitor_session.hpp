@@ -16,6 +16,7 @@
 
 #include "algo/base/message.hpp"
 #include "algo/comparison/comparison.hpp"
+#include "algo/monitoring/breath_gate.hpp"
 #include "algo/monitoring/monitor.hpp"
 #include "daemon/appliance/monitor_recorder.hpp"
 #include "daemon/appliance/scan_session.hpp"
@@ -43,6 +44,8 @@ struct MonitorUpdate {
   double arrived_s = 0.0;  ///< Steady time.
   double done_s = 0.0;
   bool has_breathing = false;
+  std::optional<BreathWindow> breath_window = {};
+  LiveAdvice breath = LiveAdvice::kUnknown;  ///< With a window; the line's advice holds it.
   std::int64_t frames = 0, frames_dropped = 0;
 };
 
@@ -70,6 +73,10 @@ class MonitorSession {
   [[nodiscard]] const std::shared_ptr<LiveFeed>& feed() const { return feed_; }
   /// Ends the thread soon; the destructor waits for that.
   void End();
+  /// As BreathGate has it; the next frame is judged by it.
+  [[nodiscard]] std::optional<BreathWindow> TeachBreath(double width_m);
+  /// False: there was none.
+  [[nodiscard]] bool ForgetBreath();
   /// For the record on the disk.
   void AddEvent(const nlohmann::json& event);
   /// What was said so far, as monitor.csv has it.
@@ -83,6 +90,7 @@ class MonitorSession {
   void EndRecord(const Message& why);
   void Watch(const std::stop_token& stop);
   void Note(const MonitorLine& line);
+  void JudgeBreath(MonitorLine& line, MonitorUpdate& update);
   void NoteZero(const Monitor& monitor, const MonitorOptions& options);
 
   const MonitorJob job_;
@@ -90,6 +98,7 @@ class MonitorSession {
   const std::shared_ptr<LiveFeed> feed_;
   mutable std::mutex mutex_;
   MonitoringRecord record_;                    ///< Guarded.
+  BreathGate breath_;                          ///< Guarded.
   std::array<std::int64_t, 3> advice_{};       ///< Guarded: frames of each since the first numbers.
   std::unique_ptr<MonitorRecorder> recorder_;  ///< Guarded: the pointer.
   std::jthread thread_;  ///< Last: starts when the members above are initialised.

@@ -9,8 +9,10 @@
 #include <fmt/format.h>
 
 #include "algo/base/message_json.hpp"
+#include "daemon/appliance/live_acceptance.hpp"
 #include "daemon/files/monitoring_file.hpp"
 #include "daemon/loop/log.hpp"
+#include "words/audit.hpp"
 
 namespace plumb {
 
@@ -37,6 +39,35 @@ class WebMonitoring final : public web::MonitoringService {
 
   void StopMonitor(const Actor& actor, Done done) override {
     done(AnswerOf(monitoring_.Stop(actor)));
+  }
+
+  void AcceptLive(const Actor& actor, const std::string& reason, Done done) override {
+    const Settings settings = ReadSettings();
+    const MonitorStatus now = monitoring_.status();
+    if (RefuseIf(WhyNotAcceptLive(now, settings.accept_live, !reason.empty()), done)) return;
+    const AcceptedLive accepted{.by = actor.user,
+                                .at = MonitoringTime(),
+                                .reason = reason,
+                                .against_reference = *now.against_reference};
+    LogAct(actor, reason.empty() ? "monitor.accept" : "monitor.accept_outside", now.scan_id,
+           DescribeAccepted(now, reason), [this, accepted, now, done](const Change& change) {
+             if (change.result == ChangeResult::kDone)
+               monitoring_.NoteAccepted(accepted, now.advice);
+             done(change);
+           });
+  }
+
+  void TeachBreath(const Actor& actor, Done done) override {
+    const Settings settings = ReadSettings();
+    BreathHold taught;
+    if (RefuseIf(monitoring_.TeachBreath(settings.breath_window_mm, taught), done)) return;
+    LogAct(actor, "monitor.breath_teach", monitoring_.status().scan_id,
+           say::audit::BreathTaught(taught.level_mm, taught.window_mm), done);
+  }
+
+  void ForgetBreath(const Actor& actor, Done done) override {
+    if (RefuseIf(monitoring_.ForgetBreath(), done)) return;
+    LogAct(actor, "monitor.breath_forget", monitoring_.status().scan_id, {}, done);
   }
 
   json MonitorRecords(const std::string& scan_id) override {
@@ -82,6 +113,15 @@ class WebMonitoring final : public web::MonitoringService {
   }
 
  private:
+  /// @throws IoError
+  Settings ReadSettings() const {
+    return store_.Read(&Store::settings, [](SettingsStore& settings) { return settings.Get(); });
+  }
+  void LogAct(const Actor& actor, const std::string& action, const std::string& scan_id,
+              const Message& detail, Done done) {
+    store_.Write(&Store::audit, std::move(done),
+                 [=](AuditStore& audit) { audit.Log(actor, action, scan_id, detail); });
+  }
   /// Empty if there is no such scan, or its files cannot be used.
   std::filesystem::path FolderOf(const std::string& scan_id) const {
     const std::optional<Scan> scan =

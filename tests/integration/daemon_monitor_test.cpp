@@ -81,6 +81,48 @@ TEST_F(DaemonMonitorTest, WatchesTheBodyAfterASweepAndHoldsWhenItMoves) {
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 
+TEST_F(DaemonMonitorTest, ALivePositionIsSignedOnlyWhereTheSettingSaysSo) {
+  Plumbd plumbd(folder_.path(), {.arguments = {"--sim-rest"}, .scenes = 2});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  test::HttpClient engineer = plumbd.MakeFirstAccount(), physicist(plumbd.port());
+  ASSERT_EQ(engineer.LogIn("engineer", test::kPassword), 200);
+  ASSERT_TRUE(test::AddAccount(plumbd.port(), engineer, "physicist", "physicist"));
+  ASSERT_EQ(physicist.LogIn("physicist", test::kPassword), 200);
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("next-scene");
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("mount");
+  ASSERT_TRUE(Monitor(plumbd, "start").value("ok", false));
+  const char* const place = "/api/v1/monitor/accept";
+  const json signature = {{"password", test::kPassword}, {"reason", "a test"}};
+  plumbd.WaitFor("an advice against the reference", [](const json& status) {
+    return status["monitor"]["against_reference"].is_object() &&
+           status["monitor"]["advice"] != "unknown";
+  });
+  EXPECT_EQ(physicist.Post(place, signature).status, 409) << "a sweep has to confirm";
+  ASSERT_EQ(engineer.Put("/api/v1/settings", {{"accept_live", "signature"}}).status, 200);
+  EXPECT_EQ(engineer.Post(place, signature).status, 403) << "not an engineer's";
+  EXPECT_EQ(physicist.Post(place, {{"password", "wrong"}, {"reason", "a test"}}).status, 403);
+  EXPECT_TRUE(plumbd.Status()["monitor"]["accepted"].is_null());
+  ASSERT_EQ(physicist.Post(place, signature).status, 200);
+  const json accepted = plumbd.Status()["monitor"]["accepted"];
+  EXPECT_EQ(accepted["by"], "physicist");
+  EXPECT_TRUE(accepted["numbers"]["vertical_mm"].is_number());
+  EXPECT_THAT(engineer.Get("/api/v1/audit?limit=20").body,
+              ::testing::AllOf(::testing::HasSubstr("monitor.accept_outside"),
+                               ::testing::HasSubstr("a test")));
+  plumbd.Sim("stall");
+  plumbd.WaitFor("an unknown state",
+                 [](const json& status) { return status["monitor"]["advice"] == "unknown"; });
+  EXPECT_EQ(physicist.Post(place, signature).status, 409) << "the value is old";
+  EXPECT_EQ(physicist.Post("/api/v1/monitor/breath/forget").status, 409) << "none is taught";
+  plumbd.Press();
+  plumbd.WaitForState("ready");
+  EXPECT_EQ(physicist.Post(place, signature).status, 409);
+  EXPECT_EQ(physicist.Post("/api/v1/monitor/breath/teach").status, 409);
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
 TEST_F(DaemonMonitorTest, ItsRecordOutlivesACutAndGoesWithThePatient) {
   PlumbdOptions options{.arguments = {"--sim-rest"}, .scenes = 2};
   std::string scan, patient;

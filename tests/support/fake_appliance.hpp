@@ -119,6 +119,9 @@ class FakeAppliance : public web::BackgroundWork,
   MonitorStatus GetMonitor() override { return monitor; }
   void StartMonitor(const Actor& actor, Done done) override;
   void StopMonitor(const Actor& actor, Done done) override;
+  void AcceptLive(const Actor& actor, const std::string& reason, Done done) override;
+  void TeachBreath(const Actor& actor, Done done) override;
+  void ForgetBreath(const Actor& actor, Done done) override;
   nlohmann::json MonitorRecords(const std::string& scan_id) override;
   nlohmann::ordered_json MonitorReport(const std::string& scan_id, int number) override {
     return number == 1 && scan_id == monitored_scan ? monitor_report : nlohmann::ordered_json();

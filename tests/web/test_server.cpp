@@ -384,6 +384,15 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.status.fault = is_full ? say::upkeep::DiskFull(90, 700) : Message();
     service.Notify(web::EventKind::kStatus);
   }
+  if (name == "breathe") {  // HEIGHT_MM ADVICE: of the breath, while a level is taught
+    double height_mm = 0;
+    std::string advice;
+    words >> height_mm >> advice;
+    service.monitor.breathing_mm = height_mm;
+    service.monitor.age_s = 0.03;
+    if (service.monitor.breath_hold) service.monitor.breath_hold->advice = advice;
+    service.Notify(web::EventKind::kMonitor);
+  }
   if (name == "recorded") {  // SCAN: it was monitored, and a power cut ended that
     words >> service.monitored_scan;
     service.monitor_report = MonitorReportOf(service.monitored_scan);

@@ -165,7 +165,8 @@ class HttpServer::Impl {
 
   static void AddPageRoutes(Routes& routes) {
     const auto serve = [](const Request& request) {
-      const Asset* asset = FindAsset(request.path == "/room" ? "/" : request.path);
+      const bool is_page = request.path == "/room" || request.path == "/breath";
+      const Asset* asset = FindAsset(is_page ? "/" : request.path);
       if (asset == nullptr) return ErrorResponse(404, say::web::NoSuchFile());
       const auto accepted = request.headers.find("accept-encoding");
       Response response;
@@ -181,7 +182,7 @@ class HttpServer::Impl {
       }
       return response;
     };
-    for (const char* pattern : {"/", "/room", "/assets/{name}"})
+    for (const char* pattern : {"/", "/room", "/breath", "/assets/{name}"})
       routes.Read(pattern, Permission::kNone, serve);
     routes.Read("/api/v1/events", Permission::kRoom, [](const Request&) {
       Response response = BodyResponse("text/event-stream", "");

@@ -51,6 +51,14 @@ void AddMonitorApi(Routes& routes, const Services& services) {
                [&monitoring](const Request& request, const Done& done) {
                  monitoring.StopMonitor(request.actor(), done);
                });
+  routes.Write("POST", "/api/v1/monitor/breath/teach", Permission::kScan, BodyKind::kNone,
+               [&monitoring](const Request& request, const Done& done) {
+                 monitoring.TeachBreath(request.actor(), done);
+               });
+  routes.Write("POST", "/api/v1/monitor/breath/forget", Permission::kScan, BodyKind::kNone,
+               [&monitoring](const Request& request, const Done& done) {
+                 monitoring.ForgetBreath(request.actor(), done);
+               });
   routes
       .ReadInBackground("/api/v1/monitor/record.csv", Permission::kView,
                         [&monitoring](const Request&) {

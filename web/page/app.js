@@ -353,6 +353,9 @@ function listen() {
 if (location.pathname === '/room') {
   import('./screens/room.js').then(({ showRoom }) => showRoom(main, { speak, applyTheme }))
     .catch(report);
+} else if (location.pathname === '/breath') {
+  import('./screens/breath.js').then(({ showBreath }) => showBreath(main, { speak, applyTheme }))
+    .catch(report);
 } else {
   listen();
   // Until the user is known, the page is in the language of the login screen.

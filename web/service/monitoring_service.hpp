@@ -22,6 +22,13 @@ class MonitoringService {
   /// Begins or ends it: kConflict where it cannot.
   virtual void StartMonitor(const Actor& actor, Done done) = 0;
   virtual void StopMonitor(const Actor& actor, Done done) = 0;
+  /// Signs the newest position against the reference: kConflict where a sweep has to confirm it,
+  /// where it is not known now, and where the advice is out and no reason is given.
+  virtual void AcceptLive(const Actor& actor, const std::string& reason, Done done) = 0;
+  /// The breath of the last second becomes the level of a breath hold: kConflict where it was not
+  /// settled.
+  virtual void TeachBreath(const Actor& actor, Done done) = 0;
+  virtual void ForgetBreath(const Actor& actor, Done done) = 0;
   /// (background) Of a scan, oldest first: number and head of each, or why it cannot be read.
   [[nodiscard]] virtual nlohmann::json MonitorRecords(const std::string& scan_id) = 0;
   /// (background) What one says in short (daemon/files/monitoring_file.hpp); null if there is none.

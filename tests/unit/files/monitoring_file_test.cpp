@@ -186,7 +186,8 @@ TEST_F(MonitoringFileTest, AnOlderRecordIsNeverOverwritten) {
 }
 
 TEST_F(MonitoringFileTest, EndsWithinItsBound) {
-  MonitoringFileWriter writer(scan_ / kMonitoringFolder / MonitoringFileName(2), {});
+  MonitoringFileWriter writer(scan_ / kMonitoringFolder / MonitoringFileName(2),
+                              {{"scan", "000007"}});
   int seconds = 0;
   while (writer.HasRoom()) {
     writer.AddFrames(std::span(lines_).first(30));
