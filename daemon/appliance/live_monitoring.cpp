@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "algo/base/message_json.hpp"
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
 #include "daemon/files/monitoring_file.hpp"
@@ -114,6 +115,11 @@ Message LiveMonitoring::End(const Message& why) {
   if (!session_) return {};
   tick_.Disarm();
   ++epoch_;
+  if (!why.empty())
+    session_->AddEvent({{"event", "stopped"},
+                        {"time", MonitoringTime()},
+                        {"why", why.English()},
+                        {"why_message", MessageJson(why)}});
   session_->End();
   const auto shares = session_->Shares();
   session_.reset();  // kept for its record

@@ -286,7 +286,10 @@ void MonitoringFileWriter::AddBlock(std::uint32_t kind, std::string_view payload
 }
 
 StoredMonitoring ReadMonitoringFile(const fs::path& file) {
-  const std::string bytes = ReadTextFile(file, kMostMonitoringBytes);
+  return ParseMonitoring(ReadTextFile(file, kMostMonitoringBytes), file);
+}
+
+StoredMonitoring ParseMonitoring(std::string_view bytes, const fs::path& file) {
   BlockReader reader(bytes, file);
   StoredMonitoring stored;
   stored.head = TextIn(reader, reader.Next());

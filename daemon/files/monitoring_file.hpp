@@ -13,6 +13,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -68,6 +69,9 @@ struct StoredMonitoring {
 /// Values that were stored rounded: 1 um or 1 urad of an interval, 0.1 per mille of what is seen.
 /// @throws DataError if it is not such a file, too long, or damaged before its last block.
 [[nodiscard]] StoredMonitoring ReadMonitoringFile(const std::filesystem::path& file);
+/// The same of its bytes. @param file  Named in errors.
+[[nodiscard]] StoredMonitoring ParseMonitoring(std::string_view bytes,
+                                               const std::filesystem::path& file);
 /// The head alone. @throws DataError
 [[nodiscard]] nlohmann::json ReadMonitoringHead(const std::filesystem::path& file);
 

@@ -49,7 +49,8 @@ class WebMonitoring final : public web::MonitoringService {
                                 .at = MonitoringTime(),
                                 .reason = reason,
                                 .against_reference = *now.against_reference};
-    LogAct(actor, reason.empty() ? "monitor.accept" : "monitor.accept_outside", now.scan_id,
+    const bool is_in = now.advice == "in";
+    LogAct(actor, is_in ? "monitor.accept" : "monitor.accept_outside", now.scan_id,
            DescribeAccepted(now, reason), [this, accepted, now, done](const Change& change) {
              if (change.result == ChangeResult::kDone)
                monitoring_.NoteAccepted(accepted, now.advice);

@@ -109,7 +109,7 @@ TEST_F(DaemonMonitorTest, ALivePositionIsSignedOnlyWhereTheSettingSaysSo) {
   EXPECT_EQ(accepted["by"], "physicist");
   EXPECT_TRUE(accepted["numbers"]["vertical_mm"].is_number());
   EXPECT_THAT(engineer.Get("/api/v1/audit?limit=20").body,
-              ::testing::AllOf(::testing::HasSubstr("monitor.accept_outside"),
+              ::testing::AllOf(::testing::HasSubstr("monitor.accept"),
                                ::testing::HasSubstr("a test")));
   plumbd.Sim("stall");
   plumbd.WaitFor("an unknown state",

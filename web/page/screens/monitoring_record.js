@@ -61,7 +61,7 @@ function facts(report) {
   const row = (label, value) => h('div', {}, h('dt', {}, label), h('dd', {}, value));
   const { drift } = report;
   const percent = (share) => `${fixed(100 * (share - 1), 2)} %`;
-  const ended = report.said.find(({ event }) => event === 'ended');
+  const ended = report.said.find(({ why }) => why);
   return h('dl', { class: 'trust' }, row(text.duration, timeOf(report.seconds)),
     row(text.frames, `${report.frames}`),
     kShares.some((one) => report.advice_s?.[one])
@@ -70,7 +70,7 @@ function facts(report) {
     row(text.holds, `${report.holds}`), row(text.gaps, timeOf(report.gaps_s)),
     row(text.drift, text.driftIs(percent(drift.least), percent(drift.most))),
     row(S.monitorRecord.breathing, breathingWords(report)),
-    ended?.why && row(text.end, sentence(said(ended, 'why'))));
+    ended && row(text.end, sentence(said(ended, 'why'))));
 }
 
 export async function showMonitoringRecord(place, argument = '') {
