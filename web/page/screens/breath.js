@@ -39,7 +39,10 @@ function bar({ word, height, hold }) {
     height !== null && svg('rect', {
       class: 'air', x: 60, y: at(height), width: 180, height: kTall - at(height), rx: 30,
     }),
-    svg('rect', { class: 'aim', x: 20, y: upper, width: 260, height: lower - upper, rx: 20 }));
+    svg('rect', { class: 'aim', x: 20, y: upper, width: 260, height: lower - upper, rx: 20 }),
+    height !== null && svg('rect', {
+      class: 'now', x: 40, y: at(height) - 8, width: 220, height: 16,
+    }));
 }
 
 function display(main, speak) {
