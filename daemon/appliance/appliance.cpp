@@ -71,7 +71,9 @@ Appliance::Appliance(SharedParts& shared)
              return Handle(starts ? ScanEvent::kMonitorStart : ScanEvent::kMonitorStop, &actor);
            },
        .changed = [this] { Show(); },
-       .failed = [this](const Message& why) { OnMonitorFailed(why); }});
+       .failed = [this](const Message& why) { OnMonitorFailed(why); },
+       .recorded = [this](const std::string& scan_id,
+                          const std::string& file) { OnMonitorRecorded(scan_id, file); }});
   storage_.Open(*this);
   room_.Refresh();
   result_timer_ =

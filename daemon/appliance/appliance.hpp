@@ -109,6 +109,8 @@ class Appliance : private StorageUser {
   Answer WhyNotMonitor() const;
   void StartMonitor();
   [[nodiscard]] MonitorJob MakeMonitorJob();
+  [[nodiscard]] Message WhyNoRecord() const;
+  void OnMonitorRecorded(const std::string& scan_id, const std::string& file);
   void EndMonitor();
   void OnMonitorFailed(const Message& why);
   void WatchRest();

@@ -6,6 +6,7 @@
 
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/plan_options.hpp"
+#include "daemon/files/monitoring_file.hpp"
 #include "daemon/loop/log.hpp"
 #include "words/monitoring.hpp"
 
@@ -25,7 +26,11 @@ MonitorJob Appliance::MakeMonitorJob() {
   job.info = sensors_.snapshot().info;
   job.compare = parts_.config.compare;
   job.room = room_.OfJob();
-  job.scene = store_->folders.Scan(last_result_->id) / "scene";
+  const std::filesystem::path scan = store_->folders.Scan(last_result_->id);
+  job.scene = scan / "scene";
+  if (WhyNoRecord().empty())
+    job.record = {.scan = scan,
+                  .head = {{"scan", last_result_->id}, {"sensor_serial", last_serial_}}};
   if (last_result_->reference_id.empty()) return job;
   const std::optional<Reference> reference = store_->references.Approved(last_result_->patient_id);
   // Another one than the scan was compared with is another question.
@@ -36,6 +41,30 @@ MonitorJob Appliance::MakeMonitorJob() {
   };
   job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
   return job;
+}
+
+/// A record must not take the room of the next scan: nothing is removed for it.
+Message Appliance::WhyNoRecord() const {
+  const auto space = storage_.SpaceForScans();
+  try {
+    if (!space || space->available >= NeededBytes() + kMostMonitoringBytes) return {};
+  } catch (const std::exception& error) {
+    return say::monitoring::NotRecorded(MessageOf(error));
+  }
+  return say::monitoring::NoRoomForRecord();
+}
+
+void Appliance::OnMonitorRecorded(const std::string& scan_id, const std::string& file) {
+  if (store_ == nullptr) return;
+  (void)store_thread_.Post([this, scan_id, file, &store = store_, &loop = loop_] {
+    try {
+      store->scans.AddFile(scan_id, file);
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError,
+          fmt::format("cannot note {} of scan {}: {}", file, scan_id, MessageOf(error).English()));
+    }
+    loop.Post("monitoring recorded", [this] { notices_.TellPage(web::EventKind::kData); });
+  });
 }
 
 /// After each change of the state, and now and then, since other things decide, too.
@@ -55,8 +84,8 @@ bool Appliance::PressMonitors() const {
 void Appliance::StartMonitor() {
   monitor_end_ = {};
   try {
-    const std::shared_ptr<LiveFeed> feed =
-        monitoring_.Begin(MakeMonitorJob(), last_result_->id, last_result_->patient_id);
+    const std::shared_ptr<LiveFeed> feed = monitoring_.Begin(
+        MakeMonitorJob(), last_result_->id, last_result_->patient_id, WhyNoRecord());
     sensors_.BeginScan(feed, /*is_sweep=*/false);
   } catch (const std::exception& error) {
     loop_.Post("monitoring failed", [this, why = MessageOf(error)] { OnMonitorFailed(why); });

@@ -7,9 +7,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "algo/base/message_json.hpp"
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/files/monitoring_file.hpp"
+#include "daemon/loop/log.hpp"
 #include "words/audit.hpp"
+#include "words/monitoring.hpp"
 
 namespace plumb {
 namespace {
@@ -42,24 +46,12 @@ LiveMonitoring::~LiveMonitoring() {
   if (session_) session_->End();
 }
 
-std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::string& scan_id,
-                                                const std::string& patient_id) {
-  scan_id_ = scan_id;
-  patient_id_ = patient_id;
-  limits_ = job.compare.limits;
-  judges_reference_ = !job.reference_scene.empty();
-  warnings_.clear();
-  ended_ = {};
-  last_.reset();
-  latencies_s_.clear();
-  was_stale_ = false;
-  began_s_ = SteadySeconds();
-  const std::uint64_t epoch = ++epoch_;
+MonitorCallbacks LiveMonitoring::CallbacksOf(std::uint64_t epoch) {
   MonitorCallbacks callbacks;
   callbacks.begun = [this, epoch](const std::vector<Message>& warnings, bool judges) {
     loop_.Post("monitoring begun", [this, epoch, warnings, judges] {
       if (epoch != epoch_) return;
-      warnings_ = warnings;
+      warnings_.insert(warnings_.end(), warnings.begin(), warnings.end());
       judges_reference_ = judges;
     });
   };
@@ -73,7 +65,40 @@ std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::strin
       if (epoch == epoch_ && session_) hooks_.failed(why);
     });
   };
-  session_ = std::make_shared<MonitorSession>(std::move(job), std::move(callbacks));
+  callbacks.not_recorded = [this, epoch](const Message& why) {
+    loop_.Post("monitoring not recorded", [this, epoch, why] {
+      Log(LogLevel::kError, why.English());
+      if (epoch != epoch_) return;
+      is_recorded_ = false;
+      warnings_.push_back(why);
+    });
+  };
+  // Also of a session that has ended.
+  callbacks.recorded = [this, scan = scan_id_](const std::string& file) {
+    loop_.Post("monitoring recorded", [this, scan, file] {
+      if (hooks_.recorded) hooks_.recorded(scan, file);
+    });
+  };
+  return callbacks;
+}
+
+std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::string& scan_id,
+                                                const std::string& patient_id,
+                                                const Message& why_no_record) {
+  scan_id_ = scan_id;
+  patient_id_ = patient_id;
+  limits_ = job.compare.limits;
+  judges_reference_ = !job.reference_scene.empty();
+  warnings_.clear();
+  accepted_.reset();
+  ended_ = {};
+  last_.reset();
+  latencies_s_.clear();
+  was_stale_ = false;
+  began_s_ = SteadySeconds();
+  is_recorded_ = job.record.has_value();
+  if (!why_no_record.empty()) warnings_.push_back(why_no_record);
+  session_ = std::make_shared<MonitorSession>(std::move(job), CallbacksOf(++epoch_));
   std::shared_ptr<MonitorSession> before = session_;
   {
     const std::lock_guard lock(record_mutex_);
@@ -90,6 +115,11 @@ Message LiveMonitoring::End(const Message& why) {
   if (!session_) return {};
   tick_.Disarm();
   ++epoch_;
+  if (!why.empty())
+    session_->AddEvent({{"event", "stopped"},
+                        {"time", MonitoringTime()},
+                        {"why", why.English()},
+                        {"why_message", MessageJson(why)}});
   session_->End();
   const auto shares = session_->Shares();
   session_.reset();  // kept for its record
@@ -121,6 +151,8 @@ MonitorStatus LiveMonitoring::status() const {
   status.rotation_tolerance_deg = limits_.rotation_tolerance_rad / kDegree;
   status.elapsed_s = SteadySeconds() - began_s_;
   status.warnings = warnings_;
+  status.is_recorded = is_recorded_;
+  status.accepted = accepted_;
   if (!last_) return status;
   const MonitorLine& line = last_->line;
   const double age_s = SteadySeconds() - last_->arrived_s;
@@ -136,6 +168,11 @@ MonitorStatus LiveMonitoring::status() const {
     status.latency_ms = 1e3 * TakeQuantile(latencies, 0.95);
   }
   status.is_old = age_s > kGrey_s;
+  if (last_->breath_window)
+    status.breath_hold = {
+        .level_mm = last_->breath_window->level_m / kMillimetre,
+        .window_mm = last_->breath_window->width_m / kMillimetre,
+        .advice = std::string(Name(age_s > kLongestGap_s ? LiveAdvice::kUnknown : last_->breath))};
   if (age_s > kLongestGap_s) {
     status.reason = "no_image";
     if (line.state >= MonitorState::kMonitoring && line.state != MonitorState::kMovedSensor)
@@ -157,6 +194,36 @@ IndicatorPattern LiveMonitoring::Pattern() const {
   if (now.advice == Name(LiveAdvice::kIn)) return IndicatorPattern::kMonitorIn;
   return now.advice == Name(LiveAdvice::kOut) ? IndicatorPattern::kMonitorOut
                                               : IndicatorPattern::kMonitorUnknown;
+}
+
+Message LiveMonitoring::TeachBreath(double width_mm, BreathHold& taught) {
+  if (!session_) return say::monitoring::NotRunning();
+  const std::optional<BreathWindow> window = session_->TeachBreath(width_mm * kMillimetre);
+  if (!window) return say::monitoring::BreathNotHeld();
+  taught.level_mm = window->level_m / kMillimetre;
+  taught.window_mm = window->width_m / kMillimetre;
+  session_->AddEvent({{"event", "breath_taught"},
+                      {"time", MonitoringTime()},
+                      {"level_mm", taught.level_mm},
+                      {"window_mm", taught.window_mm}});
+  return {};
+}
+
+Message LiveMonitoring::ForgetBreath() {
+  if (!session_) return say::monitoring::NotRunning();
+  if (!session_->ForgetBreath()) return say::monitoring::NoBreathLevel();
+  session_->AddEvent({{"event", "breath_forgotten"}, {"time", MonitoringTime()}});
+  return {};
+}
+
+void LiveMonitoring::NoteAccepted(const AcceptedLive& accepted, const std::string& advice) {
+  if (!session_) return;
+  accepted_ = accepted;
+  nlohmann::json event = AcceptedJson(accepted_);
+  event["event"] = "accepted";
+  event["advice"] = advice;
+  session_->AddEvent(event);
+  Tell();
 }
 
 void LiveMonitoring::OnUpdate(const MonitorUpdate& update) {

@@ -32,6 +32,8 @@ class LiveMonitoring {
     std::function<Message(bool starts, const Actor& actor)> ask;  ///< Empty, or why not.
     std::function<void()> changed;                                ///< The light may have to change.
     std::function<void(const Message&)> failed;                   ///< It cannot go on.
+    /// A record is complete: the scan and the file in its folder.
+    std::function<void(const std::string& scan_id, const std::string& file)> recorded;
   };
 
   /// The arguments are borrowed. @param store_thread  Waits for the thread of an ended session.
@@ -48,9 +50,17 @@ class LiveMonitoring {
   [[nodiscard]] Message Start(const Actor& actor) { return hooks_.ask(true, actor); }
   [[nodiscard]] Message Stop(const Actor& actor) { return hooks_.ask(false, actor); }
 
+  /// The breath of the last second becomes the level of a hold. @return Why not; empty: it does.
+  [[nodiscard]] Message TeachBreath(double width_mm, BreathHold& taught);
+  [[nodiscard]] Message ForgetBreath();
+  /// A person has signed this position: noted in the record and shown.
+  void NoteAccepted(const AcceptedLive& accepted, const std::string& advice);
+
   /// For the appliance: frames go to the feed from now on.
+  /// @param why_no_record  Why the job names no place for one; shown.
   [[nodiscard]] std::shared_ptr<LiveFeed> Begin(MonitorJob job, const std::string& scan_id,
-                                                const std::string& patient_id);
+                                                const std::string& patient_id,
+                                                const Message& why_no_record = {});
   /// @param why  It could not go on; empty: it was ended. @return For the audit log.
   Message End(const Message& why);
 
@@ -61,6 +71,7 @@ class LiveMonitoring {
   [[nodiscard]] std::shared_ptr<const MonitorSession> Record() const;
 
  private:
+  [[nodiscard]] MonitorCallbacks CallbacksOf(std::uint64_t epoch);
   void OnUpdate(const MonitorUpdate& update);
   void OnTick();
   void Tell();
@@ -72,8 +83,9 @@ class LiveMonitoring {
   std::function<void(bool)> gate_;
   std::string scan_id_, patient_id_;
   AcceptanceLimits limits_;
-  bool judges_reference_ = false;
+  bool judges_reference_ = false, is_recorded_ = false;
   std::vector<Message> warnings_;
+  std::optional<AcceptedLive> accepted_;
   Message ended_;
   double began_s_ = 0.0;
   std::optional<MonitorUpdate> last_;

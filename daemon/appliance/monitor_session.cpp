@@ -4,6 +4,9 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/message_json.hpp"
+#include "algo/base/units.hpp"
+#include "daemon/files/monitoring_file.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/sweep/explain.hpp"
 #include "words/scan.hpp"
@@ -29,12 +32,76 @@ void MonitorSession::End() {
 }
 
 void MonitorSession::Run(const std::stop_token& stop) {
+  Message why;
   try {
     Watch(stop);
   } catch (const Interrupted&) {  // ended while the scenes were compared
   } catch (const std::exception& error) {
-    callbacks_.failed(Explain(error));
+    why = Explain(error);
+    callbacks_.failed(why);
   }
+  EndRecord(why);
+}
+
+void MonitorSession::BeginRecord(const MonitorOptions& options) {
+  const std::lock_guard lock(mutex_);
+  record_.has_reference = options.judges_reference;
+  if (!job_.record) return;
+  MonitorRecordPlace place = *job_.record;
+  place.head["started_at"] = MonitoringTime();
+  place.head["judges"] = options.judges_reference ? "against_reference" : "since_zero";
+  place.head["shift_tolerance_mm"] = options.limits.shift_tolerance_m / kMillimetre;
+  place.head["rotation_tolerance_deg"] = options.limits.rotation_tolerance_rad / kDegree;
+  recorder_ = std::make_unique<MonitorRecorder>(std::move(place), callbacks_.not_recorded);
+}
+
+void MonitorSession::EndRecord(const Message& why) {
+  nlohmann::json event = {{"event", "ended"}, {"time", MonitoringTime()}};
+  if (!why.empty()) {
+    event["why"] = why.English();
+    event["why_message"] = MessageJson(why);
+  }
+  AddEvent(event);
+  std::unique_ptr<MonitorRecorder> recorder;
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(recorder, recorder_);
+  }
+  if (!recorder) return;
+  if (const std::optional<std::string> file = recorder->End()) callbacks_.recorded(*file);
+}
+
+void MonitorSession::AddEvent(const nlohmann::json& event) {
+  const std::lock_guard lock(mutex_);
+  if (recorder_) recorder_->AddEvent(event);
+}
+
+void MonitorSession::JudgeBreath(MonitorLine& line, MonitorUpdate& update) {
+  const std::lock_guard lock(mutex_);
+  update.breath = breath_.Next(line.time_s, line.breathing_m);
+  update.breath_window = breath_.window();
+  line.advice =
+      WithBreath(line.advice, update.breath_window ? std::optional(update.breath) : std::nullopt);
+}
+
+std::optional<BreathWindow> MonitorSession::TeachBreath(double width_m) {
+  const std::lock_guard lock(mutex_);
+  return breath_.Teach(width_m);
+}
+
+bool MonitorSession::ForgetBreath() {
+  const std::lock_guard lock(mutex_);
+  const bool was_there = breath_.window().has_value();
+  breath_.Forget();
+  return was_there;
+}
+
+void MonitorSession::NoteZero(const Monitor& monitor, const MonitorOptions& options) {
+  MonitoringRecord zero;
+  zero.Describe(monitor, options);
+  nlohmann::json event = MonitoringZero(zero);
+  event["event"] = "zero";
+  AddEvent(event);
 }
 
 void MonitorSession::Watch(const std::stop_token& stop) {
@@ -59,31 +126,36 @@ void MonitorSession::Watch(const std::stop_token& stop) {
   const MonitorOptions options =
       MonitorOptionsOf(compare, reference ? &*reference : nullptr, scene, warnings);
   Monitor monitor(scene, job_.info, options);
-  {
-    const std::lock_guard lock(mutex_);
-    record_.has_reference = options.judges_reference;
-  }
+  BeginRecord(options);
   callbacks_.begun(warnings, options.judges_reference);
   (void)feed_->TakeDropped();  // those that came before
   MonitorUpdate told;
   std::optional<double> told_s;
   std::int64_t frames = 0, dropped = 0;
+  bool is_zeroed = false;
   while (const std::optional<Frame> frame = feed_->Next(stop)) {
-    const MonitorLine line = monitor.Add(*frame).value();
+    MonitorLine line = monitor.Add(*frame).value();
+    MonitorUpdate next;
+    JudgeBreath(line, next);
     ++frames;
     dropped += feed_->TakeDropped();
     Note(line);
+    if (!is_zeroed && monitor.zero_time_s()) {
+      is_zeroed = true;
+      NoteZero(monitor, options);
+    }
     const double now_s = SteadySeconds();
     const bool changed = line.state != told.line.state || line.advice != told.line.advice ||
                          line.reason != told.line.reason;
     if (told_s && !changed && now_s - *told_s < kTellEvery_s) continue;
     told_s = now_s;
-    told = {.line = line,
-            .arrived_s = feed_->taken_arrived_s(),
-            .done_s = now_s,
-            .has_breathing = monitor.sensor().breathing().has_value(),
-            .frames = frames,
-            .frames_dropped = dropped};
+    next.line = line;
+    next.arrived_s = feed_->taken_arrived_s();
+    next.done_s = now_s;
+    next.has_breathing = monitor.sensor().breathing().has_value();
+    next.frames = frames;
+    next.frames_dropped = dropped;
+    told = next;
     callbacks_.update(told);
   }
 }
@@ -95,6 +167,7 @@ void MonitorSession::Note(const MonitorLine& line) {
   if (lines.size() >= job_.most_lines)
     lines.erase(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(1 + lines.size() / 8));
   lines.push_back(line);
+  if (recorder_) recorder_->Add(line);
   if (line.state >= MonitorState::kMonitoring) ++advice_[static_cast<std::size_t>(line.advice)];
 }
 

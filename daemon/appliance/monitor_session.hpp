@@ -16,7 +16,9 @@
 
 #include "algo/base/message.hpp"
 #include "algo/comparison/comparison.hpp"
+#include "algo/monitoring/breath_gate.hpp"
 #include "algo/monitoring/monitor.hpp"
+#include "daemon/appliance/monitor_recorder.hpp"
 #include "daemon/appliance/scan_session.hpp"
 #include "daemon/files/monitoring_folder.hpp"
 #include "daemon/pipeline/live_feed.hpp"
@@ -31,6 +33,7 @@ struct MonitorJob {
   std::filesystem::path reference_scene;  ///< Empty: there is none to judge against.
   /// As ScanJob has it.
   std::function<Message(const std::stop_token&)> check_reference;
+  std::optional<MonitorRecordPlace> record = {};  ///< Nothing: it is kept in memory only.
   std::size_t queue_capacity = 4;    ///< Frames that may wait: an old number is of no use.
   std::size_t most_lines = 108'000;  ///< Of the record: an hour at 30 Hz; the oldest leave.
 };
@@ -41,6 +44,8 @@ struct MonitorUpdate {
   double arrived_s = 0.0;  ///< Steady time.
   double done_s = 0.0;
   bool has_breathing = false;
+  std::optional<BreathWindow> breath_window = {};
+  LiveAdvice breath = LiveAdvice::kUnknown;  ///< With a window; the line's advice holds it.
   std::int64_t frames = 0, frames_dropped = 0;
 };
 
@@ -51,6 +56,10 @@ struct MonitorCallbacks {
   /// Ten times a second, and at once where state or advice change.
   std::function<void(const MonitorUpdate&)> update;
   std::function<void(const Message& why)> failed;
+  /// The record on the disk ends although the session goes on.
+  std::function<void(const Message& why)> not_recorded;
+  /// It is complete. @param file  In the scan's folder.
+  std::function<void(const std::string& file)> recorded;
 };
 
 /// All functions but the constructor are thread-safe.
@@ -64,6 +73,12 @@ class MonitorSession {
   [[nodiscard]] const std::shared_ptr<LiveFeed>& feed() const { return feed_; }
   /// Ends the thread soon; the destructor waits for that.
   void End();
+  /// As BreathGate has it; the next frame is judged by it.
+  [[nodiscard]] std::optional<BreathWindow> TeachBreath(double width_m);
+  /// False: there was none.
+  [[nodiscard]] bool ForgetBreath();
+  /// For the record on the disk.
+  void AddEvent(const nlohmann::json& event);
   /// What was said so far, as monitor.csv has it.
   [[nodiscard]] std::string Csv() const;
   /// Shares of in, out and unknown, 0 to 1, since the first numbers; nothing without any.
@@ -71,16 +86,22 @@ class MonitorSession {
 
  private:
   void Run(const std::stop_token& stop);
+  void BeginRecord(const MonitorOptions& options);
+  void EndRecord(const Message& why);
   void Watch(const std::stop_token& stop);
   void Note(const MonitorLine& line);
+  void JudgeBreath(MonitorLine& line, MonitorUpdate& update);
+  void NoteZero(const Monitor& monitor, const MonitorOptions& options);
 
   const MonitorJob job_;
   const MonitorCallbacks callbacks_;
   const std::shared_ptr<LiveFeed> feed_;
   mutable std::mutex mutex_;
-  MonitoringRecord record_;               ///< Guarded.
-  std::array<std::int64_t, 3> advice_{};  ///< Guarded: frames of each since the first numbers.
-  std::jthread thread_;                   ///< Last: starts when the members above are initialised.
+  MonitoringRecord record_;                    ///< Guarded.
+  BreathGate breath_;                          ///< Guarded.
+  std::array<std::int64_t, 3> advice_{};       ///< Guarded: frames of each since the first numbers.
+  std::unique_ptr<MonitorRecorder> recorder_;  ///< Guarded: the pointer.
+  std::jthread thread_;  ///< Last: starts when the members above are initialised.
 };
 
 }  // namespace plumb

@@ -71,6 +71,12 @@ class Stored {
     Fail(say::store::ValueNoPosture(
         key, std::vector<std::string>(std::begin(kPostures), std::end(kPostures))));
   }
+  [[nodiscard]] std::string AcceptLive(const char* key) const {
+    const StoredJson* value = Find(key);
+    if (value == nullptr || !value->is_string() || !IsAcceptLive(value->get<std::string>()))
+      Fail(say::store::ValueNoAcceptLive(key));
+    return value->get<std::string>();
+  }
   /// A point of finite numbers.
   template <std::size_t kSize>
   [[nodiscard]] std::array<double, kSize> Point(const char* key, const StoredJson& json) const {
@@ -161,6 +167,8 @@ Settings ParseSettings(const std::string& text) {
   if (stored.Find("keep_recordings") != nullptr) s.keep_recordings = stored.Flag("keep_recordings");
   whole("retention_days", s.retention_days, kRetention_days);
   whole("idle_logout_min", s.idle_logout_min, kIdleLogout_min);
+  if (stored.Find("accept_live") != nullptr) s.accept_live = stored.AcceptLive("accept_live");
+  number("breath_window_mm", s.breath_window_mm, kBreathWindow_mm);
   return s;
 }
 

@@ -53,29 +53,6 @@ std::string Cell(const std::optional<double>& value, int digits = 4) {
 
 Json Rows(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-Json EventsOf(const std::vector<MonitorLine>& lines) {
-  Json events = Json::array();
-  const auto add = [&](const MonitorLine& line, std::string_view what) {
-    events.push_back({{"time_s", line.time_s}, {"event", what}});
-  };
-  for (std::size_t k = 0; k < lines.size(); ++k) {
-    const MonitorLine& line = lines[k];
-    const bool first = k == 0;
-    if (first || line.state != lines[k - 1].state) {
-      add(line, Name(line.state));
-      if (line.reason != BlindReason::kNone) events.back()["reason"] = Name(line.reason);
-    }
-    if (!first && line.advice != lines[k - 1].advice)
-      add(line, fmt::format("advice_{}", Name(line.advice)));
-    if (!first && line.couch_moved && !lines[k - 1].couch_moved) add(line, "couch_moved");
-    if (!first && line.sensors_used != lines[k - 1].sensors_used && line.sensors_used > 0 &&
-        lines[k - 1].sensors_used > 0)
-      add(line, fmt::format("sensors_used_{}", line.sensors_used));
-    if (!first && line.time_s - lines[k - 1].time_s > kLongestGap_s) add(line, "gap");
-  }
-  return events;
-}
-
 Json ZeroOf(const MonitoringRecord& record) {
   if (!record.zero_time_s) return nullptr;
   Json spread, sensors = Json::array();
@@ -115,7 +92,32 @@ Json BreathingOf(const BreathingMode* mode) {
           {"shares", mode->shares}};
 }
 
-Json DriftOf(const std::vector<MonitorLine>& lines) {
+}  // namespace
+
+Json MonitoringEvents(const std::vector<MonitorLine>& lines) {
+  Json events = Json::array();
+  const auto add = [&](const MonitorLine& line, std::string_view what) {
+    events.push_back({{"time_s", line.time_s}, {"event", what}});
+  };
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const MonitorLine& line = lines[k];
+    const bool first = k == 0;
+    if (first || line.state != lines[k - 1].state) {
+      add(line, Name(line.state));
+      if (line.reason != BlindReason::kNone) events.back()["reason"] = Name(line.reason);
+    }
+    if (!first && line.advice != lines[k - 1].advice)
+      add(line, fmt::format("advice_{}", Name(line.advice)));
+    if (!first && line.couch_moved && !lines[k - 1].couch_moved) add(line, "couch_moved");
+    if (!first && line.sensors_used != lines[k - 1].sensors_used && line.sensors_used > 0 &&
+        lines[k - 1].sensors_used > 0)
+      add(line, fmt::format("sensors_used_{}", line.sensors_used));
+    if (!first && line.time_s - lines[k - 1].time_s > kLongestGap_s) add(line, "gap");
+  }
+  return events;
+}
+
+Json MonitoringDrift(const std::vector<MonitorLine>& lines) {
   double least = 1.0, most = 1.0, last = 1.0;
   for (const MonitorLine& line : lines) {
     if (line.state < MonitorState::kMonitoring) continue;
@@ -126,7 +128,9 @@ Json DriftOf(const std::vector<MonitorLine>& lines) {
   return {{"least", least}, {"most", most}, {"last", last}};
 }
 
-}  // namespace
+Json MonitoringZero(const MonitoringRecord& record) {
+  return {{"zero", ZeroOf(record)}, {"breathing", BreathingOf(record.breathing())}};
+}
 
 OutputKind MonitoringOutput() {
   return {say::output::Monitoring(), "monitor.json", {"monitor.json", "monitor.csv"}};
@@ -214,12 +218,12 @@ std::string MonitoringJson(const MonitoringRecord& record) {
                        {"zeroing_s", record.zeroing_s},
                        {"judges", record.has_reference ? "against_reference" : "since_zero"}}},
                      {"zero", ZeroOf(record)},
-                     {"drift", DriftOf(record.lines)},
+                     {"drift", MonitoringDrift(record.lines)},
                      {"breathing", BreathingOf(record.breathing())},
                      {"frames", record.lines.size()},
                      {"states", states},
                      {"advice", advice},
-                     {"events", EventsOf(record.lines)},
+                     {"events", MonitoringEvents(record.lines)},
                      {"warnings", EnglishTexts(record.warnings)},
                      {"timings_ms_per_frame", timings}};
   return json.dump(1) + "\n";

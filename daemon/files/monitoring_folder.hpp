@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "algo/base/message.hpp"
 #include "algo/monitoring/monitor.hpp"
 #include "daemon/files/atomic_folder.hpp"
@@ -49,6 +51,12 @@ struct MonitoringRecord {
   /// Whether it came to numbers.
   [[nodiscard]] bool began() const;
 };
+
+// Parts of monitor.json.
+[[nodiscard]] nlohmann::ordered_json MonitoringEvents(const std::vector<MonitorLine>& lines);
+[[nodiscard]] nlohmann::ordered_json MonitoringDrift(const std::vector<MonitorLine>& lines);
+/// {"zero", "breathing"}
+[[nodiscard]] nlohmann::ordered_json MonitoringZero(const MonitoringRecord& record);
 
 [[nodiscard]] std::string MonitoringJson(const MonitoringRecord& record);
 [[nodiscard]] std::string MonitoringCsv(const MonitoringRecord& record);

@@ -257,6 +257,15 @@ void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
   transaction.Commit();
 }
 
+void ScanStore::AddFile(const std::string& scan_id, const std::string& path) {
+  const FileDigest digest = DigestOfFile(folders_.Scan(scan_id), path);
+  const std::optional<std::int64_t> number = ParseId(scan_id);
+  StoreChange change(database_);
+  if (!change->Has("SELECT 1 FROM scans WHERE id = ? AND has_folder = 1", number)) return;
+  StoreDigests(*change, *number, {digest});
+  change.Commit();
+}
+
 void ScanStore::Accept(const Actor& actor, const std::string& id, const std::string& reason) {
   const std::optional<std::int64_t> number = ParseId(id);
   StoreChange change(database_);

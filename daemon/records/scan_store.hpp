@@ -72,6 +72,10 @@ class ScanStore {
   /// Stores a scene that no sensor took, as the done scan of a reference.
   /// @param made  A staging folder with the scene, which becomes the scan's. Returns the id.
   std::string AddMade(const NewScan& scan, const std::filesystem::path& made);
+  /// A file that a finished scan has got since: from now on it is one of those that must stay as
+  /// they are. Nothing for a scan that was removed meanwhile.
+  /// @param path  In the scan's folder.
+  void AddFile(const std::string& scan_id, const std::string& path);
   /// Verdict, numbers and reason are logged. kConflict if a newer scan of the patient is done or
   /// running, and for a result that is not in tolerance without a reason.
   void Accept(const Actor& actor, const std::string& id, const std::string& reason = {});

@@ -21,9 +21,8 @@ constexpr int kPreviewQuality = 70;
 
 class WebAppliance final : public web::ApplianceService {
  public:
-  WebAppliance(Appliance& appliance, LiveMonitoring& monitoring, const SensorThread& sensors,
-               Notices& notices)
-      : appliance_(appliance), monitoring_(monitoring), sensors_(sensors), notices_(notices) {}
+  WebAppliance(Appliance& appliance, const SensorThread& sensors, Notices& notices)
+      : appliance_(appliance), sensors_(sensors), notices_(notices) {}
 
   Status GetStatus() override { return appliance_.WebStatus(); }
 
@@ -74,28 +73,12 @@ class WebAppliance final : public web::ApplianceService {
 
   void Cancel(const Actor& actor, Done done) override { done(AnswerOf(appliance_.Cancel(actor))); }
 
-  MonitorStatus GetMonitor() override { return monitoring_.status(); }
-
-  void StartMonitor(const Actor& actor, Done done) override {
-    done(AnswerOf(monitoring_.Start(actor)));
-  }
-
-  void StopMonitor(const Actor& actor, Done done) override {
-    done(AnswerOf(monitoring_.Stop(actor)));
-  }
-
-  std::string MonitorRecord() override {
-    const std::shared_ptr<const MonitorSession> record = monitoring_.Record();
-    return record ? record->Csv() : std::string();
-  }
-
   void SetListener(std::function<void(web::EventKind)> listener) override {
     notices_.SetPage(std::move(listener));
   }
 
  private:
   Appliance& appliance_;
-  LiveMonitoring& monitoring_;
   const SensorThread& sensors_;
   Notices& notices_;
   std::shared_ptr<const std::string> preview_;
@@ -108,10 +91,9 @@ class WebAppliance final : public web::ApplianceService {
 }  // namespace
 
 std::unique_ptr<web::ApplianceService> MakeWebAppliance(Appliance& appliance,
-                                                        LiveMonitoring& monitoring,
                                                         const SensorThread& sensors,
                                                         Notices& notices) {
-  return std::make_unique<WebAppliance>(appliance, monitoring, sensors, notices);
+  return std::make_unique<WebAppliance>(appliance, sensors, notices);
 }
 
 }  // namespace plumb

@@ -27,11 +27,12 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
                          std::unique_ptr<SystemRestart> restart)
     : store_(shared.loop, shared.storage, shared.store_thread, shared.notices),
       audit_(MakeWebAuditLog(store_)),
-      button_(MakeWebAppliance(appliance, shared.monitoring, shared.sensors, shared.notices)),
+      button_(MakeWebAppliance(appliance, shared.sensors, shared.notices)),
       patients_(MakeWebPatients(appliance, shared.session, shared.references, store_)),
       references_(
           MakeWebReferences(shared.references, shared.session, shared.room, store_, background_)),
       scans_(MakeWebScans(appliance, shared.references, shared.room, store_)),
+      monitoring_(MakeWebMonitoring(shared.monitoring, store_)),
       checks_(MakeWebChecks(appliance, shared.references, store_)),
       room_(MakeWebRoomCalibration(shared.room, store_)),
       profiles_(MakeWebSensorProfiles(appliance, shared.profiles, shared.notices, store_)),

@@ -16,7 +16,6 @@ namespace plumb {
 // Make the services, which are implemented in web_*.cpp. They keep references to the arguments.
 [[nodiscard]] std::unique_ptr<web::AccountService> MakeWebAccounts(StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::ApplianceService> MakeWebAppliance(Appliance& appliance,
-                                                                      LiveMonitoring& monitoring,
                                                                       const SensorThread& sensors,
                                                                       Notices& notices);
 [[nodiscard]] std::unique_ptr<web::AuditLog> MakeWebAuditLog(StoreAccess& store);
@@ -28,6 +27,8 @@ namespace plumb {
                                                                           StorageUpkeep& upkeep,
                                                                           const LoopMeter& meter,
                                                                           StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::MonitoringService> MakeWebMonitoring(LiveMonitoring& monitoring,
+                                                                        StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance,
                                                                    CurrentSession& session,
                                                                    const ReferenceGate& references,
@@ -59,6 +60,7 @@ class WebServices {
             .patients = *patients_,
             .references = *references_,
             .scans = *scans_,
+            .monitoring = *monitoring_,
             .checks = *checks_,
             .room = *room_,
             .profiles = *profiles_,
@@ -78,6 +80,7 @@ class WebServices {
   std::unique_ptr<web::PatientService> patients_;
   std::unique_ptr<web::ReferenceService> references_;
   std::unique_ptr<web::ScanService> scans_;
+  std::unique_ptr<web::MonitoringService> monitoring_;
   std::unique_ptr<web::CheckService> checks_;
   std::unique_ptr<web::RoomCalibrationService> room_;
   std::unique_ptr<web::SensorProfileService> profiles_;

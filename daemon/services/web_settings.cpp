@@ -24,6 +24,7 @@ Message CheckSettings(const SettingsChange& change) {
                      const auto&... limits) { (check(name, value, limits), ...); });
   if (wrong.empty() && !IsPosture(settings.posture))
     wrong = say::scan::SettingPosture({kPostures.begin(), kPostures.end()});
+  if (wrong.empty() && !IsAcceptLive(settings.accept_live)) wrong = say::scan::SettingAcceptLive();
   return wrong;
 }
 

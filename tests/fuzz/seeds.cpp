@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
+#include "daemon/files/monitoring_file.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/stored_scene.hpp"
 #include "daemon/files/trajectory_file.hpp"
@@ -142,6 +143,10 @@ void WriteSurfaces(const fs::path& root) {
   cloud.points = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
   cloud.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
   cloud.colors = {Color{1, 2, 3}, Color{4, 5, 6}, Color{7, 8, 9}};
+  fs::remove_all(root / "monitoring");
+  MonitoringFileWriter record(Folder(root / "monitoring") / "01.plm", {{"scan", "000001"}});
+  record.AddFrames(std::vector<MonitorLine>(3, {.since_zero = LiveNumbers{}, .visible = 0.9}));
+  record.AddEvent({{"event", "ended"}});
   const fs::path ply = Folder(root / "ply");
   WriteCloudPly(ply / "cloud", cloud);
   WriteMeshPly(ply / "mesh", {cloud.points, {}, cloud.colors, {{0, 1, 2}}});

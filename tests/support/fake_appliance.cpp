@@ -75,6 +75,42 @@ void FakeAppliance::StartMonitor(const Actor& actor, Done done) {
   Did(actor, "monitor.start", monitor.scan_id, done);
 }
 
+void FakeAppliance::AcceptLive(const Actor& actor, const std::string& reason, Done done) {
+  if (settings.accept_live != kBySignature)
+    return Finish(done, Refused(ChangeResult::kConflict, "a sweep has to confirm the position"));
+  if (!monitor.against_reference || monitor.advice == "unknown")
+    return Finish(done, Refused(ChangeResult::kConflict, "the position is not known now"));
+  if (monitor.advice == "out" && reason.empty())
+    return Finish(done, Refused(ChangeResult::kConflict, "give a reason"));
+  monitor.accepted = {.by = actor.user,
+                      .at = "2026-06-01T09:30:00Z",
+                      .reason = reason,
+                      .against_reference = *monitor.against_reference};
+  Notify(EventKind::kMonitor);
+  Did(actor, "monitor.accept", monitor.scan_id, done);
+}
+
+void FakeAppliance::TeachBreath(const Actor& actor, Done done) {
+  if (!monitor.breathing_mm)
+    return Finish(done, Refused(ChangeResult::kConflict, "the breath is not held"));
+  monitor.breath_hold = {.level_mm = *monitor.breathing_mm, .window_mm = settings.breath_window_mm};
+  Notify(EventKind::kMonitor);
+  Did(actor, "monitor.breath_teach", monitor.scan_id, done);
+}
+
+void FakeAppliance::ForgetBreath(const Actor& actor, Done done) {
+  monitor.breath_hold.reset();
+  Notify(EventKind::kMonitor);
+  Did(actor, "monitor.breath_forget", monitor.scan_id, done);
+}
+
+nlohmann::json FakeAppliance::MonitorRecords(const std::string& scan_id) {
+  nlohmann::json records = nlohmann::json::array();
+  if (!monitored_scan.empty() && scan_id == monitored_scan)
+    records.push_back({{"number", 1}, {"head", monitor_report["head"]}});
+  return records;
+}
+
 void FakeAppliance::StopMonitor(const Actor& actor, Done done) {
   if (!monitor.active)
     return Finish(done, Refused(ChangeResult::kConflict, "nothing is being monitored"));

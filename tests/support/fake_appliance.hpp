@@ -22,6 +22,7 @@ class FakeAppliance : public web::BackgroundWork,
                       public web::PatientService,
                       public web::ReferenceService,
                       public web::ScanService,
+                      public web::MonitoringService,
                       public web::CheckService,
                       public web::RoomCalibrationService,
                       public web::SensorProfileService,
@@ -36,7 +37,7 @@ class FakeAppliance : public web::BackgroundWork,
 
   /// All of them are this object.
   [[nodiscard]] web::Services services() {
-    return {*this, *this, *this, *this, *this, *this, *this,
+    return {*this, *this, *this, *this, *this, *this, *this, *this,
             *this, *this, *this, *this, *this, *this, *this};
   }
 
@@ -118,10 +119,21 @@ class FakeAppliance : public web::BackgroundWork,
   MonitorStatus GetMonitor() override { return monitor; }
   void StartMonitor(const Actor& actor, Done done) override;
   void StopMonitor(const Actor& actor, Done done) override;
-  std::string MonitorRecord() override {
-    return monitor.has_record ? "time_s,state,advice\n" : std::string();
+  void AcceptLive(const Actor& actor, const std::string& reason, Done done) override;
+  void TeachBreath(const Actor& actor, Done done) override;
+  void ForgetBreath(const Actor& actor, Done done) override;
+  nlohmann::json MonitorRecords(const std::string& scan_id) override;
+  nlohmann::ordered_json MonitorReport(const std::string& scan_id, int number) override {
+    return number == 1 && scan_id == monitored_scan ? monitor_report : nlohmann::ordered_json();
+  }
+  std::string MonitorCsv(const std::string& scan_id, int number) override {
+    const bool is_there =
+        number == 0 ? monitor.has_record : number == 1 && scan_id == monitored_scan;
+    return is_there ? "time_s,state,advice\n" : std::string();
   }
   MonitorStatus monitor;
+  std::string monitored_scan;             ///< That has one record.
+  nlohmann::ordered_json monitor_report;  ///< Of that.
   void SetListener(std::function<void(web::EventKind)> listener) override {
     listener_ = std::move(listener);
   }

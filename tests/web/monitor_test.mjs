@@ -93,6 +93,53 @@ await h.step('an old number is grey, then gone, where no word comes', async () =
   await h.picture(tech, 'monitor-phone-old.png');
 });
 
+await h.step('a sweep has to confirm, until the setting lets a signature', async () => {
+  keepSaying('monitoring in none 0.5');
+  await tech.getByText('A sweep must confirm the position').waitFor();
+  equal(await tech.getByRole('button', { name: 'Accept this position' }).count(), 0, 'no button');
+  const signed = await h.api(tech, 'monitor/accept', 'POST', { password: h.password });
+  equal(signed.status, 409, 'by sweep');
+  await h.api(engineer, 'settings', 'PUT', { accept_live: 'signature' });
+  await tech.reload();
+  const accept = tech.getByRole('button', { name: 'Accept this position' });
+  await accept.waitFor();
+  await tech.getByLabel('Your password').fill(h.password);
+  await h.look(tech, 'monitor-phone-accept');
+  await accept.click();
+  await tech.getByText('✓ Accepted by tech').waitFor();
+});
+
+await h.step('a level is taught, and the screen for the patient coaches', async () => {
+  keepSaying('monitoring in none 0.5');
+  await tech.getByRole('button', { name: 'Teach this level' }).click();
+  await tech.getByText(/^Level [\d.]+ mm, window 3.5 mm/).waitFor();
+  fallSilent();
+  const level = (await h.api(tech, 'monitor')).body.breath_hold.level_mm;
+  await room.goto(`${h.url}breath`);
+  const words = room.locator('.breath-word');
+  const breathe = async (height, breath, expected, picture) => {
+    const speak = () => h.tell(`breathe ${height} ${breath}`);
+    speak();
+    saying = setInterval(speak, 100);
+    await words.filter({ hasText: expected }).waitFor();
+    if (picture) await h.look(room, picture, { fullPage: false, axe: picture === 'breath-good' });
+    clearInterval(saying);
+  };
+  await breathe(level - 4, 'out', 'Breathe in a little more', 'breath-in');
+  await breathe(level + 4, 'out', 'Breathe out a little');
+  await breathe(level + 1, 'out', 'Hold your breath');
+  await breathe(level, 'in', 'Good. Keep holding', 'breath-good');
+  equal(/\d/.test(await room.locator('main').innerText()), false, 'no number');
+  // Where no word comes it does not go on saying that all is good.
+  await words.filter({ hasText: 'We cannot see your breathing' }).waitFor();
+  equal(await room.locator('.breath-bar .air').count(), 0, 'no old height');
+  keepSaying('monitoring in none 0.5');
+  await tech.getByRole('button', { name: 'End breath hold' }).click();
+  await words.filter({ hasText: 'Please breathe normally.' }).waitFor();
+  await room.goto(`${h.url}room`);
+  fallSilent();
+});
+
 await h.step('it ends by the button, and its numbers can be had', async () => {
   await tech.getByRole('button', { name: 'Stop monitoring' }).click();
   await tech.locator('.live-advice', { hasText: 'Not monitoring' }).waitFor();
@@ -104,6 +151,19 @@ await h.step('it ends by the button, and its numbers can be had', async () => {
   equal(answer[0], 200, 'the record');
   check(answer[1].includes('plumb_monitoring.csv'), answer[1]);
   check(await room.locator('.live-view').count() === 0, 'the room shows it no more');
+});
+
+await h.step('a record beside its scan is read, and says that a power cut ended it', async () => {
+  h.tell('recorded 000007');
+  await tech.goto(`${h.url}#/monitoring/000007-1`);
+  await tech.getByText('The record is cut off').waitFor();
+  await tech.getByText('4.5 mm every 3.8 s').waitFor();
+  await tech.locator('dd', { hasText: 'IN: 4.3 min (90 %)' }).waitFor();
+  await tech.locator('li', { hasText: 'Too little of the body is seen.' }).waitFor();
+  await h.look(tech, 'monitor-record-phone');
+  const taken = await tech.evaluate(() => fetch('/api/v1/scans/000007/monitoring/1.csv?download')
+    .then((answer) => answer.headers.get('Content-Disposition')));
+  check(taken.includes('plumb_monitoring_000007_1.csv'), taken);
 });
 
 await h.finish();

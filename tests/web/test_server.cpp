@@ -265,6 +265,31 @@ FakeAppliance::Recorded Moved(Recorder& recorder, const std::string& axis, doubl
                                is_room_known);
 }
 
+/// As plumbd gives it.
+nlohmann::ordered_json MonitorReportOf(const std::string& scan) {
+  const nlohmann::ordered_json axis = {{"least", -0.6}, {"most", 1.4}, {"last", 0.3}};
+  nlohmann::ordered_json motion;
+  for (const NumberAxis& one : kNumberAxes) motion[one.key] = axis;
+  return {
+      {"head", {{"scan", scan}, {"judges", "since_zero"}, {"started_at", "2026-06-01T09:30:00Z"}}},
+      {"is_cut_off", true},
+      {"frames", 9000},
+      {"seconds", 300.0},
+      {"states_s", {{"mounting", 2.0}, {"zeroing", 8.6}, {"monitoring", 280.0}, {"blind", 9.4}}},
+      {"advice_s", {{"in", 261.0}, {"out", 19.0}, {"unknown", 9.4}}},
+      {"gaps_s", 0.4},
+      {"holds", 2},
+      {"drift", {{"least", 0.9998}, {"most", 1.0011}, {"last", 1.0009}}},
+      {"since_zero", motion},
+      {"against_reference", nullptr},
+      {"num_events", 3},
+      {"events",
+       {{{"time_s", 0.0}, {"event", "mounting"}},
+        {{"time_s", 12.0}, {"event", "advice_in"}},
+        {{"time_s", 100.0}, {"event", "blind"}, {"reason", "covered"}}}},
+      {"said", {{{"event", "zero"}, {"breathing", {{"amplitude_mm", 4.5}, {"period_s", 3.8}}}}}}};
+}
+
 void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command) {
   std::istringstream words(command);
   std::string name;
@@ -358,6 +383,19 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.status.fault_kind = is_full ? FaultKind::kStorage : FaultKind::kNone;
     service.status.fault = is_full ? say::upkeep::DiskFull(90, 700) : Message();
     service.Notify(web::EventKind::kStatus);
+  }
+  if (name == "breathe") {  // HEIGHT_MM ADVICE: of the breath, while a level is taught
+    double height_mm = 0;
+    std::string advice;
+    words >> height_mm >> advice;
+    service.monitor.breathing_mm = height_mm;
+    service.monitor.age_s = 0.03;
+    if (service.monitor.breath_hold) service.monitor.breath_hold->advice = advice;
+    service.Notify(web::EventKind::kMonitor);
+  }
+  if (name == "recorded") {  // SCAN: it was monitored, and a power cut ended that
+    words >> service.monitored_scan;
+    service.monitor_report = MonitorReportOf(service.monitored_scan);
   }
   if (name == "watch") {  // STATE ADVICE REASON VERTICAL_MM: what live monitoring says
     double vertical_mm = 0;

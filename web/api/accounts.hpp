@@ -161,6 +161,7 @@ class Accounts : public SessionLookup {
   PatientService& patients_;
   ReferenceService& references_;
   ScanService& scans_;
+  MonitoringService& monitoring_;
   CheckService& checks_;
   RoomCalibrationService& room_;
   SensorProfileService& profiles_;

@@ -18,6 +18,9 @@ void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::str
 /// Adds status and button, settings, audit log, updates and maintenance.
 void AddUnitApi(Routes& routes, const Services& services);
 
+/// Adds live monitoring and the records of its sessions.
+void AddMonitorApi(Routes& routes, const Services& services);
+
 /// Adds GET /result: the last result as a page without script.
 void AddResultPage(Routes& routes, const Services& services);
 

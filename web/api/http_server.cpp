@@ -58,6 +58,7 @@ class HttpServer::Impl {
  public:
   Impl(const Services& services, HttpServerOptions options)
       : appliance_(services.appliance),
+        monitoring_(services.monitoring),
         options_(Completed(std::move(options))),
         accounts_(services, options_, CertificateReplacer()),
         hub_({.all = options_.max_event_streams,
@@ -72,6 +73,7 @@ class HttpServer::Impl {
     AddScanApi(routes, services);
     AddUnitApi(routes, services);
     AddMetricsRoute(routes, services.appliance, options_.metrics_token);
+    AddMonitorApi(routes, services);
     AddResultPage(routes, services);
     AddExportRoutes(routes, services);
     AddRoomCalibrationRoutes(routes, services);
@@ -164,7 +166,8 @@ class HttpServer::Impl {
 
   static void AddPageRoutes(Routes& routes) {
     const auto serve = [](const Request& request) {
-      const Asset* asset = FindAsset(request.path == "/room" ? "/" : request.path);
+      const bool is_page = request.path == "/room" || request.path == "/breath";
+      const Asset* asset = FindAsset(is_page ? "/" : request.path);
       if (asset == nullptr) return ErrorResponse(404, say::web::NoSuchFile());
       const auto accepted = request.headers.find("accept-encoding");
       Response response;
@@ -180,7 +183,7 @@ class HttpServer::Impl {
       }
       return response;
     };
-    for (const char* pattern : {"/", "/room", "/assets/{name}"})
+    for (const char* pattern : {"/", "/room", "/breath", "/assets/{name}"})
       routes.Read(pattern, Permission::kNone, serve);
     routes.Read("/api/v1/events", Permission::kRoom, [](const Request&) {
       Response response = BodyResponse("text/event-stream", "");
@@ -206,7 +209,7 @@ class HttpServer::Impl {
   /// to reload.
   void OnEvent(EventKind kind) {
     if (kind == EventKind::kMonitor) {
-      if (hub_.size() > 0) hub_.Broadcast(Name(kind), Dump(MonitorJson(appliance_.GetMonitor())));
+      if (hub_.size() > 0) hub_.Broadcast(Name(kind), Dump(MonitorJson(monitoring_.GetMonitor())));
       return;
     }
     if (kind != EventKind::kStatus && kind != EventKind::kProgress)
@@ -217,6 +220,7 @@ class HttpServer::Impl {
   }
 
   ApplianceService& appliance_;
+  MonitoringService& monitoring_;
   HttpServerOptions options_;
   Router router_;
   Accounts accounts_;

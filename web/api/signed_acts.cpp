@@ -37,6 +37,16 @@ void Accounts::AddSignedActs(Routes& routes) {
                 scans_.AcceptScan(actor, scan, reason, std::move(done));
               };
             });
+  // Accepts the position that live monitoring shows, with a reason where it is out.
+  AddSigned(routes, "POST", "/api/v1/monitor/accept", Permission::kAccept,
+            [this](const Request&, Fields& fields) -> SignedAct {
+              const std::string reason = fields.Has("reason")
+                                             ? fields.Text("reason", kMinReason, kMaxReason)
+                                             : std::string();
+              return [this, reason](const Actor& actor, Done done) {
+                monitoring_.AcceptLive(actor, reason, std::move(done));
+              };
+            });
   AddSigned(routes, "POST", "/api/v1/treatment/fraction", Permission::kAccept,
             [this](const Request&, Fields& fields) -> SignedAct {
               const std::string session = fields.Text("session_id", 1, 64);

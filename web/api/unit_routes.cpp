@@ -65,29 +65,6 @@ void AddApplianceRoutes(Routes& routes, ApplianceService& appliance) {
                });
 }
 
-void AddMonitorRoutes(Routes& routes, ApplianceService& appliance) {
-  routes.Read("/api/v1/monitor", Permission::kRoom, [&appliance](const Request&) {
-    return JsonResponse(MonitorJson(appliance.GetMonitor()));
-  });
-  routes.Write("POST", "/api/v1/monitor/start", Permission::kScan, BodyKind::kNone,
-               [&appliance](const Request& request, const Done& done) {
-                 appliance.StartMonitor(request.actor(), done);
-               });
-  routes.Write("POST", "/api/v1/monitor/stop", Permission::kScan, BodyKind::kNone,
-               [&appliance](const Request& request, const Done& done) {
-                 appliance.StopMonitor(request.actor(), done);
-               });
-  routes
-      .ReadInBackground("/api/v1/monitor/record.csv", Permission::kView,
-                        [&appliance](const Request&) {
-                          std::string csv = appliance.MonitorRecord();
-                          if (csv.empty()) return ErrorResponse(404, say::web::NothingHere());
-                          return Download("text/csv; charset=utf-8", std::move(csv),
-                                          "plumb_monitoring.csv");
-                        })
-      .Discloses("", "download.monitoring");
-}
-
 void AddSettingsRoutes(Routes& routes, SettingsService& settings, AuditLog& audit) {
   routes
       .ReadInBackground(
@@ -176,7 +153,6 @@ void AddMaintenanceRoutes(Routes& routes, MaintenanceService& maintenance, Audit
 
 void AddUnitApi(Routes& routes, const Services& services) {
   AddApplianceRoutes(routes, services.appliance);
-  AddMonitorRoutes(routes, services.appliance);
   AddSettingsRoutes(routes, services.settings, services.audit);
   AddUpdateRoutes(routes, services.updates);
   AddMaintenanceRoutes(routes, services.maintenance, services.audit);

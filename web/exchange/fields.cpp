@@ -135,8 +135,13 @@ void Take(Fields& fields, const char* name, std::optional<int>& wanted, const Li
 void Take(Fields& fields, const char* name, std::optional<bool>& wanted) {
   wanted = fields.Flag(name);
 }
-void Take(Fields& fields, const char* /*posture*/, std::optional<std::string>& wanted) {
-  wanted = PostureIn(fields);
+void Take(Fields& fields, const char* name, std::optional<std::string>& wanted) {
+  if (std::string_view(name) == "posture") {
+    wanted = PostureIn(fields);
+    return;
+  }
+  wanted = fields.Text(name, 1, 16);
+  if (!IsAcceptLive(*wanted)) throw DataError(say::web::FieldAcceptLive());
 }
 
 }  // namespace

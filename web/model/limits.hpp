@@ -31,6 +31,7 @@ inline constexpr Limits kRotationTolerance_deg{.entered = {0.1, 20}, .stored = {
 inline constexpr Limits kAutoStop_s{.entered = {1, 120}, .stored = {0.1, 3600}};
 inline constexpr Limits kScanLimit_s{.entered = {5, 600}, .stored = {0.1, 3600}};
 inline constexpr Limits kRetention_days{.entered = {0, 36500}, .stored = {0, 1'000'000}};
+inline constexpr Limits kBreathWindow_mm{.entered = {1, 20}, .stored = {0.1, 100}};
 inline constexpr Limits kIdleLogout_min{.entered = {1, 240}, .stored = {1, 100'000}};
 
 /// Lengths of texts in bytes. A name is that of an account, a display, or a patient (its code).
@@ -42,11 +43,19 @@ inline constexpr std::uint64_t kMaxPlanningFile = std::uint64_t{64} << 20;
 inline constexpr std::size_t kMaxPlanningName = 4 * 64;
 inline constexpr int kMaxFraction = 999;
 
+/// How a position that live monitoring shows is accepted: by a sweep that confirms it, or by a
+/// person's signature on the live value.
+inline constexpr std::string_view kBySweep = "sweep", kBySignature = "signature";
+
 /// Head or feet first, supine or prone.
 inline constexpr auto kPostures = kNamesOf<PatientPosture>;
 
 [[nodiscard]] constexpr bool IsPosture(std::string_view text) {
   return Named<PatientPosture>(text).has_value();
+}
+
+[[nodiscard]] constexpr bool IsAcceptLive(std::string_view text) {
+  return text == kBySweep || text == kBySignature;
 }
 
 }  // namespace plumb

@@ -21,6 +21,18 @@ struct MotionNumbers {
   std::array<double, kNumberAxes.size()> value{}, u95{};  ///< In the order and units of the axes.
 };
 
+/// A window about a level of the breath that was taught.
+struct BreathHold {
+  double level_mm = 0.0, window_mm = 0.0;
+  std::string advice = "unknown";  ///< Of the breath alone.
+};
+
+/// A position that a person signed while it was monitored.
+struct AcceptedLive {
+  std::string by, at, reason;  ///< At: UTC. Reason: empty for one that was in.
+  MotionNumbers against_reference = {};
+};
+
 /// Numbers are never older than a second, and not judged after 150 ms: then state, advice and
 /// reason say so.
 struct MonitorStatus {
@@ -36,6 +48,8 @@ struct MonitorStatus {
   double shift_tolerance_mm = 0.0, rotation_tolerance_deg = 0.0;
   bool has_breathing = false;
   std::optional<double> breathing_mm = {};
+  std::optional<BreathHold> breath_hold = {};
+  std::optional<AcceptedLive> accepted = {};  ///< The last one of this session.
   bool couch_moved = false;
   std::int64_t frames = 0, frames_dropped = 0;
   double elapsed_s = 0.0;
@@ -44,6 +58,7 @@ struct MonitorStatus {
   std::vector<Message> warnings = {};
   Message ended = {};  ///< Not active: why it could not go on; empty if it was ended.
   bool has_record = false;
+  bool is_recorded = false;  ///< On the disk, beside the scan.
 };
 
 /// Null without numbers; names as in monitor.csv.
@@ -56,6 +71,19 @@ inline nlohmann::json MotionJson(const std::optional<MotionNumbers>& numbers) {
     json[std::string(axis.name) + "_u95_" + axis.unit] = numbers->u95[i];
   }
   return json;
+}
+
+inline nlohmann::json BreathHoldJson(const std::optional<BreathHold>& hold) {
+  if (!hold) return nullptr;
+  return {{"level_mm", hold->level_mm}, {"window_mm", hold->window_mm}, {"advice", hold->advice}};
+}
+
+inline nlohmann::json AcceptedJson(const std::optional<AcceptedLive>& accepted) {
+  if (!accepted) return nullptr;
+  return {{"by", accepted->by},
+          {"at", accepted->at},
+          {"reason", accepted->reason},
+          {"numbers", MotionJson(accepted->against_reference)}};
 }
 
 inline nlohmann::json MonitorJson(const MonitorStatus& status) {
@@ -76,12 +104,15 @@ inline nlohmann::json MonitorJson(const MonitorStatus& status) {
           {"rotation_tolerance_deg", status.rotation_tolerance_deg},
           {"has_breathing", status.has_breathing},
           {"breathing_mm", or_null(status.breathing_mm)},
+          {"breath_hold", BreathHoldJson(status.breath_hold)},
+          {"accepted", AcceptedJson(status.accepted)},
           {"couch_moved", status.couch_moved},
           {"frames", status.frames},
           {"frames_dropped", status.frames_dropped},
           {"elapsed_s", status.elapsed_s},
           {"latency_p95_ms", or_null(status.latency_ms)},
           {"has_record", status.has_record},
+          {"is_recorded", status.is_recorded},
           {"warnings", EnglishTexts(status.warnings)},
           {"warning_messages", MessagesJson(status.warnings)},
           {"ended", status.ended.English()},

@@ -21,6 +21,8 @@ struct Settings {
   bool keep_recordings = false;  ///< Keep the raw frames of scans, with colour.
   int retention_days = 0;        ///< Older scans are removed; 0: never. References are kept.
   int idle_logout_min = 15;
+  std::string accept_live{kBySweep};  ///< Or kBySignature.
+  double breath_window_mm = 3.5;      ///< Of a breath hold.
 };
 
 /// Calls visit(name, change, value, limits) for each of them, or without limits where it has none.
@@ -39,6 +41,8 @@ void ForEachSetting(Change& change, Values& values, const Visit& visit) {
   visit("keep_recordings", change.keep_recordings, values.keep_recordings);
   visit("retention_days", change.retention_days, values.retention_days, kRetention_days);
   visit("idle_logout_min", change.idle_logout_min, values.idle_logout_min, kIdleLogout_min);
+  visit("accept_live", change.accept_live, values.accept_live);
+  visit("breath_window_mm", change.breath_window_mm, values.breath_window_mm, kBreathWindow_mm);
 }
 
 /// Settings that are not set keep their stored value, so that two people who change different ones
@@ -50,6 +54,8 @@ struct SettingsChange {
   std::optional<double> auto_stop_s, scan_limit_s;
   std::optional<bool> keep_recordings;
   std::optional<int> retention_days, idle_logout_min;
+  std::optional<std::string> accept_live;
+  std::optional<double> breath_window_mm;
 
   SettingsChange() = default;
   /// Changes all of them.

@@ -15,6 +15,7 @@ import { showCheck } from './screens/check.js';
 import { stateHere } from './screens/common.js';
 import { showFault, showFirstPassword, showLogin } from './screens/login.js';
 import { showMonitor } from './screens/monitor.js';
+import { showMonitoringRecord } from './screens/monitoring_record.js';
 import { showPatient, showPatients } from './screens/patients.js';
 import { showPlan } from './screens/plan/plan.js';
 import { showResult } from './screens/result.js';
@@ -34,6 +35,7 @@ const kScreens = {
   scan: { show: showScan, permission: 'view', nav: true },
   result: { show: showResult, permission: 'view', nav: true },
   monitor: { show: showMonitor, permission: 'view', nav: true },
+  monitoring: { show: showMonitoringRecord, permission: 'view', parent: 'monitor' },
   check: { show: showCheck, permission: 'view', nav: true },
   users: { show: showUsers, permission: 'login', nav: true },
   audit: { show: showAudit, permission: 'audit', nav: true },
@@ -350,6 +352,9 @@ function listen() {
 
 if (location.pathname === '/room') {
   import('./screens/room.js').then(({ showRoom }) => showRoom(main, { speak, applyTheme }))
+    .catch(report);
+} else if (location.pathname === '/breath') {
+  import('./screens/breath.js').then(({ showBreath }) => showBreath(main, { speak, applyTheme }))
     .catch(report);
 } else {
   listen();

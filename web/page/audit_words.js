@@ -29,7 +29,8 @@ function planChange(detail) {
 
 /// Each setting that was changed, before and after.
 const settingsWords = (changes) => Object.entries(changes).map(([name, values]) => {
-  const told = (value) => (name === 'posture' ? wordOf(S.plan.postures, value) : plain(value));
+  const words = { posture: S.plan.postures, accept_live: S.settings.acceptLiveBy }[name];
+  const told = (value) => (words ? wordOf(words, value) : plain(value));
   return `${wordOf(S.settings, name)}: ${[values].flat().map(told).join(' → ')}`;
 }).join('; ');
 

@@ -9,6 +9,7 @@ export const kBounds = {
   scan_limit_s: { min: 5, max: 600, step: 1 },
   retention_days: { min: 0, max: 36500, step: 1 },
   idle_logout_min: { min: 1, max: 240, step: 1 },
+  breath_window_mm: { min: 1, max: 20, step: 0.5 },
 };
 export const kFraction = { min: 1, max: 999, step: 1 };
 

@@ -8,7 +8,6 @@
 
 #include "web/model/account.hpp"
 #include "web/model/change.hpp"
-#include "web/model/monitoring.hpp"
 #include "web/model/status.hpp"
 
 namespace plumb::web {
@@ -19,7 +18,7 @@ enum class EventKind {
   kResult,    ///< A scan ended: ask GetStatus().
   kData,      ///< Patients, references, scans, users or settings changed.
   kUpdate,    ///< Ask GetUpdate().
-  kMonitor,   ///< Ask GetMonitor().
+  kMonitor,   ///< Ask MonitoringService::GetMonitor().
 };
 
 /// The rules of services.hpp hold.
@@ -45,13 +44,6 @@ class ApplianceService {
   virtual void EndSweep(const Actor& actor, Done done) = 0;
   /// Like a long press: discards the scan.
   virtual void Cancel(const Actor& actor, Done done) = 0;
-  /// Live monitoring, also where none goes on.
-  [[nodiscard]] virtual MonitorStatus GetMonitor() = 0;
-  /// Begins or ends it: kConflict where it cannot.
-  virtual void StartMonitor(const Actor& actor, Done done) = 0;
-  virtual void StopMonitor(const Actor& actor, Done done) = 0;
-  /// (background) monitor.csv of the present or last session since the start; empty without one.
-  [[nodiscard]] virtual std::string MonitorRecord() = 0;
   /// Called on the loop thread. One listener; an empty function removes it.
   virtual void SetListener(std::function<void(EventKind)> listener) = 0;
 };

@@ -6,6 +6,7 @@
 #include "web/service/account_services.hpp"
 #include "web/service/appliance_service.hpp"
 #include "web/service/background_work.hpp"
+#include "web/service/monitoring_service.hpp"
 #include "web/service/patient_services.hpp"
 #include "web/service/room_services.hpp"
 #include "web/service/scan_service.hpp"
@@ -28,6 +29,7 @@ struct Services {
   PatientService& patients;
   ReferenceService& references;
   ScanService& scans;
+  MonitoringService& monitoring;
   CheckService& checks;
   RoomCalibrationService& room;
   SensorProfileService& profiles;

@@ -13,9 +13,12 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "daemon/appliance/live_acceptance.hpp"
+#include "daemon/files/monitoring_file.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "tests/support/rest_frames.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "web/model/limits.hpp"
 
 namespace plumb::testing {
 namespace {
@@ -30,13 +33,16 @@ class LiveMonitoringTest : public ::testing::Test {
   LiveMonitoringTest() {
     WriteScene(scene_, folder_ / "scene");
     monitoring_.SetGate([this](bool is_in) { gate_.push_back(is_in); });
-    monitoring_.SetHooks({.ask = [](bool, const Actor&) { return Message(); },
-                          .changed = [this] { patterns_.push_back(monitoring_.Pattern()); },
-                          .failed =
-                              [this](const Message& why) {
-                                failure_ = why;
-                                failed_.set_value();
-                              }});
+    monitoring_.SetHooks(
+        {.ask = [](bool, const Actor&) { return Message(); },
+         .changed = [this] { patterns_.push_back(monitoring_.Pattern()); },
+         .failed =
+             [this](const Message& why) {
+               failure_ = why;
+               failed_.set_value();
+             },
+         .recorded = [this](const std::string& scan,
+                            const std::string& file) { recorded_.set_value(scan + '/' + file); }});
     notices_.SetWatchers([this](const std::string& line) {
       events_.push_back(nlohmann::json::parse(line));
       told_.release();
@@ -69,7 +75,7 @@ class LiveMonitoringTest : public ::testing::Test {
     On([&] { event = events_.back(); });
     return event;
   }
-  void Begin() {
+  void Begin(std::optional<MonitorRecordPlace> record = {}, const Message& why_no_record = {}) {
     On([&] {
       feed_ = monitoring_.Begin({.info = frames_.info(),
                                  .compare = {},
@@ -77,8 +83,9 @@ class LiveMonitoringTest : public ::testing::Test {
                                  .scene = folder_ / "scene",
                                  .reference_scene = {},
                                  .check_reference = {},
+                                 .record = std::move(record),
                                  .queue_capacity = 1000},
-                                "scan-1", "patient-1");
+                                "scan-1", "patient-1", why_no_record);
     });
   }
   void Push(double until_s) {
@@ -114,6 +121,7 @@ class LiveMonitoringTest : public ::testing::Test {
   std::vector<nlohmann::json> events_;
   Message failure_;
   std::promise<void> failed_;
+  std::promise<std::string> recorded_;
   std::counting_semaphore<> told_{0};  ///< Released by each event.
   double time_s_ = 50.0;
 };
@@ -169,6 +177,126 @@ TEST_F(LiveMonitoringTest, ComesInAndAnOldNumberBecomesUnknownThenGoes) {
       EXPECT_FALSE(gate_.back());
     });
   });
+}
+
+TEST_F(LiveMonitoringTest, TheGateHoldsOutsideTheTaughtBreathAndTheRecordTellsIt) {
+  Play([&] {
+    BreathHold taught;
+    On([&] { EXPECT_FALSE(monitoring_.TeachBreath(3.0, taught).empty()) << "none goes on"; });
+    Begin(MonitorRecordPlace{.scan = folder_.path(), .head = {{"scan", "scan-1"}}});
+    Push(60.0);
+    ASSERT_TRUE(PushUntil([](const MonitorStatus& now) { return now.advice == "in"; }));
+    EXPECT_TRUE(Status().is_recorded);
+    EXPECT_FALSE(Status().breath_hold);
+    // The body breathes by 6 mm: what is taught at the end of an expiration is left by the next
+    // breath, though the body lies still.
+    const auto teach = [&](const MonitorStatus&) {
+      Message why;
+      On([&] { why = monitoring_.TeachBreath(3.0, taught); });
+      return why.empty();
+    };
+    ASSERT_TRUE(PushUntil(teach));
+    EXPECT_EQ(taught.window_mm, 3.0);
+    ASSERT_TRUE(PushUntil([](const MonitorStatus& now) {
+      return now.breath_hold && now.breath_hold->advice == "out";
+    }));
+    EXPECT_EQ(Status().advice, "out");
+    EXPECT_NEAR(Status().breath_hold->level_mm, taught.level_mm, 1e-9);
+    ASSERT_TRUE(PushUntil([](const MonitorStatus& now) { return now.advice == "in"; }));
+    On([&] {
+      EXPECT_TRUE(monitoring_.ForgetBreath().empty());
+      EXPECT_FALSE(monitoring_.ForgetBreath().empty()) << "once";
+      monitoring_.NoteAccepted({.by = "anna", .at = "now", .reason = "", .against_reference = {}},
+                               "in");
+    });
+    EXPECT_EQ(Status().accepted->by, "anna");
+    On([&] { (void)monitoring_.End({}); });
+    std::future<std::string> recorded = recorded_.get_future();
+    ASSERT_EQ(recorded.wait_for(20s), std::future_status::ready);
+    EXPECT_EQ(recorded.get(), "scan-1/monitoring/01.plm");
+  });
+  const StoredMonitoring stored = ReadMonitoringFile(folder_ / "monitoring/01.plm");
+  EXPECT_FALSE(stored.is_cut_off);
+  std::vector<std::string> events;
+  for (const nlohmann::json& event : stored.events) events.push_back(event.at("event"));
+  EXPECT_THAT(events, ::testing::ElementsAre("zero", "breath_taught", "breath_forgotten",
+                                             "accepted", "ended"));
+  EXPECT_EQ(MonitoringCsv(stored.record).substr(0, 400), monitoring_.Record()->Csv().substr(0, 400))
+      << "before the first numbers both have the same";
+}
+
+TEST_F(LiveMonitoringTest, GoesOnWithoutARecordAndSaysSo) {
+  Play([&] {
+    Begin({}, Message::Verbatim("no room"));
+    EXPECT_FALSE(Status().is_recorded);
+    ASSERT_EQ(Status().warnings.size(), 1u);
+    On([&] { (void)monitoring_.End({}); });
+    Begin(MonitorRecordPlace{.scan = folder_ / "gone", .head = {{"scan", "scan-1"}}});
+    Push(time_s_ + 1.0);
+    ASSERT_TRUE(Becomes([](const MonitorStatus& now) { return !now.is_recorded; }));
+    EXPECT_EQ(Status().warnings.size(), 1u);
+    EXPECT_EQ(Status().state, "mounting");
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "gone"));
+    On([&] { (void)monitoring_.End({}); });
+  });
+}
+
+class LiveAcceptanceTest : public ::testing::Test {
+ protected:
+  LiveAcceptanceTest() {
+    now_.active = now_.judges_reference = true;
+    now_.state = "monitoring";
+    now_.advice = "in";
+    now_.age_s = 0.05;
+    now_.against_reference.emplace().value = {1.25, -0.5, 0, 0, 0, 0.1};
+  }
+  [[nodiscard]] bool May(bool has_reason = false) const {
+    return WhyNotAcceptLive(now_, kBySignature, has_reason).empty();
+  }
+  MonitorStatus now_;
+};
+
+TEST_F(LiveAcceptanceTest, OnlyWhereASignatureIsAskedFor) {
+  EXPECT_TRUE(May());
+  EXPECT_FALSE(WhyNotAcceptLive(now_, kBySweep, true).empty());
+  EXPECT_FALSE(WhyNotAcceptLive(now_, "", true).empty());
+  now_.active = false;
+  EXPECT_FALSE(May());
+}
+
+TEST_F(LiveAcceptanceTest, OnlyWhatIsKnownNow) {
+  const MonitorStatus good = now_;
+  for (const char* state : {"mounting", "zeroing", "blind", "moved_sensor"}) {
+    now_.state = state;
+    EXPECT_FALSE(May()) << state;
+  }
+  now_ = good;
+  now_.advice = "unknown";
+  EXPECT_FALSE(May(true));
+  now_ = good;
+  now_.age_s = kLongestGap_s;
+  EXPECT_TRUE(May());
+  now_.age_s = kLongestGap_s + 0.001;
+  EXPECT_FALSE(May());
+  now_.age_s.reset();
+  EXPECT_FALSE(May());
+}
+
+TEST_F(LiveAcceptanceTest, OnlyAgainstAReference) {
+  now_.judges_reference = false;
+  EXPECT_FALSE(May());
+  now_.judges_reference = true;
+  now_.against_reference.reset();
+  now_.since_zero.emplace();
+  EXPECT_FALSE(May());
+}
+
+TEST_F(LiveAcceptanceTest, OutOfToleranceOnlyWithAReason) {
+  now_.advice = "out";
+  EXPECT_FALSE(May());
+  EXPECT_TRUE(May(true));
+  EXPECT_THAT(DescribeAccepted(now_, "swelling").English(),
+              ::testing::AllOf(HasSubstr("out"), HasSubstr("+1.25 mm"), HasSubstr("swelling")));
 }
 
 TEST_F(LiveMonitoringTest, ASceneThatCannotBeReadFails) {

@@ -22,6 +22,7 @@ using ::testing::UnorderedElementsAreArray;
 const std::set<std::string> kWithoutPatients = {
     "/",
     "/room",
+    "/breath",
     "/assets/{name}",
     "/health",
     "/api/v1/session",

@@ -98,6 +98,7 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
                                      {"auto_stop_s", kAutoStop_s},
                                      {"scan_limit_s", kScanLimit_s},
                                      {"retention_days", kRetention_days},
+                                     {"breath_window_mm", kBreathWindow_mm},
                                      {"idle_logout_min", kIdleLogout_min}}) {
     const auto [least, most] = limits.entered;
     EXPECT_THAT(Stated(page, name, "min"), ElementsAre(least)) << name;

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Live monitoring: how far the body has moved, now. An old number is never shown as a new one: it
 // is grey after 200 ms and gone after a second, also where the appliance says nothing more.
-import { currentSession, get, live, may, post, since_s } from '../api.js';
 import {
-  action, clear, done, enable, h, hint, saveFrom, say, svg,
+  currentSession, get, getOrNull, live, may, post, since_s,
+} from '../api.js';
+import {
+  action, card, clear, done, enable, field, h, hint, redraw, saveFrom, say, signedTime, svg,
 } from '../dom.js';
+import { kReason } from '../limits.js';
 import { kAxes, mostDigits, signed, toleranceBar, withUnit } from '../numbers.js';
-import { S, said } from '../words.js';
-import { follow } from './common.js';
+import { signedForm } from '../signed_form.js';
+import { S, said, saidEach } from '../words.js';
+import { follow, sentence } from './common.js';
 
 const kGrey_s = 0.2;
 const kUnknown_s = 0.15;
@@ -33,6 +37,8 @@ export function presentOf(monitor, received_s) {
     since_zero: isGone ? null : monitor.since_zero,
     against_reference: isGone ? null : monitor.against_reference,
     breathing_mm: isGone ? null : monitor.breathing_mm,
+    breath_hold: monitor.breath_hold && isLate ? { ...monitor.breath_hold, advice: 'unknown' }
+      : monitor.breath_hold ?? null,
   };
 }
 
@@ -172,21 +178,82 @@ export function monitorView() {
   };
 }
 
+const acceptedMark = ({ reason }) => (reason ? kMarks.out : kMarks.in);
+
+/// A person signs what is shown now, where the settings let that accept a position.
+function acceptance(settings) {
+  const text = S.monitor;
+  const accepted = h('p', { class: 'badge wide in_tolerance', hidden: true });
+  const bySignature = settings?.accept_live === 'signature';
+  const reason = h('input', { autocomplete: 'off', ...kReason });
+  const sign = bySignature && may('accept') && signedForm({ class: 'form inline' },
+    async (proof) => {
+      const why = reason.value.trim();
+      await post('monitor/accept', { ...(why && { reason: why }), ...proof() });
+      reason.value = '';
+      done(S.saved);
+    }, h('button', { class: 'primary' }, text.accept), field(text.acceptReason, reason));
+  const element = card(text.acceptTitle, hint(bySignature ? text.acceptBySignature
+    : text.acceptBySweep), accepted, sign);
+  return {
+    element,
+    draw(monitor) {
+      element.hidden = !(monitor?.active && monitor.judges === 'against_reference');
+      const last = monitor?.accepted;
+      accepted.hidden = !last;
+      accepted.textContent = last ? `${acceptedMark(last)} ${
+        text.accepted(last.by, signedTime(last.at))}` : '';
+    },
+  };
+}
+
+/// The level of a breath hold is taught, and its window shown.
+function breathHold() {
+  const text = S.monitor;
+  const isHeld = h('p', { class: 'lead' });
+  const teach = action(text.teach, () => post('monitor/breath/teach'), {});
+  const forget = action(text.forget, () => post('monitor/breath/forget'), {});
+  const element = card(text.holdTitle, hint(text.holdHint), isHeld,
+    may('scan') && h('div', { class: 'row' }, teach, forget), hint(text.breathScreen));
+  return {
+    element,
+    draw(monitor) {
+      element.hidden = !(monitor?.active && monitor.has_breathing);
+      const hold = monitor?.breath_hold;
+      forget.hidden = !hold;
+      const words = hold ? `${text.holdIs(hold.level_mm, hold.window_mm)} · ${
+        text.holdAdvice[hold.advice]}` : '';
+      if (isHeld.textContent !== words) isHeld.textContent = words;
+    },
+  };
+}
+
 export async function showMonitor(place) {
   const text = S.monitor;
+  const settings = await getOrNull('settings');
+  const accept = acceptance(settings);
+  const hold = breathHold();
   const view = monitorView();
   const start = action(text.start, () => post('monitor/start'), { class: 'primary giant' });
   const stop = action(text.stop, async () => {
     await post('monitor/stop');
     done(S.monitor.off);
   }, { class: 'danger giant' });
+  // What it goes on without, such as its record on the disk.
+  const warnings = h('ul', { class: 'caution', hidden: true });
+  const drawWarnings = () => {
+    const words = live.monitor?.active ? saidEach(live.monitor, 'warnings') : [];
+    warnings.hidden = !words.length;
+    redraw(warnings, words.map((one) => h('li', {}, sentence(one))));
+  };
   const record = h('button', {
     class: 'quiet', type: 'button',
     onclick: () => saveFrom('/api/v1/monitor/record.csv', 'plumb_monitoring.csv'),
   }, text.record);
   clear(place, h('h1', {}, text.title),
-    h('section', { class: 'card' }, view.element, hint(text.motion)),
-    may('scan') && h('div', { class: 'controls' }, start, stop), hint(text.hint), record);
+    h('section', { class: 'card' }, view.element, warnings, hint(text.motion)),
+    may('scan') && h('div', { class: 'controls' }, start, stop), hint(text.hint),
+    accept.element, hold.element, record);
   const draw = () => {
     const { status } = live;
     if (!status || !currentSession()) return;
@@ -196,6 +263,10 @@ export async function showMonitor(place) {
     enable(start, live.connected && (status.state === 'ready' || status.state === 'result'));
     enable(stop, live.connected);
     record.hidden = !live.monitor?.has_record;
+    drawWarnings();
+    const now = presentOf(live.monitor, live.monitor ? since_s(live.monitorAt) : 0);
+    accept.draw(now);
+    hold.draw(now);
   };
   await askMonitor();
   draw();

@@ -12,6 +12,7 @@ import { actions } from './accept.js';
 import { findings, follow, isAdvice, partsOf, sentence } from './common.js';
 import { couchReadings } from './couch.js';
 import { meshView } from './mesh_view.js';
+import { recordsOf } from './monitoring_record.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
 
 /// The newest finished scan: of this run of the appliance, else the newest that is stored.
@@ -124,6 +125,7 @@ function build(data, reload, id) {
     words: h('div', {}),
     map: h('div', {}, hint(S.loading)),
     mesh: h('div', {}),
+    records: h('div', {}),
     overlay: h('div', {}, hint(S.loading)),
     actions: actions(data, reload),
     fresh: h('div', { class: 'fresh' }),
@@ -144,7 +146,7 @@ function build(data, reload, id) {
     parts.note.element, parts.other,
     parts.fresh,
     h('section', { class: 'card actions' }, parts.actions.element),
-    data.details && data.quality && card(text.trust, trust(data)),
+    data.details && data.quality && card(text.trust, trust(data)), parts.records,
     mapped && card(text.where, parts.words, parts.map),
     pictures,
     scan.result && card(text.trend,
@@ -200,6 +202,7 @@ export async function showResult(place, id) {
     };
     tick();
     stopMesh();
+    recordsOf(data.scan).then((records) => mine === turn && clear(parts.records, records));
     const tolerance = toleranceOf(data.reference);
     let map = null;
     if (data.details?.alignment && data.reference) {

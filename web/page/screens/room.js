@@ -394,7 +394,8 @@ function display(main, speak) {
   draw();
 }
 
-export async function showRoom(main, { speak, applyTheme }) {
+/// @param screen  What is drawn once the display is paired, or somebody is logged in.
+export async function showRoom(main, { speak, applyTheme }, screen = display) {
   document.documentElement.classList.add('room-page');
   const key = takeKey();
   const asked = new URLSearchParams(location.search);
@@ -425,5 +426,5 @@ export async function showRoom(main, { speak, applyTheme }) {
     }
   }
   setLoggedOffHandler(() => location.reload());
-  display(main, speak);
+  screen(main, speak);
 }

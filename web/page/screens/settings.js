@@ -76,11 +76,13 @@ export async function showSettings(place) {
   });
   const posture = select(S.plan.postures, settings.posture,
     { required: true, disabled: !editable });
+  const acceptLive = select(text.acceptLiveBy, settings.accept_live,
+    { required: true, disabled: !editable });
   const alert = fault && h('p', { class: 'caution', role: 'alert' }, text.enterAll, ' ',
     h('code', {}, fault));
   let stored = settings;
   const entered = () => ({
-    posture: posture.value,
+    posture: posture.value, accept_live: acceptLive.value,
     ...Object.fromEntries(Object.keys(kBounds).map((name) => [name, Number(inputs[name].value)])),
     ...Object.fromEntries(kFlags.map((name) => [name, inputs[name].isOn()])),
   });
@@ -92,6 +94,7 @@ export async function showSettings(place) {
     if (changed.length) await put('settings', Object.fromEntries(changed));
     stored = await get('settings').catch(() => ({ ...stored, ...wanted }));
     posture.value = stored.posture;
+    acceptLive.value = stored.accept_live;
     for (const name of Object.keys(kBounds)) inputs[name].value = stored[name];
     for (const name of kFlags) inputs[name].turn(stored[name]);
     alert?.remove();
@@ -100,7 +103,7 @@ export async function showSettings(place) {
   clear(place, h('h1', {}, text.title), !editable && h('p', { class: 'lead' }, text.readOnly),
     alert,
     h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
-      field(text.posture, posture), flags,
+      field(text.posture, posture), field(text.accept_live, acceptLive), flags,
       editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),
     profileCard(), editable && backupCard(),
     editable && certificateCard());
