@@ -99,11 +99,12 @@ function buildTop(session) {
   nav.addEventListener('click', () => open(false));
   clear(top,
     h('a', { class: 'brand', href: '#/status' }, S.product), menu, nav,
-    h('p', { class: 'chip', id: 'chip' }),
-    h('p', { class: 'who' }, session.is_quick ? S.login.quickly(session.user)
-      : S.loggedInAs(session.user, S.roles[session.role])),
-    looks(session.user), handOverButton(session),
-    h('button', { class: 'quiet log-out', onclick: () => leave().catch(report) }, S.logOut));
+    h('div', { class: 'mine' },
+      h('p', { class: 'chip', id: 'chip' }),
+      h('p', { class: 'who' }, session.is_quick ? S.login.quickly(session.user)
+        : S.loggedInAs(session.user, S.roles[session.role])),
+      looks(session.user), handOverButton(session),
+      h('button', { class: 'quiet log-out', onclick: () => leave().catch(report) }, S.logOut)));
 }
 
 /// There while somebody else of the shift can take over here.

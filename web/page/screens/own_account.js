@@ -64,7 +64,8 @@ export function ownPin() {
         if (fresh.value !== again.value) throw new Error(text.differ);
         await put('session/pin', { pin: fresh.value, ...sign() });
         await saved(S.saved);
-      }, h('button', {}, text.set), field(text.fresh, fresh), field(text.repeat, again)),
+      }, h('button', {}, text.set), field(text.fresh, fresh, text.freshHint),
+      field(text.repeat, again)),
       has && h('details', {}, h('summary', {}, `${text.remove}…`),
         signedForm({ class: 'form inline' }, async (sign) => {
           await removeFor('session/pin', sign());
