@@ -311,7 +311,7 @@ void TrendOf(Pages& pages, const std::vector<CourseRow>& rows, std::size_t numbe
   }
 }
 
-constexpr double kTrendHeight = 62, kTrendRow = kTrendHeight + 24;
+constexpr double kTrendHeight = 62, kTrendRow = kTrendHeight + 30;
 
 /// The six, three in a row.
 void Trends(Pages& pages, const std::vector<CourseRow>& rows, const std::array<double, 2>& limits,
@@ -330,6 +330,10 @@ void Trends(Pages& pages, const std::vector<CourseRow>& rows, const std::array<d
     if (limit > 0) name += fmt::format("  \u00b1{}", PlainNumber(limit, language.decimal));
     pages.Text(x, row + 12, name, 8, kGrey);
     TrendOf(pages, rows, i, limit, x, row + 16, width, kTrendHeight);
+    const double below = row + 16 + kTrendHeight + 8;  // the first and the last fraction
+    pages.Text(x, below, rows.front().fraction, 7, kGrey);
+    const std::string& last = rows.back().fraction;
+    pages.Text(x + width - pages.Width(last, 7), below, last, 7, kGrey);
   }
   pages.y = top + 2 * kTrendRow;
 }
@@ -450,6 +454,7 @@ void Draw(Pages& pages, const ScanReport& report) {
     Heading(pages, Word(say::result::kReportQuality, *report.language));
     Facts(pages, report.quality);
   }
+  if (pages.y + kSignature > pages.bottom()) pages.Next();
   SignatureLine(pages, *report.language);
   std::array<double, 2> limits{};
   for (const ShownRow& number : report.numbers)
