@@ -106,9 +106,12 @@ Appliance::Answer Appliance::WhyNotIdle() const {
   return IsRunning() ? say::scan::WaitForResult() : Message();
 }
 
-/// Without a running scan and a shown result, a long press ends the treatment session. A short one
-/// starts monitoring where the sensor is at rest, as light and screens have said before.
+/// Without a running scan and a shown result, a long press ends what the screens say is in hand: a
+/// daily check that was opened, else the treatment session. A short one starts monitoring where the
+/// sensor is at rest, as light and screens have said before.
 Appliance::Answer Appliance::Press(ButtonPress press, const Actor& actor) {
+  if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady && session_.check())
+    return LeaveCheck(actor);
   if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady && session_.IsOpen() &&
       session_.IsPatients())
     return CloseSession(actor);
@@ -239,6 +242,15 @@ Appliance::Answer Appliance::OpenCheck(const Actor& actor) {
   if (Message why = WhyNotIdle(); !why.empty()) return why;
   session_.SetCheck(actor);
   notices_.TellPage(web::EventKind::kStatus);
+  return {};
+}
+
+Appliance::Answer Appliance::LeaveCheck(const Actor& actor) {
+  if (Message why = WhyNotIdle(); !why.empty()) return why;
+  if (!session_.check()) return say::scan::NoCheckOpen();
+  session_.SetCheck({});
+  notices_.TellPage(web::EventKind::kStatus);
+  Audit(actor, "check.leave", "", {});
   return {};
 }
 

@@ -90,11 +90,14 @@ std::optional<Pose> RoomInUse::T_iec_reference() const {
   return room_.calibration ? room_.calibration->fit.T_iec_reference : room_.configured;
 }
 
-std::optional<RoomWays> RoomInUse::In(const MarkerMap& scene) const {
+std::optional<Pose> RoomInUse::AxesIn(const MarkerMap& scene) const {
   const std::lock_guard lock(mutex_);
   if (!room_.due.empty()) return std::nullopt;
-  const std::optional<Pose> T_iec_scene =
-      room_.calibration ? RoomOf(room_.calibration->fit.markers_iec, scene) : room_.configured;
+  return room_.calibration ? RoomOf(room_.calibration->fit.markers_iec, scene) : room_.configured;
+}
+
+std::optional<RoomWays> RoomInUse::In(const MarkerMap& scene) const {
+  const std::optional<Pose> T_iec_scene = AxesIn(scene);
   return T_iec_scene ? std::optional(WaysOfRoom(*T_iec_scene)) : std::nullopt;
 }
 

@@ -31,6 +31,9 @@ class RoomInUse {
   void Refresh();
   /// For the comparison of the next scan.
   [[nodiscard]] std::optional<RoomAxes> OfJob() const;
+  /// The room's axes on the maps of a scene, as a comparison with it would find them; not set if
+  /// the room is not known. From any thread.
+  [[nodiscard]] std::optional<Pose> AxesIn(const MarkerMap& scene) const;
   /// Where the gantry is on the maps of a scene, as a comparison with it would find it; not set if
   /// the room is not known. From any thread.
   /// @param scene  Its markers: the reference marker may have lain otherwise than when the room

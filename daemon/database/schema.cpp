@@ -205,6 +205,11 @@ CREATE TABLE second_factors (
   last_step INTEGER NOT NULL,
   recovery TEXT NOT NULL
 ) STRICT;
+-- The hash of a person's PIN or badge. A version that does not know it asks for the password.
+CREATE TABLE pins (
+  user TEXT PRIMARY KEY REFERENCES users(name) ON DELETE CASCADE,
+  hash TEXT NOT NULL
+) STRICT;
 -- The digest that an approval signed, from the log for earlier ones; never changed once it is there.
 -- 0.2.0 leaves it empty.
 ALTER TABLE refs ADD COLUMN approved_digest TEXT NOT NULL DEFAULT '';

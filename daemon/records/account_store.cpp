@@ -122,6 +122,26 @@ void UserStore::SetSecondFactor(const Actor& actor, const std::string& name,
   change.Commit();
 }
 
+std::optional<std::string> UserStore::PinOf(const std::string& name) {
+  return database_.ForRows()->First(
+      "SELECT hash FROM pins WHERE user = ?", [](const Statement& row) { return row.Text(0); },
+      name);
+}
+
+void UserStore::SetPin(const Actor& actor, const std::string& name,
+                       const std::optional<std::string>& hash) {
+  StoreChange change(database_);
+  if (!change->Has("SELECT 1 FROM users WHERE name = ?", name))
+    throw StoreRefusal(ChangeResult::kNotFound, say::store::NoAccount());
+  if (hash) {
+    change->Run("INSERT OR REPLACE INTO pins (user, hash) VALUES (?, ?)", name, *hash);
+  } else {
+    change->Run("DELETE FROM pins WHERE user = ?", name);
+  }
+  change.Log(actor, hash ? "user.pin_set" : "user.pin_removed", name, {});
+  change.Commit();
+}
+
 Preferences UserStore::PreferencesOf(const std::string& name) {
   const auto read = [](const Statement& row) {
     return Preferences{.language = row.Text(0), .theme = row.Text(1)};

@@ -28,6 +28,9 @@ class UserStore {
   void SetSecondFactor(const Actor& actor, const std::string& name,
                        const std::optional<SecondFactor>& expected,
                        const std::optional<SecondFactor>& wanted, const std::string& action);
+  /// As AccountService::FindPin() and SetPin().
+  [[nodiscard]] std::optional<std::string> PinOf(const std::string& name);
+  void SetPin(const Actor& actor, const std::string& name, const std::optional<std::string>& hash);
   /// Empty if none were chosen.
   [[nodiscard]] Preferences PreferencesOf(const std::string& name);
   /// Without an entry in the log. kNotFound for a name that no account has.

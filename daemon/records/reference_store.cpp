@@ -212,7 +212,8 @@ std::string ReferenceStore::Plan(const Actor& actor, const std::string& id, int 
 }
 
 void ReferenceStore::Approve(const Actor& actor, const std::string& id, int revision,
-                             const std::string& digest, bool two_users, const std::string& reason) {
+                             const std::string& digest, bool two_users, const std::string& reason,
+                             bool posture_confirmed) {
   const std::int64_t number = RequireId(id, "reference");
   if (const std::optional<Reference> reference = Find(id)) {  // before the lock is taken
     const Message fault = integrity_.Check(reference->scan_id, /*scene_only=*/true);
@@ -236,9 +237,10 @@ void ReferenceStore::Approve(const Actor& actor, const std::string& id, int revi
   if (two_users) RequireSecondPerson(*reference, actor);
   change->Run("UPDATE refs SET approved_by = ?, approved_at = ?, approved_digest = ? WHERE id = ?",
               actor.user, StoredNow(), reference->digest, number);
-  change.Log(actor, "reference.approve", id,
-             reason.empty() ? say::store::LogDigest(reference->digest)
-                            : say::store::LogDigestReason(reference->digest, reason));
+  Message approval = reason.empty() ? say::store::LogDigest(reference->digest)
+                                    : say::store::LogDigestReason(reference->digest, reason);
+  if (posture_confirmed) approval = say::store::LogPostureConfirmed(std::move(approval));
+  change.Log(actor, "reference.approve", id, approval);
   change.Commit();
 }
 

@@ -43,7 +43,7 @@ class ReferenceStore {
   /// @param reason  Why a scan with cautions becomes the reference, for the log; may be empty.
   void Approve(const Actor& actor, const std::string& id, int revision,
                const std::string& digest = {}, bool two_users = true,
-               const std::string& reason = {});
+               const std::string& reason = {}, bool posture_confirmed = false);
 
  private:
   StoreDatabase& database_;

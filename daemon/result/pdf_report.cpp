@@ -17,6 +17,7 @@
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/utf8.hpp"
+#include "drivers/files/image_file.hpp"
 #include "words/result.hpp"
 
 namespace plumb {
@@ -38,7 +39,7 @@ struct Ink {
   double r, g, b;
 };
 constexpr Ink kBlack{0.08, 0.1, 0.12}, kGrey{0.38, 0.43, 0.48}, kLine{0.75, 0.79, 0.82};
-constexpr Ink kGood{0.04, 0.4, 0.24}, kMove{0.58, 0.3, 0.0};
+constexpr Ink kShade{0.89, 0.92, 0.94}, kGood{0.04, 0.4, 0.24}, kMove{0.58, 0.3, 0.0};
 
 /// Points, y down.
 class Pages {
@@ -96,6 +97,24 @@ class Pages {
     cairo_line_to(context_.get(), paper_.width - kMargin, at);
     cairo_stroke(context_.get());
   }
+  void Line(double x0, double y0, double x1, double y1, Ink ink, double line_width) {
+    cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
+    cairo_set_line_width(context_.get(), line_width);
+    cairo_move_to(context_.get(), x0, y0);
+    cairo_line_to(context_.get(), x1, y1);
+    cairo_stroke(context_.get());
+  }
+  void Box(double x, double top, double width, double height, Ink ink) {
+    cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
+    cairo_rectangle(context_.get(), x, top, width, height);
+    cairo_fill(context_.get());
+  }
+  void Dot(double x, double at, double radius, Ink ink) {
+    constexpr double kTurn = 6.283185307179586;
+    cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
+    cairo_arc(context_.get(), x, at, radius, 0, kTurn);
+    cairo_fill(context_.get());
+  }
   /// CV_8UC3 RGB, as large as fits.
   void Picture(const cv::Mat& rgb, double x, double top, double width, double height) {
     const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> image(
@@ -103,6 +122,7 @@ class Pages {
     if (cairo_surface_status(image.get()) != CAIRO_STATUS_SUCCESS)
       throw IoError("cannot draw the report: not enough memory for a picture");
     FillSurface(image.get(), rgb);
+    AttachJpeg(image.get(), rgb);
     const double scale = std::min(width / rgb.cols, height / rgb.rows);
     const double w = rgb.cols;
     cairo_save(context_.get());
@@ -143,6 +163,15 @@ class Pages {
                       std::uint32_t{in[column][2]};
     }
     cairo_surface_mark_dirty(image);
+  }
+  /// What the file contains in place of the pixels: a tenth of their size.
+  static void AttachJpeg(cairo_surface_t* image, const cv::Mat& rgb) {
+    constexpr int kQuality = 90;
+    auto jpeg = std::make_unique<std::vector<std::uint8_t>>(EncodeJpeg(rgb, kQuality));
+    const auto remove = [](void* bytes) { delete static_cast<std::vector<std::uint8_t>*>(bytes); };
+    if (cairo_surface_set_mime_data(image, CAIRO_MIME_TYPE_JPEG, jpeg->data(), jpeg->size(), remove,
+                                    jpeg.get()) == CAIRO_STATUS_SUCCESS)
+      (void)jpeg.release();
   }
   static cairo_status_t Append(void* bytes, const unsigned char* data, unsigned int size) {
     static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
@@ -206,6 +235,20 @@ std::string ValueAndU95(double value, std::optional<double> u95, int most,
   return shown.value + " \u00b1" + half;
 }
 
+/// The number with its interval on a line of twice the tolerance, which is shaded.
+void ToleranceBar(Pages& pages, double x, double at, double width, const ShownRow& number) {
+  if (!(number.tolerance > 0)) return;
+  const double middle = x + width / 2, scale = width / (4 * number.tolerance);
+  const auto place = [&](double value) { return std::clamp(middle + value * scale, x, x + width); };
+  pages.Box(place(-number.tolerance), at - 2.5, width / 2, 5, kShade);
+  pages.Line(x, at, x + width, at, kLine, 0.7);
+  pages.Line(middle, at - 2.5, middle, at + 2.5, kGrey, 0.7);
+  const double u95 = number.u95.value_or(0.0);
+  pages.Line(place(*number.value - u95), at, place(*number.value + u95), at, kBlack, 1.6);
+  pages.Dot(place(*number.value), at, 2.2,
+            number.judgement == NumberJudgement::kWithin ? kGood : kMove);
+}
+
 void NumberLine(Pages& pages, const ShownRow& number, Verdict verdict, const Catalogue& language) {
   const double line = pages.y + 15;
   constexpr double kNameSize = 9.5, kNameWidth = 82;
@@ -226,6 +269,7 @@ void NumberLine(Pages& pages, const ShownRow& number, Verdict verdict, const Cat
       Text(say::result::ReportTolerance(PlainNumber(number.tolerance, language.decimal), unit),
            language),
       8.5, kGrey);
+  ToleranceBar(pages, kMargin + 180, line + 6, 76, number);
   constexpr double kWordsAt = 372, kWordsSize = 8;
   constexpr double kJudgementAt = 265, kJudgementSize = 8.5;
   pages.y = line - 1.3 * kJudgementSize;  // the first line of the judgement is on this line
@@ -236,8 +280,73 @@ void NumberLine(Pages& pages, const ShownRow& number, Verdict verdict, const Cat
   pages.y = line - 1.3 * kWordsSize;  // the first line of the words is on this line
   pages.Paragraph(kMargin + kWordsAt, pages.inner() - kWordsAt,
                   Text(WayOf(number, verdict), language), kWordsSize);
-  pages.y = std::max({pages.y, line, name_end, judgement_end});
+  pages.y = std::max({pages.y, line + 5, name_end, judgement_end});
 }
+
+/// One number over the scans.
+void TrendOf(Pages& pages, const std::vector<CourseRow>& rows, std::size_t number, double tolerance,
+             double x, double top, double width, double height) {
+  double most = tolerance;
+  for (const CourseRow& row : rows)
+    if (const auto& value = row.values.at(number))
+      most = std::max(most, std::abs(value->value) + value->u95.value_or(0.0));
+  if (!(most > 0)) most = 1;
+  constexpr double kInset = 5, kRoom = 1.1;
+  const double middle = top + height / 2, scale = height / 2 / (kRoom * most);
+  pages.Box(x, middle - tolerance * scale, width, 2 * tolerance * scale, kShade);
+  pages.Line(x, middle, x + width, middle, kLine, 0.7);
+  pages.Line(x, top, x, top + height, kLine, 0.7);
+  const double step =
+      rows.size() > 1 ? (width - 2 * kInset) / static_cast<double>(rows.size() - 1) : 0.0;
+  std::optional<std::pair<double, double>> before;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto& value = rows[i].values.at(number);
+    if (!value) continue;
+    const double at = x + kInset + static_cast<double>(i) * step;
+    const double y = middle - value->value * scale, half = value->u95.value_or(0.0) * scale;
+    if (before) pages.Line(before->first, before->second, at, y, kLine, 0.7);
+    pages.Line(at, y - half, at, y + half, kGrey, 0.9);
+    pages.Dot(at, y, 1.8, std::abs(value->value) <= tolerance ? kGood : kMove);
+    before = {at, y};
+  }
+}
+
+constexpr double kTrendHeight = 62, kTrendRow = kTrendHeight + 30;
+
+/// The six, three in a row.
+void Trends(Pages& pages, const std::vector<CourseRow>& rows, const std::array<double, 2>& limits,
+            const Catalogue& language) {
+  if (rows.size() < 2) return;
+  Heading(pages, Word(say::result::kReportTrend, language));
+  constexpr std::array kNames = {say::result::kShortVertical, say::result::kShortLongitudinal,
+                                 say::result::kShortLateral,  say::result::kShortPitch,
+                                 say::result::kShortRoll,     say::result::kShortYaw};
+  const double gap = 16, width = (pages.inner() - 2 * gap) / 3, top = pages.y;
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    const double x = kMargin + static_cast<double>(i % 3) * (width + gap);
+    const double row = top + (i < 3 ? 0.0 : kTrendRow);
+    const double limit = limits.at(i / 3);
+    std::string name = Word(kNames.at(i), language);
+    if (limit > 0) name += fmt::format("  \u00b1{}", PlainNumber(limit, language.decimal));
+    pages.Text(x, row + 12, name, 8, kGrey);
+    TrendOf(pages, rows, i, limit, x, row + 16, width, kTrendHeight);
+    const double below = row + 16 + kTrendHeight + 8;  // the first and the last fraction
+    pages.Text(x, below, rows.front().fraction, 7, kGrey);
+    const std::string& last = rows.back().fraction;
+    pages.Text(x + width - pages.Width(last, 7), below, last, 7, kGrey);
+  }
+  pages.y = top + 2 * kTrendRow;
+}
+
+/// At the foot of the page, to be filled in by hand.
+void SignatureLine(Pages& pages, const Catalogue& language) {
+  const std::string words = Word(say::result::kReportSignature, language);
+  const double line = pages.bottom() - 4;
+  pages.Text(kMargin, line, words, 8.5, kGrey);
+  const double x = kMargin + pages.Width(words, 8.5) + 8;
+  pages.Line(x, line + 2, kMargin + pages.inner(), line + 2, kGrey, 0.7);
+}
+constexpr double kSignature = 30;  // its height
 
 /// One below the other, each as large as the space for all of them permits.
 void Pictures(Pages& pages, const std::vector<cv::Mat>& pictures, const std::string& note) {
@@ -345,6 +454,18 @@ void Draw(Pages& pages, const ScanReport& report) {
     Heading(pages, Word(say::result::kReportQuality, *report.language));
     Facts(pages, report.quality);
   }
+  if (pages.y + kSignature > pages.bottom()) pages.Next();
+  SignatureLine(pages, *report.language);
+  std::array<double, 2> limits{};
+  for (const ShownRow& number : report.numbers)
+    limits.at(IsShift(number.number) ? 0 : 1) = number.tolerance;
+  const double trends = report.trend.size() < 2 ? 0.0 : 2 * kTrendRow + kSignature;
+  const bool fits = pages.y + trends + kSignature < pages.bottom();
+  if (fits) Trends(pages, report.trend, limits, *report.language);
+  if (report.pictures.empty() && (fits || trends == 0.0)) return;
+  // On a page of their own: their scales are to be read.
+  pages.Next();
+  if (!fits) Trends(pages, report.trend, limits, *report.language);
   Pictures(pages, report.pictures, report.pictures_note);
 }
 
@@ -382,6 +503,9 @@ void Draw(Pages& pages, const CourseReport& report) {
     pages.y += 8;
     pages.Paragraph(kMargin, pages.inner(), report.note, kSmall, kGrey);
   }
+  if (pages.y + 2 * kTrendRow + 2 * kSignature > pages.bottom()) pages.Next();
+  Trends(pages, report.rows, report.tolerance, *report.language);
+  SignatureLine(pages, *report.language);
 }
 
 }  // namespace

@@ -18,21 +18,6 @@ namespace plumb {
 /// Texts are printed unchanged; numbers are formatted by the report.
 using ReportFacts = std::vector<std::pair<std::string, std::string>>;
 
-/// A page for one scan.
-struct ScanReport {
-  const Catalogue* language = &EnglishCatalogue();  ///< Of the fixed texts; never null.
-  std::string title, verdict, why;
-  ReportFacts identity;  ///< Patient, time with zone, versions, planner, approver and accepter.
-  std::vector<ShownRow> numbers;
-  Verdict result_verdict = Verdict::kNoAnswer;  ///< Decides what to do about each number.
-  std::vector<std::string> cautions;
-  ReportFacts quality;
-  std::vector<std::string> body;   ///< Differences by part of the body.
-  std::vector<cv::Mat> pictures;   ///< CV_8UC3 RGB.
-  std::string pictures_note = {};  ///< Below the pictures.
-  std::string footer;              ///< Version and time of the report.
-};
-
 /// A value and its uncertainty, in the units of its column.
 struct CourseValue {
   double value = 0.0;
@@ -45,12 +30,31 @@ struct CourseRow {
   std::array<std::optional<CourseValue>, 6> values;
 };
 
+/// A page for one scan.
+struct ScanReport {
+  const Catalogue* language = &EnglishCatalogue();  ///< Of the fixed texts; never null.
+  std::string title, verdict, why;
+  ReportFacts identity;  ///< Patient, time with zone, versions, planner, approver and accepter.
+  std::vector<ShownRow> numbers;
+  Verdict result_verdict = Verdict::kNoAnswer;  ///< Decides what to do about each number.
+  std::vector<std::string> cautions;
+  ReportFacts quality;
+  std::vector<std::string> body;  ///< Differences by part of the body.
+  std::vector<CourseRow> trend =
+      {};                          ///< Scans with the same reference until this one, oldest first.
+  std::vector<cv::Mat> pictures;   ///< CV_8UC3 RGB.
+  std::string pictures_note = {};  ///< Below the pictures.
+  std::string footer;              ///< Version and time of the report.
+};
+
 struct CourseReport {
   const Catalogue* language = &EnglishCatalogue();  ///< Of the fixed texts; never null.
   std::string title;
   ReportFacts identity;
   std::vector<CourseRow> rows;  ///< Oldest first.
-  std::string note;             ///< Below the rows.
+  /// Of the approved reference, mm and degrees; 0: none is approved.
+  std::array<double, 2> tolerance = {};
+  std::string note;  ///< Below the rows.
   std::string footer;
 };
 

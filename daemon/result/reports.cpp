@@ -234,6 +234,33 @@ ReportPictures PicturesOf(const ReportSources& stored, const Scan& scan,
           .note = {}};
 }
 
+CourseRow RowOf(const Scan& scan, const Catalogue& language) {
+  CourseRow row{.fraction = scan.fraction > 0 ? std::to_string(scan.fraction) : "-",
+                .when = web::LocalTimeText(scan.started_at),
+                .verdict = VerdictOf(scan, language),
+                .accepted = AcceptedText(scan, language),
+                .values = {}};
+  if (scan.result) {
+    for (const ShownRow& number : ShownRows(*scan.result))
+      if (number.value) row.values[number.number] = CourseValue{*number.value, number.u95};
+  }
+  return row;
+}
+
+/// The newest scans with the same reference, this one included.
+std::vector<CourseRow> TrendUntil(const ReportSources& stored, const Scan& scan,
+                                  const Catalogue& language) {
+  constexpr std::size_t kMost = 40;
+  std::vector<CourseRow> rows;
+  for (const Scan& one : stored.scans.List(scan.patient_id, kMaxScans)) {
+    const bool counts = one.result && one.result->verdict != Verdict::kNoAnswer &&
+                        one.reference_id == scan.reference_id && one.started_at <= scan.started_at;
+    if (counts && rows.size() < kMost) rows.push_back(RowOf(one, language));
+  }
+  std::ranges::reverse(rows);
+  return rows;
+}
+
 }  // namespace
 
 ScanReport DescribeScan(const ReportSources& stored, const Scan& scan, const Catalogue& language) {
@@ -256,6 +283,7 @@ ScanReport DescribeScan(const ReportSources& stored, const Scan& scan, const Cat
                     .pictures_note = std::move(drawn.note),
                     .footer = Footer(language)};
   if (report.numbers.empty()) return report;
+  if (!scan.patient_id.empty()) report.trend = TrendUntil(stored, scan, language);
   for (const Message& part : scan.result->body_after) report.body.push_back(Text(part, language));
   if (report.body.empty()) report.body.emplace_back(Word(say::result::kAsReference, language));
   return report;
@@ -272,27 +300,22 @@ CourseReport DescribeCourse(const ReportSources& stored, const Patient& patient,
       .rows = {},
       .note = Word(say::result::kReportDigitsNote, language),
       .footer = Footer(language)};
-  if (const auto reference = stored.references.Find(patient.approved_reference_id))
+  if (const auto reference = stored.references.Find(patient.approved_reference_id)) {
     AddReferenceTo(report.identity, *reference, language);
+    const Tolerance& tolerance = reference->plan.tolerance;
+    report.tolerance = {tolerance.shift_mm, tolerance.rotation_deg};
+  }
   std::vector<Scan> scans = stored.scans.List(patient.id, kMaxScans);
   bool is_any_overdue = false, is_any_failed = false;
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != ScanOutcome::kDone) continue;
-    CourseRow row{.fraction = scan->fraction > 0 ? std::to_string(scan->fraction) : "-",
-                  .when = web::LocalTimeText(scan->started_at),
-                  .verdict = VerdictOf(*scan, language),
-                  .accepted = AcceptedText(*scan, language),
-                  .values = {}};
+    CourseRow row = RowOf(*scan, language);
     if (scan->daily_check == DailyCheck::kOverdue) {
       row.verdict += " *";
       is_any_overdue = true;
     } else if (scan->daily_check == DailyCheck::kFailed) {
       row.verdict += " **";
       is_any_failed = true;
-    }
-    if (scan->result) {
-      for (const ShownRow& number : ShownRows(*scan->result))
-        if (number.value) row.values[number.number] = CourseValue{*number.value, number.u95};
     }
     report.rows.push_back(std::move(row));
   }

@@ -71,14 +71,17 @@ void AddComparisonTo(Rows& rows, const StoredResult& result) {
   }
 }
 
+double LostShare(const Scene& scene) {
+  if (scene.frames_total <= 0) return 0.0;
+  return static_cast<double>(scene.frames_dropped) / static_cast<double>(scene.frames_total);
+}
+
 void AddSweepTo(Rows& rows, const StoredScene& stored) {
   const Scene& scene = stored.scene;
   if (scene.planning) return;  // no sweep made it
   rows.Add(say::result::QualityTracked(),
            say::result::QualityTrackedOf(scene.frames_tracked, scene.frames_total));
-  const double lost = scene.frames_total > 0 ? static_cast<double>(scene.frames_dropped) /
-                                                   static_cast<double>(scene.frames_total)
-                                             : 0.0;
+  const double lost = LostShare(scene);
   rows.Add(say::result::QualityLost(),
            say::result::QualityLostShare(scene.frames_dropped, 100 * lost), lost >= kManyLost);
   if (scene.longest_lost_s > 0)
@@ -114,11 +117,8 @@ std::vector<web::QualityRow> RowsOf(const Scan& scan, const ScanFiles& files) {
 std::vector<Message> CautionsOf(const Scan& scan, const ScanFiles& files, double warm_up_min) {
   std::vector<Message> cautions;
   if (files.scene) {
-    const Scene& scene = files.scene->scene;
-    const auto total = static_cast<double>(scene.frames_total);
-    const auto lost = static_cast<double>(scene.frames_dropped);
-    if (total > 0 && lost / total >= kManyLost)
-      cautions.push_back(say::result::ReportFramesLost(100 * lost / total));
+    const double lost = LostShare(files.scene->scene);
+    if (lost >= kManyLost) cautions.push_back(say::result::ReportFramesLost(100 * lost));
   }
   if (scan.sensor_on_s && *scan.sensor_on_s < 60 * warm_up_min)
     cautions.push_back(
@@ -177,7 +177,10 @@ ScanFiles FilesOf(const Scan& scan) {
 ScanQuality QualityOf(const Scan& scan, const ScanFiles& files, double warm_up_min) {
   ScanQuality quality{.rows = RowsOf(scan, files),
                       .cautions = CautionsOf(scan, files, warm_up_min),
-                      .remarks = files.unreadable};
+                      .remarks = files.unreadable,
+                      .why_not_accept = {}};
+  if (const double lost = files.scene ? LostShare(files.scene->scene) : 0.0; lost > kMostLostFrames)
+    quality.why_not_accept = say::result::TooManyLost(100 * lost, 100 * kMostLostFrames);
   if (files.result) AddRemarksTo(quality.remarks, *files.result);
   if (files.scene) {
     // The remarks may hold them already: a comparison repeats the warnings of its scans.

@@ -22,6 +22,9 @@ struct ScanFiles {
 
 [[nodiscard]] ScanFiles FilesOf(const Scan& scan);
 
+/// Largest share of lost frames with which a result can be accepted.
+inline constexpr double kMostLostFrames = 0.5;
+
 /// @param warm_up_min  Time that a sensor must have been on to be warm.
 [[nodiscard]] web::ScanQuality QualityOf(const Scan& scan, const ScanFiles& files,
                                          double warm_up_min);

@@ -51,6 +51,16 @@ class WebAccounts final : public web::AccountService {
     });
   }
 
+  std::optional<std::string> FindPin(const std::string& name) override {
+    return store_.ReadOrNothing(&Store::users, [&](UserStore& users) { return users.PinOf(name); });
+  }
+
+  void SetPin(const Actor& actor, const std::string& name, const std::optional<std::string>& hash,
+              Done done) override {
+    store_.Write(&Store::users, std::move(done),
+                 [=](UserStore& users) { users.SetPin(actor, name, hash); });
+  }
+
   Preferences PreferencesOf(const std::string& name) override {
     return store_.ReadOrNothing(&Store::users,
                                 [&](UserStore& users) { return users.PreferencesOf(name); });

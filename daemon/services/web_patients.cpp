@@ -9,10 +9,12 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/names.hpp"
 #include "daemon/appliance/plan_options.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/planning/planning_import.hpp"
+#include "daemon/result/posture_doubt.hpp"
 #include "daemon/result/scan_quality.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
@@ -244,6 +246,8 @@ class WebReferences final : public web::ReferenceService {
                      .is_known = true};
       if (const auto lasers = room_.LasersIn(markers))
         room.lasers_m = {lasers->x(), lasers->y(), lasers->z()};
+      if (reference.approved_by.empty() && !reference.planned_by.empty())
+        room.contradicts_posture = ContradictsItsPosture(reference);
       return room;
     } catch (const std::exception& error) {
       Log(LogLevel::kNotice,
@@ -309,21 +313,48 @@ class WebReferences final : public web::ReferenceService {
   }
 
   void ApproveReference(const Actor& actor, const std::string& id, int revision,
-                        const std::string& digest, const std::string& reason, Done done) override {
+                        const std::string& digest, const web::Considered& considered,
+                        Done done) override {
     const std::optional<Reference> reference = FindReference(id);
     const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
     // What no sensor took needs neither a checked room nor a warm sensor.
     const bool is_sweep = !PlanningOf(reference);
     if (is_sweep && RefuseIf(references_.WhyNot(scan), done)) return;
-    if (is_sweep && scan && reason.empty() &&
+    if (is_sweep && scan && considered.reason.empty() &&
         !QualityOf(*scan, FilesOf(*scan), references_.warm_up_min()).cautions.empty())
       return done(AnswerOf(say::store::ReferenceNeedsReason()));
-    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
-      references.Approve(actor, id, revision, digest, /*two_users=*/true, reason);
-    });
+    const auto contradicts = std::make_shared<bool>(false);
+    const auto work = [=, this] {
+      try {
+        if (is_sweep && reference) *contradicts = ContradictsItsPosture(*reference);
+      } catch (const std::exception& error) {  // Approve() compares every file, and says it
+        Log(LogLevel::kError,
+            fmt::format("cannot read the scene of reference {}: {}", id, error.what()));
+      }
+    };
+    const auto approve = [=, this] {
+      if (*contradicts && !considered.posture)
+        return done(AnswerOf(say::store::ReferencePosture()));
+      store_.Write(&Store::references, done, [=](ReferenceStore& references) {
+        references.Approve(actor, id, revision, digest, /*two_users=*/true, considered.reason,
+                           /*posture_confirmed=*/*contradicts);
+      });
+    };
+    if (!background_.RunInBackground(web::BackgroundPool::kReads, work, approve))
+      done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
   }
 
  private:
+  /// Whether the surface speaks against the planned posture. Reads the whole scene.
+  bool ContradictsItsPosture(const Reference& reference) {
+    const std::optional<Scan> scan = ScanOf(reference.scan_id);
+    const auto posture = Named<PatientPosture>(reference.plan.posture);
+    if (!posture || !scan || scan->folder.empty()) return false;
+    const Scene scene = ReadScene(scan->folder / "scene");
+    const std::optional<Pose> room = room_.AxesIn(scene.markers);
+    return room && ContradictsPosture(scene, *room, *posture);
+  }
+
   std::optional<Scan> ScanOf(const std::string& scan_id) {
     return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
   }

@@ -30,6 +30,10 @@ class WebChecks final : public web::CheckService {
                  [=](AuditStore& audit) { audit.Log(actor, "check.open", "", Message()); });
   }
 
+  void LeaveCheck(const Actor& actor, Done done) override {
+    done(AnswerOf(appliance_.LeaveCheck(actor)));
+  }
+
   void SetCheckBaseline(const Actor& actor, const std::string& check_id, const std::string& reason,
                         Done done) override {
     store_.Write(&Store::checks, std::move(done),

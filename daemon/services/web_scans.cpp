@@ -53,6 +53,7 @@ class WebScans final : public web::ScanService {
     const auto& open = status.session;
     if (!scan->patient_id.empty() && (!open || open->id != scan->session_id))
       return done(AnswerOf(say::scan::AcceptInSession()));
+    if (const Message why = QualityOf(id).why_not_accept; !why.empty()) return done(AnswerOf(why));
     store_.Write(&Store::scans, std::move(done),
                  [=](ScanStore& scans) { scans.Accept(actor, id, reason); });
   }

@@ -361,6 +361,14 @@ void FakeAppliance::OpenCheck(const Actor& actor, Done done) {
   Did(actor, "check.open", "", done);
 }
 
+void FakeAppliance::LeaveCheck(const Actor& actor, Done done) {
+  if (status.scan || !is_check_)
+    return Finish(done, Refused(ChangeResult::kConflict, "no daily check is open"));
+  CloseCheck();
+  Notify(EventKind::kStatus);
+  Did(actor, "check.leave", "", done);
+}
+
 void FakeAppliance::SetCheckBaseline(const Actor& actor, const std::string& check_id,
                                      const std::string&, Done done) {
   const auto found = std::find_if(checks.checks.begin(), checks.checks.end(),

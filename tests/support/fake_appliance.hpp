@@ -178,7 +178,8 @@ class FakeAppliance : public web::BackgroundWork,
                      const ReferencePlan& plan, Done done) override;
   /// Cautions are asked for where a test judges the quality.
   void ApproveReference(const Actor& actor, const std::string& id, int revision,
-                        const std::string& digest, const std::string& reason, Done done) override;
+                        const std::string& digest, const web::Considered& considered,
+                        Done done) override;
   std::vector<Scan> Scans(const std::string& patient_id, int limit) override;
   std::optional<Scan> FindScan(const std::string& id) override;
   void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
@@ -221,6 +222,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::string report_language = "en";  ///< Of the last report.
   CheckStatus GetChecks() override { return checks; }
   void OpenCheck(const Actor& actor, Done done) override;
+  void LeaveCheck(const Actor& actor, Done done) override;
   void SetCheckBaseline(const Actor& actor, const std::string& check_id, const std::string& reason,
                         Done done) override;
   web::RoomCalibrationStatus GetRoomCalibration() override { return room; }
@@ -248,6 +250,13 @@ class FakeAppliance : public web::BackgroundWork,
                        const std::optional<SecondFactor>& expected,
                        const std::optional<SecondFactor>& wanted, const std::string& action,
                        Done done) override;
+  std::map<std::string, std::string> pins;
+  std::optional<std::string> FindPin(const std::string& name) override {
+    const auto found = pins.find(name);
+    return found == pins.end() ? std::nullopt : std::optional(found->second);
+  }
+  void SetPin(const Actor& actor, const std::string& name, const std::optional<std::string>& hash,
+              Done done) override;
   Preferences PreferencesOf(const std::string& name) override { return preferences_[name]; }
   void SetPreferences(const Actor& actor, const Preferences& preferences, Done done) override;
   void Log(const Actor& actor, const std::string& action, const std::string& subject,

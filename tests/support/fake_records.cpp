@@ -381,7 +381,7 @@ void FakeAppliance::PlanReference(const Actor& actor, const std::string& id, int
 }
 
 void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, int revision,
-                                     const std::string& digest, const std::string& reason,
+                                     const std::string& digest, const web::Considered& considered,
                                      Done done) {
   if (is_unreadable) throw IoError("version 2 of the reference: its plan cannot be read");
   const auto found = std::find_if(references.begin(), references.end(),
@@ -406,8 +406,10 @@ void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, 
                           "a second person must approve: you made or planned this reference"));
   }
   if (const auto scan = FindScan(found->scan_id);
-      scan && judge_quality && reason.empty() && !judge_quality(*scan).cautions.empty())
+      scan && judge_quality && considered.reason.empty() && !judge_quality(*scan).cautions.empty())
     return Finish(done, Refused(ChangeResult::kConflict, say::store::ReferenceNeedsReason()));
+  if (RoomOfReference(*found).contradicts_posture && !considered.posture)
+    return Finish(done, Refused(ChangeResult::kConflict, say::store::ReferencePosture()));
   found->approved_by = actor.user;
   found->approved_at = WallClock::now();
   if (Patient* patient = PatientOf(found->patient_id)) patient->approved_reference_id = id;
@@ -457,6 +459,8 @@ void FakeAppliance::AcceptScan(const Actor& actor, const std::string& id, const 
         return scan.patient_id == found->patient_id && scan.outcome == ScanOutcome::kDone;
       }))
     return refuse("there is a newer scan of this patient: accept that one");
+  if (const Message why = QualityOf(id).why_not_accept; !why.empty())
+    return Finish(done, Refused(ChangeResult::kConflict, why));
   if (found->result->verdict != Verdict::kInTolerance && reason.empty())
     return refuse("this result is not in tolerance: accepting it requires a reason");
   found->accepted_by = actor.user;

@@ -63,6 +63,13 @@ void FakeAppliance::SetSecondFactor(const Actor& actor, const std::string& name,
   Did(actor, action, name, done);
 }
 
+void FakeAppliance::SetPin(const Actor& actor, const std::string& name,
+                           const std::optional<std::string>& hash, Done done) {
+  pins.erase(name);
+  if (hash) pins[name] = *hash;
+  Did(actor, hash ? "user.pin_set" : "user.pin_removed", name, done);
+}
+
 void FakeAppliance::SetPreferences(const Actor& actor, const Preferences& preferences, Done done) {
   preferences_[actor.user] = preferences;
   if (status.session && status.session->opened_by == actor.user) {

@@ -195,6 +195,7 @@ await h.step('the daily check of the real markers: no baseline, then passed', as
   await second.getByRole('button', { name: 'Set as baseline' }).click();
   await bob.getByText('set by clara').waitFor();
   await takeCheck('PASSED');
+  equal(await bob.getByText('A physicist other than').count(), 0, 'nothing is left to do');
   await h.look(bob, 'check', { axe: false });
   await bob.goto(`${h.url}#/status`);
   await bob.locator('.tile.good', { hasText: 'Daily check' }).waitFor();

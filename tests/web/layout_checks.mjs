@@ -19,10 +19,11 @@ export function englishTexts(en, es) {
 }
 
 /// Runs in the page. Returns what is wrong, each with its kind in front.
-/// @param touched  Whether this is a touch screen, where controls need 24 px.
+/// @param touched  Whether this is a phone.
+/// @param tapped   Whether people tap here, with gloves perhaps.
 /// @param wall     Whether this is the screen on the room's wall, which nobody scrolls.
 /// @param english  What englishTexts() found, on a screen in another language; else null.
-export function faultsOfLayout({ touched, wall, english }) {
+export function faultsOfLayout({ touched, tapped = touched, wall, english }) {
   const found = new Set();
   const shorten = (text) => text.trim().replace(/\s+/g, ' ').slice(0, 60);
   const nameOf = (element) =>
@@ -143,13 +144,19 @@ export function faultsOfLayout({ touched, wall, english }) {
   const below = last ? last.getBoundingClientRect().bottom : 0;
   if (below > clientHeight) add('far down', last, `: it ends at ${px(below)} of ${clientHeight}`);
 
-  // WCAG 2.2, 2.5.8: 24 px, but for links within a sentence. A box is touched by its label, too.
-  const isInSentence = (link) => link.tagName === 'A' && styleOf(link).display === 'inline'
-    && [...link.parentElement.childNodes].some((one) => one !== link && one.textContent.trim());
-  for (const control of touched ? controls : []) {
-    if (isInSentence(control)) continue;
+  // For hands in gloves: 48 px, 60 px for what a screen is there for and what signs. A link in a
+  // sentence is as high as WCAG 2.2 wants targets to be (2.5.8). A box is touched by its label,
+  // too.
+  const isInSentence = (link) => link.tagName === 'A' && styleOf(link).display.startsWith('inline')
+    && [...link.parentElement.childNodes].some((one) => one !== link && one.textContent.trim())
+    && !link.matches('.button, #top a');
+  for (const control of tapped ? controls : []) {
     const { width, height } = (control.closest('label') ?? control).getBoundingClientRect();
-    if (width < 24 || height < 24) add('small', control, `, ${px(width)} x ${px(height)}`);
+    const inSentence = isInSentence(control);
+    const least = inSentence ? 24 : control.matches('.primary, .signs') ? 60 : 48;
+    if (height < least - 0.5 || (!inSentence && width < 47.5)) {
+      add('small', control, `, ${px(width)} x ${px(height)} of ${least}`);
+    }
   }
 
   // Every text is a text of the page's language: no key, no gap that was not filled, no English.

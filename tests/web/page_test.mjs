@@ -660,6 +660,12 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   const trends = (await anna.locator('.trend figcaption').allInnerTexts()).join('; ');
   check(!/\d\.\d{3}/.test(trends), `no digits beyond those measured: ${trends}`);
   await h.look(anna, 'check-passed', { axe: false });
+  // One that passed, and the baseline is there: nothing is left to say to who took it.
+  equal((await h.api(bob, 'checks/open', 'POST')).status, 200, 'bob takes one');
+  h.tell('press');
+  await bob.getByText(/by bob/).first().waitFor();
+  equal(await bob.getByText('A physicist other than').count(), 0, 'no card for that');
+  equal(await asBaseline.count(), 0, 'nor a form');
   h.tell('markermoved');
   await takeCheck();
   await anna.locator('.verdict', { hasText: 'FAILED' }).waitFor();

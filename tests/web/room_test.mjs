@@ -450,6 +450,21 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await anna.getByRole('button', { name: 'Close session' }).click();
   await asked.getByRole('button', { name: 'Close without acceptance' }).click();
   await anna.getByText('No session open').first().waitFor();
+  // A check that was opened can be left: then the open session is in hand again, here and there.
+  await openOnPage(anna, 'P-0042', 'Resume fraction 1');
+  await anna.locator('.who-line', { hasText: 'Fraction 1' }).waitFor();
+  await ok(anna, 'checks/open', 'POST');
+  await anna.locator('.who-line', { hasText: 'Daily check' }).waitFor();
+  await anna.getByText('After it: P-0042, Fraction 1').waitFor();
+  await room.locator('.room-code', { hasText: 'Daily check' }).waitFor();
+  equal(await room.getByText('Fraction 1').count(), 0, 'the check only');
+  await anna.getByRole('button', { name: 'Leave the check' }).click();
+  await anna.locator('.who-line', { hasText: 'Fraction 1' }).waitFor();
+  await room.locator('.room-code', { hasText: 'P-0042' }).waitFor();
+  equal(await room.getByText('Daily check', { exact: true }).count(), 0, 'the session only');
+  await anna.getByRole('button', { name: 'Close session' }).click();
+  await asked.getByRole('button', { name: 'Close without acceptance' }).click();
+  await anna.getByText('No session open').first().waitFor();
   // A failed daily check stays in the corner, and the display is ready for the next session.
   await ok(anna, 'checks/open', 'POST');
   h.tell('markermoved');

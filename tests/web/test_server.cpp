@@ -363,6 +363,10 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
       service.room_of_references = service.status.room;
       service.room_of_references->lasers_m = {0.61, 0.44, 0.05};
     }
+    if (what == "contradicts") {
+      service.room_of_references = service.status.room;
+      service.room_of_references->contradicts_posture = true;
+    }
     service.Notify(web::EventKind::kStatus);
   }
   if (name == "board") service.is_board_there = true;
@@ -424,12 +428,12 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
             corner.x() += 12 * kMillimetre;
         });
   if (name == "weak") service.next_recorded = recorder.RecordWeak();
-  if (name == "hurried")
+  if (name == "hurried" || name == "halflost" || name == "mostlost")
     service.next_recorded =
-        recorder.RecordChanged(At(Pose::Identity(), 9, 0.0008), [](Scene& scene) {
+        recorder.RecordChanged(At(Pose::Identity(), 9, 0.0008), [name](Scene& scene) {
           scene.frames_total = 300;
-          scene.frames_tracked = 200;
-          scene.frames_dropped = 100;
+          scene.frames_dropped = name == "hurried" ? 100 : name == "halflost" ? 150 : 151;
+          scene.frames_tracked = scene.frames_total - scene.frames_dropped;
         });
   if (name == "shoulder") service.next_recorded = recorder.Record(LiftedShoulder());
   if (name == "moved") {

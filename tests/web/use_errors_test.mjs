@@ -538,6 +538,19 @@ await h.step(
   h.tell('hurried');
   await scan();
   await flags.getByText('33 % of the frames were lost').waitFor();
+  // More than half of them: nobody accepts it, with a reason or without.
+  h.tell('halflost');
+  await scan();
+  await anna.locator('.acceptance').getByRole('button').or(
+    anna.locator('.accept-outside')).first().waitFor();
+  h.tell('mostlost');
+  const lost = await scan();
+  await anna.getByText('50.3 % of the frames were lost, more than 50 %').waitFor();
+  equal(await anna.locator('.acceptance button, .accept-outside').count(), 0, 'no way to accept');
+  await h.look(anna, 'lost-frames', { axe: false });
+  equal((await h.api(anna, `scans/${lost.id}/accept`, 'POST')).status, 409, 'nor by the interface');
+  equal((await h.api(anna, `scans/${lost.id}/accept-outside`, 'POST',
+    { reason: 'nevertheless', password: h.password })).status, 409, 'nor with a reason');
   h.tell('cold');
   await scan();
   await flags.getByText('The sensor had been on for only 17 min').waitFor();
@@ -602,12 +615,24 @@ await h.step('what is doubtful about a reference is told to who can scan again, 
   const { body: { digest, revision } } = await h.api(clara, `references/${id}`);
   equal((await h.api(clara, `references/${id}/approve`, 'POST',
     { digest, revision, password: h.password })).status, 409, 'no reason, no approval');
+  // A posture that the surface speaks against needs a tick of its own, for the interface as well.
+  h.tell('room contradicts');
+  const reasoned = { digest, revision, password: h.password, reason: 'the patient has left' };
+  for (const more of [{}, { posture_confirmed: false }]) {
+    equal((await h.api(clara, `references/${id}/approve`, 'POST', { ...reasoned, ...more })).status,
+      409, 'the posture is not confirmed');
+  }
   await clara.goto(`${h.url}#/plan/${id}`);
   await clara.getByRole('button', { name: 'Review and approve' }).click();
+  await clara.getByText('The surface speaks against this posture').waitFor();
   await clara.getByLabel('Why it becomes the reference nevertheless').fill('the patient has left');
+  await h.sign(clara);
+  equal(await clara.getByText('approved by clara').count(), 0, 'not without the tick');
+  await clara.getByLabel('the planned posture is right').check();
   await h.look(clara, 'approve-flags', { axe: false });
   await h.sign(clara);
   await clara.getByText('approved by clara').waitFor();
+  h.tell('room known');
   await open(before, 'fraction');
 });
 
@@ -1091,6 +1116,72 @@ await h.step('site and note are corrected; an archived patient is out of the lis
   await anna.getByLabel('Note').waitFor();
   equal(await anna.getByRole('button', { name: 'Archive', exact: true }).count(), 0,
     'not offered to a technician');
+});
+
+await h.step('a PIN within a shift: people change in one browser, and signatures keep the password',
+  async () => {
+  const desk = await h.person('desk');
+  const setPin = async (pin) => {
+    await desk.goto(`${h.url}#/users`);
+    const own = desk.locator('section.card',
+      { has: desk.getByRole('heading', { name: 'My PIN or badge' }) });
+    await own.getByLabel('New PIN').fill(pin);
+    await own.getByLabel('The same again').fill(pin);
+    await own.getByLabel('Your password').first().fill(h.password);
+    await own.getByRole('button', { name: 'Set PIN or badge' }).click();
+    await own.getByText('Set.', { exact: true }).waitFor();
+  };
+  const type = async (where, pin) => {
+    for (const digit of pin) await where.getByRole('button', { name: digit, exact: true }).click();
+    await where.getByRole('button', { name: 'Log in' }).click();
+  };
+  await h.logIn(desk, 'anna');
+  equal(await desk.getByRole('button', { name: 'Change person' }).count(), 0, 'nobody else');
+  await setPin('4711');
+  await desk.getByRole('button', { name: 'Log out' }).click();
+  await desk.getByRole('button', { name: 'Log in with name and password' }).click();
+  await desk.getByLabel('Name').fill('bob');
+  await desk.getByLabel('Password').fill(h.password);
+  await desk.getByRole('button', { name: 'Log in', exact: true }).click();
+  await desk.locator('#top a.brand').waitFor();
+  await setPin('2580');
+  // The screen stays, and what is open on it.
+  await desk.goto(`${h.url}#/scan`);
+  await desk.getByRole('button', { name: 'Change person' }).click();
+  const box = desk.locator('dialog');
+  await h.look(desk, 'change-person', { axe: false });
+  await box.getByRole('button', { name: 'anna' }).click();
+  await h.look(desk, 'pin', { axe: false });
+  const begun = Date.now();
+  await type(box, '4711');
+  await desk.getByText('anna, with a PIN').waitFor();
+  console.log(`        changed in ${Date.now() - begun} ms, four taps included`);
+  equal(await desk.evaluate(() => location.hash), '#/scan', 'the same screen');
+  // Back to the physicist, who is a technician now: no plan, no log, and every signature asks.
+  await desk.getByRole('button', { name: 'Change person' }).click();
+  await box.getByRole('button', { name: 'bob' }).click();
+  await desk.keyboard.type('2580');
+  await desk.keyboard.press('Enter');
+  await desk.getByText('bob, with a PIN').waitFor();
+  equal(await desk.getByRole('link', { name: 'Audit log' }).count(), 0, 'rights of a technician');
+  equal((await h.api(desk, 'audit')).status, 403, 'the interface refuses, too');
+  equal((await h.api(desk, 'session')).body.role, 'physicist', 'whoever it is');
+  // Three wrong ones end it: only the password helps.
+  await desk.getByRole('button', { name: 'Log out' }).click();
+  await desk.getByRole('heading', { name: 'Who are you?' }).waitFor();
+  await h.look(desk, 'people');
+  await desk.getByRole('button', { name: 'bob' }).click();
+  for (const said of ['2 more tries', 'one more try', 'log in with the password']) {
+    await type(desk, '1379');
+    await desk.getByRole('alert').getByText(said).waitFor();
+  }
+  await h.look(desk, 'pin-refused');
+  await desk.reload();
+  await desk.getByRole('button', { name: 'anna' }).waitFor();
+  equal(await desk.getByRole('button', { name: 'bob', exact: true }).count(), 0, 'not by PIN');
+  await desk.getByRole('button', { name: 'Log in with name and password' }).click();
+  await desk.getByLabel('Password').waitFor();
+  await desk.context().close();
 });
 
 await h.step('unplugged in the middle of a sweep: no result, and none of before in its place',

@@ -132,6 +132,7 @@ Done Accounts::WhileAlive(Done done) const {
 
 void Accounts::AddRoutes(Routes& routes) {
   displays_.AddRoutes(routes);
+  AddQuickLogInRoutes(routes);
   AddSecondFactorRoutes(routes);
   AddSessionRoutes(routes);
   routes.Read("/api/v1/displays/presence", Permission::kRoom,
@@ -262,7 +263,7 @@ Response Accounts::DescribeSession(const Request& request) {
   };
   Json permissions = Json::array();
   for (const Permission permission : PermissionsOf(request.session->role))
-    permissions.push_back(Name(permission));
+    if (request.session->May(permission)) permissions.push_back(Name(permission));
   return JsonResponse(
       {{"user", request.session->user},
        {"role", Name(request.session->role)},
@@ -270,6 +271,8 @@ Response Accounts::DescribeSession(const Request& request) {
        {"csrf_token", request.session->csrf_token},
        {"password_change_required", request.session->must_change_password},
        {"second_factor", user && user->has_second_factor},
+       {"is_quick", request.session->is_quick},
+       {"has_pin", user && users_.FindPin(user->name)},
        {"idle_logout_min",
         std::chrono::duration_cast<std::chrono::minutes>(sessions_.IdleOf(request.session->role))
             .count()},
@@ -349,6 +352,7 @@ void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond)
                 Response response = ChangeResponse(change);
                 if (change.result == ChangeResult::kDone) {
                   sessions_.EndAllOf(name, session);
+                  quick_.EndAllOf(name);
                   session->must_change_password = false;
                   SetDeviceCookie(response, name, hash);
                 }
@@ -412,7 +416,10 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
                       WhileAlive([this, name = what.name, respond](const Change& done) {
                         // The permissions of an account are fixed at login: its sessions end,
                         // including the user's own.
-                        if (done.result == ChangeResult::kDone) sessions_.EndAllOf(name, nullptr);
+                        if (done.result == ChangeResult::kDone) {
+                          sessions_.EndAllOf(name, nullptr);
+                          quick_.EndAllOf(name);
+                        }
                         respond(ChangeResponse(done));
                       }));
   };

@@ -17,6 +17,7 @@
 #include "web/security/device_cookies.hpp"
 #include "web/security/login_limiter.hpp"
 #include "web/security/password_worker.hpp"
+#include "web/security/quick_logins.hpp"
 #include "web/security/sessions.hpp"
 #include "web/security/tls_identity.hpp"
 #include "web/service/services.hpp"
@@ -97,6 +98,16 @@ class Accounts : public SessionLookup {
   /// @param fail  Answers otherwise.
   void PassSecondFactor(const Actor& actor, const User& user, const std::string& given,
                         const Respond& fail, const std::function<void()>& then);
+  void AddQuickLogInRoutes(Routes& routes);
+  /// The browser, if this person has logged in there with the present password.
+  [[nodiscard]] std::optional<std::string> DeviceOf(const Request& request, const User& user) const;
+  /// Who can log in quickly in this browser.
+  [[nodiscard]] Response ListQuickPeople(const Request& request);
+  /// @param before  Session that ends by it; null: none.
+  void LogInQuickly(const Request& request, const std::shared_ptr<Session>& before,
+                    const Respond& respond);
+  [[nodiscard]] Response WelcomeQuickly(const User& user, const Actor& actor);
+  void SetPin(const Request& request, const Respond& respond);
   void AddSecondFactorRoutes(Routes& routes);
   /// Answers with a secret for an authenticator; FinishSecondFactor() checks its first code.
   void OfferSecondFactor(const Request& request, const Respond& respond);
@@ -139,9 +150,8 @@ class Accounts : public SessionLookup {
   void ChangeUser(const Request& request, const Respond& respond);
   /// Opens a session and notifies the page.
   [[nodiscard]] Response Welcome(const User& user, const std::string& address, bool form);
-  /// Sets the cookie by which this browser is recognised from now on.
-  void SetDeviceCookie(Response& response, const std::string& user,
-                       const std::string& stored) const;
+  /// Sets the cookie by which this browser is recognised from now on, and begins a shift there.
+  void SetDeviceCookie(Response& response, const std::string& user, const std::string& stored);
   /// Calls `then` with the hash, or answers why there is none.
   void HashThen(std::string password, const Respond& respond,
                 std::function<void(const std::string&)> then);
@@ -181,6 +191,7 @@ class Accounts : public SessionLookup {
   Sessions sessions_;
   Displays displays_;
   DeviceCookies devices_;
+  QuickLogIns quick_;
   LoginLimiter limiter_;
   Message accounts_fault_;  ///< Why no account can be seen; empty: they can.
   std::string setup_code_;  ///< Empty once there is an account.

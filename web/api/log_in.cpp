@@ -58,10 +58,12 @@ Response Accounts::Welcome(const User& user, const std::string& address, bool fo
 }
 
 void Accounts::SetDeviceCookie(Response& response, const std::string& user,
-                               const std::string& stored) const {
+                               const std::string& stored) {
   constexpr std::chrono::hours kYear{365 * 24};
-  SetCookie(response, devices_.NameFor(user), devices_.Make(user, stored), certificate_.has_value(),
-            kYear);
+  const std::string made = devices_.Make(user, stored);
+  SetCookie(response, devices_.NameFor(user), made, certificate_.has_value(), kYear);
+  if (const auto device = devices_.Identify(made, user, stored))
+    quick_.Open(*device, user, options_.now());
 }
 
 std::string Accounts::presence_code() {

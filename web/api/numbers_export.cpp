@@ -68,23 +68,33 @@ std::string NumbersJson(const Patient& patient, const std::vector<Scan>& scans) 
   return Dump({{"patient", patient}, {"scans", ListJson(scans, WallClock::now())}});
 }
 
-void AddReports(Routes& routes, ScanService& scans) {
+/// By the patient's code, as people file it.
+std::string ReportName(PatientService& patients, const Scan& scan) {
+  const auto patient = patients.FindPatient(scan.patient_id);
+  const std::string fraction = scan.fraction > 0 ? fmt::format("_fraction_{}", scan.fraction) : "";
+  return fmt::format("plumb_{}{}_scan_{}.pdf", patient ? patient->code : "unassigned", fraction,
+                     scan.id);
+}
+
+void AddReports(Routes& routes, PatientService& patients, ScanService& scans) {
   routes
       .ReadInBackground("/api/v1/scans/{id}/report.pdf", Permission::kView,
-                        [&scans](const Request& request) {
+                        [&patients, &scans](const Request& request) {
+                          const auto scan = scans.FindScan(request.arguments[0]);
                           auto pdf = scans.ScanReport(request.arguments[0], LanguageIn(request));
-                          if (!pdf) return ErrorResponse(404, say::store::NoScan());
+                          if (!pdf || !scan) return ErrorResponse(404, say::store::NoScan());
                           return Download("application/pdf", std::move(*pdf),
-                                          fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
+                                          ReportName(patients, *scan));
                         })
       .Discloses("", "download.report");
   routes
       .ReadInBackground("/api/v1/patients/{id}/report.pdf", Permission::kView,
-                        [&scans](const Request& request) {
+                        [&patients, &scans](const Request& request) {
+                          const auto patient = patients.FindPatient(request.arguments[0]);
                           auto pdf = scans.CourseReport(request.arguments[0], LanguageIn(request));
-                          if (!pdf) return ErrorResponse(404, say::store::NoPatient());
+                          if (!pdf || !patient) return ErrorResponse(404, say::store::NoPatient());
                           return Download("application/pdf", std::move(*pdf),
-                                          fmt::format("plumb_course_{}.pdf", request.arguments[0]));
+                                          fmt::format("plumb_course_{}.pdf", patient->code));
                         })
       .Discloses("", "download.course_report");
 }
@@ -207,7 +217,7 @@ void AddProfiles(Routes& routes, SensorProfileService& profiles) {
 }  // namespace
 
 void AddExportRoutes(Routes& routes, const Services& services) {
-  AddReports(routes, services.scans);
+  AddReports(routes, services.patients, services.scans);
   AddNumbers(routes, services.patients, services.scans);
   AddCourse(routes, services.patients, services.scans);
   AddProfiles(routes, services.profiles);

@@ -155,6 +155,10 @@ void AddCheckRoutes(Routes& routes, CheckService& checks) {
                [&checks](const Request& request, const Done& done) {
                  checks.OpenCheck(request.actor(), done);
                });
+  routes.Write("POST", "/api/v1/checks/leave", Permission::kScan, BodyKind::kNone,
+               [&checks](const Request& request, const Done& done) {
+                 checks.LeaveCheck(request.actor(), done);
+               });
 }
 
 }  // namespace

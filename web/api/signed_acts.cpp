@@ -61,12 +61,15 @@ void Accounts::AddSignedActs(Routes& routes) {
   AddSigned(routes, "POST", "/api/v1/references/{id}/approve", Permission::kApprove,
             [this](const Request& request, Fields& fields) -> SignedAct {
               const int revision = fields.Integer("revision", 1, kMaxRevision);
-              const std::string reason = fields.Has("reason")
-                                             ? fields.Text("reason", kMinReason, kMaxReason)
-                                             : std::string();
-              return [this, id = request.arguments.at(0), revision, reason,
+              Considered considered;
+              if (fields.Has("reason"))
+                considered.reason = fields.Text("reason", kMinReason, kMaxReason);
+              if (fields.Has("posture_confirmed"))
+                considered.posture = fields.Flag("posture_confirmed");
+              return [this, id = request.arguments.at(0), revision, considered,
                       digest = fields.Text("digest", 1, 64)](const Actor& actor, Done done) {
-                references_.ApproveReference(actor, id, revision, digest, reason, std::move(done));
+                references_.ApproveReference(actor, id, revision, digest, considered,
+                                             std::move(done));
               };
             });
   AddSigned(routes, "DELETE", "/api/v1/patients/{id}", Permission::kWipe,

@@ -206,6 +206,7 @@ Json ToJson(const ScanQuality& quality) {
   }
   PutMessages(json, "caution", quality.cautions);
   PutMessages(json, "remark", quality.remarks);
+  PutMessage(json, "why_not_accept", quality.why_not_accept);
   return json;
 }
 
@@ -354,6 +355,7 @@ Json PlanJson(const ReferencePlan& plan) {
 void to_json(Json& json, const RoomOnMap& room) {
   json = {{"gantry_xy", room.gantry_xy}, {"right_xy", room.right_xy}, {"known", room.is_known}};
   if (room.lasers_m) json["lasers_m"] = *room.lasers_m;
+  if (room.contradicts_posture) json["contradicts_posture"] = true;
 }
 
 void to_json(Json& json, const Reference& reference) {

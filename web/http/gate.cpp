@@ -85,7 +85,7 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   request.arguments = std::move(match.arguments);
   if (route.permission != Permission::kNone) {
     if (!request.session) return NotLoggedIn();
-    if (!May(request.session->role, route.permission))
+    if (!request.session->May(route.permission))
       return ErrorResponse(403, say::web::RoleNotAllowed());
     if (request.session->must_change_password && route.permission != Permission::kLogin)
       return ErrorResponse(403, say::web::ChooseOwnPassword());

@@ -102,6 +102,9 @@ struct RoomOnMap {
   bool is_known = false;  ///< False: the marker's axes are shown in place of the room's.
   /// Where the lasers cross, in the frame of the map; only of a reference in a calibrated room.
   std::optional<std::array<double, 3>> lasers_m = {};
+  /// The surface of a draft speaks against its planned posture: the body lies across, or its head
+  /// is where the feet should be. An approval has to confirm the posture then.
+  bool contradicts_posture = false;
 };
 
 struct Status {

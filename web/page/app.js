@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: who is logged in, which screen is shown, and the bar above it.
 import {
-  currentSession, get, live, loadSession, logOut, may, now, setLoggedOffHandler, since_s, touchedAt,
+  currentSession, get, live, loadSession, logOut, may, now, post, setLoggedOffHandler, since_s,
+  touchedAt,
 } from './api.js';
-import { clear, forgetWarning, h, hint, say, warn } from './dom.js';
+import { action, clear, forgetWarning, h, hint, say, warn } from './dom.js';
 import { kNobody, languageOf, useLanguage } from './language.js';
 import { lastLogin, lastLoginWords } from './last_login.js';
 import { mayLeave } from './leave.js';
@@ -18,6 +19,7 @@ import { showMonitor } from './screens/monitor.js';
 import { showMonitoringRecord } from './screens/monitoring_record.js';
 import { showPatient, showPatients } from './screens/patients.js';
 import { showPlan } from './screens/plan/plan.js';
+import { quickLogIn, quickPeople, rememberQuickPeople } from './screens/quick_login.js';
 import { showResult } from './screens/result.js';
 import { showScan } from './screens/scan.js';
 import { showSettings } from './screens/settings.js';
@@ -99,10 +101,43 @@ function buildTop(session) {
   nav.addEventListener('click', () => open(false));
   clear(top,
     h('a', { class: 'brand', href: '#/status' }, S.product), menu, nav,
-    h('p', { class: 'chip', id: 'chip' }),
-    h('p', { class: 'who' }, S.loggedInAs(session.user, S.roles[session.role])),
-    looks(session.user),
-    h('button', { class: 'quiet log-out', onclick: () => leave().catch(report) }, S.logOut));
+    h('div', { class: 'mine' },
+      h('p', { class: 'chip', id: 'chip' }),
+      h('p', { class: 'who' }, session.is_quick ? S.login.quickly(session.user)
+        : S.loggedInAs(session.user, S.roles[session.role])),
+      looks(session.user), handOverButton(session),
+      h('button', { class: 'quiet log-out', onclick: () => leave().catch(report) }, S.logOut)));
+}
+
+/// There while somebody else of the shift can take over here.
+function handOverButton(session) {
+  const button = h('button', { class: 'quiet change-person', hidden: true }, S.login.switchPerson);
+  const others = async () => (await quickPeople()).filter((name) => name !== session.user);
+  button.addEventListener('click', async () => {
+    const people = await others();
+    if (!people.length) button.hidden = true;
+    else if (mayLeave()) handOver(people);
+  });
+  others().then((people) => { button.hidden = !people.length; });
+  return button;
+}
+
+/// What is open stays open, and the screen stays: only the person changes.
+function handOver(people) {
+  const place = h('div', { class: 'login' });
+  const box = h('dialog', { class: 'session-alert', 'aria-label': S.login.switchPerson }, place);
+  const close = async () => box.close();
+  box.addEventListener('close', () => box.remove());
+  document.body.append(box);
+  box.showModal();
+  quickLogIn(place, people, async (entered) => {
+    await post('session/hand-over', entered);
+    box.close();
+    drafts.removeAll();
+    live.close();
+    forgetSession();
+    await begin();
+  }, action(S.cancel, close, {}));
 }
 
 let lastState = null;
@@ -204,6 +239,7 @@ async function begin(message) {
   if (!found) return;
   const { session, setupRequired, fault, certificate } = found;
   if (session) adoptPreferences(session);
+  if (session?.has_pin) rememberQuickPeople();
   await speak(session?.user ?? kNobody);
   applyTheme(session?.user ?? kNobody);
   drawnFor = undefined;
@@ -268,6 +304,17 @@ for (const kind of ['pointerdown', 'keydown', 'wheel', 'input']) {
     if (since_s(touchedAt()) >= kUseEvery_s) get('session').catch(() => {});
   }, { capture: true, passive: true });
 }
+/// The button and a sweep are use, too, of the screens that show them.
+let seenState = null;
+function noteSweep() {
+  const { state } = live.status ?? {};
+  const isUse = seenState !== null && state !== seenState && kSweep.includes(state);
+  seenState = state ?? null;
+  if (isUse && kActOnSession.includes(route().name) && !document.hidden) {
+    used = now();
+    get('session').catch(() => {});
+  }
+}
 function watchIdle() {
   const session = currentSession();
   if (!session || !live.wanted) return;
@@ -304,6 +351,7 @@ let lastPurpose = null;
 /// Screens on which users act on the open session: they scan, or use a result. Opening another
 /// patient there asks whether to close this session.
 const kActOnSession = ['scan', 'result'];
+const kSweep = ['scanning', 'working', 'result'];
 const watchSession = () => {
   const { name, argument } = route();
   // A result that was opened from the history is read, not acted on.
@@ -320,7 +368,10 @@ function listen() {
     if (kind === 'connection' && live.connected && failed) show();
     if (kind === 'status' || kind === 'connection') drawChip();
     if (kind === 'status' && live.status.sensor.present) forgetWarning(S.scan.lost);
-    if (kind === 'status') watchSession();
+    if (kind === 'status') {
+      watchSession();
+      noteSweep();
+    }
     if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
   });
   setLoggedOffHandler(() => {

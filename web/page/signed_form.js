@@ -28,5 +28,6 @@ export function ownProof(name = 'password', label = S.result.acceptPassword) {
 /// @param button  The button, or an element that holds it.
 export function signedForm(properties, send, button, ...fields) {
   const proof = ownProof();
+  (button.matches('button') ? button : button.querySelector('button')).classList.add('signs');
   return form(properties, () => send(proof.take), fields, proof.fields, button);
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "web/model/account.hpp"
+#include "web/security/permissions.hpp"
 
 namespace plumb::web {
 
@@ -26,6 +27,12 @@ struct Session {
   std::string address = {};  ///< Of the browser that logged in.
   /// Of an authenticator that is being set up; empty: none is.
   std::string offered_secret = {};
+  /// Opened with a PIN or a badge: the rights that a technician has, too, and no others.
+  bool is_quick = false;
+
+  [[nodiscard]] bool May(Permission permission) const {
+    return web::May(role, permission) && (!is_quick || web::May(Role::kTechnician, permission));
+  }
 };
 
 class Sessions {

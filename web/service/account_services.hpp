@@ -36,6 +36,12 @@ class AccountService {
                                const std::optional<SecondFactor>& expected,
                                const std::optional<SecondFactor>& wanted, const std::string& action,
                                Done done) = 0;
+  /// Hash of the person's PIN or badge, as that of a password; nothing if the person has none, or
+  /// it cannot be read.
+  [[nodiscard]] virtual std::optional<std::string> FindPin(const std::string& name) = 0;
+  /// @param hash  Nothing: the person has none from now on.
+  virtual void SetPin(const Actor& actor, const std::string& name,
+                      const std::optional<std::string>& hash, Done done) = 0;
   /// Empty if none were chosen, or they cannot be read.
   [[nodiscard]] virtual Preferences PreferencesOf(const std::string& name) = 0;
   /// Keeps what the actor chose. It is not logged.

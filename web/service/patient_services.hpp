@@ -69,6 +69,12 @@ struct SentPlanning {
   std::string reason;  ///< Reason for a new reference; may be empty.
 };
 
+/// What an approval states about the doubts that there are: kConflict without it.
+struct Considered {
+  std::string reason;    ///< Why the scan's cautions (ScanQuality) do not matter.
+  bool posture = false;  ///< The posture is right although RoomOnMap::contradicts_posture is set.
+};
+
 /// The rules of services.hpp hold.
 class ReferenceService {
  public:
@@ -98,9 +104,8 @@ class ReferenceService {
   /// @param revision  The revision that was read, as above.
   /// @param digest    Digest of the data that was read and is signed; kConflict if other data is
   ///         stored. Empty: only the revision is checked.
-  /// @param reason  kConflict if it is empty and the scan has cautions (ScanQuality).
   virtual void ApproveReference(const Actor& actor, const std::string& id, int revision,
-                                const std::string& digest, const std::string& reason,
+                                const std::string& digest, const Considered& considered,
                                 Done done) = 0;
 };
 

@@ -24,6 +24,9 @@ class CheckService {
   [[nodiscard]] virtual CheckStatus GetChecks() = 0;  ///< (background)
   /// The next scan, from any button, is a check of the room's markers. kConflict during a scan.
   virtual void OpenCheck(const Actor& actor, Done done) = 0;
+  /// Gives up a check that was opened: the next scan belongs to the open session again. kConflict
+  /// during a scan, and if no check is open.
+  virtual void LeaveCheck(const Actor& actor, Done done) = 0;
   /// Sets this check as the baseline. kRefused for the user who took it.
   virtual void SetCheckBaseline(const Actor& actor, const std::string& check_id,
                                 const std::string& reason, Done done) = 0;

@@ -27,6 +27,8 @@ struct ScanQuality {
   std::vector<QualityRow> rows;
   std::vector<Message> cautions;  ///< To be read beside the verdict: how the scan was taken.
   std::vector<Message> remarks;   ///< What the comparison could not rely on, and warnings.
+  /// Why nobody can accept the result, with a reason or without; empty: it can be.
+  Message why_not_accept;
 };
 
 /// The rules of services.hpp hold.

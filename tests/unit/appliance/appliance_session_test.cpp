@@ -287,7 +287,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
                                                  keep);
       EXPECT_EQ(answer.result, ChangeResult::kConflict);
       EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("open Daily check"));
-      services_->services().references.ApproveReference(tess, "1", 1, "", "", keep);
+      services_->services().references.ApproveReference(tess, "1", 1, "", {}, keep);
       EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("open Daily check"));
       services_->services().references.AddReference(tess, "1", "", keep);
       EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("open Daily check"));

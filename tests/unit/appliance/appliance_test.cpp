@@ -130,6 +130,18 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
     On([&] { EXPECT_EQ(appliance_->OpenCheck(tess).English(), ""); });
     scan("no subject: daily check");
     On([&] {
+      EXPECT_NE(appliance_->LeaveCheck(tess).English(), "") << "it was scanned";
+      for (const bool by_button : {false, true}) {
+        EXPECT_EQ(appliance_->OpenCheck(tess).English(), "");
+        EXPECT_EQ(
+            (by_button ? appliance_->Press(ButtonPress::kLong, tess) : appliance_->LeaveCheck(tess))
+                .English(),
+            "");
+        EXPECT_NE(appliance_->WebStatus().next_purpose, ScanPurpose::kDailyCheck) << by_button;
+      }
+    });
+    EXPECT_TRUE(Becomes([&] { return logged("check.leave") == "no subject: "; }));
+    On([&] {
       Store& store = *shared_->store.get();
       (void)store.checks.Add(
           tess, appliance_->WebStatus().sensor.serial,

@@ -166,5 +166,37 @@ TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
   EXPECT_NE(pdf.find("/MediaBox [ 0 0 595"), std::string::npos);
 }
 
+TEST(PdfReportTest, PicturesHaveAPageOfTheirOwnAndTheFileIsSmall) {
+  ScanReport report;
+  report.title = "Scan";
+  EXPECT_NE(PdfOf(report).find("/Count 1"), std::string::npos);
+  cv::Mat picture(900, 1400, CV_8UC3);
+  for (int row = 0; row < picture.rows; ++row)
+    for (int column = 0; column < picture.cols; ++column)
+      picture.at<cv::Vec3b>(row, column) = {
+          static_cast<std::uint8_t>(row / 4), static_cast<std::uint8_t>(column / 6),
+          static_cast<std::uint8_t>((row * 31 + column * 17) % 9)};
+  report.pictures = {picture, picture};
+  const std::string pdf = PdfOf(report);
+  EXPECT_NE(pdf.find("/Count 2"), std::string::npos);
+  EXPECT_NE(pdf.find("/DCTDecode"), std::string::npos);
+  EXPECT_LT(pdf.size(), 1'000'000U) << "2 x 3.8 MB of pixels";
+}
+
+TEST(PdfReportTest, ATrendIsDrawnFromTwoScansOn) {
+  ScanReport report;
+  report.title = "Scan";
+  const CourseRow row{.fraction = "1",
+                      .when = "",
+                      .verdict = "",
+                      .accepted = "",
+                      .values = {CourseValue{0.1, 0.9}, std::nullopt, CourseValue{-3.2, {}}}};
+  const std::size_t without = PdfOf(report).size();
+  report.trend = {row};
+  EXPECT_EQ(PdfOf(report).size(), without);
+  report.trend = {row, row};
+  EXPECT_GT(PdfOf(report).size(), without);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -84,7 +84,7 @@ inline void MakeSchema9(const std::filesystem::path& database) {
           "ALTER TABLE scans DROP COLUMN unavailable_message; ALTER TABLE refs DROP COLUMN "
           "approved_digest; ALTER TABLE sessions DROP COLUMN reference_id; DROP TABLE "
           "backup_scans; DROP TABLE backups; DROP TABLE removals; DROP "
-          "TABLE bin; DROP TABLE second_factors; PRAGMA user_version = 9");
+          "TABLE bin; DROP TABLE second_factors; DROP TABLE pins; PRAGMA user_version = 9");
 }
 
 /// Turns a database into one of the schema of 0.1.0, without what that cannot hold.

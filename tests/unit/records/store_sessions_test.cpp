@@ -311,6 +311,13 @@ TEST_F(StoreSessionsTest, WhatIsSignedIsWhatIsStored) {
   EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(), "sha256 " + signed_digest);
   EXPECT_THAT(store.references.Waiting(), SizeIs(0));
   EXPECT_EQ(store.patients.Find(patient)->draft_reference_id, "");
+  // The next version, whose posture was confirmed although the surface speaks against it.
+  const std::string next = store.references.Plan(kAnna, reference, 2, {});
+  const Reference draft = *store.references.Find(next);
+  store.references.Approve(kBert, next, draft.revision, draft.digest, /*two_users=*/true, "",
+                           /*posture_confirmed=*/true);
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(),
+            "sha256 " + draft.digest + "; posture confirmed against the surface");
 }
 
 TEST_F(StoreSessionsTest, PairedScreensStayOverARestart) {
@@ -360,6 +367,28 @@ TEST_F(StoreSessionsTest, ASecondFactorChangesOnlyFromWhatItIsAndStaysOverAResta
   EXPECT_EQ(store.users.SecondFactorOf("anna"), used);
   store.users.SetSecondFactor(kAnna, "anna", used, std::nullopt, "user.second_factor_off");
   EXPECT_FALSE(store.users.Find("anna")->has_second_factor);
+}
+
+TEST_F(StoreSessionsTest, APinIsKeptUntilItsOwnerRemovesIt) {
+  {
+    Store store(folder_ / "state");
+    store.users.Add(kAnna, {.name = "anna",
+                            .role = Role::kEngineer,
+                            .password_hash = "hash",
+                            .disabled = false,
+                            .created_at = {},
+                            .has_second_factor = false});
+    EXPECT_EQ(store.users.PinOf("anna"), std::nullopt);
+    for (const char* hash : {"first", "second"}) store.users.SetPin(kAnna, "anna", hash);
+    EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "user.pin_set");
+    EXPECT_EQ(RefusalOf([&] { store.users.SetPin(kAnna, "bob", "hash"); }),
+              ChangeResult::kNotFound);
+  }
+  Store store(folder_ / "state");
+  EXPECT_EQ(store.users.PinOf("anna"), "second");
+  store.users.SetPin(kAnna, "anna", std::nullopt);
+  EXPECT_EQ(store.users.PinOf("anna"), std::nullopt);
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "user.pin_removed");
 }
 
 TEST_F(StoreSessionsTest, AProvisionedScreenIsPairedOnceForEachKey) {

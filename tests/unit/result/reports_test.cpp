@@ -155,6 +155,17 @@ TEST_F(ReportsTest, ASensorThatWasOnForLessThanTheConfiguredTimeIsACaution) {
   EXPECT_THAT(cautions(1200), Not(::testing::Contains(HasSubstr(warming))));
 }
 
+TEST_F(ReportsTest, AResultOfMoreThanHalfLostFramesCannotBeAccepted) {
+  ScanFiles files{.scene = StoredScene{}, .result = {}, .unreadable = {}};
+  files.scene->scene.frames_total = 200;
+  const auto why_not = [&](std::int64_t lost) {
+    files.scene->scene.frames_dropped = lost;
+    return QualityOf(Scan{}, files, 20).why_not_accept;
+  };
+  EXPECT_EQ(why_not(100).English(), "");
+  EXPECT_THAT(why_not(101).English(), HasSubstr("50.5 % of the frames were lost, more than 50 %"));
+}
+
 TEST_F(ReportsTest, EachIgnoredMarkerIsACaution) {
   const std::string id = AddScan(
       Approved(), kMove, DailyCheck::kPassed, {},

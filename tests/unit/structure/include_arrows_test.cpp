@@ -117,7 +117,7 @@ const Arrows kAllowed = {
      {"algo/base", "algo/types", "algo/geometry", "algo/acceptance", "algo/motion",
       "algo/comparison", "algo/monitoring", "drivers/files", "daemon/files"}},
     {"daemon/result",
-     {"algo/base", "algo/types", "algo/acceptance", "algo/comparison", "algo/render",
+     {"algo/base", "algo/types", "algo/acceptance", "algo/motion", "algo/comparison", "algo/render",
       "drivers/files", "web/model", "web/service", "web/exchange", "daemon/loop", "daemon/config",
       "daemon/files", "daemon/records"}},
     {"daemon/unit",

@@ -205,6 +205,7 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
   const auto scan = [&] {
     EXPECT_EQ(technician.Post("/api/v1/press").status, 200);
     EXPECT_EQ(technician.Post("/api/v1/checks/open").status, 409) << "not during a scan";
+    EXPECT_EQ(technician.Post("/api/v1/checks/leave").status, 409) << "not during a scan";
     loop_->Do([&] {
       for (int i = 0; i < 20; ++i)
         service_.Tick(std::chrono::steady_clock::now() + std::chrono::seconds(10 * i));
@@ -231,6 +232,15 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
   EXPECT_FALSE(status["check_overdue"]);
   EXPECT_EQ(technician.Get("/api/v1/checks").json()["baseline"]["set_by"], "physicist");
   EXPECT_EQ(HttpClient(port_).Get("/api/v1/checks").status, 401);
+}
+
+TEST_F(ApiTest, ADailyCheckThatWasOpenedIsLeft) {
+  HttpClient technician = LoggedIn("technician");
+  EXPECT_EQ(technician.Post("/api/v1/checks/leave").status, 409) << "none is open";
+  EXPECT_EQ(technician.Post("/api/v1/checks/open").status, 200);
+  EXPECT_EQ(technician.Post("/api/v1/checks/leave").status, 200);
+  EXPECT_NE(technician.Get("/api/v1/status").json()["next_purpose"], "daily_check");
+  EXPECT_EQ(technician.Post("/api/v1/checks/leave").status, 409);
 }
 
 TEST_F(ApiTest, AReferenceStatesWhereTheRoomLiesOnItsOwnMaps) {

@@ -27,7 +27,8 @@ const std::set<std::string> kWithoutPatients = {
     "/health",
     "/api/v1/session",
     "/api/v1/session/last-login",
-    "/api/v1/status",  // the open session's code and no more, like the events
+    "/api/v1/login/people",  // names of staff, to a browser that knows them
+    "/api/v1/status",        // the open session's code and no more, like the events
     "/api/v1/events",
     "/api/v1/templates",
     "/api/v1/checks",

@@ -4,7 +4,7 @@ import { fileUrl, live, may, post } from '../api.js';
 import { action, clear, done, field, form, h, hint, signedTime } from '../dom.js';
 import { kReason } from '../limits.js';
 import { signedForm } from '../signed_form.js';
-import { S, wordOf } from '../words.js';
+import { S, said, wordOf } from '../words.js';
 import { closeSession } from '../treatment.js';
 import { acceptanceMark } from './common.js';
 import { removeScan } from './remove_scan.js';
@@ -36,10 +36,14 @@ function outsideForm(scan, reload) {
 }
 
 /// Only a valid result can be accepted: one tap in tolerance, else a reason and the password.
-function acceptance({ scan, received }, reload) {
+function acceptance({ scan, received, quality }, reload) {
   const text = S.result;
   if (scan.accepted_by) return accepted(scan);
   const element = h('div', { class: 'acceptance' });
+  if (scan.result && quality?.why_not_accept) {
+    clear(element, h('p', { class: 'caution' }, said(quality, 'why_not_accept')));
+    return { element, tick: () => {} };
+  }
   const possible = may('accept') && scan.result && scan.result.verdict !== 'no_answer';
   // Kept, so that a half-typed reason survives a short loss of the connection.
   let offer = null;

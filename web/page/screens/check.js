@@ -158,7 +158,10 @@ export async function showCheck(place) {
     const offer = last && JSON.stringify([last.id, baseline?.check_id, S.languageName]);
     if (last && offered !== offer) {
       offered = offer;
-      const mayTake = may('plan') && last.num_markers >= 3 && baseline?.check_id !== last.id;
+      // Who took a check that passed has nothing to do here once there is a baseline.
+      const isDone = baseline && last.status === 'passed' && last.user === currentSession()?.user;
+      const mayTake = may('plan') && last.num_markers >= 3 && baseline?.check_id !== last.id
+        && !isDone;
       clear(baselinePlace, mayTake && baselineForm(last, saidEach(answer, 'changes'), load));
       baselinePlace.hidden = !mayTake;
     }

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 import { get, loadSession, post, put } from '../api.js';
-import { clear, codeInput, field, form, h, hint, passwordInput, select } from '../dom.js';
+import {
+  action, clear, codeInput, field, form, h, hint, passwordInput, select,
+} from '../dom.js';
 import { kName, kNewPassword } from '../limits.js';
 import { S } from '../words.js';
+import { quickLogIn, quickPeople } from './quick_login.js';
 
 const kAskAgain_ms = 5000;
 
@@ -20,7 +23,24 @@ export async function showFault(main, fault) {
   }
 }
 
-export function showLogin(main, setupRequired, certificate, done) {
+/// The people of the shift first, where there are any: a PIN is typed sooner than a password.
+export async function showLogin(main, setupRequired, certificate, done) {
+  const people = setupRequired ? [] : await quickPeople();
+  if (!people.length) {
+    showPasswordLogin(main, setupRequired, certificate, done);
+    return;
+  }
+  const place = h('section', { class: 'login card' });
+  clear(main, place);
+  quickLogIn(place, people, async (entered) => {
+    await post('login/pin', entered);
+    await loadSession();
+    await done();
+  }, action(S.login.withPassword,
+    async () => showPasswordLogin(main, setupRequired, certificate, done), {}));
+}
+
+function showPasswordLogin(main, setupRequired, certificate, done) {
   const text = S.login;
   const name = h('input', {
     name: 'name', autocomplete: 'username', required: true, spellcheck: 'false',

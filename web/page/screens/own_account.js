@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // One's own authenticator, and where one is logged in.
-import { currentSession, get, loadSession, post, remove, removeFor } from '../api.js';
+import { currentSession, get, loadSession, post, put, remove, removeFor } from '../api.js';
 import {
   action, card, clear, codeInput, done, field, form, h, hint, row, table, warn,
 } from '../dom.js';
 import { signedForm } from '../signed_form.js';
 import { S } from '../words.js';
 import { ageText } from './common.js';
+import { pinInput, rememberQuickPeople } from './quick_login.js';
 
 /// Set up: the password, then the secret, then a first code; the recovery codes are shown once.
 export function ownAuthenticator() {
@@ -40,6 +41,36 @@ export function ownAuthenticator() {
           h('ul', { class: 'recovery' }, codes.map((one) => h('li', {}, h('code', {}, one)))));
       }, field(text.code, code), h('button', { class: 'primary' }, text.finish)));
     code.focus();
+  };
+  draw();
+  return card(text.title, hint(text.hint), place);
+}
+
+/// A PIN or a badge for the rest of a shift.
+export function ownPin() {
+  const text = S.pin;
+  const place = h('div', {});
+  const saved = async (words) => {
+    await loadSession();
+    rememberQuickPeople();
+    done(words);
+    draw();
+  };
+  const draw = () => {
+    const has = currentSession().has_pin;
+    const [fresh, again] = [pinInput(), pinInput()];
+    clear(place, h('p', {}, has ? text.on : text.off),
+      signedForm({ class: 'form inline' }, async (sign) => {
+        if (fresh.value !== again.value) throw new Error(text.differ);
+        await put('session/pin', { pin: fresh.value, ...sign() });
+        await saved(S.saved);
+      }, h('button', {}, text.set), field(text.fresh, fresh, text.freshHint),
+      field(text.repeat, again)),
+      has && h('details', {}, h('summary', {}, `${text.remove}…`),
+        signedForm({ class: 'form inline' }, async (sign) => {
+          await removeFor('session/pin', sign());
+          await saved(text.removed);
+        }, h('button', { class: 'danger' }, text.remove))));
   };
   draw();
   return card(text.title, hint(text.hint), place);

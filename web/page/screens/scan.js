@@ -3,9 +3,9 @@
 import {
   currentSession, fetchPicture, get, live, may, now, post, repeat, since_s,
 } from '../api.js';
-import { action, card, clear, done, enable, h, hint, redraw, say } from '../dom.js';
+import { action, card, clear, done, enable, h, hint, say } from '../dom.js';
 import { liveSurface } from '../drawings/live_surface.js';
-import { isAcknowledged, sessionLine } from '../treatment.js';
+import { isAcknowledged, sessionLine, sessionName } from '../treatment.js';
 import { S, said } from '../words.js';
 import {
   faultWords, follow, lastKnownNote, sentence, stateHere, stateHint,
@@ -148,7 +148,13 @@ export async function showScan(place, what) {
     if (isCheck) {
       const [name, sweep] = what === 'board' ? [S.room_calibration.title, S.room_calibration.sweep]
         : [S.purposes.daily_check, S.check.sweep];
-      redraw(who, h('strong', { class: 'code-big' }, name), ` ${sweep}`);
+      const isWaiting = !['scanning', 'working'].includes(status.state);
+      clear(who, h('strong', { class: 'code-big' }, name), ` ${sweep}`,
+        status.session && h('span', {}, S.session.afterCheck(sessionName(status.session))),
+        may('scan') && isWaiting && action(S.check.leave, async () => {
+          await post('checks/leave');
+          done(S.check.left);
+        }));
     } else drawSession();
   };
   const drawProgress = (status) => {

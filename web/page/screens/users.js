@@ -9,7 +9,7 @@ import { kName, kNewPassword } from '../limits.js';
 import { preferences } from '../preferences.js';
 import { ownProof, signedForm } from '../signed_form.js';
 import { S } from '../words.js';
-import { ownAuthenticator, ownSessions } from './own_account.js';
+import { ownAuthenticator, ownPin, ownSessions } from './own_account.js';
 
 const accountRoles = () => Object.fromEntries(
   Object.entries(S.roles).filter(([name]) => name !== 'display'));
@@ -122,6 +122,7 @@ export async function showUsers(place) {
       form({ class: 'form inline' }, add, field(text.name, name, text.nameHint),
         field(text.role, role), field(text.password, fresh, S.login.passwordHint), proof.fields,
         h('button', { class: 'primary' }, text.submit))),
-    may('users') && displays(), ownPreferences(), ownPassword(), ownAuthenticator(), ownSessions());
+    may('users') && displays(), ownPreferences(), ownPassword(), ownPin(),
+    ownAuthenticator(), ownSessions());
   if (may('users')) await load().catch((error) => warn(error.message));
 }

@@ -127,10 +127,15 @@ function summary(reference, patient, { scan, quality, picture, heights }, approv
   const doubts = heights && plan.isocentre_m && !planning
     ? doubtsOf(heights, plan.isocentre_m).words : [];
   const reason = flags && h('input', { required: true, autocomplete: 'off', ...kReason });
+  const posture = reference.room?.contradicts_posture
+    && checkbox(text.postureConfirm, false, { required: true });
   const signature = signedForm({ class: 'form inline below' },
-    (sign) => approve({ ...sign(), ...(reason && { reason: reason.value.trim() }) }),
+    (sign) => approve({ ...sign(), ...(reason && { reason: reason.value.trim() }),
+      ...(posture && { posture_confirmed: posture.box.checked }) }),
     h('button', { class: 'primary' }, text.summarySubmit),
-    reason ? field(text.flagsReason, reason) : []);
+    reason ? field(text.flagsReason, reason) : [],
+    posture ? h('div', {}, h('p', { class: 'caution' }, text.postureContradicted),
+      posture.element) : []);
   return h('section', { class: 'card summary', 'aria-label': text.summary },
     h('h2', {}, text.summary), h('div', { class: 'summary-grid' },
       picture, h('dl', { class: 'facts' },
