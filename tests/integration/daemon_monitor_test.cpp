@@ -108,9 +108,9 @@ TEST_F(DaemonMonitorTest, ALivePositionIsSignedOnlyWhereTheSettingSaysSo) {
   const json accepted = plumbd.Status()["monitor"]["accepted"];
   EXPECT_EQ(accepted["by"], "physicist");
   EXPECT_TRUE(accepted["numbers"]["vertical_mm"].is_number());
-  EXPECT_THAT(engineer.Get("/api/v1/audit?limit=20").body,
-              ::testing::AllOf(::testing::HasSubstr("monitor.accept"),
-                               ::testing::HasSubstr("a test")));
+  EXPECT_THAT(
+      engineer.Get("/api/v1/audit?limit=20").body,
+      ::testing::AllOf(::testing::HasSubstr("monitor.accept"), ::testing::HasSubstr("a test")));
   plumbd.Sim("stall");
   plumbd.WaitFor("an unknown state",
                  [](const json& status) { return status["monitor"]["advice"] == "unknown"; });

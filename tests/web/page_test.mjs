@@ -729,19 +729,21 @@ await h.step('patients, log, settings and update look finished', async () => {
   const choices = form.locator('select');
   const all =
     await form.locator('input, select').evaluateAll((fields) => fields.map((one) => one.value));
-  equal(all.join(), ',,,,,,,,', 'nothing is filled in');
+  equal(all.join(), ',,,,,,,,,,', 'nothing is filled in');
   const sent = [];
   const note = (request) => { if (request.method() === 'PUT') sent.push(request.postDataJSON()); };
   engineer.on('request', note);
   const save = engineer.getByRole('button', { name: 'Save' });
   await save.click();
-  for (const [k, value] of ['5', '1', '10', '60', '0', '15'].entries()) {
+  for (const [k, value] of ['5', '1', '10', '60', '0', '15', '3.5'].entries()) {
     await numbers.nth(k).fill(value);
   }
-  for (const [k, value] of ['HFS', 'true'].entries()) await choices.nth(k).selectOption(value);
+  for (const [k, value] of ['HFS', 'sweep', 'true'].entries()) {
+    await choices.nth(k).selectOption(value);
+  }
   await save.click();
   equal(await form.evaluate((one) => one.checkValidity()), false, 'one choice is missing');
-  await choices.nth(2).selectOption('false');
+  await choices.nth(3).selectOption('false');
   await save.click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
   equal(sent.length, 1, 'nothing was sent before all was entered');

@@ -13,6 +13,7 @@ namespace {
 const std::map<std::string, std::string> kWhoMay = {
     {"GET /", "any"},
     {"GET /room", "any"},
+    {"GET /breath", "any"},
     {"GET /assets/{name}", "any"},
     {"GET /health", "any"},
     {"GET /result", "any"},
