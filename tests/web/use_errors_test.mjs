@@ -1118,6 +1118,27 @@ await h.step('site and note are corrected; an archived patient is out of the lis
     'not offered to a technician');
 });
 
+await h.step('a press of the button is use of a screen that shows the sweep, and of no other',
+  async () => {
+  const idle = await h.person('idle');
+  await h.logIn(idle, 'anna');
+  h.tell('slow');
+  let uses = 0;
+  idle.on('request', (one) => { if (/\/api\/v1\/session$/.test(one.url())) ++uses; });
+  for (const [screen, most] of [['status', 0], ['scan', 1]]) {
+    await idle.goto(`${h.url}#/${screen}`);
+    await idle.locator('.headline').waitFor();
+    uses = 0;
+    h.tell('press');
+    await idle.locator('.chip[data-state=scanning]').waitFor();
+    await h.ticks(idle);
+    equal(uses, most, `uses of ${screen}`);
+    equal((await h.api(anna, 'cancel', 'POST')).status, 200, 'discarded');
+    await idle.locator('.chip[data-state=ready]').waitFor();
+  }
+  await idle.context().close();
+});
+
 await h.step('a PIN within a shift: people change in one browser, and signatures keep the password',
   async () => {
   const desk = await h.person('desk');
