@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <memory>
 #include <vector>
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
 #include "algo/comparison/comparison.hpp"
+#include "daemon/cli/batch.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/cli/work_digest.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
@@ -21,7 +25,8 @@ namespace plumb {
 namespace {
 
 struct CompareArguments {
-  std::filesystem::path reference, current, out;
+  std::filesystem::path reference, current, list, out;
+  ThreadLimit threads;
   std::optional<std::filesystem::path> region;
   std::vector<double> isocentre_m;
   MethodOptions method;
@@ -46,22 +51,20 @@ CompareOptions MethodOf(const CompareArguments& options) {
   return compare;
 }
 
-int Run(const CompareArguments& options, const CommandContext& context) {
-  const CompareOptions method = MethodOf(options);
-  { const AtomicFolder check(options.out, ResultOutput()); }  // rejects a bad place before the work
-  Progress progress(context.language);
-  const auto stop_if_asked = [&] {
+StoredResult Compared(const BatchInputs& scenes, const CompareOptions& method,
+                      const CompareArguments& options, const std::filesystem::path& out,
+                      const std::string& name, Progress& progress, const CommandContext& context) {
+  const auto enter = [&](const Message& step, double fraction) {
     if (context.stop.stop_requested()) throw Interrupted(say::cli::NothingWritten());
+    progress.Update(name.empty() ? step : say::cli::StepOf(name, step), fraction);
   };
-  progress.Update(say::cli::ReadingScenes(), 0.1);
-  const Scene reference = ReadScene(options.reference);
-  stop_if_asked();
-  const Scene current = ReadScene(options.current);
-  stop_if_asked();
-  progress.Update(say::progress::Comparing(), 0.3);
+  enter(say::cli::ReadingScenes(), 0.1);
+  const Scene reference = ReadScene(scenes.at(0));
+  enter(say::cli::ReadingScenes(), 0.2);
+  const Scene current = ReadScene(scenes.at(1));
+  enter(say::progress::Comparing(), 0.3);
   Comparison comparison = Compare(reference, current, method);
-  stop_if_asked();
-  progress.Update(say::cli::Drawing(), 0.8);
+  enter(say::cli::Drawing(), 0.8);
   const double start_s = SteadySeconds();
   const ResultPictures pictures =
       DrawResult(comparison, reference.height_map ? &*reference.height_map : nullptr,
@@ -69,15 +72,98 @@ int Run(const CompareArguments& options, const CommandContext& context) {
                   .paper_colors = options.paper_colors,
                   .subtitle = PictureSubtitle(comparison)});
   comparison.timings_s["pictures"] = SteadySeconds() - start_s;
-  stop_if_asked();
-  progress.Update(say::cli::Writing(), 0.9);
-  WriteResult(comparison, pictures, options.out);
+  enter(say::cli::Writing(), 0.9);
+  WriteResult(comparison, pictures, out);
   progress.Clear();
-  const StoredResult result = Stored(comparison);
+  return Stored(comparison);
+}
+
+int RunOne(const CompareArguments& options, const CommandContext& context) {
+  const CompareOptions method = MethodOf(options);
+  { const AtomicFolder check(options.out, ResultOutput()); }  // rejects a bad place before the work
+  Progress progress(context.language);
+  const StoredResult result = Compared({options.reference, options.current}, method, options,
+                                       options.out, "", progress, context);
   PrintOut(options.json ? ResultText(result)
                         : ComparisonText(result, context.language) + "\n" +
                               context.Said(say::cli::WrittenTo(options.out.string())) + "\n");
-  return comparison.verdict == Verdict::kNoAnswer ? kNoAnswer : kDone;
+  return result.verdict == Verdict::kNoAnswer ? kNoAnswer : kDone;
+}
+
+/// Numbers that must not be acted on are not in the table, as they are in no other one.
+BatchAnswer ComparisonAnswer(const std::filesystem::path& output) {
+  const StoredResult result = ReadResult(output);
+  const bool is_answer = result.verdict != Verdict::kNoAnswer && result.correction;
+  TableRow cells;
+  for (const bool is_u95 : {false, true}) {
+    for (std::size_t i = 0; i < std::size(kNumberNames); ++i) {
+      const auto number = !is_answer ? std::optional<double>()
+                          : is_u95   ? result.correction->u95[i]
+                                     : result.correction->value[i];
+      cells.push_back(number ? fmt::to_string(*number) : std::string());
+    }
+  }
+  return {.exit_code = result.verdict == Verdict::kNoAnswer ? kNoAnswer : kDone,
+          .verdict = std::string(Name(result.verdict)),
+          .cells = std::move(cells)};
+}
+
+std::vector<TableColumn> NumberColumns() {
+  std::vector<TableColumn> columns;
+  for (const char* prefix : {"", "u95_"}) {
+    for (std::size_t i = 0; i < std::size(kNumberNames); ++i) {
+      columns.push_back({fmt::format("{}{}_{}", prefix, kNumberNames[i], UnitOf(i)), "double",
+                         *prefix == 0 ? "What restores the position; empty: not known or no answer"
+                                      : "Half-width of the interval of 95 %"});
+    }
+  }
+  return columns;
+}
+
+/// Everything but the scenes that decides about a result.
+std::string MethodOfAll(const CompareArguments& options, const CommandContext& context) {
+  constexpr auto kSections = std::to_array<std::string_view>({"markers", "compare", "iec"});
+  const Config config = options.method.Read();
+  std::string text = MethodText("compare", config, kSections);
+  const auto add_file = [&](const char* option, const std::optional<std::filesystem::path>& file) {
+    if (file) text += OptionText(option, ContentDigest(*file, context.stop));
+  };
+  add_file("region_file", config.region_file);
+  add_file("markers_scene", config.markers_scene);
+  add_file("region", options.region);
+  if (options.reference_method.config_file) {
+    const Config room = options.reference_method.Read();
+    text += MethodText("reference", room, kSections);
+    add_file("markers_scene", room.markers_scene);
+  }
+  for (const double metres : options.isocentre_m) text += OptionText("m", fmt::to_string(metres));
+  return text + OptionText("paper_colours", options.paper_colors ? "1" : "0");
+}
+
+int RunList(const CompareArguments& options, const CommandContext& context) {
+  const CompareOptions method = MethodOf(options);
+  Progress progress(context.language);
+  const BatchWork work{
+      .method = MethodOfAll(options, context),
+      .inputs = {{"reference", "string", "Scene of the reference, as the list has it"},
+                 {"current", "string", "Scene of the current scan, as the list has it"}},
+      .columns = NumberColumns(),
+      .table = "results.csv",
+      .is_finished = IsResultFolder,
+      .make =
+          [&](const BatchInputs& item, const std::filesystem::path& out, const std::string& name) {
+            (void)Compared(item, method, options, out, name, progress, context);
+          },
+      .read = ComparisonAnswer};
+  return RunBatch(options.list, options.out, work, context);
+}
+
+int Run(const CompareArguments& options, const CommandContext& context) {
+  const bool has_paths = !options.reference.empty() && !options.current.empty();
+  if (has_paths == !options.list.empty() || has_paths != !options.reference.empty())
+    throw InvalidRequest(say::cli::ListOrPaths());
+  return options.threads.Run(
+      [&] { return has_paths ? RunOne(options, context) : RunList(options, context); });
 }
 
 }  // namespace
@@ -85,12 +171,18 @@ int Run(const CompareArguments& options, const CommandContext& context) {
 Command AddCompare(CLI::App& app) {
   auto options = std::make_shared<CompareArguments>();
   app.add_option("reference", options->reference, "Scene folder of the reference")
-      ->required()
       ->type_name("REFERENCE_SCENE");
   app.add_option("current", options->current, "Scene folder of the current scan")
-      ->required()
       ->type_name("CURRENT_SCENE");
-  app.add_option("--out", options->out, "Result folder to write")->required()->type_name("RESULT");
+  CLI::Option* const list =
+      app.add_option("--list", options->list,
+                     "Compare many scenes: a file with a reference and a current scene a line")
+          ->type_name("FILE");
+  app.add_option("--out", options->out,
+                 "Result folder to write; with --list the folder of all results")
+      ->required()
+      ->type_name("RESULT");
+  options->threads.AddTo(app);
   options->method.AddTo(app);
   app.add_option("--reference-config", options->reference_method.config_file,
                  "The room of the reference, where that is another one: its [iec] as TOML")
@@ -106,7 +198,7 @@ Command AddCompare(CLI::App& app) {
       ->type_name("X Y Z");
   app.add_flag("--paper-colours", options->paper_colors,
                "Draw the error map on the paper's scale: |e|, blue at 0 to red at 10 cm");
-  app.add_flag("--json", options->json, "Print result.json on the standard output");
+  app.add_flag("--json", options->json, "Print result.json on the standard output")->excludes(list);
   app.footer("\nExit code 4 with the verdict no_answer: the result is written and states why.");
   return [options](const CommandContext& context) { return Run(*options, context); };
 }

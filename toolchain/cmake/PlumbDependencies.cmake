@@ -27,13 +27,15 @@ if(PLUMB_WITH_DICOM)
   endforeach()
 endif()
 
+# Digests, of the command line too.
+pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
+
 # The appliance. Each hardware library can be left out.
 if(PLUMB_WITH_APPLIANCE)
   pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
   pkg_check_modules(microhttpd REQUIRED IMPORTED_TARGET libmicrohttpd)
   pkg_check_modules(gnutls REQUIRED IMPORTED_TARGET gnutls)
   pkg_check_modules(sqlite3 REQUIRED IMPORTED_TARGET sqlite3)
-  pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
   pkg_check_modules(libzip REQUIRED IMPORTED_TARGET libzip)
   pkg_check_modules(libarchive REQUIRED IMPORTED_TARGET libarchive)
 endif()

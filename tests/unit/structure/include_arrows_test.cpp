@@ -150,7 +150,8 @@ const Arrows kAllowed = {
       "drivers/live",    "drivers/gpio",      "drivers/importers", "drivers/dicom",
       "algo/planning",   "daemon/planning",   "daemon/loop",       "daemon/config",
       "daemon/pipeline", "daemon/files",      "daemon/database",   "daemon/archive",
-      "daemon/control",  "daemon/evaluation", "daemon/result",     "daemon/sheets"}},
+      "daemon/control",  "daemon/evaluation", "daemon/result",     "daemon/sheets",
+      "daemon/scan_files"}},
     // A program on top of everything.
     {"daemon/python",
      {"algo/base", "algo/types", "algo/comparison", "drivers/replay", "daemon/config",
