@@ -111,7 +111,7 @@ Appliance::Answer Appliance::WhyNotIdle() const {
 /// sensor is at rest, as light and screens have said before.
 Appliance::Answer Appliance::Press(ButtonPress press, const Actor& actor) {
   if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady && session_.check())
-    return LeaveCheck(actor);
+    return PrepareCheck(/*opens=*/false, actor);
   if (press == ButtonPress::kLong && state_.phase == ApplianceState::kReady && session_.IsOpen() &&
       session_.IsPatients())
     return CloseSession(actor);
@@ -238,19 +238,12 @@ void Appliance::Act(ScanAction action) {
   }
 }
 
-Appliance::Answer Appliance::OpenCheck(const Actor& actor) {
+Appliance::Answer Appliance::PrepareCheck(bool opens, const Actor& actor) {
   if (Message why = WhyNotIdle(); !why.empty()) return why;
-  session_.SetCheck(actor);
+  if (!opens && !session_.check()) return say::scan::NoCheckOpen();
+  session_.SetCheck(opens ? std::optional(actor) : std::nullopt);
   notices_.TellPage(web::EventKind::kStatus);
-  return {};
-}
-
-Appliance::Answer Appliance::LeaveCheck(const Actor& actor) {
-  if (Message why = WhyNotIdle(); !why.empty()) return why;
-  if (!session_.check()) return say::scan::NoCheckOpen();
-  session_.SetCheck({});
-  notices_.TellPage(web::EventKind::kStatus);
-  Audit(actor, "check.leave", "", {});
+  if (!opens) Audit(actor, "check.leave", "", {});
   return {};
 }
 

@@ -57,10 +57,8 @@ class Appliance : private StorageUser {
   /// Closes this patient if it is open. An open daily check stays open.
   void ClosePatient(const std::string& patient_id);
   /// The next scan is the daily check of the room's markers; scans after it belong to the open
-  /// patient again.
-  Answer OpenCheck(const Actor& actor);
-  /// The opened check is given up: the next scan belongs to the open patient again.
-  Answer LeaveCheck(const Actor& actor);
+  /// patient again. @param opens  False: the opened check is given up.
+  Answer PrepareCheck(bool opens, const Actor& actor);
   /// Applies changes that are possible while running and logs those that are not. For SIGHUP.
   void Reload(const Config& config);
   /// Calls `stopped` once no scan runs any more; a running one is discarded.

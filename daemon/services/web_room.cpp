@@ -24,14 +24,14 @@ class WebChecks final : public web::CheckService {
   }
 
   void OpenCheck(const Actor& actor, Done done) override {
-    if (const Message refusal = appliance_.OpenCheck(actor); !refusal.empty())
+    if (const Message refusal = appliance_.PrepareCheck(/*opens=*/true, actor); !refusal.empty())
       return done(AnswerOf(refusal));
     store_.Write(&Store::audit, std::move(done),
                  [=](AuditStore& audit) { audit.Log(actor, "check.open", "", Message()); });
   }
 
   void LeaveCheck(const Actor& actor, Done done) override {
-    done(AnswerOf(appliance_.LeaveCheck(actor)));
+    done(AnswerOf(appliance_.PrepareCheck(/*opens=*/false, actor)));
   }
 
   void SetCheckBaseline(const Actor& actor, const std::string& check_id, const std::string& reason,

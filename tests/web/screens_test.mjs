@@ -313,7 +313,12 @@ await h.step('while nothing was scanned, and for who has not come in', async () 
   const url = () => '';
   const session = '**/api/v1/session';
   h.tell('overdue');
+  h.tell('recorded 000007');
   await lookAll(
+    {
+      name: 'monitoring-record', route: 'monitoring', who: 'anna', hash: 'monitoring/000007-1',
+      ready: 'dd',
+    },
     { name: 'status-empty', route: 'status', who: 'anna', hash: 'status', ready: '.tile' },
     { name: 'patients-empty', route: 'patients', who: 'anna', hash: 'patients', ready: 'form' },
     { name: 'result-none', route: 'result', who: 'anna', hash: 'result', ready: '.result h1' },

@@ -70,7 +70,7 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     EXPECT_EQ(opened.get_future().get().result, ChangeResult::kDone);
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().patient_id, id);
-      EXPECT_EQ(appliance_->OpenCheck(actor).English(), "");
+      EXPECT_EQ(appliance_->PrepareCheck(/*opens=*/true, actor).English(), "");
       services_->services().patients.WipePatient(
           actor, id, [&](const Change& change) { wiped.set_value(change); });
       EXPECT_EQ(appliance_->WebStatus().next_purpose, ScanPurpose::kDailyCheck)

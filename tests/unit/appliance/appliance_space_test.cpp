@@ -120,7 +120,7 @@ TEST_F(ApplianceSpaceTest, ARecordingNeedsItsOwnRoomAndADailyCheckHasNone) {
     SetAvailable(kScanBytes + kRecordingBytes - 1);
     On([&] {
       EXPECT_THAT(reason(), HasSubstr("the disk is full"));
-      EXPECT_EQ(appliance_->OpenCheck(kTester).English(), "");
+      EXPECT_EQ(appliance_->PrepareCheck(/*opens=*/true, kTester).English(), "");
       EXPECT_EQ(reason(), "");
     });
     SetAvailable(kScanBytes);

@@ -127,16 +127,16 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
       EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     };
     scan("no subject: unassigned");
-    On([&] { EXPECT_EQ(appliance_->OpenCheck(tess).English(), ""); });
+    On([&] { EXPECT_EQ(appliance_->PrepareCheck(/*opens=*/true, tess).English(), ""); });
     scan("no subject: daily check");
     On([&] {
-      EXPECT_NE(appliance_->LeaveCheck(tess).English(), "") << "it was scanned";
+      EXPECT_NE(appliance_->PrepareCheck(/*opens=*/false, tess).English(), "") << "it was scanned";
       for (const bool by_button : {false, true}) {
-        EXPECT_EQ(appliance_->OpenCheck(tess).English(), "");
-        EXPECT_EQ(
-            (by_button ? appliance_->Press(ButtonPress::kLong, tess) : appliance_->LeaveCheck(tess))
-                .English(),
-            "");
+        EXPECT_EQ(appliance_->PrepareCheck(/*opens=*/true, tess).English(), "");
+        EXPECT_EQ((by_button ? appliance_->Press(ButtonPress::kLong, tess)
+                             : appliance_->PrepareCheck(/*opens=*/false, tess))
+                      .English(),
+                  "");
         EXPECT_NE(appliance_->WebStatus().next_purpose, ScanPurpose::kDailyCheck) << by_button;
       }
     });
