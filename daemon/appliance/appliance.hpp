@@ -157,7 +157,7 @@ class Appliance : private StorageUser {
   Message sensor_fault_, scan_fault_, rolled_back_;
   CurrentScan scan_;
   std::optional<CurrentScan> last_result_;
-  ScanCounts counts_;  ///< Since the start.
+  ScanCounts counts_;        ///< Since the start.
   std::string last_serial_;  ///< Serial of the last used sensor.
   PageNotes page_;
   IndicatorPattern shown_ = IndicatorPattern::kOff;

@@ -81,7 +81,7 @@ struct LiveScan {
 struct ScanCounts {
   std::int64_t failed = 0, cancelled = 0;
   std::array<std::int64_t, kNamesOf<Verdict>.size()> verdicts = {};  ///< By Verdict.
-  std::int64_t without_comparison = 0;  ///< References, daily checks.
+  std::int64_t without_comparison = 0;                               ///< References, daily checks.
   std::int64_t frames = 0, frames_dropped = 0;
   std::optional<double> answer_s = {};  ///< Of the newest scan, from its last frame.
 };
