@@ -13,7 +13,7 @@ constexpr double kMostSlope_m_s = 0.002;
 /// The trace's own noise is 0.2 to 0.4 mm (docs/monitoring.md): over a second a held breath lies
 /// within about six times that.
 constexpr double kMostRange_m = 0.002;
-constexpr std::size_t kLeastFrames = 5;
+constexpr std::size_t kLeastHeights = 5;
 
 }  // namespace
 
@@ -41,7 +41,7 @@ LiveAdvice BreathGate::Next(double time_s, const std::optional<double>& height_m
 }
 
 std::optional<BreathWindow> BreathGate::Teach(double width_m) {
-  if (recent_.size() < kLeastFrames ||
+  if (recent_.size() < kLeastHeights ||
       recent_.back().first - recent_.front().first < kSettled_s - kLongestGap_s)
     return std::nullopt;
   double least = recent_.front().second, most = least, sum = 0;
@@ -77,7 +77,7 @@ std::optional<double> BreathGate::Slope_m_s(double since_s) const {
     products += at * height_m;
   }
   const double spread = squares - time * time / std::max(1.0, count);
-  if (count < kLeastFrames || !(spread > 0)) return std::nullopt;
+  if (count < kLeastHeights || !(spread > 0)) return std::nullopt;
   return (products - time * height / count) / spread;
 }
 

@@ -77,7 +77,7 @@ export async function showMonitoringRecord(place, argument = '') {
   const text = S.monitorRecord;
   const [scan, number] = argument.split('-');
   const report = await get(`${path(scan, number)}.json`);
-  const back = h('p', {}, h('a', { href: `#/result/${scan}` }, text.back));
+  const back = h('p', {}, h('a', { class: 'button', href: `#/result/${scan}` }, text.back));
   if (report.fault) {
     clear(place, h('h1', {}, text.title), back,
       h('p', { class: 'caution', role: 'alert' }, sentence(said(report, 'fault'))));
