@@ -9,6 +9,8 @@
 namespace plumb {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 std::string TableCell(const std::string& text) {
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -34,7 +36,6 @@ std::string TableText(const std::vector<TableColumn>& columns, const std::vector
 }
 
 std::string TableMetadata(const std::vector<TableColumn>& columns, std::string_view name) {
-  using Json = nlohmann::ordered_json;
   Json json = {{"@context", {"http://www.w3.org/ns/csvw", {{"@language", "en"}}}},
                {"url", name},
                {"dialect", {{"encoding", "utf-8"}, {"header", true}, {"lineTerminators", "\r\n"}}},
