@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <fmt/format.h>
@@ -349,9 +350,12 @@ void SignatureLine(Pages& pages, const Catalogue& language) {
 constexpr double kSignature = 30;  // its height
 
 /// One below the other, each as large as the space for all of them permits.
-void Pictures(Pages& pages, const std::vector<cv::Mat>& pictures, const std::string& note) {
+/// @param foot  Height that is left free at the foot of the page.
+void Pictures(Pages& pages, std::span<const cv::Mat> pictures, const std::string& note,
+              double foot = 0.0) {
   constexpr double kLeast = 60, kGap = 8, kNoteSize = 8.5;
-  const double bottom = pages.bottom() - (note.empty() ? 0.0 : 2.6 * kNoteSize);  // two lines
+  const double bottom =
+      pages.bottom() - foot - (note.empty() ? 0.0 : 2.6 * kNoteSize);  // two lines
   auto left = static_cast<double>(pictures.size());
   for (const cv::Mat& picture : pictures) {
     const double height = (bottom - pages.y - 6) / left - kGap;
@@ -463,7 +467,11 @@ void Draw(Pages& pages, const ScanReport& report) {
   const bool fits = pages.y + trends + kSignature < pages.bottom();
   if (fits) Trends(pages, report.trend, limits, *report.language);
   if (report.pictures.empty() && (fits || trends == 0.0)) return;
-  // On a page of their own: their scales are to be read.
+  // The map of a comparison has all that the overlay beside it shows, and may end the page; its
+  // scale is to be read.
+  constexpr double kReadable = 200.0;
+  if (fits && !report.numbers.empty() && pages.bottom() - kSignature - pages.y >= kReadable)
+    return Pictures(pages, {report.pictures.data(), 1}, report.pictures_note, kSignature);
   pages.Next();
   if (!fits) Trends(pages, report.trend, limits, *report.language);
   Pictures(pages, report.pictures, report.pictures_note);
