@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # toolchain/provision: twenty units of one table, again, and tables that are wrong.
 import pathlib
