@@ -191,7 +191,8 @@ bool ShowsHead(const Profile& profile) {
   return shoulders->width_m >= kShouldersOfAll * profile.widest();
 }
 
-// Whether a trunk begins with the stub of a neck and ends cut off.
+// Whether the outline is a trunk without a head: a short neck at its beginning, a broad cut at its
+// end.
 bool ShowsNeck(const Profile& profile) {
   const std::optional<Shoulders> shoulders = FindShoulders(profile);
   if (!shoulders || shoulders->line_m - profile.begin_m >= kMinHead_m) return false;

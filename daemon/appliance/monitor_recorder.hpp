@@ -27,7 +27,8 @@ struct MonitorRecordPlace {
 /// Thread-safe. What is added is on the disk a second later: that much is lost by a power cut.
 class MonitorRecorder {
  public:
-  /// @param told  Called once on the recorder's thread: why the record ended before the session.
+  /// @param told  Called at most once, on the recorder's thread, with the reason why it stopped
+  ///              before the session ended.
   MonitorRecorder(MonitorRecordPlace place, std::function<void(const Message&)> told);
   /// Writes down what was added, and waits for that.
   ~MonitorRecorder();

@@ -24,8 +24,8 @@ class OutputLock {
   bool is_held_ = false;
 };
 
-/// Removes what killed processes were writing when they ended: hidden names of outputs that nobody
-/// has locked. @throws IoError
+/// Removes the unfinished outputs of processes that were killed: hidden folders that no process has
+/// locked. @throws IoError
 void RemoveUnfinished(const std::filesystem::path& folder);
 
 }  // namespace plumb

@@ -67,7 +67,8 @@ struct WebConfig {
   bool plain_http = false;
   /// Names by which browsers reach it, in addition to addresses.
   std::vector<std::string> host_names;
-  /// File with the token by which a monitoring system reads /metrics; empty: nobody may.
+  /// File with the token by which a monitoring system reads /metrics; without it
+  /// there is no such page.
   std::filesystem::path metrics_token_file;
 };
 

@@ -160,7 +160,7 @@ TEST_F(DaemonMonitorTest, ItsRecordOutlivesACutAndGoesWithThePatient) {
   EXPECT_GT(report["advice_s"].size(), 0u);
   EXPECT_GT(report["states_s"]["monitoring"].get<double>(), 0.5);
   EXPECT_EQ(report["said"][0]["event"], "zero");
-  EXPECT_EQ(report["said"].size(), 1u) << "nobody ended it";
+  EXPECT_EQ(report["said"].size(), 1u) << "the record was cut off";
   const std::string csv = engineer.Get(place + "/1.csv?download").body;
   EXPECT_THAT(csv, ::testing::HasSubstr("ref_lateral_mm"));
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + report["frames"].get<int>());

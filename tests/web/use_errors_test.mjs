@@ -538,7 +538,7 @@ await h.step(
   h.tell('hurried');
   await scan();
   await flags.getByText('33 % of the frames were lost').waitFor();
-  // More than half of them: nobody accepts it, with a reason or without.
+  // With more than half of the frames lost, the scan cannot be accepted, even with a reason.
   h.tell('halflost');
   await scan();
   await anna.locator('.acceptance').getByRole('button').or(
