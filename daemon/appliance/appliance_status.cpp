@@ -241,7 +241,8 @@ Status Appliance::WebStatus() {
                  .frames_tracked = scan_.update.frames_tracked,
                  .frames_dropped = scan_.update.frames_dropped,
                  .step = scan_.update.step,
-                 .step_fraction = scan_.update.fraction};
+                 .step_fraction = scan_.update.fraction,
+                 .forming = scan_.update.forming};
   }
   status.version = Version();
   status.warnings = page_.warnings;

@@ -86,7 +86,8 @@ Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
                  {"speed_m_s", update.guidance.speed_m_s},
                  {"median_depth_m", update.guidance.median_depth_m},
                  {"area_m2", update.guidance.area_m2},
-                 {"coverage", coverage ? Json(*coverage) : Json(nullptr)}};
+                 {"coverage", coverage ? Json(*coverage) : Json(nullptr)},
+                 {"forming", FormingJson(update.forming)}};
   PutMessage(fields, "step", update.step);
   return fields;
 }

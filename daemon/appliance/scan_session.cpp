@@ -15,7 +15,6 @@
 #include "daemon/pipeline/frame_thinning.hpp"
 #include "daemon/pipeline/learning_gate.hpp"
 #include "daemon/pipeline/recording_feed.hpp"
-#include "daemon/pipeline/scan_runner.hpp"
 #include "daemon/result/text_report.hpp"
 #include "daemon/sweep/explain.hpp"
 #include "words/room.hpp"
@@ -26,6 +25,10 @@ namespace {
 
 constexpr double kUpdateEvery_s = 0.1;
 constexpr double kShowEvery_s = 0.4;  // interval at which pages ask for the surface from above
+// A sweep that took less has too few views; answers follow each other at this interval at least.
+constexpr double kFormAfter_s = 2.0, kFormEvery_s = 1.0;
+// With less of the region the comparison would refuse, see AcceptanceLimits::min_coverage.
+constexpr double kFormFromCoverage = 0.85;
 
 void ThrowIfStopped(const std::stop_token& stop) {
   if (stop.stop_requested()) throw Interrupted(say::scan::Discarded());
@@ -218,6 +221,9 @@ void ScanSession::OnProgress(const ScanProgress& progress) {
     if (update_.guidance.without_new_surface_s >= job_.stop_after_s &&
         !std::exchange(complete_reported_, true))
       callbacks_.sweep_complete();
+    FormAnswer(progress);
+  } else if (forming_) {
+    forming_->Stop();  // what follows needs the processors
   }
   ReportProgress(progress.step, progress.fraction);
 }
@@ -228,6 +234,30 @@ void ScanSession::Show(const Frame& frame, const TrackingReport& report) {
   if (now_s - shown_s_ < kShowEvery_s) return;
   shown_s_ = now_s;
   update_.surface = surface_.View();
+}
+
+/// Begins the next answer of what was seen so far, if the last one is made, and reports that one.
+void ScanSession::FormAnswer(const ScanProgress& progress) {
+  if (!reference_.valid() || !progress.tracking->T_scene_world ||
+      reference_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return;
+  const double now_s = SteadySeconds();
+  if (formed_s_ == 0.0) formed_s_ = now_s - kFormEvery_s + kFormAfter_s;
+  if (!forming_) {
+    forming_.emplace([this](const Scene& scene, const std::stop_token& stop) {
+      std::optional<ResultRoom> room;
+      return CompareWith(reference_.get().scene, scene, stop, room);
+    });
+  }
+  update_.forming = forming_->Newest();
+  if (update_.guidance.advice == SweepAdvice::kNone && update_.forming &&
+      update_.forming->is_enough)
+    update_.guidance.advice = SweepAdvice::kEnough;
+  const bool is_covered =
+      !update_.surface || update_.surface->coverage.value_or(1.0) >= kFormFromCoverage;
+  if (!is_covered || now_s - formed_s_ < kFormEvery_s || !forming_->IsIdle()) return;
+  formed_s_ = now_s;
+  forming_->Make(progress.sweep->SceneUpToNow(), update_.guidance.elapsed_s);
 }
 
 /// Reports at most ten times a second, but each new step and the first frame at once.
@@ -265,6 +295,20 @@ void ScanSession::Check(const Scene& scene) {
                                                       : std::nullopt};
 }
 
+Comparison ScanSession::CompareWith(const Scene& reference, const Scene& scene,
+                                    const std::stop_token& stop,
+                                    std::optional<ResultRoom>& room) const {
+  CompareOptions compare = job_.compare;
+  compare.stop = stop;
+  room = TakeRoom(job_.room, reference, compare);
+  try {
+    return Compare(reference, scene, compare);
+    // not an error of the sweep: another one would end the same way
+  } catch (const DataError& error) {
+    throw MessageError(say::scan::DoesNotFit(error.message()));
+  }
+}
+
 void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   ThrowIfStopped(stop);
   if (job_.is_reference && (scene.frame != SceneFrame::kReferenceMarker || !scene.height_map)) {
@@ -281,15 +325,7 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
     ReportProgress(say::scan::Comparing(), 0.0);
     const Scene& reference = reference_.get().scene;
     ThrowIfStopped(stop);
-    CompareOptions compare = job_.compare;
-    compare.stop = stop;
-    room = TakeRoom(job_.room, reference, compare);
-    try {
-      comparison = Compare(reference, scene, compare);
-      // not an error of the sweep: another one would end the same way
-    } catch (const DataError& error) {
-      throw MessageError(say::scan::DoesNotFit(error.message()));
-    }
+    comparison = CompareWith(reference, scene, stop, room);
     ThrowIfStopped(stop);
     if (room && !room->why_not_used.empty()) {
       comparison->warnings.push_back(

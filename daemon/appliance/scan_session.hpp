@@ -22,7 +22,9 @@
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/stored_result.hpp"
 #include "daemon/pipeline/live_feed.hpp"
+#include "daemon/pipeline/scan_runner.hpp"
 #include "daemon/records/check_json.hpp"
+#include "daemon/sweep/forming_answer.hpp"
 #include "daemon/sweep/live_surface.hpp"
 #include "daemon/sweep/sweep_guidance.hpp"
 
@@ -86,6 +88,7 @@ struct ScanUpdate {
   std::int64_t keyframes = 0;
   SweepGuidance guidance;
   std::shared_ptr<const LiveSurfaceView> surface;  ///< Null: nothing can be shown yet.
+  std::optional<FormingAnswer> forming;            ///< Of a comparison, once there was one.
 };
 
 /// How the scan ended, and its results. The store keeps the former as a ScanOutcome.
@@ -144,8 +147,12 @@ class ScanSession {
   [[nodiscard]] Scene Track(const std::stop_token& stop);
   void Check(const Scene& scene);
   void Evaluate(const Scene& scene, const std::stop_token& stop);
-  void OnProgress(const struct ScanProgress& progress);
+  void OnProgress(const ScanProgress& progress);
   void Show(const Frame& frame, const TrackingReport& report);
+  void FormAnswer(const ScanProgress& progress);
+  [[nodiscard]] Comparison CompareWith(const Scene& reference, const Scene& scene,
+                                       const std::stop_token& stop,
+                                       std::optional<ResultRoom>& room) const;
   void ReportProgress(Message step, double fraction);
 
   ScanJob job_;
@@ -164,7 +171,8 @@ class ScanSession {
   ScanUpdate update_;
   EndedScan outcome_;
   bool complete_reported_ = false;
-  double reported_s_ = 0.0, shown_s_ = 0.0;
+  double reported_s_ = 0.0, shown_s_ = 0.0, formed_s_ = 0.0;
+  std::optional<FormingAnswers> forming_;  ///< While frames come, of a scan that is compared.
   std::atomic<double> heartbeat_s_;
   std::jthread thread_;  // last: starts when the members above are initialised
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <map>
 #include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -30,9 +32,33 @@ struct EvaluateArguments {
   bool reuse = false;
   bool results = false;
   bool json = false;
+  std::optional<double> part;
 };
 
-Scene Reconstruct(const Suite& suite, const std::string& name, const Config& config,
+/// The first frames of a recording.
+class FirstFrames : public FrameSource {
+ public:
+  FirstFrames(std::unique_ptr<FrameSource> whole, double part)
+      : whole_(std::move(whole)), info_(whole_->info()) {
+    if (!info_.num_frames) return;
+    info_.num_frames =
+        static_cast<std::int64_t>(std::ceil(part * static_cast<double>(*info_.num_frames)));
+  }
+  [[nodiscard]] const StreamInfo& info() const override { return info_; }
+  [[nodiscard]] std::optional<Frame> Next() override {
+    if (info_.num_frames && num_read_ == *info_.num_frames) return std::nullopt;
+    ++num_read_;
+    return whole_->Next();
+  }
+
+ private:
+  std::unique_ptr<FrameSource> whole_;
+  StreamInfo info_;
+  std::int64_t num_read_ = 0;
+};
+
+/// @param part  Of the sweep, from its beginning.
+Scene Reconstruct(const Suite& suite, const std::string& name, const Config& config, double part,
                   const std::filesystem::path& folder, const CommandContext& context,
                   Progress& progress) {
   const std::filesystem::path structures = suite.recordings.at(name) / "structures.dcm";
@@ -42,9 +68,8 @@ Scene Reconstruct(const Suite& suite, const std::string& name, const Config& con
     WriteScene(planned, folder);
     return planned;
   }
-  const std::unique_ptr<FrameSource> recording =
-      OpenRecording(suite.recordings.at(name), config.markers);
-  Scene scene = RunScan(*recording, {.reconstructor = config.reconstruct}, context.stop,
+  FirstFrames recording(OpenRecording(suite.recordings.at(name), config.markers), part);
+  Scene scene = RunScan(recording, {.reconstructor = config.reconstruct}, context.stop,
                         [&](const ScanProgress& scan) { Show(progress, name, scan); });
   WriteScene(scene, folder);
   return scene;
@@ -104,11 +129,17 @@ int Run(const EvaluateArguments& options, const CommandContext& context) {
   EvaluateOptions evaluate{.compare = config.compare};
   evaluate.compare.preset = preset;
   evaluate.compare.now_s = SteadySeconds;
-  evaluate.get_scene = [&](const std::string& name) {
-    const std::filesystem::path folder = out / "scenes" / name;
+  const auto get = [&](const std::string& name, const std::filesystem::path& scenes, double part) {
+    const std::filesystem::path folder = scenes / name;
     if (options.reuse && IsSceneFolder(folder)) return ReadScene(folder);
-    return Reconstruct(suite, name, config, folder, context, progress);
+    return Reconstruct(suite, name, config, part, folder, context, progress);
   };
+  evaluate.get_scene = [&](const std::string& name) { return get(name, out / "scenes", 1.0); };
+  if (options.part) {
+    evaluate.get_current = [&](const std::string& name) {
+      return get(name, out / fmt::format("scenes-part-{:g}", *options.part), *options.part);
+    };
+  }
   if (options.results) {
     evaluate.store = [&](const std::string& reference, const std::string& current,
                          const Scene& reference_scene, const Comparison& comparison) {
@@ -158,6 +189,11 @@ Command AddEvaluate(CLI::App& app) {
   app.add_flag("--reuse", options->reuse,
                "Use the scenes of an earlier run in the folder instead of reconstructing "
                "them again");
+  app.add_option("--part", options->part,
+                 "Use only this part of each current sweep, from its beginning: the accuracy of "
+                 "the numbers that form while one sweeps")
+      ->check(CLI::Range(0.05, 1.0))
+      ->type_name("FRACTION");
   app.add_flag("--results", options->results, "Write the result folder of every pair too");
   app.add_flag("--json", options->json, "Print the figures as JSON on the standard output");
   return [options](const CommandContext& context) { return Run(*options, context); };

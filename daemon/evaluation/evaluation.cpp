@@ -270,33 +270,44 @@ Evaluation EvaluateSuite(
   evaluation.suite = suite.name;
   evaluation.preset = options.compare.preset;
   evaluation.limits = options.compare.limits;
-  std::map<std::string, KeptScene> kept;
+  std::map<std::string, KeptScene> kept, kept_currents;
   for (const std::string& name : suite.scenes) {
     KeptScene& entry = kept[name];
     entry.truth = ReadSceneTruth(
         suite.truths.at(name));  // before the long work, so that a bad truth is reported at once
   }
-  for (const std::string& name : suite.scenes) {
-    KeptScene& entry = kept[name];
-    entry.scene = options.get_scene(name);
+  const auto measure = [&](const std::string& name, Scene scene, KeptScene& entry) {
     if (stop.stop_requested()) throw Interrupted(say::evaluation::Interrupted());
-    evaluation.scenes.push_back(MeasureScene(name, entry.scene, entry.truth, options));
-    if (const auto& trajectory = evaluation.scenes.back().keyframes) {
+    SceneEvaluation measured = MeasureScene(name, scene, entry.truth, options);
+    if (const auto& trajectory = measured.keyframes) {
       entry.T_world_scene = trajectory->T_world_scene;
       entry.has_world = true;
     }
+    entry.scene = std::move(scene);
     entry.scene.mesh = {};  // nine scenes stay in memory: keep only what pairs need
+    return measured;
+  };
+  for (const std::string& name : suite.scenes)
+    evaluation.scenes.push_back(measure(name, options.get_scene(name), kept[name]));
+  if (options.get_current) {
+    for (const auto& [reference, current] : suite.pairs) {
+      if (kept_currents.contains(current)) continue;
+      KeptScene& entry = kept_currents[current];
+      entry.truth = kept.at(current).truth;
+      (void)measure(current, options.get_current(current), entry);
+    }
   }
+  const std::map<std::string, KeptScene>& currents = options.get_current ? kept_currents : kept;
   for (const auto& [reference, current] : suite.pairs) {
     if (stop.stop_requested()) throw Interrupted(say::evaluation::Interrupted());
     if (progress)
       progress(say::progress::Comparing(), static_cast<double>(evaluation.pairs.size()) /
                                                static_cast<double>(suite.pairs.size()));
     const Comparison comparison =
-        Compare(kept.at(reference).scene, kept.at(current).scene, options.compare);
+        Compare(kept.at(reference).scene, currents.at(current).scene, options.compare);
     if (options.store) options.store(reference, current, kept.at(reference).scene, comparison);
-    evaluation.pairs.push_back(
-        MeasurePair(reference, current, kept.at(reference), kept.at(current), comparison, options));
+    evaluation.pairs.push_back(MeasurePair(reference, current, kept.at(reference),
+                                           currents.at(current), comparison, options));
   }
   return evaluation;
 }

@@ -97,6 +97,8 @@ struct EvaluateOptions {
       3;  ///< Frames that must have measured a part of the body for it to count as visible.
   /// Creates (or finds) the scene of a name; required.
   std::function<Scene(const std::string& name)> get_scene = {};
+  /// If set, creates the current scenes of the pairs, for example of a part of each sweep.
+  std::function<Scene(const std::string& name)> get_current = {};
   /// If set, called with every comparison, to store it.
   std::function<void(const std::string& reference, const std::string& current,
                      const Scene& reference_scene, const Comparison&)>

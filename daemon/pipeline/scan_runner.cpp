@@ -118,9 +118,11 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
     state.fraction = expected_frames > 0 ? std::min(1.0, seen / expected_frames) : 0.0;
     state.tracking = &report;
     state.frame = &*frame;
+    state.sweep = &reconstructor;
     if (progress) progress(state);
     state.tracking = nullptr;
     state.frame = nullptr;
+    state.sweep = nullptr;
   }
   const std::optional<double> last_frame_s = feed.last_frame_s();
   if (stop.stop_requested()) throw Interrupted(say::progress::Interrupted());

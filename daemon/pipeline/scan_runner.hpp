@@ -28,6 +28,7 @@ struct ScanProgress {
   const TrackingReport* tracking =
       nullptr;                   ///< Of the newest frame while tracking; valid during the call.
   const Frame* frame = nullptr;  ///< The newest frame while tracking; valid during the call.
+  const Reconstructor* sweep = nullptr;  ///< While tracking, with that frame; during the call.
 };
 
 struct ScanRunnerOptions {

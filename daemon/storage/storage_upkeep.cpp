@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/storage/storage_upkeep.hpp"
 
-#include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <ctime>
@@ -19,6 +16,7 @@
 #include "daemon/archive/summed_folder.hpp"
 #include "daemon/database/database.hpp"
 #include "daemon/database/stored_values.hpp"
+#include "daemon/loop/give_way.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/records/clock_doubt.hpp"
 #include "daemon/state_folder/old_copies.hpp"
@@ -43,14 +41,6 @@ bool AreOnOneDisk(const std::filesystem::path& a, const std::filesystem::path& b
   struct stat of_b {};
   return ::stat(a.c_str(), &of_a) == 0 && ::stat(b.c_str(), &of_b) == 0 &&
          of_a.st_dev == of_b.st_dev;
-}
-
-/// From now on the calling thread gets processor and disk time only when they are idle, so that a
-/// backup costs no frames of a scan. If the system refuses, the priority stays unchanged.
-void GiveWayToScans() {
-  constexpr int kLeastPriority = 19, kOfThread = 1, kBestEffort = 2, kLowestOfIts = 7;
-  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLeastPriority);
-  (void)::syscall(SYS_ioprio_set, kOfThread, 0, kBestEffort << 13 | kLowestOfIts);
 }
 
 }  // namespace

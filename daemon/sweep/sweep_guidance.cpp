@@ -32,6 +32,7 @@ SweepGuide::SweepGuide(const Intrinsics& intrinsics, const GuidanceOptions& opti
 const SweepGuidance& SweepGuide::Add(const Frame& frame, const TrackingReport& report) {
   const double time_s = frame.depth_time_s;
   if (!first_s_) first_s_ = time_s;
+  guidance_.elapsed_s = time_s - *first_s_;
   guidance_.median_depth_m = report.median_depth_m;
   guidance_.valid_depth = report.valid_depth;
   if (report.tracked) {

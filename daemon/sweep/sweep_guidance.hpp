@@ -41,6 +41,7 @@ struct SweepGuidance {
   /// All surface seen, including floor and markers; counted in coarse cells, so only for
   /// comparison.
   double area_m2 = 0.0;
+  double elapsed_s = 0.0;  ///< Since the first frame.
   /// Time since new surface was last seen; 0 until there was some.
   double without_new_surface_s = 0.0;
 };

@@ -215,6 +215,13 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
     scan.without_new_surface_s = fraction > 0.8 ? 3.4 : 0.2;
     scan.guidance = fraction > 0.3 && fraction < 0.6 ? SweepAdvice::kSlower : SweepAdvice::kNone;
     if (guidance) scan.guidance = *guidance;
+    if (scan.guidance == SweepAdvice::kEnough)
+      scan.forming = FormingAnswer{
+          .sweep_s = scan.elapsed_s,
+          .numbers = MotionNumbers{{4.1, -2.6, 1.2, 0.4, -0.3, 0.9}, {1.4, 1.9, 1.6, .4, .5, .3}},
+          .shift_tolerance_mm = 5,
+          .rotation_tolerance_deg = 3,
+          .is_enough = true};
     status.light = scan.guidance == SweepAdvice::kSlower ? "too_fast" : "scanning";
     scan.frames = static_cast<std::int64_t>(scan.elapsed_s * 30);
     scan.frames_tracked = scan.frames;

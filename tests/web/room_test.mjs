@@ -168,10 +168,11 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
   h.tell('slow');
   h.tell('moved z 8 HFS');
   h.tell('press');
-  const kAdvice = ['slower', 'closer', 'farther', 'lost', 'too_slow', 'good'];
+  const kAdvice = ['slower', 'closer', 'farther', 'lost', 'too_slow', 'good', 'enough'];
   for (const [language, words] of [
-    ['es', ['MÁS DESPACIO', 'MÁS CERCA', 'MÁS LEJOS', 'PERDIDO', 'EQUIPO LENTO', 'BIEN']],
-    ['en', ['SLOWER', 'CLOSER', 'FARTHER', 'LOST', 'COMPUTER TOO SLOW', 'GOOD']]]) {
+    ['es', ['MÁS DESPACIO', 'MÁS CERCA', 'MÁS LEJOS', 'PERDIDO', 'EQUIPO LENTO', 'BIEN',
+      'SUFICIENTE']],
+    ['en', ['SLOWER', 'CLOSER', 'FARTHER', 'LOST', 'COMPUTER TOO SLOW', 'GOOD', 'ENOUGH']]]) {
     await room.goto(`${h.url}room?language=${language}`);
     for (const [i, word] of words.entries()) {
       h.tell(`guide ${kAdvice[i]}`);
@@ -190,6 +191,8 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
       await h.look(room, `room-${kAdvice[i]}-${language}`, { axe: false, fullPage: false });
     }
   }
+  equal(await room.locator('.forming .live-number').count(), 6, 'the numbers that form');
+  await room.getByText('So far, provisional').waitFor(kSlow);
   equal(await room.locator('.number').count(), 0, 'no result during the sweep');
   // Also beside the note of whose sides the marks are.
   await room.locator('.room-sweep .marks-note').waitFor(kSlow);

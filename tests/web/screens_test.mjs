@@ -443,7 +443,7 @@ async function everyAdvice(page, language, text) {
   const { words } = text.room;
   for (const [advice, word] of [['slower', words.slower], ['closer', words.closer],
     ['farther', words.farther], ['lost', words.tracking_lost], ['good', words.none],
-    ['too_slow', words.computer_too_slow]]) {
+    ['too_slow', words.computer_too_slow], ['enough', words.enough]]) {
     h.tell(`guide ${advice}`);
     await page.locator('.room-word', { hasText: word }).waitFor();
     await drawn(page);
@@ -472,7 +472,7 @@ await h.step('the room’s display, and the scan from the start to the result an
   h.tell('press');
   await inState('scanning');
   await lookAll({ ...inRoom('sweep', '.room-sweep'), also: everyAdvice },
-    atScan('sweep', '.headline[data-state=scanning]'));
+    atScan('sweep', '.forming .live-number'));
   h.tell('guide');
   await ok(anna, 'cancel', 'POST');
   await inState('ready');

@@ -302,7 +302,8 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     static const std::map<std::string, SweepAdvice> kGuidance = {
         {"good", SweepAdvice::kNone},         {"slower", SweepAdvice::kSlower},
         {"closer", SweepAdvice::kCloser},     {"farther", SweepAdvice::kFarther},
-        {"lost", SweepAdvice::kTrackingLost}, {"too_slow", SweepAdvice::kComputerTooSlow}};
+        {"lost", SweepAdvice::kTrackingLost}, {"too_slow", SweepAdvice::kComputerTooSlow},
+        {"enough", SweepAdvice::kEnough}};
     std::string what;
     words >> what;
     service.guidance.reset();

@@ -34,7 +34,8 @@ Json LiveScanJson(const LiveScan& scan) {
                {"frames", scan.frames},
                {"frames_tracked", scan.frames_tracked},
                {"frames_dropped", scan.frames_dropped},
-               {"step_fraction", scan.step_fraction}};
+               {"step_fraction", scan.step_fraction},
+               {"forming", FormingJson(scan.forming)}};
   PutMessage(json, "step", scan.step, "");
   return json;
 }

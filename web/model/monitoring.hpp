@@ -16,7 +16,8 @@
 
 namespace plumb {
 
-/// A motion of the body, not a correction, with the half-widths of its 95 % intervals.
+/// Six numbers with the half-widths of their 95 % intervals: of live monitoring a motion of the
+/// body, of a sweep the correction.
 struct MotionNumbers {
   std::array<double, kNumberAxes.size()> value{}, u95{};  ///< In the order and units of the axes.
 };

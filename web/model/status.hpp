@@ -11,6 +11,7 @@
 #include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "web/model/check.hpp"
+#include "web/model/forming_answer.hpp"
 #include "web/model/patient.hpp"
 #include "web/model/reference.hpp"
 #include "web/model/scan.hpp"
@@ -44,10 +45,12 @@ enum class SweepAdvice {
   kTrackingLost,
   kNoMarkers,
   kComputerTooSlow,  ///< Images are lost because they cannot be processed in time.
+  kEnough,           ///< Going on changes neither the verdict nor, by much, the numbers.
 };
 template <>
-inline constexpr auto kNamesOf<SweepAdvice> = NamesUpTo<SweepAdvice::kComputerTooSlow>(
-    {"none", "slower", "closer", "farther", "tracking_lost", "no_markers", "computer_too_slow"});
+inline constexpr auto kNamesOf<SweepAdvice> =
+    NamesUpTo<SweepAdvice::kEnough>({"none", "slower", "closer", "farther", "tracking_lost",
+                                     "no_markers", "computer_too_slow", "enough"});
 
 struct SensorStatus {
   bool present = false;
@@ -75,6 +78,7 @@ struct LiveScan {
   std::int64_t frames_dropped = 0;
   Message step;                ///< "tracking", then the steps of the reconstructor.
   double step_fraction = 0.0;  ///< 0..1
+  std::optional<FormingAnswer> forming = {};
 };
 
 /// What was done since the start, for systems that watch the unit.

@@ -202,6 +202,32 @@ TEST_F(ReconstructorTest, SameBitsOnAnyNumberOfThreads) {
   }
 }
 
+TEST_F(ReconstructorTest, TheSceneUpToNowIsThatOfASweepThatEndsThere) {
+  constexpr std::size_t kPart = 10;
+  int num_learned = 0;
+  ReconstructorOptions learning;
+  learning.on_learned = [&](const SensorProfile&) { ++num_learned; };
+  Reconstructor whole(sweep().info, learning);
+  Reconstructor part(sweep().info, {});
+  std::function<Scene(const std::stop_token&)> up_to_now;
+  for (std::size_t i = 0; i < sweep().frames.size(); ++i) {
+    if (i == kPart) up_to_now = whole.SceneUpToNow();
+    if (i < kPart) part.AddFrame(sweep().frames[i]);
+    whole.AddFrame(sweep().frames[i]);
+  }
+  const Scene after = whole.Finish();
+  const int learned = std::exchange(num_learned, 0);
+  const Scene asked_for = up_to_now({});
+  const Scene ended = part.Finish();
+  EXPECT_EQ(learned, 1);
+  EXPECT_EQ(num_learned, 0);
+  EXPECT_EQ(asked_for.frames_total, static_cast<int>(kPart));
+  EXPECT_EQ(asked_for.cloud.points, ended.cloud.points);
+  EXPECT_EQ(asked_for.calibration, ended.calibration);
+  // The sweep went on undisturbed.
+  EXPECT_EQ(after.cloud.points, Reconstruct({}).cloud.points);
+}
+
 TEST_F(ReconstructorTest, SaysWhatIsMissing) {
   EXPECT_THAT(Refusal({}), HasSubstr("0 usable frame"));
   EXPECT_THAT(Refusal({sweep().frames[0]}), HasSubstr("1 usable frame"));

@@ -55,7 +55,8 @@ function number(axis, numbers, tolerance) {
     toleranceBar(value ?? 0, value === null ? NaN : u95, tolerance, value !== null));
 }
 
-function six(title, numbers, monitor, isJudged) {
+/// @param monitor  States the tolerances.
+export function six(title, numbers, monitor, isJudged) {
   return h('section', { class: `live-six${isJudged ? ' judged' : ''}` }, h('h2', {}, title),
     h('div', { class: 'live-numbers' }, kAxes.map((axis) => number(axis, numbers,
       axis.shift ? monitor.shift_tolerance_mm : monitor.rotation_tolerance_deg))));

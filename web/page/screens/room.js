@@ -17,7 +17,9 @@ import {
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { askMonitor, monitorView } from './monitor.js';
-import { preview, stepWords, surfaceIn, surfaceWords } from './scan.js';
+import {
+  formingNumbers, preview, stepWords, surfaceIn, surfaceWords, toneOf,
+} from './scan.js';
 import { ageOf, validityNote, verdictStrip } from './verdict.js';
 
 const kAsk_ms = 2000;
@@ -124,13 +126,15 @@ function sweep(status, camera, seen) {
   const { guidance, coverage } = status.scan ?? { guidance: 'none' };
   const percent = Math.round(100 * (coverage ?? 0));
   const known = coverage !== null && coverage !== undefined;
+  const forming = formingNumbers(status.scan);
   return [
-    word(text.words[guidance], guidance === 'none' ? 'good' : 'bad'),
+    word(text.words[guidance], toneOf(guidance)),
     text.hints[guidance] && h('p', { class: 'room-hint' }, text.hints[guidance]),
     h('div', { class: 'room-sweep' }, seen, h('div', { class: 'room-cover' },
       h('p', { class: 'room-percent' }, coverageWords(status.scan)),
       known && h('progress', { max: 1, value: coverage, 'aria-label': text.covered(percent) }),
-      camera))];
+      !forming && camera)),  // the numbers need its place
+    forming];
 }
 
 const computing = (status) => [word(S.room.computing, 'info'),

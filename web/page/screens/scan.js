@@ -10,6 +10,7 @@ import { S, said } from '../words.js';
 import {
   faultWords, follow, lastKnownNote, sentence, stateHere, stateHint,
 } from './common.js';
+import { six } from './monitor.js';
 
 const kPreviewEvery_ms = 250;
 const kPreviewAgain_ms = 2000;  // without a picture
@@ -51,6 +52,13 @@ export function surfaceIn(place) {
     surface = wanted ? liveSurface() : null;
     clear(place, surface?.element);
   };
+}
+
+/// The numbers of what the sweep has seen so far; null before there are any.
+export function formingNumbers(scan) {
+  const { forming } = scan ?? {};
+  return forming?.numbers && h('section', { class: 'forming' },
+    six(S.scan.forming, forming.numbers, forming, false), hint(S.scan.formingHint));
 }
 
 /// Returns what the large button does now: its words and its request; nothing where it is off.
@@ -103,6 +111,8 @@ export const surfaceWords = (still_s = 0) => S.scan.surface(Math.floor(still_s))
 export const stepWords = (scan) => S.scan.step[scan?.step?.replaceAll(' ', '_').toLowerCase()]
   ?? said(scan, 'step') ?? '';
 
+export const toneOf = (advice) => (['none', 'enough'].includes(advice) ? 'good' : 'bad');
+
 /// The tone and words of what the person who sweeps should do.
 export function adviceOf(status) {
   if (status.state !== 'scanning') {
@@ -110,7 +120,7 @@ export function adviceOf(status) {
   }
   const advice = status.scan?.guidance ?? 'none';
   return {
-    hint: advice, words: S.scan.guidance[advice], tone: advice === 'none' ? 'good' : 'bad',
+    hint: advice, words: S.scan.guidance[advice], tone: toneOf(advice),
   };
 }
 
@@ -129,6 +139,7 @@ export async function showScan(place, what) {
   const facts = h('dl', { class: 'facts' });
   const seen = h('div', { class: 'seen-so-far' });
   const showSurface = surfaceIn(seen);
+  const soFar = h('div', {});
   const control = buttons();
   const drawSession = sessionLine(who, { mayClose: may('scan') });
   const shown = {};
@@ -136,7 +147,7 @@ export async function showScan(place, what) {
   clear(place, h('h1', { class: 'visually-hidden' }, text.title),
     h('div', { class: 'scan-grid' },
       h('section', { class: 'card sweep' }, who, known.element, headline, guidance, caution,
-        toResult, h('div', { class: 'bar' }, bar, barText), control.element),
+        toResult, h('div', { class: 'bar' }, bar, barText), control.element, soFar),
       card(S.status.preview, camera.element, seen, facts)));
 
   const drawWho = (status) => {
@@ -173,6 +184,9 @@ export async function showScan(place, what) {
     guidance.dataset.tone = advice.tone;
     if (advice.tone === 'bad' && advice.hint !== shown.hint) say(advice.words);
     shown.hint = advice.hint;
+    const forming = JSON.stringify([S.languageName, scan?.forming]);
+    if (shown.forming !== forming) clear(soFar, formingNumbers(scan));
+    shown.forming = forming;
     const pair = (name, value) => [h('dt', {}, name), h('dd', {}, value)];
     clear(facts, scan ? [pair(text.time, text.seconds(scan.elapsed_s)),
       pair(text.keyframes, scan.keyframes),
