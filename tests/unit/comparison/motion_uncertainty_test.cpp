@@ -144,7 +144,11 @@ TEST(MotionUncertaintyTest, TheSensorsCovarianceTakesThePlaceOfTheUsualOne) {
   EXPECT_NEAR(std::sqrt((flight - sensor)(0, 0)) / kDegree, 0.170, 0.001);
   EXPECT_LT((flight - sensor)(2, 2), (flight - sensor)(1, 1));
   EXPECT_TRUE((flight - sensor).bottomRightCorner(3, 3).isZero(0.0));
-  EXPECT_EQ(of_classes({DepthSensor::kStructuredLight, DepthSensor::kStructuredLight}), sensor);
+  EXPECT_EQ(of_classes({DepthSensor::kActiveStereo, DepthSensor::kActiveStereo}), sensor);
+  // Of structured light only the turn about the vertical, 0.024 deg for each scan.
+  const Matrix6d light = of_classes({DepthSensor::kStructuredLight, DepthSensor::kStructuredLight});
+  EXPECT_NEAR(std::sqrt((light - sensor)(2, 2)) / kDegree, 0.034, 0.001);
+  EXPECT_EQ((light - sensor)(0, 0), 0.0);
   // 0.4 mm for each of the two sweeps.
   EXPECT_NEAR(std::sqrt(Of(Pose::Identity()).sensor(3, 3)) / kMillimetre, 0.566, 0.001);
 }
