@@ -6,7 +6,7 @@
 
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/plan_options.hpp"
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/loop/log.hpp"
 #include "words/monitoring.hpp"
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "daemon/appliance/scan_session.hpp"
+#include "daemon/scanning/scan_session.hpp"
 #include "drivers/sensor.hpp"
 #include "web/model/scan.hpp"
 

@@ -10,7 +10,7 @@
 #include "algo/base/message_json.hpp"
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/loop/log.hpp"
 #include "words/audit.hpp"
 #include "words/monitoring.hpp"

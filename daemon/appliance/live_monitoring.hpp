@@ -14,7 +14,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "algo/base/message.hpp"
-#include "daemon/appliance/monitor_session.hpp"
+#include "daemon/monitoring/monitor_session.hpp"
 #include "daemon/appliance/notices.hpp"
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/work_thread.hpp"

@@ -11,7 +11,7 @@
 #include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/comparison/body_parts.hpp"
-#include "daemon/appliance/scan_session.hpp"
+#include "daemon/scanning/scan_session.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/storage/current_store.hpp"
 #include "daemon/sweep/sensor_thread.hpp"

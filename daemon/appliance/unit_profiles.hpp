@@ -10,7 +10,7 @@
 #include <string>
 
 #include "algo/base/message.hpp"
-#include "daemon/appliance/unit_profile.hpp"
+#include "daemon/scanning/unit_profile.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/sweep/sensor_thread.hpp"
 #include "web/service/room_services.hpp"

@@ -22,7 +22,7 @@
 #include "daemon/cli/progress.hpp"
 #include "daemon/cli/watch_recording.hpp"
 #include "daemon/files/atomic_folder.hpp"
-#include "daemon/files/monitoring_folder.hpp"
+#include "daemon/monitoring_files/monitoring_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "words/cli.hpp"
 #include "words/monitoring.hpp"

@@ -10,7 +10,7 @@
 #include "algo/types/scene.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/progress.hpp"
-#include "daemon/files/monitoring_folder.hpp"
+#include "daemon/monitoring_files/monitoring_folder.hpp"
 
 namespace plumb {
 

@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "algo/base/message_json.hpp"
-#include "daemon/appliance/live_acceptance.hpp"
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring/live_acceptance.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/loop/log.hpp"
 #include "words/audit.hpp"
 

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/cli/burn_in.hpp"
+#include "daemon/cli/unit/burn_in.hpp"
 #include "tests/integration/command_line.hpp"
 #include "tests/support/temp_folder.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a record of live monitoring.
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 
 #include "tests/fuzz/fuzz_one.hpp"
 

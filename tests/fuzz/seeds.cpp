@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/stored_scene.hpp"
 #include "daemon/files/trajectory_file.hpp"

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/units.hpp"
-#include "daemon/appliance/unit_profile.hpp"
+#include "daemon/scanning/unit_profile.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/records/profile_shelf.hpp"
 #include "tests/support/board_checks.hpp"

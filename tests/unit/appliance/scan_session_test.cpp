@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scans of a still wall: how they end, and what they report meanwhile.
-#include "daemon/appliance/scan_session.hpp"
+#include "daemon/scanning/scan_session.hpp"
 
 #include <condition_variable>
 #include <filesystem>

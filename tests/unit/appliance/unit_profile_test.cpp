@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is known of a sensor unit, on its way into a scan and out of it.
-#include "daemon/appliance/unit_profile.hpp"
+#include "daemon/scanning/unit_profile.hpp"
 
 #include <fstream>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/cli/doctor_report.hpp"
+#include "daemon/cli/unit/doctor_report.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The record of live monitoring: what was written is read, a cut end is left out, and what no
 // writer wrote is refused.
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 
 #include <cmath>
 #include <fstream>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/appliance/rest_watch.hpp"
+#include "daemon/monitoring/rest_watch.hpp"
 
 #include <chrono>
 #include <optional>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/appliance/monitor_session.hpp"
+#include "daemon/monitoring/monitor_session.hpp"
 
 #include <utility>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
 #include "algo/base/units.hpp"
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/sweep/explain.hpp"
 #include "words/scan.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "algo/base/units.hpp"
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 
 namespace plumb {
 namespace {

@@ -15,10 +15,10 @@
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
-#include "daemon/cli/burn_in.hpp"
+#include "daemon/cli/unit/burn_in.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
-#include "daemon/cli/doctor_report.hpp"
+#include "daemon/cli/unit/doctor_report.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "drivers/files/unix_socket.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/cli/burn_in.hpp"
+#include "daemon/cli/unit/burn_in.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>

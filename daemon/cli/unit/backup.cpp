@@ -12,7 +12,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/archive/backup.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
-#include "daemon/cli/backup_keys.hpp"
+#include "daemon/cli/unit/backup_keys.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/config/config.hpp"

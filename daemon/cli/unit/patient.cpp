@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/archive/patient_transfer.hpp"
-#include "daemon/cli/backup_keys.hpp"
+#include "daemon/cli/unit/backup_keys.hpp"
 #include "daemon/cli/commands.hpp"
 #include "words/cli.hpp"
 

@@ -18,7 +18,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/files/monitoring_folder.hpp"
+#include "daemon/monitoring_files/monitoring_folder.hpp"
 #include "drivers/files/descriptor.hpp"
 
 namespace plumb {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/appliance/monitor_recorder.hpp"
+#include "daemon/monitoring/monitor_recorder.hpp"
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
 #include "algo/base/errors.hpp"
-#include "daemon/files/monitoring_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "words/monitoring.hpp"
 
 namespace plumb {

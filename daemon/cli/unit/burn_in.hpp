@@ -9,7 +9,7 @@
 #include <functional>
 #include <string>
 
-#include "daemon/cli/doctor_report.hpp"
+#include "daemon/cli/unit/doctor_report.hpp"
 
 namespace plumb {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/appliance/scan_session.hpp"
+#include "daemon/scanning/scan_session.hpp"
 
 #include <cmath>
 #include <future>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/files/monitoring_folder.hpp"
+#include "daemon/monitoring_files/monitoring_folder.hpp"
 
 #include <algorithm>
 #include <map>

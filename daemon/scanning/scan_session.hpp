@@ -18,7 +18,7 @@
 #include "algo/comparison/comparison.hpp"
 #include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
-#include "daemon/appliance/unit_profile.hpp"
+#include "daemon/scanning/unit_profile.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/stored_result.hpp"
 #include "daemon/pipeline/live_feed.hpp"

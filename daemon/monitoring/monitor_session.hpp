@@ -18,9 +18,9 @@
 #include "algo/comparison/comparison.hpp"
 #include "algo/monitoring/breath_gate.hpp"
 #include "algo/monitoring/monitor.hpp"
-#include "daemon/appliance/monitor_recorder.hpp"
-#include "daemon/appliance/scan_session.hpp"
-#include "daemon/files/monitoring_folder.hpp"
+#include "daemon/monitoring/monitor_recorder.hpp"
+#include "daemon/scanning/scan_session.hpp"
+#include "daemon/monitoring_files/monitoring_folder.hpp"
 #include "daemon/pipeline/live_feed.hpp"
 
 namespace plumb {

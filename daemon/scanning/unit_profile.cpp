@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/appliance/unit_profile.hpp"
+#include "daemon/scanning/unit_profile.hpp"
 
 #include <chrono>
 #include <cmath>

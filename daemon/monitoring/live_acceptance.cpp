@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/appliance/live_acceptance.hpp"
+#include "daemon/monitoring/live_acceptance.hpp"
 
 #include <vector>
 
