@@ -103,6 +103,8 @@ constexpr auto kCommands = std::to_array<CommandEntry>({
     {"import", "Turn a recording of another program into one in Plumb's own layout", AddImport},
     {"import-dicom", "Turn the contours and the isocentre of a planning CT into a reference scene",
      AddImportDicom},
+    {"export-dicom", "Write a result, its pictures and the scanned surface as DICOM files",
+     AddExportDicom},
     {"evaluate",
      "Measure the accuracy on a suite of recordings with truth, and show the paper's table",
      AddEvaluate},

@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "algo/base/errors.hpp"
+#include "drivers/dicom/dicom_program.hpp"
 #include "drivers/dicom/planning_wire.hpp"
 #include "drivers/files/descriptor.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/reader_process.hpp"
-#include "drivers/program_folders.hpp"
 #include "words/dicom.hpp"
 
 namespace plumb {
@@ -23,38 +23,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path DicomReaderProgram() {
-  const std::optional<fs::path> program = FindBesideProgram("lib/plumb/plumb-dicom-reader");
-  if (!program) throw IoError(say::dicom::ReaderMissing());
-  return *program;
-}
-
-void ReadAll(ReaderProcess& reader, void* data, std::size_t size) {
-  switch (reader.Read(data, size)) {
-    case ReaderProcess::Got::kAll:
-      return;
-    case ReaderProcess::Got::kEnd: {
-      const ReaderProcess::End end = reader.Reap();
-      throw DataError(end.crashed ? say::dicom::ReaderCrashed(end.code)
-                                  : say::dicom::ReaderEnded(end.code));
-    }
-    case ReaderProcess::Got::kSilence:
-      throw DataError(say::dicom::ReaderSilent());
-  }
-}
-
 PlanningContent AskReader(const fs::path& file) {
-  ReaderProcess reader(DicomReaderProgram(), {file.string()});
+  DicomProgram reader("plumb-dicom-reader", {file.string()});
   PlanningHeader header;
-  ReadAll(reader, &header, sizeof header);
+  reader.Read(&header, sizeof header);
   if (header.magic != PlanningHeader::kMagic || header.text_bytes > kMostFactBytes ||
       header.num_numbers > 3 * kMostContourPoints)
     throw DataError(say::dicom::ReaderVersion());
   std::string text(static_cast<std::size_t>(header.text_bytes), ' ');
-  ReadAll(reader, text.data(), text.size());
+  reader.Read(text.data(), text.size());
   if (header.is_error != 0) throw DataError(ReaderErrorOf(text));
   std::vector<double> numbers(static_cast<std::size_t>(header.num_numbers));
-  ReadAll(reader, numbers.data(), numbers.size() * sizeof(double));
+  reader.Read(numbers.data(), numbers.size() * sizeof(double));
   return ParsePlanning(text, numbers);
 }
 

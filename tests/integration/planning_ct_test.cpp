@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "daemon/files/mesh_file.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "tests/integration/command_line.hpp"
 #include "tests/unit/dicom/small_files.hpp"
@@ -81,6 +82,64 @@ TEST_F(PlanningCtTest, WithoutACalibratedRoomThereIsNoAnswer) {
   EXPECT_THAT(told.at("reasons").at(0).get<std::string>(), HasSubstr("T_iec_reference"));
   EXPECT_EQ(told.at("compared_with").at("source"), "dicom");
   EXPECT_TRUE(fs::exists(folder_ / "result" / "result.json"));
+}
+
+TEST_F(PlanningCtTest, AResultIsExportedWithACodeOrTheGivenIdentity) {
+  const fs::path reference = SmallScene(SmallNames().front()), current = SmallScene("moved");
+  ASSERT_EQ(Plumb({"compare", reference, current, "--out", folder_ / "result"}).exit_code, 0);
+  const std::vector<std::string> line = {"export-dicom", folder_ / "result",  "--reference",
+                                         reference,      "--current",         current,
+                                         "--out",        folder_ / "exported"};
+  const RunResult exported = Plumb(line);
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_THAT(exported.out, HasSubstr("5 DICOM files"));
+  for (const char* name : {"report", "error_map", "overlay", "surface", "registration"}) {
+    const RunResult told =
+        Plumb({"info", folder_ / "exported" / (std::string(name) + ".dcm"), "--json"});
+    EXPECT_EQ(told.exit_code, 0) << name << told.err;
+  }
+  // The surface is the scene's, in millimetres.
+  WriteMeshFile(folder_ / "scene.stl", ReadScene(current, {.mesh = true}).mesh,
+                MeshUnit::kMillimetres);
+  EXPECT_THAT(ReadText(folder_ / "exported" / "surface.dcm"),
+              HasSubstr(ReadText(folder_ / "scene.stl")));
+  const std::string report = ReadText(folder_ / "exported" / "report.dcm");
+  EXPECT_THAT(report, HasSubstr("PLUMB-"));
+  // Named, and with a report of its own; what is no PDF is refused and leaves what is there.
+  std::vector<std::string> named = line;
+  WriteText(folder_ / "own.pdf", "%PDF-1.4 own report");
+  for (const std::string& word :
+       {std::string("--patient-id"), std::string("X7"), std::string("--patient-name"),
+        std::string("Doe^Jo"), std::string("--report"), (folder_ / "own.pdf").string()})
+    named.push_back(word);
+  ASSERT_EQ(Plumb(named).exit_code, 0);
+  const std::string own = ReadText(folder_ / "exported" / "report.dcm");
+  EXPECT_THAT(own, HasSubstr("Doe^Jo"));
+  EXPECT_THAT(own, HasSubstr("%PDF-1.4 own report"));
+  EXPECT_EQ(own.find("PLUMB-"), std::string::npos);
+  WriteText(folder_ / "own.pdf", "a letter");
+  const RunResult letter = Plumb(named);
+  EXPECT_EQ(letter.exit_code, 3);
+  EXPECT_THAT(letter.err, HasSubstr("no PDF"));
+  EXPECT_EQ(ReadText(folder_ / "exported" / "report.dcm"), own);
+}
+
+TEST_F(PlanningCtTest, AResultWithoutAnAnswerHasNoPlaceInTheCt) {
+  ASSERT_EQ(Import({}).exit_code, 0);
+  const fs::path current = SmallScene(SmallNames().back());
+  ASSERT_EQ(Plumb({"compare", folder_ / "planned", current, "--out", folder_ / "result"}).exit_code,
+            4);
+  const RunResult exported =
+      Plumb({"export-dicom", folder_ / "result", "--reference", folder_ / "planned", "--current",
+             current, "--out", folder_ / "exported"});
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_THAT(exported.out, HasSubstr("no spatial registration"));
+  EXPECT_FALSE(fs::exists(folder_ / "exported" / "registration.dcm"));
+  const RunResult other = Plumb({"export-dicom", folder_ / "result", "--reference", current,
+                                 "--current", current, "--out", folder_ / "other"});
+  EXPECT_EQ(other.exit_code, 3);
+  EXPECT_THAT(other.err, HasSubstr("not compared with the scene"));
+  EXPECT_FALSE(fs::exists(folder_ / "other"));
 }
 
 TEST_F(PlanningCtTest, ARealPlanIsImported) {

@@ -25,7 +25,7 @@ TEST(UsageTest, HelpListsEveryCommandAndCarriesTheNotice) {
   const RunResult result = Plumb({"--help"});
   EXPECT_EQ(result.exit_code, 0);
   for (const char* command : {"simulate", "reconstruct", "compare", "mesh", "info", "import-dicom",
-                              "evaluate", "monitor"}) {
+                              "export-dicom", "evaluate", "monitor"}) {
     EXPECT_THAT(result.out, HasSubstr(command));
     const RunResult help = Plumb({command, "--help"});
     EXPECT_EQ(help.exit_code, 0);
@@ -52,6 +52,8 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
       {"mesh", "a"},
       {"import-dicom", "structures.dcm", "--out", "x"},
       {"import-dicom", "structures.dcm", "plan.dcm"},
+      {"export-dicom", "result", "--reference", "a", "--current", "b"},
+      {"export-dicom", "result", "--reference", "a", "--out", "x"},
       {"simulate", "--suite", "ct", "--out", "x", "--ct-quirk", "fax"},
       {"info"},
       {"info", "a", "--verbose"}};
