@@ -219,8 +219,8 @@ void MoveIn(const fs::path& made, const fs::path& state) {
 
 /// The files that SQLite and the store keep beside a database. Without them it has lost its latest
 /// changes, or the record that would reveal the loss.
-constexpr std::array<const char*, 4> kBesideDatabase = {"plumb.db-wal", "plumb.db-shm",
-                                                        "plumb.db-journal", "plumb.db-mark"};
+constexpr std::array<const char*, 5> kBesideDatabase = {
+    "plumb.db-wal", "plumb.db-shm", "plumb.db-journal", "plumb.db-mark", "plumb.db-seals"};
 
 /// Moves the database. At every moment it has the files that belong to it: these are in both
 /// folders until it has moved.

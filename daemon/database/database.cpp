@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "daemon/database/examination.hpp"
+#include "daemon/database/page_seals.hpp"
 #include "daemon/database/sealed_pages.hpp"
 #include "daemon/database/sealed_vfs.hpp"
 #include "drivers/files/file_io.hpp"
@@ -40,6 +41,8 @@ std::string UriOf(const std::filesystem::path& file, Database::Access access) {
   if (access == Database::Access::kFrozen &&
       !std::filesystem::exists(file.string() + "-wal", error))
     uri += "?immutable=1";
+  if (access == Database::Access::kReadWrite || access == Database::Access::kReadOnly)
+    uri += std::string("?") + kKeepPages + "=1";
   return uri;
 }
 
@@ -92,6 +95,7 @@ void ConvertToSealed(const std::filesystem::path& file, std::chrono::millisecond
     throw DatabaseCorrupt(say::store::DatabaseUnsealed(made.string()));
   Database(made, Database::Access::kFrozen).CheckIntegrity();
   SyncToDisk(made);
+  std::filesystem::remove(file.string() + kSealsSuffix, error);  // of another database
   place(made, file);
   SyncToDisk(folder);
 }
@@ -105,10 +109,12 @@ bool Examined(const std::filesystem::path& file, Database::Access access,
     return false;
   }
   const DatabaseKind kind =
-      access == Database::Access::kReadOnly ? KindOfDatabase(file) : ExamineDatabase(file);
-  if (kind != DatabaseKind::kPlain) return true;
-  if (access != Database::Access::kReadWrite) return false;
-  ConvertToSealed(file, busy_wait);
+      access == Database::Access::kReadOnly || access == Database::Access::kFromDisk
+          ? KindOfDatabase(file)
+          : ExamineDatabase(file);
+  if (access != Database::Access::kReadWrite) return kind != DatabaseKind::kPlain;
+  if (kind == DatabaseKind::kPlain) ConvertToSealed(file, busy_wait);
+  MakeSeals(file);
   return true;
 }
 

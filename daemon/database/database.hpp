@@ -74,18 +74,21 @@ class Statement {
 /// the disk when they return. The file belongs to one process at a time: data shared by connections
 /// is in its memory and not in a mapped file, whose disk may become read-only.
 ///
-/// Each page carries a checksum, compared at each read, from the file or from the log of writes: a
-/// page that a disk has changed is DatabaseCorrupt. Before a connection is opened that may write or
-/// that is the only one, the log of writes is examined and compared with the database and its mark
-/// (examination.hpp). A database of 0.2.0 gets its checksums the first time that it is opened for
-/// writing: the original is copied to before-checksums/; a new file is written, checked, and then
-/// replaces the original. After an interruption one of the two is in place, and the next attempt
-/// starts over.
+/// Each page carries a checksum, compared when it is read from the file or from the log of writes:
+/// a page that a disk has changed, or that is of an earlier time (page_seals.hpp), is
+/// DatabaseCorrupt. What was read or written stays in the memory of the process (kept_pages.hpp),
+/// so that rows are read without waiting for the disk. Before a connection is opened that may write
+/// or that is the only one, the log of writes is examined and compared with the database and its
+/// mark (examination.hpp). A database of 0.2.0 gets its checksums the first time that it is opened
+/// for writing: the original is copied to before-checksums/; a new file is written, checked, and
+/// then replaces the original. After an interruption one of the two is in place, and the next
+/// attempt starts over.
 class Database {
  public:
   enum class Access {
     kReadWrite,
     kReadOnly,  ///< In addition to a connection that writes.
+    kFromDisk,  ///< As kReadOnly, but reads everything from the disk: for checks.
     kFrozen,    ///< On a disk that cannot be written at all.
     kUnsealed,  ///< Writes a database of 0.2.0 without checksums; for its conversion.
   };

@@ -20,9 +20,11 @@ struct DatabaseMark {
 
 /// Nothing if there is none, or if it is damaged.
 [[nodiscard]] std::optional<DatabaseMark> ReadMark(const std::filesystem::path& database);
-/// Not forced to the disk: after a power cut the mark may name an earlier change, but never one
-/// that the database does not have. If the mark cannot be written, the old one stays, which is just
-/// as harmless.
+/// Not forced to the disk: until SyncMark(), a power cut may leave an earlier change's, but never
+/// one that the database does not have. If the mark cannot be written, the old one stays, which is
+/// just as harmless.
 void WriteMark(const std::filesystem::path& database, const DatabaseMark& mark);
+/// Forces the mark to the disk. If the disk refuses, the mark may lag behind, as above.
+void SyncMark(const std::filesystem::path& database);
 
 }  // namespace plumb

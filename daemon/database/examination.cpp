@@ -24,6 +24,16 @@ namespace fs = std::filesystem;
 /// The last schema whose databases have no checksums.
 constexpr std::uint32_t kLastPlainSchema = 9;
 
+/// A database with tables is changed through its log of writes only. SQLite would still undo what a
+/// rollback journal beside it says, and so put pages of another time into it.
+void RefuseJournal(const fs::path& database) {
+  std::error_code missing;
+  const fs::path journal = database.string() + "-journal";
+  const std::uintmax_t bytes = fs::file_size(journal, missing);
+  if (!missing && bytes > 0)
+    throw DatabaseCorrupt(say::store::LogForeign(journal.string(), database.string()));
+}
+
 /// A file, opened for reading.
 class BytesOf {
  public:
@@ -77,6 +87,8 @@ FirstPage ReadFirstPage(const fs::path& file) {
     return {.kind = DatabaseKind::kPlain};
   }
   FirstPage first{.kind = DatabaseKind::kSealed, .changes = BigEndian32(page.data() + kChangesAt)};
+  // Without tables it may have been interrupted while it was created, which the journal undoes.
+  if (BigEndian32(page.data() + kUserVersionAt) != 0) RefuseJournal(file);
   if (got < page.size() || page[kReservedAt] != kSealBytes || !IsSealed(page, 1)) {
     first.torn = say::store::PageDamaged(1, file.string());
   } else if (bytes.size() % static_cast<std::int64_t>(kPageBytes) != 0) {

@@ -30,10 +30,12 @@ void SealPage(Page page, std::uint32_t number) {
   std::memcpy(page.data() + kPageBytes - kSealBytes, &sum, kSealBytes);
 }
 
-bool IsSealed(ConstPage page, std::uint32_t number) {
-  std::uint64_t sealed = 0;
-  std::memcpy(&sealed, page.data() + kPageBytes - kSealBytes, kSealBytes);
-  return sealed == SumOf(page, number);
+bool IsSealed(ConstPage page, std::uint32_t number) { return SealIn(page) == SumOf(page, number); }
+
+std::uint64_t SealIn(ConstPage page) {
+  std::uint64_t seal = 0;
+  std::memcpy(&seal, page.data() + kPageBytes - kSealBytes, kSealBytes);
+  return seal;
 }
 
 void LogSum::Add(std::span<const std::uint8_t> bytes) {

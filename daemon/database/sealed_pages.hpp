@@ -21,6 +21,8 @@ void SealPage(Page page, std::uint32_t number);
 /// Whether the page is as it was written. A change within one group of eight bytes is always
 /// noticed; any other change is missed with a probability of 2^-64.
 [[nodiscard]] bool IsSealed(ConstPage page, std::uint32_t number);
+/// The checksum that the page carries, whether or not it is right.
+[[nodiscard]] std::uint64_t SealIn(ConstPage page);
 
 /// A number as the file format stores it, highest byte first.
 [[nodiscard]] inline std::uint32_t BigEndian32(const std::uint8_t* bytes) {

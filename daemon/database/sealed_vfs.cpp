@@ -2,16 +2,20 @@
 #include "daemon/database/sealed_vfs.hpp"
 
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstring>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <new>
 #include <string>
 #include <utility>
 
 #include "daemon/database/database_mark.hpp"
+#include "daemon/database/kept_pages.hpp"
+#include "daemon/database/page_seals.hpp"
 #include "daemon/database/sealed_pages.hpp"
 
 namespace plumb {
@@ -26,6 +30,8 @@ struct SealedFile : sqlite3_file {
   bool frame_commits;        ///< That frame is the last one of a change.
   DatabaseMark mark;         ///< Of the change that is being written; 0: it has no page 1 yet.
   bool is_committed;         ///< All of that change is in the log; the next sync confirms it.
+  int seals;                 ///< Of a database: the open list of page_seals.hpp, or -1.
+  std::shared_ptr<KeptPages> kept;  ///< Null: everything is read from the disk.
 };
 
 sqlite3_file* Below(sqlite3_file* file) {
@@ -43,7 +49,7 @@ ConstPage AsPage(const void* bytes) {
 
 /// Fails unless the whole page is in the file and its checksum is right. Any page of an empty file
 /// is SQLITE_IOERR_SHORT_READ. @param number  From 1
-int ReadPage(sqlite3_file* below, void* page, std::uint32_t number) {
+int ReadPage(const SealedFile& database, sqlite3_file* below, void* page, std::uint32_t number) {
   const int code = below->pMethods->xRead(below, page, static_cast<int>(kPageBytes),
                                           (sqlite3_int64{number} - 1) * sqlite3_int64{kPageBytes});
   if (code == SQLITE_IOERR_SHORT_READ) {
@@ -52,7 +58,9 @@ int ReadPage(sqlite3_file* below, void* page, std::uint32_t number) {
     return Unsealed(number);
   }
   if (code != SQLITE_OK) return code;
-  return IsSealed(AsPage(page), number) ? SQLITE_OK : Unsealed(number);
+  const bool is_last =
+      database.seals < 0 || IsLastSeal(database.seals, number, SealIn(AsPage(page)));
+  return is_last && IsSealed(AsPage(page), number) ? SQLITE_OK : Unsealed(number);
 }
 
 int ReadDatabase(sqlite3_file* file, void* bytes, int amount, sqlite3_int64 offset) {
@@ -63,7 +71,18 @@ int ReadDatabase(sqlite3_file* file, void* bytes, int amount, sqlite3_int64 offs
   const auto number = static_cast<std::uint32_t>(offset / sqlite3_int64{kPageBytes}) + 1;
   if (amount != static_cast<int>(kPageBytes) || offset % sqlite3_int64{kPageBytes} != 0)
     return Unsealed(number);
-  return ReadPage(Below(file), bytes, number);
+  const auto& database = *static_cast<SealedFile*>(file);
+  if (database.kept && database.kept->Get(offset, bytes)) return SQLITE_OK;
+  const int code = ReadPage(database, Below(file), bytes, number);
+  if (code == SQLITE_OK && database.kept) database.kept->Put(offset, bytes);
+  return code;
+}
+
+/// Keeps a page that was written, or forgets one that could not be.
+int Keep(const SealedFile& file, sqlite3_int64 offset, const void* page, int code) {
+  if (file.kept && code == SQLITE_OK) file.kept->Put(offset, page);
+  if (file.kept && code != SQLITE_OK) file.kept->Drop(offset);
+  return code;
 }
 
 int WriteDatabase(sqlite3_file* file, const void* bytes, int amount, sqlite3_int64 offset) {
@@ -71,20 +90,28 @@ int WriteDatabase(sqlite3_file* file, const void* bytes, int amount, sqlite3_int
     return SQLITE_IOERR_WRITE;  // only whole pages can be sealed
   std::array<std::uint8_t, kPageBytes> page;
   std::memcpy(page.data(), bytes, kPageBytes);
-  SealPage(page, static_cast<std::uint32_t>(offset / sqlite3_int64{kPageBytes}) + 1);
+  const auto number = static_cast<std::uint32_t>(offset / sqlite3_int64{kPageBytes}) + 1;
+  SealPage(page, number);
+  const auto& database = *static_cast<SealedFile*>(file);
+  if (database.seals >= 0 && !NoteSeal(database.seals, number, SealIn(page)))
+    return SQLITE_IOERR_WRITE;
   sqlite3_file* const below = Below(file);
-  return below->pMethods->xWrite(below, page.data(), amount, offset);
+  return Keep(database, offset, page.data(),
+              below->pMethods->xWrite(below, page.data(), amount, offset));
 }
 
 /// A frame's page is as it was written if the sum of the frame before, continued over this frame's
 /// header and page, is the sum in its header.
 int ReadLog(sqlite3_file* file, void* bytes, int amount, sqlite3_int64 offset) {
   sqlite3_file* const below = Below(file);
+  KeptPages* const kept = static_cast<SealedFile*>(file)->kept.get();
+  const bool is_page = amount == static_cast<int>(kPageBytes);
+  if (is_page && kept != nullptr && kept->Get(offset, bytes)) return SQLITE_OK;
   const auto read = below->pMethods->xRead;
   if (const int code = read(below, bytes, amount, offset); code != SQLITE_OK) return code;
   constexpr sqlite3_int64 kFrameBytes = kFrameHeaderBytes + kPageBytes;
   const sqlite3_int64 frame_at = offset - sqlite3_int64{kFrameHeaderBytes};
-  if (amount != static_cast<int>(kPageBytes) || frame_at < sqlite3_int64{kLogHeaderBytes} ||
+  if (!is_page || frame_at < sqlite3_int64{kLogHeaderBytes} ||
       (frame_at - sqlite3_int64{kLogHeaderBytes}) % kFrameBytes != 0)
     return SQLITE_OK;  // a header, or a whole frame, whose sum SQLite compares
   std::array<std::uint8_t, kFrameHeaderBytes> header;
@@ -102,13 +129,17 @@ int ReadLog(sqlite3_file* file, void* bytes, int amount, sqlite3_int64 offset) {
   LogSum sum = LogSum::At(before.data());
   sum.Add(std::span(header).first(8));
   sum.Add(AsPage(bytes));
-  return sum == LogSum::At(header.data() + kSumAt) ? SQLITE_OK : Unsealed(0);
+  if (!(sum == LogSum::At(header.data() + kSumAt))) return Unsealed(0);
+  if (kept != nullptr) kept->Put(offset, bytes);
+  return SQLITE_OK;
 }
 
 int WriteLog(sqlite3_file* file, const void* bytes, int amount, sqlite3_int64 offset) {
   auto& log = *static_cast<SealedFile*>(file);
   const auto* const written = static_cast<const std::uint8_t*>(bytes);
-  const int code = Below(file)->pMethods->xWrite(Below(file), bytes, amount, offset);
+  const bool is_page = amount == static_cast<int>(kPageBytes);
+  int code = Below(file)->pMethods->xWrite(Below(file), bytes, amount, offset);
+  if (is_page) code = Keep(log, offset, bytes, code);
   if (code != SQLITE_OK) {  // the change is rolled back: a later sync must not confirm it
     log.mark = {};
     log.is_committed = false;
@@ -116,7 +147,7 @@ int WriteLog(sqlite3_file* file, const void* bytes, int amount, sqlite3_int64 of
     constexpr std::size_t kCommitAt = 4;
     log.frame_page = BigEndian32(written);
     log.frame_commits = BigEndian32(written + kCommitAt) != 0;
-  } else if (amount == static_cast<int>(kPageBytes)) {
+  } else if (is_page) {
     if (log.frame_page == 1) log.mark = {.changes = BigEndian32(written + kChangesAt)};
     log.is_committed = log.frame_commits && log.mark.changes != 0;
   }
@@ -134,11 +165,26 @@ int SyncLog(sqlite3_file* file, int flags) {
   return code;
 }
 
-int Close(sqlite3_file* file) { return Below(file)->pMethods->xClose(Below(file)); }
+/// SQLite syncs the database before it lets go of the log of writes, so up to then a list, or a
+/// page, that has not reached the disk is written again from the log. All changes that are in the
+/// database by now have been confirmed, so that the mark, too, can be made to last.
+int SyncDatabase(sqlite3_file* file, int flags) {
+  const auto& database = *static_cast<SealedFile*>(file);
+  if (database.seals >= 0 && ::fdatasync(database.seals) != 0) return SQLITE_IOERR_FSYNC;
+  if (database.seals >= 0) SyncMark(database.name);
+  return Below(file)->pMethods->xSync(Below(file), flags);
+}
+
+int Close(sqlite3_file* file) {
+  auto& sealed = *static_cast<SealedFile*>(file);
+  if (sealed.seals >= 0) ::close(std::exchange(sealed.seals, -1));
+  sealed.kept.reset();
+  return Below(file)->pMethods->xClose(Below(file));
+}
 int Truncate(sqlite3_file* file, sqlite3_int64 size) {
+  if (const auto& kept = static_cast<SealedFile*>(file)->kept) kept->DropFrom(size);
   return Below(file)->pMethods->xTruncate(Below(file), size);
 }
-int Sync(sqlite3_file* file, int flags) { return Below(file)->pMethods->xSync(Below(file), flags); }
 int FileSize(sqlite3_file* file, sqlite3_int64* size) {
   return Below(file)->pMethods->xFileSize(Below(file), size);
 }
@@ -191,7 +237,7 @@ constexpr sqlite3_io_methods Methods(decltype(sqlite3_io_methods::xRead) read,
   methods.xShmUnmap = ShmUnmap;
   return methods;
 }
-constexpr sqlite3_io_methods kDatabaseMethods = Methods(ReadDatabase, WriteDatabase, Sync);
+constexpr sqlite3_io_methods kDatabaseMethods = Methods(ReadDatabase, WriteDatabase, SyncDatabase);
 constexpr sqlite3_io_methods kLogMethods = Methods(ReadLog, WriteLog, SyncLog);
 
 struct System {
@@ -207,10 +253,18 @@ int Open(sqlite3_vfs* vfs, const char* name, sqlite3_file* file, int flags, int*
     return below->xOpen(below, name, file, flags, flags_given);
   auto* const sealed = new (file) SealedFile{};
   sealed->name = name;
+  sealed->seals = -1;
   const int code = below->xOpen(below, name, Below(file), flags, flags_given);
   // SQLite closes a file that could not be opened if it has methods.
-  if (Below(file)->pMethods != nullptr)
-    sealed->pMethods = is_database ? &kDatabaseMethods : &kLogMethods;
+  if (Below(file)->pMethods == nullptr) return code;
+  sealed->pMethods = is_database ? &kDatabaseMethods : &kLogMethods;
+  // With a name of SQLite's own, a log has the parameters of its database.
+  if (sqlite3_uri_boolean(name, kKeepPages, 0) != 0) sealed->kept = KeptPages::Of(name);
+  if (!is_database) return code;
+  const bool writes = (flags & SQLITE_OPEN_READWRITE) != 0;
+  sealed->seals = OpenSeals(name, writes);
+  // A list that is not kept up would accuse every page that is written from now on.
+  if (sealed->seals < 0 && writes && HasSeals(name)) return SQLITE_CANTOPEN;
   return code;
 }
 

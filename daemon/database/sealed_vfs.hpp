@@ -16,6 +16,10 @@ namespace plumb {
 /// kPageBytes.
 [[nodiscard]] const char* SealedSystem(const char* system);
 
+/// A parameter of a database's URI. 1: pages are kept in memory (kept_pages.hpp), so that each is
+/// read from the disk and compared once.
+inline constexpr const char* kKeepPages = "keep_pages";
+
 /// The number of the last page that this thread found damaged; 0: it was in the log of writes.
 [[nodiscard]] std::uint32_t LastUnsealedPage();
 

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "daemon/database/database_mark.hpp"
+#include "daemon/database/page_seals.hpp"
 #include "daemon/database/retry_while_busy.hpp"
 #include "daemon/database/schema.hpp"
 #include "daemon/records/clock_doubt.hpp"
@@ -60,8 +61,12 @@ void RequireWritable(const ScanFolders& folders) {
 void KeepDamaged(const fs::path& state) {
   constexpr std::size_t kLongest = std::size_t{1} << 28U;
   constexpr int kMostKept = 3;
-  const std::array<std::string, 4> names = {kDatabaseFile, "plumb.db-wal", "plumb.db-shm",
-                                            std::string(kDatabaseFile) + kMarkSuffix};
+  const std::array<std::string, 6> names = {kDatabaseFile,
+                                            "plumb.db-wal",
+                                            "plumb.db-shm",
+                                            "plumb.db-journal",
+                                            std::string(kDatabaseFile) + kMarkSuffix,
+                                            std::string(kDatabaseFile) + kSealsSuffix};
   try {
     std::error_code error;
     std::string sums;
@@ -154,7 +159,8 @@ int RestrictAccess(const fs::path& state) {
     for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error))
       if (!entry->is_symlink(ignored) && entry->path() != scans) restrict(entry->path());
   }
-  for (const char* name : {kDatabaseFile, "plumb.db-wal", "plumb.db-shm", "plumb.db-mark"})
+  for (const char* name :
+       {kDatabaseFile, "plumb.db-wal", "plumb.db-shm", "plumb.db-mark", "plumb.db-seals"})
     restrict(state / name);
   restrict(scans);
   restrict(state);

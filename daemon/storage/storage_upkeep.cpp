@@ -204,9 +204,10 @@ void StorageUpkeep::CheckRecords() {
   const bool posted = reads_.Post([this] {
     Message fault;
     try {
-      if (!std::exchange(is_database_checked_, true)) {
+      // The rows that are read come from the memory: only this notices later damage on the disk.
+      if (!std::exchange(is_database_checked_, false)) {
         constexpr std::chrono::minutes kLongest{30};
-        Database(storage_.state() / kDatabaseFile, Database::Access::kReadOnly)
+        Database(storage_.state() / kDatabaseFile, Database::Access::kFromDisk)
             .CheckIntegrity(kLongest);
       }
       if (const std::optional<std::int64_t> broken = store_->audit.FirstBroken())

@@ -104,7 +104,7 @@ class StorageUpkeep {
   RemovalFacts removals_;
   std::map<std::filesystem::path, Message> backup_faults_;  ///< By the place of the backup.
   Message record_fault_;              ///< That the audit log is not as it was written.
-  bool is_database_checked_ = false;  ///< Once it is open, the check thread's.
+  bool is_database_checked_ = false;  ///< By the start; the first check here can do without.
   std::int64_t lost_entries_ = 0;     ///< Of the audit log: the state folder was rolled back.
   Message backup_fault_;
   std::optional<std::chrono::system_clock::time_point> backup_made_at_;

@@ -321,7 +321,7 @@ TEST_F(BackupTest, ADatabaseThatPlumbdCannotStartWithMovesNothing) {
     const std::string all = DigestOfFile(backup(), "SHA256SUMS").sha256;
     fs::permissions(database, fs::perms::owner_write, fs::perm_options::add);
     change(database);
-    for (const char* beside : {"plumb.db-wal", "plumb.db-shm", "plumb.db-mark"})
+    for (const char* beside : {"plumb.db-wal", "plumb.db-shm", "plumb.db-mark", "plumb.db-seals"})
       fs::remove(backup() / beside);
     const auto replace = [&](const char* name, const std::string& from, const std::string& to) {
       std::string text = ReadTextFile(backup() / name, 1U << 20U);

@@ -330,7 +330,8 @@ TEST(DamagedDatabaseTest, IsOpenedOrRefusedAndNoScanIsDeleted) {
   int opened = 0, refused = 0, unreadable = 0;
   for (int round = 0; round < 200 * Repeats(); ++round) {
     SCOPED_TRACE(round);
-    for (const char* name : {"plumb.db", "plumb.db-wal", "plumb.db-shm", "plumb.db-mark"})
+    for (const char* name :
+         {"plumb.db", "plumb.db-wal", "plumb.db-shm", "plumb.db-mark", "plumb.db-seals"})
       fs::remove(state / name);
     WriteWholeFile(state / "plumb.db", Damaged(whole, random));
     try {

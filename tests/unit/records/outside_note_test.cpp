@@ -126,7 +126,8 @@ TEST_F(OutsideNoteTest, AUnitThatWasInUseIsNeverANewOne) {
     const auto store = Open();
     store->removal.WipePatient(kAnna, store->patients.FindByCode("A")->id);
   }
-  for (const char* name : {"plumb.db", "plumb.db-wal", "plumb.db-shm", "plumb.db-mark"})
+  for (const char* name :
+       {"plumb.db", "plumb.db-wal", "plumb.db-shm", "plumb.db-mark", "plumb.db-seals"})
     fs::remove(state() / name);
   EXPECT_THAT(WhyNotOpened(), HasSubstr("has been in use"));
   fs::remove(state() / "plumb.db");

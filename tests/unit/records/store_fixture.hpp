@@ -57,7 +57,7 @@ class StoreTest : public ::testing::Test {
   [[nodiscard]] std::filesystem::path database() const { return folder_ / "state" / "plumb.db"; }
   /// With what says that there was one.
   void RemoveDatabase() const {
-    for (const char* name : {"plumb.db", "plumb.db-mark", "last-scan"})
+    for (const char* name : {"plumb.db", "plumb.db-mark", "plumb.db-seals", "last-scan"})
       std::filesystem::remove(folder_ / "state" / name);
   }
 

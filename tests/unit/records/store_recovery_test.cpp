@@ -448,7 +448,10 @@ TEST_F(StoreRecoveryTest, WhatAnOlderDatabaseSetAsideComesBackWithTheNewerOne) {
   const auto before = testing::FilesBelow(state() / "scans" / scan);
   fs::rename(state() / "plumb.db", folder_ / "newer");
   fs::rename(folder_ / "older", state() / "plumb.db");
-  fs::remove(state() / "plumb.db-mark");  // as a restore leaves it
+  const auto without_notes = [&] {  // as a restore leaves it
+    for (const char* beside : {"plumb.db-mark", "plumb.db-seals"}) fs::remove(state() / beside);
+  };
+  without_notes();
   {
     const auto store = Open();
     EXPECT_EQ(store->recovery().foreign_folders, 2);
@@ -458,7 +461,7 @@ TEST_F(StoreRecoveryTest, WhatAnOlderDatabaseSetAsideComesBackWithTheNewerOne) {
   WriteWholeFile(state() / "set-aside" / changed / "scene" / "mesh.ply",
                  std::string(before.at("scene/mesh.ply").size(), 'x'));
   fs::rename(folder_ / "newer", state() / "plumb.db");
-  fs::remove(state() / "plumb.db-mark");
+  without_notes();
   const auto store = Open();
   EXPECT_EQ(store->recovery().attached_scans, 1);
   EXPECT_EQ(store->scans.Find(scan)->folder, store->folders.Scan(scan));

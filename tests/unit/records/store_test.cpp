@@ -117,7 +117,8 @@ TEST_F(StoreTest, ScansThatAnOlderBackupDoesNotKnowAreSetAsideAndTheirNumbersSta
   backup = ReadWholeFile(database(), 1 << 26);
   new_scan = Scan(*Open(), patient);
   for (int i = 0; i < 2; ++i) {
-    fs::remove(folder_ / "state" / "plumb.db-mark");  // as a restore leaves it
+    for (const char* beside : {"plumb.db-mark", "plumb.db-seals"})
+      fs::remove(folder_ / "state" / beside);  // as a restore leaves it
     WriteWholeFile(database(),
                    std::string_view(reinterpret_cast<const char*>(backup.data()), backup.size()));
     const auto store = Open();
