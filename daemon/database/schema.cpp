@@ -222,6 +222,11 @@ CREATE TRIGGER refs_immutable BEFORE UPDATE ON refs WHEN OLD.approved_by <> ''
 -- What a session for fractions compares with: the reference that was approved when it was opened.
 -- NULL, as 0.2.0 leaves it: the newest approved one.
 ALTER TABLE sessions ADD COLUMN reference_id INTEGER REFERENCES refs(id) ON DELETE SET NULL;
+-- What a reference was made of, with the keyed hash of the Patient ID in the files of
+-- a planning CT; and the newest approved version when a person chose what a session compares with.
+ALTER TABLE refs ADD COLUMN source TEXT NOT NULL DEFAULT 'sweep';
+ALTER TABLE refs ADD COLUMN patient_hash TEXT NOT NULL DEFAULT '';
+ALTER TABLE sessions ADD COLUMN chosen_at_version INTEGER NOT NULL DEFAULT 0;
 -- Backups that were made, when their bytes were last compared with the digest (verified_at: and were
 -- the same), and the scans of which each one holds every file as it was stored.
 CREATE TABLE backups (

@@ -224,15 +224,22 @@ void TreatmentStore::UseReference(const Actor& actor, const std::string& session
   const std::optional<std::int64_t> session = ParseId(session_id),
                                     reference = ParseId(reference_id);
   StoreChange change(database_);
-  const auto version = change->FirstInteger(
-      "SELECT version FROM refs JOIN sessions ON sessions.patient_id = refs.patient_id WHERE "
+  const auto chosen = change->First(
+      "SELECT version, source FROM refs JOIN sessions ON sessions.patient_id = refs.patient_id "
+      "WHERE "
       "refs.id = ?2 AND sessions.id = ?1 AND closed_at IS NULL AND purpose = 'fraction' AND "
       "approved_by <> '' AND NOT EXISTS (SELECT 1 FROM refs AS newer WHERE newer.patient_id = "
-      "refs.patient_id AND newer.approved_by <> '' AND newer.version > refs.version)",
-      session, reference);
-  if (!version) throw StoreRefusal(ChangeResult::kConflict, say::store::ReferenceNotForSession());
-  change->Run("UPDATE sessions SET reference_id = ? WHERE id = ?", reference, session);
-  change.Log(actor, "session.reference", session_id, say::store::LogVersion(*version));
+      "refs.patient_id AND newer.source = refs.source AND newer.approved_by <> '' AND "
+      "newer.version > refs.version)",
+      [](const Statement& row) { return std::pair(row.Integer(0), row.Text(1)); }, session,
+      reference);
+  if (!chosen) throw StoreRefusal(ChangeResult::kConflict, say::store::ReferenceNotForSession());
+  change->Run(
+      "UPDATE sessions SET reference_id = ?1, chosen_at_version = (SELECT max(version) FROM refs "
+      "WHERE refs.patient_id = sessions.patient_id AND approved_by <> '') WHERE id = ?2",
+      reference, session);
+  change.Log(actor, "session.reference", session_id,
+             say::store::LogVersion(chosen->first, chosen->second));
   change.Commit();
 }
 
@@ -247,10 +254,14 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
       "results.scan_id IS NOT NULL FROM scans LEFT JOIN results ON scan_id = scans.id WHERE "
       "session_id = open.id AND outcome = 'done' ORDER BY scans.id DESC LIMIT 1), 0), "
       "ifnull((SELECT "
-      "language FROM preferences WHERE user = opened_by), '') FROM open "
+      "language FROM preferences WHERE user = opened_by), ''), kept.source, newest.source, "
+      "other.id, "
+      "other.version, other.source, newest.version > chosen_at_version FROM open "
       "JOIN patients ON patients.id = "
       "open.patient_id LEFT JOIN refs AS kept ON kept.id = ifnull(reference_id, newest_id) LEFT "
-      "JOIN refs AS newest ON newest.id = newest_id",
+      "JOIN refs AS newest ON newest.id = newest_id LEFT JOIN refs AS other ON other.id = (SELECT "
+      "id FROM refs WHERE refs.patient_id = open.patient_id AND approved_by <> '' AND source <> "
+      "kept.source ORDER BY version DESC LIMIT 1)",
       [](const Statement& row) {
         TreatmentSession session{.id = row.Text(0),
                                  .patient_id = row.Text(1),
@@ -261,14 +272,17 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
                                  .opened_by = row.Text(5),
                                  .opened_at = FromStored(row.Integer(6)),
                                  .has_unaccepted = row.Integer(12) != 0};
-        const auto version = [&](int column) {
-          return ReferenceVersion{.id = row.Text(column),
-                                  .version = static_cast<int>(row.Integer(column + 1))};
+        const auto version = [&](int column, int source) {
+          return ReferenceVersion{
+              .id = row.Text(column),
+              .version = static_cast<int>(row.Integer(column + 1)),
+              .source = ParseStored<ReferenceSource>("source", row.Text(source))};
         };
         session.language = row.Text(13);
-        if (!row.IsNull(8)) session.reference = version(8);
-        if (session.reference && version(10) != *session.reference)
-          session.newer_reference = version(10);
+        if (!row.IsNull(8)) session.reference = version(8, 14);
+        if (session.reference && row.Text(10) != session.reference->id && row.Integer(19) != 0)
+          session.newer_reference = version(10, 15);
+        if (!row.IsNull(16)) session.other_reference = version(16, 18);
         return session;
       });
 }

@@ -53,7 +53,7 @@ class TreatmentStore {
   void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
                        const std::string& reason);
   /// From now on the open session is compared with this reference. kConflict unless it is the
-  /// newest approved one of its patient.
+  /// newest approved one of its patient and its source.
   void UseReference(const Actor& actor, const std::string& session_id,
                     const std::string& reference_id);
   void CloseAll(const Actor& actor);

@@ -17,7 +17,7 @@ const std::string kReferenceColumns =
     "SELECT id, patient_id, version, scan_id, created_at, created_by, reason, approved_by, "
     "approved_at, plan, revision, planned_by, (SELECT group_concat(path || ' ' || sha256, "
     "char(10)) FROM (SELECT path, sha256 FROM scan_files WHERE scan_files.scan_id = refs.scan_id "
-    "AND path LIKE 'scene/%' ORDER BY path)), approved_digest FROM refs ";
+    "AND path LIKE 'scene/%' ORDER BY path)), approved_digest, source, patient_hash FROM refs ";
 
 /// SHA-256 of the data that an approval signs: all that the summary shows, and the files of the
 /// surface that later scans are compared with.
@@ -70,6 +70,8 @@ Reference ReadReferenceRow(const Statement& row) {
                       .approved_by = row.Text(7)};
   if (!row.IsNull(8)) reference.approved_at = FromStored(row.Integer(8));
   reference.digest = DigestOf(row);
+  reference.origin = {.source = ParseStored<ReferenceSource>("source", row.Text(14)),
+                      .patient_hash = row.Text(15)};
   return reference;
 }
 
@@ -149,7 +151,8 @@ std::optional<Reference> ReferenceStore::OfSession(const std::string& session_id
 }
 
 std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
-                                const std::string& reason, const ReferencePlan& plan) {
+                                const std::string& reason, const ReferencePlan& plan,
+                                const ReferenceOrigin& origin) {
   const std::int64_t scan = RequireId(scan_id, "scan");
   StoreChange change(database_);
   std::int64_t patient = 0;
@@ -167,10 +170,11 @@ std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
   }
   change->Run(
       "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
-      "reason, plan) VALUES (?,"
+      "reason, plan, source, patient_hash) VALUES (?,"
       " 1 + (SELECT ifnull(max(version), 0) FROM refs WHERE patient_id = ?), ?, ?, ?, '', ?, "
-      "?)",
-      patient, patient, scan, StoredNow(), actor.user, reason, PlanJson(plan));
+      "?, ?, ?)",
+      patient, patient, scan, StoredNow(), actor.user, reason, PlanJson(plan), Name(origin.source),
+      origin.patient_hash);
   const std::string id = std::to_string(change->last_id());
   change.Log(actor, "reference.add", id, say::store::LogReferenceScan(scan_id));
   change.Commit();
@@ -195,10 +199,10 @@ std::string ReferenceStore::Plan(const Actor& actor, const std::string& id, int 
   if (is_approved) {
     change->Run(
         "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
-        "reason, plan)"
+        "reason, plan, source, patient_hash)"
         " SELECT patient_id, 1 + (SELECT max(version) FROM refs AS r WHERE r.patient_id = "
         "refs.patient_id), scan_id, ?, ?, ?,"
-        " 'new plan of version ' || version, ? FROM refs WHERE id = ?",
+        " 'new plan of version ' || version, ?, source, patient_hash FROM refs WHERE id = ?",
         StoredNow(), actor.user, actor.user, PlanJson(plan), number);
     changed = std::to_string(change->last_id());
   } else {

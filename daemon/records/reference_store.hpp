@@ -31,7 +31,7 @@ class ReferenceStore {
 
   /// Creates a draft. Returns the id.
   std::string Add(const Actor& actor, const std::string& scan_id, const std::string& reason,
-                  const ReferencePlan& plan);
+                  const ReferencePlan& plan, const ReferenceOrigin& origin = {});
   /// Changes a draft, or creates a new version of an approved reference. Returns the id.
   /// @param revision  The revision that was read; kConflict if another one has been saved since.
   std::string Plan(const Actor& actor, const std::string& id, int revision,

@@ -262,10 +262,16 @@ class WebReferences final : public web::ReferenceService {
     if (RefuseIf(references_.WhyNot(scan), done)) return;
     const Settings settings =
         store_.Read(&Store::settings, [](SettingsStore& stored) { return stored.Get(); });
-    store_.Write(&Store::references, std::move(done),
-                 [=, plan = DefaultPlan(settings)](ReferenceStore& references) {
-                   return references.Add(actor, scan_id, reason, plan);
-                 });
+    ReferencePlan plan = DefaultPlan(settings);
+    // A position that was compared with a reference is captured in the posture and with the
+    // tolerance of that one. Its region and isocentre lie on another map.
+    if (const auto before = scan ? FindReference(scan->reference_id) : std::nullopt) {
+      plan.posture = before->plan.posture;
+      plan.tolerance = before->plan.tolerance;
+    }
+    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
+      return references.Add(actor, scan_id, reason, plan);
+    });
   }
 
   void AddPlanning(const Actor& actor, const std::string& patient_id, const web::SentPlanning& sent,
@@ -378,7 +384,7 @@ class WebReferences final : public web::ReferenceService {
     return [=, this, done = std::move(done)](const Change& change) {
       if (change.result != ChangeResult::kDone) return done(change);
       store_.Write(&Store::references, done, [=, scan = change.id](ReferenceStore& references) {
-        return references.Add(actor, scan, reason, plan);
+        return references.Add(actor, scan, reason, plan, {.source = ReferenceSource::kPlanningCt});
       });
     };
   }

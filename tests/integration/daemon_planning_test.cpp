@@ -100,7 +100,7 @@ class DaemonPlanningTest : public ::testing::Test {
     const std::string path = "/api/v1/references/" + reference;
     const json draft = planner_->Get(path).json();
     json plan = {
-        {"region_m", json::array()},    {"isocentre_m", {0, 0, 0}}, {"shift_tolerance_mm", 3},
+        {"region_m", json::array()},    {"isocentre_m", {0, 0, 0}}, {"shift_tolerance_mm", 3.5},
         {"rotation_tolerance_deg", 1},  {"posture", "HFP"},         {"couch_markers", false},
         {"revision", draft["revision"]}};
     EXPECT_EQ(planner_->Put(path + "/plan", plan).status, 400) << "the file says HFS";
@@ -117,12 +117,59 @@ class DaemonPlanningTest : public ::testing::Test {
     ASSERT_EQ(approved.status, 200) << approved.body;
   }
 
-  json ScanFraction() {
+  [[nodiscard]] json OpenSession() {
     EXPECT_EQ(planner_
                   ->Post("/api/v1/patients/" + patient_ + "/open",
                          {{"purpose", "fraction"}, {"reason", ""}})
                   .status,
               200);
+    return planner_->Get("/api/v1/status").json()["session"];
+  }
+
+  /// Plans and approves a surface captured from that scan. Returns the id.
+  std::string Capture(const std::string& scan) {
+    const std::string path =
+        "/api/v1/references/" +
+        planner_->Post("/api/v1/references", {{"scan_id", scan}, {"reason", "verified"}})
+            .json()
+            .value("id", "");
+    const json draft = planner_->Get(path).json();
+    EXPECT_EQ(draft["source"], "sweep");
+    EXPECT_EQ(draft["plan"]["tolerance"]["shift_mm"], 3.5) << "as in the plan of the CT";
+    EXPECT_EQ(planner_
+                  ->Put(path + "/plan", {{"region_m", json::array()},
+                                         {"isocentre_m", draft["room"]["lasers_m"]},
+                                         {"shift_tolerance_mm", 3},
+                                         {"rotation_tolerance_deg", 1},
+                                         {"posture", "HFS"},
+                                         {"couch_markers", false},
+                                         {"revision", draft["revision"]}})
+                  .status,
+              200);
+    const json planned = approver_->Get(path).json();
+    const auto approved = approver_->Post(path + "/approve", {{"revision", planned["revision"]},
+                                                              {"digest", planned["digest"]},
+                                                              {"reason", "looked at it"},
+                                                              {"password", kPassword}});
+    EXPECT_EQ(approved.status, 200) << approved.body;
+    return draft["id"];
+  }
+
+  /// Opens a session, chooses that reference for it, and sweeps once.
+  json ScanAgainst(const std::string& reference) {
+    const std::string session = OpenSession()["id"];
+    const auto chosen = planner_->Post("/api/v1/treatment/reference",
+                                       {{"session_id", session}, {"reference_id", reference}});
+    EXPECT_EQ(chosen.status, 200) << chosen.body;
+    const std::string scan = plumbd_->ScanOnce()["last_result"]["scan"];
+    EXPECT_EQ(planner_->Get("/api/v1/scans/" + scan).json()["reference_id"], reference);
+    EXPECT_EQ(planner_->Post("/api/v1/treatment/close", {{"session_id", session}}).status, 200);
+    return planner_->Get("/api/v1/results/" + scan).json();
+  }
+
+  json ScanFraction() {
+    const json opened = OpenSession();
+    EXPECT_EQ(opened["reference"]["source"], "planning_ct");
     const std::string scan = plumbd_->ScanOnce()["last_result"]["scan"];
     const json session = planner_->Get("/api/v1/status").json()["session"];
     EXPECT_EQ(planner_->Post("/api/v1/treatment/close", {{"session_id", session["id"]}}).status,
@@ -175,6 +222,26 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   EXPECT_NEAR(numbers["lateral_mm"].get<double>(), couch(0) / kMillimetre, 1.8);
   EXPECT_NEAR(numbers["longitudinal_mm"].get<double>(), couch(1) / kMillimetre, 1.8);
   EXPECT_NEAR(numbers["vertical_mm"].get<double>(), couch(2) / kMillimetre, 1.8);
+
+  // That position is captured. Each session compares with what was chosen for it.
+  const std::string captured = Capture(planner_->Get("/api/v1/status").json()["last_result"]["id"]);
+  const json opened = OpenSession();
+  EXPECT_EQ(opened["reference"]["id"], captured) << "the newest, as long as nobody chooses";
+  EXPECT_EQ(opened["other_reference"]["id"], reference);
+  const json against_ct = ScanAgainst(reference);
+  EXPECT_EQ(against_ct["compared_with"]["source"], "dicom");
+  EXPECT_NEAR(against_ct["correction"]["lateral_mm"].get<double>(), couch(0) / kMillimetre, 1.8);
+  const json log = engineer_->Get("/api/v1/audit").json()["entries"];
+  const auto row = std::find_if(log.begin(), log.end(), [](const json& entry) {
+    return entry["action"] == "session.reference";
+  });
+  ASSERT_NE(row, log.end());
+  EXPECT_EQ((*row)["detail"], "version 1, planning CT");
+  // The body lies where it lay when it was captured.
+  const json against_surface = ScanAgainst(captured);
+  EXPECT_FALSE(against_surface["compared_with"].is_object()) << against_surface.dump();
+  EXPECT_NEAR(against_surface["correction"]["lateral_mm"].get<double>(), 0, 1.5);
+  EXPECT_NEAR(against_surface["correction"]["vertical_mm"].get<double>(), 0, 1.5);
 }
 
 }  // namespace

@@ -288,6 +288,7 @@ class FakeAppliance : public web::BackgroundWork,
   void EndScan();
   void TellWaiting();
   void TellNewerReference();
+  std::string chosen_at_reference_;  ///< The newest one when a person chose another.
   void EndSession();
   [[nodiscard]] bool IsOld(const Scan& scan) const;
   void EndCheck();

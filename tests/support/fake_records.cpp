@@ -23,6 +23,10 @@ std::optional<T> FindById(const std::vector<T>& items, const std::string& id) {
   return found == items.end() ? std::nullopt : std::optional(*found);
 }
 
+ReferenceVersion VersionOf(const Reference& reference) {
+  return {.id = reference.id, .version = reference.version, .source = reference.origin.source};
+}
+
 }  // namespace
 
 Patient* FakeAppliance::PatientOf(const std::string& id) {
@@ -154,7 +158,9 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
   status.session->language = preferences_[actor.user].language;
   if (const auto approved = FindReference(patient->approved_reference_id);
       approved && purpose == ScanPurpose::kFraction)
-    status.session->reference = {.id = approved->id, .version = approved->version};
+    status.session->reference = VersionOf(*approved);
+  chosen_at_reference_.clear();
+  TellNewerReference();
   sessions_[status.session->id] = *status.session;
   Notify(EventKind::kStatus);
   Did(actor, "session.open", status.session->id, done, status.session->id);
@@ -163,10 +169,18 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
 void FakeAppliance::TellNewerReference() {
   if (!status.session || !status.session->reference) return;
   status.session->newer_reference.reset();
+  status.session->other_reference.reset();
   const Patient* patient = PatientOf(status.session->patient_id);
-  if (patient == nullptr || patient->approved_reference_id == status.session->reference->id) return;
-  if (const auto newer = FindReference(patient->approved_reference_id))
-    status.session->newer_reference = {.id = newer->id, .version = newer->version};
+  if (patient == nullptr) return;
+  for (const Reference& other : References(patient->id)) {
+    if (other.approved_by.empty() || other.origin.source == status.session->reference->source)
+      continue;
+    status.session->other_reference = VersionOf(other);
+    break;
+  }
+  const std::string& newest = patient->approved_reference_id;
+  if (newest == status.session->reference->id || newest == chosen_at_reference_) return;
+  if (const auto newer = FindReference(newest)) status.session->newer_reference = VersionOf(*newer);
 }
 
 void FakeAppliance::ResumeSession(const Actor& actor, const std::string& session_id,
@@ -226,10 +240,14 @@ void FakeAppliance::UseReference(const Actor& actor, const std::string& session_
   if (status.scan) return Finish(done, Refused(ChangeResult::kConflict, "a scan is running"));
   if (!status.session || status.session->id != session_id)
     return Finish(done, Refused(ChangeResult::kConflict, "this session is closed already"));
-  if (!status.session->newer_reference || status.session->newer_reference->id != reference_id)
+  const auto is_asked = [&](const std::optional<ReferenceVersion>& one) {
+    return one && one->id == reference_id;
+  };
+  if (!is_asked(status.session->newer_reference) && !is_asked(status.session->other_reference))
     return Finish(done, Refused(ChangeResult::kConflict, "another version is approved by now"));
-  status.session->reference = status.session->newer_reference;
-  status.session->newer_reference.reset();
+  status.session->reference = VersionOf(FindReference(reference_id).value());
+  chosen_at_reference_ = PatientOf(status.session->patient_id)->approved_reference_id;
+  TellNewerReference();
   Notify(EventKind::kStatus);
   Did(actor, "session.reference", session_id, done);
 }
@@ -319,7 +337,12 @@ void FakeAppliance::AddReference(const Actor& actor, const std::string& scan_id,
     return Finish(done, Refused(ChangeResult::kNotFound, "no finished scan of this id"));
   if (!status.reference_block.empty())
     return Finish(done, Refused(ChangeResult::kConflict, status.reference_block));
-  const std::string id = MakeReference(*scan, actor.user, reason).id;
+  Reference& draft = MakeReference(*scan, actor.user, reason);
+  const std::string id = draft.id;
+  if (const auto before = FindReference(scan->reference_id)) {
+    draft.plan.posture = before->plan.posture;
+    draft.plan.tolerance = before->plan.tolerance;
+  }
   Did(actor, "reference.add", id, done, id);
 }
 
@@ -345,6 +368,7 @@ void FakeAppliance::AddPlanning(const Actor& actor, const std::string& patient_i
   scans.push_back(scan);
   Reference& draft = MakeReference(scan, actor.user, sent.reason);
   draft.plan.isocentre_m = {0, 0, 0};
+  draft.origin.source = ReferenceSource::kPlanningCt;
   const std::string id = draft.id;
   Did(actor, "reference.add", id, done, id);
 }

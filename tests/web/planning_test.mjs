@@ -23,6 +23,7 @@ async function send(page, names) {
 }
 
 await h.step('accounts and a patient', async () => {
+  h.tell('checked');
   await h.firstStart(engineer);
   await h.addAccountByApi(engineer, 'planner', 'physicist');
   await h.addAccountByApi(engineer, 'second', 'physicist');
@@ -66,6 +67,71 @@ await h.step('another physicist signs it', async () => {
   await second.locator('.summary .planning-facts', { hasText: 'BODY' }).waitFor();
   equal(await second.getByText('below the couch').count(), 0, 'a CT shows no couch');
   await h.look(second, 'planning-summary-phone');
+  await h.sign(second);
+  await second.getByText('approved by second').first().waitFor();
+});
+
+/// Sweeps once in the session that is open, and returns the scan.
+async function sweep(page) {
+  h.tell('moved z 8 HFS');
+  await page.goto(`${h.url}#/scan`);
+  await page.getByRole('button', { name: /Start sweep|Scan again/ }).click();
+  await page.locator('.verdict').waitFor({ timeout: 60000 });
+  return (await h.api(page, 'scans?limit=1')).body.scans[0];
+}
+const begin = (page) => page.getByRole('button',
+  { name: /^Start (treatment session|a new fraction)/ });
+
+await h.step('a position that was compared with it is captured as reference', async () => {
+  await planner.goto(`${h.url}#/patient/${patient}`);
+  await planner.getByRole('cell', { name: 'Planning CT' }).waitFor();
+  equal(await planner.getByLabel('Compare with').count(), 0, 'nothing to choose from yet');
+  await begin(planner).click();
+  await planner.getByText('Compared with planning CT, version 1').waitFor();
+  const scan = await sweep(planner);
+  await planner.goto(`${h.url}#/result/${scan.id}`);
+  await planner.getByText('this position becomes the new zero').waitFor();
+  await planner.getByText('planning CT, version 1, ').waitFor();
+  await planner.getByLabel('Reason for the new reference').fill('verified by imaging');
+  await h.look(planner, 'capture');
+  await planner.getByRole('button', { name: 'Capture as reference' }).click();
+  await planner.waitForURL(/#\/plan\//);
+  await planner.getByRole('heading', { name: 'Surface against planning CT' }).waitFor();
+  equal(await planner.locator('dl.captured dd').count(), 6, 'the correction between both');
+  await h.look(planner, 'captured-plan');
+  await planner.getByRole('button', { name: 'Save plan' }).click();
+  await second.goto(planner.url());
+  await second.getByRole('button', { name: 'Review and approve' }).click();
+  await second.locator('.summary dl.captured').waitFor();
+  await h.look(second, 'captured-summary-phone');
+  await h.sign(second);
+  await second.getByText('approved by second').first().waitFor();
+});
+
+await h.step('a session compares with what was chosen for it', async () => {
+  await h.api(planner, 'treatment/close', 'POST', { session_id: '' });
+  await h.acknowledge(planner);
+  await planner.goto(`${h.url}#/patient/${patient}`);
+  const choice = planner.getByLabel('Compare with');
+  equal(await choice.locator('option:checked').innerText(), 'captured surface, version 2',
+    'the newest one, unless somebody says otherwise');
+  await choice.selectOption({ label: 'planning CT, version 1' });
+  await h.look(planner, 'choose-reference');
+  await begin(planner).click();
+  await planner.getByText('Compared with planning CT, version 1').waitFor();
+  const [ct, surface] = (await h.api(planner, `patients/${patient}/references`)).body.references
+    .sort((a, b) => a.version - b.version);
+  equal((await sweep(planner)).reference_id, ct.id, 'what the scan was compared with');
+  await planner.goto(`${h.url}#/scan`);
+  equal(await planner.getByRole('dialog').count(), 0, 'no question about what was passed over');
+  await h.look(planner, 'chosen-session');
+  await planner.getByRole('button', { name: 'Compare with captured surface, version 2' }).click();
+  await planner.getByText('Compared with captured surface, version 2').waitFor();
+  const scan = await sweep(planner);
+  equal(scan.reference_id, surface.id, 'what the next one was compared with');
+  await planner.goto(`${h.url}#/result/${scan.id}`);
+  await planner.getByRole('heading', { name: 'Surface against planning CT' }).waitFor();
+  await h.look(planner, 'captured-result');
 });
 
 await h.finish();

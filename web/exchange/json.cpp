@@ -229,7 +229,8 @@ namespace {
 
 Json VersionJson(const std::optional<ReferenceVersion>& reference) {
   if (!reference) return nullptr;
-  return {{"id", reference->id}, {"version", reference->version}};
+  return {
+      {"id", reference->id}, {"version", reference->version}, {"source", Name(reference->source)}};
 }
 
 Json SessionJson(const TreatmentSession& session) {
@@ -244,6 +245,7 @@ Json SessionJson(const TreatmentSession& session) {
           {"has_unaccepted", session.has_unaccepted},
           {"reference", VersionJson(session.reference)},
           {"newer_reference", VersionJson(session.newer_reference)},
+          {"other_reference", VersionJson(session.other_reference)},
           {"language", session.language.empty() ? Json(nullptr) : Json(session.language)}};
 }
 
@@ -363,6 +365,7 @@ void to_json(Json& json, const Reference& reference) {
   json = {{"id", reference.id},
           {"patient_id", reference.patient_id},
           {"version", reference.version},
+          {"source", Name(reference.origin.source)},
           {"scan_id", reference.scan_id},
           {"created_at", reference.created_at},
           {"created_by", reference.created_by},

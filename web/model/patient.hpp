@@ -50,6 +50,7 @@ struct CourseNotes {
 struct ReferenceVersion {
   std::string id;
   int version = 0;
+  ReferenceSource source = ReferenceSource::kSweep;
   bool operator==(const ReferenceVersion&) const = default;
 };
 
@@ -66,8 +67,12 @@ struct TreatmentSession {
   bool has_unaccepted = false;  ///< Nobody has accepted its newest result.
   /// What its scans are compared with. Not set while no reference is approved.
   std::optional<ReferenceVersion> reference = {};
-  /// A newer one that was approved since: used once a person says so.
+  /// A newer one that was approved since, also since a person chose `reference`: used once a person
+  /// says so.
   std::optional<ReferenceVersion> newer_reference = {};
+  /// The newest approved one of the other source: the planning CT where a captured surface is
+  /// compared with, or the other way round. A person may choose it for this session.
+  std::optional<ReferenceVersion> other_reference = {};
   std::string language = {};  ///< The choice of the person who opened it; empty: none.
 };
 

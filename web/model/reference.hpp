@@ -9,6 +9,7 @@
 
 #include "algo/base/default_tolerance.hpp"
 #include "algo/base/message.hpp"
+#include "algo/base/names.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
@@ -29,6 +30,20 @@ struct ReferencePlan {
   bool couch_markers = false;   ///< Markers are fixed to the couch: no shifts are calculated.
 };
 
+/// What a reference was made of.
+enum class ReferenceSource { kSweep, kPlanningCt };
+template <>
+inline constexpr auto kNamesOf<ReferenceSource> =
+    NamesUpTo<ReferenceSource::kPlanningCt>({"sweep", "planning_ct"});
+
+/// Where a reference comes from; the same for all versions that only change its plan.
+struct ReferenceOrigin {
+  ReferenceSource source = ReferenceSource::kSweep;
+  /// Keyed hash of the Patient ID in the files of a planning CT; empty for a sweep, and for files
+  /// without one.
+  std::string patient_hash = {};
+};
+
 /// Immutable once approved; a change of plan creates a new version.
 struct Reference {
   std::string id;
@@ -45,6 +60,7 @@ struct Reference {
   std::string approved_by;  ///< Empty for a draft; "auto" for the demo's.
   std::optional<WallClock::time_point> approved_at = {};
   ReferencePlan plan = {};
+  ReferenceOrigin origin = {};
   Message unreadable = {};  ///< Why the stored plan cannot be read; `plan` is then invalid.
 };
 

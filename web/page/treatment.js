@@ -3,6 +3,7 @@
 // when somebody else changes it.
 import { get, live, may, post } from './api.js';
 import { action, clear, done, h } from './dom.js';
+import { comparesWith, sourceVersion } from './screens/captured.js';
 import { S } from './words.js';
 
 const kSeen = 'plumb-session-seen';
@@ -54,15 +55,29 @@ async function asOwn(change, isOurs) {
   }
 }
 
-/// @param replaces  Id of the session of another patient that the person has agreed to close.
-export const openPatient = (patient, purpose, reason = '', replaces = '') => asOwn(async () => {
+/// The session of that patient, which was just opened, is compared with what a person has chosen.
+async function compareWith(patient, reference) {
+  if (!reference) return;
+  const { session } = await get('status', true);
+  if (session?.patient_id !== patient || session.reference?.id === reference) return;
+  await post('treatment/reference', { session_id: session.id, reference_id: reference });
+}
+
+/// @param more  reason; replaces: id of the session of another patient that the person has agreed
+/// to close; reference: id of what a fraction is to be compared with, else it is the newest one.
+export const openPatient = (patient, purpose, more) => asOwn(async () => {
+  const { reason = '', replaces = '', reference = '' } = more;
   await post(`patients/${patient.id}/open`, { purpose, reason, replaces });
+  await compareWith(patient.id, reference);
   done(S.patients.opened(patient.code));
 }, (now) => now?.patient_id === patient.id && now.purpose === purpose);
 
-/// @param replaces  As for openPatient(), also the id of another session of this patient.
-export const resumeSession = (session, replaces = '') => asOwn(async () => {
+/// @param more  replaces: as for openPatient(), also the id of another session of this patient;
+/// reference: else the session goes on with its own.
+export const resumeSession = (patient, session, more) => asOwn(async () => {
+  const { replaces = '', reference = '' } = more;
   await post('treatment/resume', { session_id: session.id, replaces });
+  await compareWith(patient.id, reference);
   done(S.session.resumed(session.fraction));
 }, (now) => now?.id === session.id);
 
@@ -166,10 +181,9 @@ function removeQuestion() {
   questionOf = '';
 }
 
-const useReference = (session) => asOwn(async () => {
-  await post('treatment/reference',
-    { session_id: session.id, reference_id: session.newer_reference.id });
-  done(S.session.referenceUsed(session.newer_reference.version));
+const useReference = (session, wanted = session.newer_reference) => asOwn(async () => {
+  await post('treatment/reference', { session_id: session.id, reference_id: wanted.id });
+  done(S.session.referenceUsed(wanted.version));
 }, (now) => now?.id === session.id);
 
 async function planWords({ id, version }) {
@@ -237,15 +251,18 @@ export function sessionLine(place, { mayClose }) {
     }
     const running = status.state === 'scanning' || status.state === 'working';
     const close = mayClose && !running && action(text.close, () => closeSession(session), {});
-    const { reference, newer_reference: newer } = session;
+    const { reference, newer_reference: newer, other_reference: other } = session;
+    const mayChoose = mayClose && !running;
     clear(place, h('strong', { class: 'code-big' }, session.patient_code),
       h('span', {}, session.purpose === 'reference' ? S.purposes.reference
         : text.fraction(session.fraction)),
       h('span', {}, text.scans(session.num_scans)),
-      reference && h('span', {}, text.referenceIs(reference.version)),
+      reference && h('span', {}, comparesWith(session)),
       newer && h('span', { class: 'caution' }, text.referenceNewer(newer.version)),
-      newer && mayClose && !running && action(text.referenceUse(newer.version),
+      newer && mayChoose && action(text.referenceUse(newer.version),
         () => useReference(session), {}),
+      other && other.id !== newer?.id && mayChoose && action(
+        text.compareInstead(sourceVersion(other)), () => useReference(session, other), {}),
       h('span', { class: 'hint' }, text.openedBy(session.opened_by)), close);
   };
   return draw;

@@ -53,7 +53,7 @@ class PatientService {
   virtual void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
                                const std::string& reason, Done done) = 0;
   /// The session is compared with this reference from now on. kConflict during a scan, if another
-  /// session is open, or if it is not the newest approved reference of its patient.
+  /// session is open, or if it is not the newest approved reference of its patient from its source.
   virtual void UseReference(const Actor& actor, const std::string& session_id,
                             const std::string& reference_id, Done done) = 0;
   /// Ends the treatment session. kConflict during a scan, or if another session is open.

@@ -101,9 +101,54 @@ TEST_F(StoreSessionsTest, ASessionKeepsTheReferenceThatItWasOpenedWithUntilAPers
   const AuditEntry logged = store.audit.Find({0, 1}).at(0);
   EXPECT_EQ(logged.action, "session.reference");
   EXPECT_EQ(logged.subject, session);
-  EXPECT_EQ(logged.detail.English(), "version 2");
+  EXPECT_EQ(logged.detail.English(), "version 2, captured surface");
   store.treatments.CloseAll(kAnna);
   EXPECT_EQ(use(session, second), ChangeResult::kConflict) << "closed";
+}
+
+TEST_F(StoreSessionsTest, APersonChoosesBetweenThePlanningCtAndTheCapturedSurface) {
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "");
+  const auto approved = [&](ReferenceSource source) {
+    return testing::PlanAndApprove(
+        store, store.references.Add(kAnna, testing::StoreScan(store, patient), "", {},
+                                    {.source = source}));
+  };
+  const std::string planned = approved(ReferenceSource::kPlanningCt);
+  const ReferenceVersion ct{planned, 1, ReferenceSource::kPlanningCt};
+  EXPECT_EQ(store.references.Find(planned)->origin.source, ReferenceSource::kPlanningCt);
+  const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->reference, ct);
+  EXPECT_FALSE(store.treatments.Opened()->other_reference);
+  const std::string captured = approved(ReferenceSource::kSweep);
+  const ReferenceVersion surface{captured, 2, ReferenceSource::kSweep};
+  EXPECT_EQ(store.treatments.Opened()->newer_reference, surface);
+  EXPECT_EQ(store.treatments.Opened()->other_reference, surface);
+
+  store.treatments.UseReference(kAnna, session, captured);
+  EXPECT_EQ(store.references.OfSession(session)->id, captured);
+  EXPECT_EQ(store.treatments.Opened()->other_reference, ct);
+  store.treatments.UseReference(kBert, session, planned);
+  EXPECT_EQ(store.references.OfSession(session)->id, planned);
+  EXPECT_EQ(store.treatments.Opened()->reference, ct);
+  EXPECT_FALSE(store.treatments.Opened()->newer_reference) << "it was passed over on purpose";
+  const AuditEntry logged = store.audit.Find({0, 1}).at(0);
+  EXPECT_EQ(logged.action, "session.reference");
+  EXPECT_EQ(logged.detail.English(), "version 1, planning CT");
+
+  // A change of its plan is a newer one of the same source, and a question again.
+  const std::string second = store.references.Plan(kAnna, planned, 2, {});
+  store.references.Approve(kBert, second, 1);
+  EXPECT_EQ(store.treatments.Opened()->newer_reference,
+            (ReferenceVersion{second, 3, ReferenceSource::kPlanningCt}));
+  EXPECT_EQ(RefusalOf([&] { store.treatments.UseReference(kAnna, session, planned); }),
+            ChangeResult::kConflict)
+      << "not the newest of its source";
+  EXPECT_EQ(RefusalOf([&] { store.treatments.UseReference(kAnna, session, captured); }),
+            ChangeResult::kDone);
+  // The next session begins with the newest again.
+  (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->reference->id, second);
 }
 
 TEST_F(StoreSessionsTest, FractionNumbersCountSessionsNotScans) {

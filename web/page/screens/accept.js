@@ -121,13 +121,17 @@ export function actions(data, reload) {
   const { scan, patient } = data;
   const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
   const accept = acceptance(data, reload);
+  // After verification by imaging, the position that was compared with the planning CT.
+  const isCapture = data.reference?.source === 'planning_ct';
   const newReference = may('plan') && scan.outcome === 'done' && patient
     && scan.purpose !== 'reference'
-    && form({ class: 'form inline' }, async () => {
-      const body = { scan_id: scan.id, reason: reason.value.trim() };
-      const { id } = await post('references', body);
-      location.hash = `#/plan/${id}`;
-    }, field(text.newReferenceReason, reason), h('button', {}, text.newReference));
+    && h('div', { class: 'below' }, isCapture && hint(text.captureHint),
+      form({ class: 'form inline' }, async () => {
+        const body = { scan_id: scan.id, reason: reason.value.trim() };
+        const { id } = await post('references', body);
+        location.hash = `#/plan/${id}`;
+      }, field(text.newReferenceReason, reason),
+      h('button', {}, isCapture ? text.capture : text.newReference)));
   const element = h('div', {}, nextStep(data),
     h('div', { class: 'row' }, may('scan') && patient && rescanButton(data), accept.element,
       scan.outcome === 'done' && h('a', {

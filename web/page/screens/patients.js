@@ -3,7 +3,7 @@
 import { get, live, may, post, put, removeFor } from '../api.js';
 import {
   action, card, clear, done, enable, field, form, h, hint, localTime, redraw, row, say, signedTime,
-  table, warn,
+  select, table, warn,
 } from '../dom.js';
 import { kFraction, kName, kNote, kReason, kSite } from '../limits.js';
 import { numbersLine } from '../numbers.js';
@@ -11,6 +11,7 @@ import { lookOf, plainCode } from '../scanner.js';
 import { signedForm } from '../signed_form.js';
 import { S } from '../words.js';
 import { closeSession, openPatient, resumeSession } from '../treatment.js';
+import { sourceVersion } from './captured.js';
 import { planningUpload } from './planning.js';
 import { acceptanceMark, ageText, blockNote, isAdvice, outcomeBadge } from './common.js';
 
@@ -112,8 +113,10 @@ export async function showPatients(place) {
 
 /// If another patient's session is open, it is named and closed by the same tap. A session that is
 /// open already is not offered again.
+/// @param references  Newest first; where a planning CT and a captured surface are approved, it is
+/// chosen which one the fraction is compared with.
 /// @return {element, draw}  Call draw() when the connection or the session has changed.
-function openButtons(patient) {
+function openButtons(patient, references) {
   const text = S.patients;
   const reason = h('input', { autocomplete: 'off', maxlength: kReason.maxlength });
   const question = h('div', {});
@@ -139,11 +142,20 @@ function openButtons(patient) {
       throw new Error(text.reasonNeeded);
     }
     await beginWith(async (replaces) => {
-      await openPatient(patient, purpose, purpose === 'reference' ? reason.value.trim() : '',
-        replaces);
+      await openPatient(patient, purpose, purpose === 'reference'
+        ? { reason: reason.value.trim(), replaces } : { replaces, reference: choice?.value });
       location.hash = '#/scan';
     });
   };
+  const approved = references.filter((one) => one.approved_by);
+  const newest = Object.keys(text.sources)
+    .map((source) => approved.find((one) => one.source === source)).filter(Boolean)
+    .sort((a, b) => b.version - a.version);
+  const choice = newest.length > 1 ? select(
+    Object.fromEntries(newest.map((one) => [one.id, sourceVersion(one)])), newest[0].id) : null;
+  let chosen = '';  // by a person: a session that is resumed goes on with its own otherwise
+  choice?.addEventListener('change', () => { chosen = choice.value; });
+  const compare = choice ? field(S.session.compareWith, choice) : h('div', {});
   const confirm = h('p', { class: 'lead' }, text.confirmWho(patient.code));
   const why = field(text.reason, reason);
   const { last_session: last } = patient;
@@ -152,7 +164,7 @@ function openButtons(patient) {
   const since_s = last && Math.max(0, (Date.now() - Date.parse(last.closed_at)) / 1000);
   const resume = last && action(S.session.resume(last.fraction, ageText(since_s)),
     () => beginWith(async (replaces) => {
-      await resumeSession(last, replaces);
+      await resumeSession(patient, last, { replaces, reference: chosen });
       location.hash = '#/scan';
     }), { class: 'start-session' });
   const reference = action(text.openReference, open('reference'), {});
@@ -167,6 +179,7 @@ function openButtons(patient) {
       && next === purpose;
     fraction.hidden = isOpen('fraction');
     if (resume) resume.hidden = fraction.hidden;
+    compare.hidden = fraction.hidden;
     reference.hidden = isOpen('reference');
     confirm.hidden = fraction.hidden;  // who is open stands above
     why.hidden = reference.hidden;
@@ -176,7 +189,7 @@ function openButtons(patient) {
     draw();
   });
   const element = h('div', { class: 'form' },
-    confirm,
+    confirm, compare,
     h('div', { class: 'row' }, resume, fraction, reference), block, question,
     !patient.approved_reference_id && hint(text.needsReference),
     why);
@@ -220,6 +233,7 @@ function referenceTable(references) {
   if (!references.length) return hint(text.noReferences);
   const plan = may('plan') ? text.plan : text.planView;
   const rows = references.map((reference) => row(reference.version,
+    text.sources[reference.source],
     `${localTime(reference.created_at)}, ${reference.created_by}`, reference.reason || S.none,
     reference.approved_by
       ? `✓ ${text.approvedBy(reference.approved_by, signedTime(reference.approved_at))}`
@@ -228,7 +242,7 @@ function referenceTable(references) {
       class: 'button', href: `#/plan/${reference.id}`,
       'aria-label': `${plan}, ${text.version} ${reference.version}`,
     }, plan)));
-  return table([text.version, text.made, text.reasonShort, text.state, S.action], rows,
+  return table([text.version, text.source, text.made, text.reasonShort, text.state, S.action], rows,
     text.references);
 }
 
@@ -316,10 +330,11 @@ export async function showPatient(place, id) {
       get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
     // A reason that was typed stays as long as nothing else is offered.
     const opens = `${patient.approved_reference_id} ${patient.archived} ${
-      patient.last_session?.id} ${patient.last_session?.fraction}`;
+      patient.last_session?.id} ${patient.last_session?.fraction} ${
+      found.references.filter((one) => one.approved_by).map((one) => one.id)}`;
     if (approved !== opens) {
       approved = opens;
-      buttons = patient.archived ? null : openButtons(patient);
+      buttons = patient.archived ? null : openButtons(patient, found.references);
       clear(opening, buttons?.element ?? hint(text.isArchived));
       weigh();
     }

@@ -9,6 +9,7 @@ import { sixNumbers, toleranceOf } from '../numbers.js';
 import { trend } from '../drawings/trend.js';
 import { S, said, saidEach } from '../words.js';
 import { actions } from './accept.js';
+import { capturedAgainst, capturedCard } from './captured.js';
 import { findings, follow, isAdvice, partsOf, sentence } from './common.js';
 import { couchReadings } from './couch.js';
 import { meshView } from './mesh_view.js';
@@ -31,6 +32,7 @@ async function collect(scan, received) {
     isReference ? getOrNull(`patients/${scan.patient_id}/references`) : null]);
   return {
     scan: { ...scan, details: parts.details }, received, patient, ...parts,
+    captured: await capturedAgainst(parts.reference),
     history: history?.scans ?? [],
     draft: references?.references.find(({ scan_id: id }) => id === scan.id) ?? null,
   };
@@ -147,6 +149,7 @@ function build(data, reload, id) {
     parts.fresh,
     h('section', { class: 'card actions' }, parts.actions.element),
     data.details && data.quality && card(text.trust, trust(data)), parts.records,
+    capturedCard(data.captured),
     mapped && card(text.where, parts.words, parts.map),
     pictures,
     scan.result && card(text.trend,

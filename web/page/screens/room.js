@@ -17,6 +17,7 @@ import {
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { askMonitor, monitorView } from './monitor.js';
+import { comparesWith } from './captured.js';
 import {
   formingNumbers, preview, stepWords, surfaceIn, surfaceWords, toneOf,
 } from './scan.js';
@@ -100,7 +101,7 @@ function top(status, said, isSwapped, isChecked) {
     !isCheck && session && h('p', { class: 'room-fraction' }, session.purpose === 'reference'
       ? S.purposes.reference : S.session.fraction(session.fraction),
     h('span', {}, ` · ${S.session.scans(session.num_scans)}`),
-    session.reference && h('span', {}, ` · ${S.session.referenceIs(session.reference.version)}`)),
+    session.reference && h('span', {}, ` · ${comparesWith(session)}`)),
     !isCheck && session?.newer_reference && h('p', { class: 'room-newer caution', role: 'alert' },
       S.session.referenceNewer(session.newer_reference.version)),
     h('ul', { class: 'room-marks' },

@@ -4,6 +4,7 @@ import { live, may, since_s } from '../api.js';
 import { clear, h, localTime } from '../dom.js';
 import { kResult } from '../limits.js';
 import { S, said, saidEach } from '../words.js';
+import { sourceVersion } from './captured.js';
 import { ageText, flagList, sentence, sessionOf, verdictIcon } from './common.js';
 
 /// Seconds since the scan ended; Infinity where that is not known: such a result is old.
@@ -42,7 +43,8 @@ export function identity({ scan, patient, reference, received }) {
       patient ? h('a', { href: `#/patient/${patient.id}` }, patient.code) : S.none)),
     scan.fraction && item(text.fraction, `${scan.fraction}`),
     item(text.reference, reference
-      ? `${text.version(reference.version)}, ${localTime(reference.created_at)}` : S.none),
+      ? `${reference.source === 'planning_ct' ? sourceVersion(reference)
+        : text.version(reference.version)}, ${localTime(reference.created_at)}` : S.none),
     item(text.scanned, localTime(scan.started_at)),
     sinceScan);
   const tick = () => {

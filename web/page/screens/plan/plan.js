@@ -15,6 +15,7 @@ import { kAxes } from '../../numbers.js';
 import { drafts } from '../../plan_drafts.js';
 import { signedForm } from '../../signed_form.js';
 import { S, said } from '../../words.js';
+import { capturedAgainst, capturedCard } from '../captured.js';
 import { blockNote, flagList, qualityOf } from '../common.js';
 import { planningFacts } from '../planning.js';
 import { editor, measure } from './plan_editor.js';
@@ -114,7 +115,7 @@ function whyNotApprove(reference) {
 }
 
 /// Shows what an approval signs, read-only and complete, with the checksum that goes into the log.
-function summary(reference, patient, { scan, quality, picture, heights }, approve) {
+function summary(reference, patient, { scan, quality, picture, heights, captured }, approve) {
   const text = S.plan;
   const { plan } = reference;
   const row = (name, value) => [h('dt', {}, name), h('dd', {}, value)];
@@ -155,7 +156,7 @@ function summary(reference, patient, { scan, quality, picture, heights }, approv
       quality && row(text.scanQuality, quality.rows.map((one) =>
         `${said(one, 'name')}: ${said(one, 'value')}`).join('; ')),
       row(text.signature, h('code', {}, reference.digest)))),
-    planning, sideViews(heights, plan.isocentre_m),
+    planning, capturedCard(captured), sideViews(heights, plan.isocentre_m),
     doubts.map((words) => h('p', { class: 'caution' }, words)),
     flags, hint(text.approveHint), signature);
 }
@@ -167,6 +168,7 @@ async function draft(place, reference, store, reload) {
   const patient = await get(`patients/${reference.patient_id}`);
   const scan = await get(`scans/${reference.scan_id}`).catch(() => null);
   const quality = scan && await qualityOf(scan);
+  const captured = await capturedAgainst(reference);
   const editable = may('plan');
   let planning = null;
   const kept = editable ? drafts.read(reference) : null;
@@ -274,7 +276,7 @@ async function draft(place, reference, store, reload) {
       revision: reference.revision, digest: reference.digest, ...signature,
     }), text.approved);
     const element = summary(reference, patient, {
-      scan, quality, picture: picture(), heights: loaded,
+      scan, quality, picture: picture(), heights: loaded, captured,
     }, approve);
     clear(signPlace, element);
     element.scrollIntoView({ block: 'nearest' });
@@ -327,7 +329,7 @@ async function draft(place, reference, store, reload) {
       card(text.region,
         editable && hint(text.regionHint), mapPlace, corners, tools),
       h('section', { class: 'card form' },
-        planning,
+        planning, capturedCard(captured),
         h('fieldset', {}, h('legend', {}, text.isocentre),
           !planning && hint(text.isocentreHint),
           movable && hint(text.pickHint),
