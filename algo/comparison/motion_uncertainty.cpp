@@ -58,15 +58,16 @@ Matrix6d Isotropic(double angle_rad, double shift_m) {
 // that field of distortion, and the field at the body is not reduced by averaging over many
 // markers. The stretch that makes the maps equally long is included, because its cause need not
 // affect the body in the same way. A field that changes over the spread of the markers rotates the
-// body by its size over that length.
-Matrix6d DistortionAt(const Alignment& alignment) {
+// body by its size over that length, about the markers: a body far beside them is shifted, too. Of
+// a real recording cut in two, whose body lay half a metre from markers with a spread of 0.25 m,
+// the height was off by 4.9 mm where 2.5 mm were stated without that.
+Matrix6d DistortionAt(const Alignment& alignment, const Eigen::Vector3d& moved) {
   Matrix6d covariance = Matrix6d::Zero();
-  covariance.bottomRightCorner<3, 3>() = alignment.distortion;
   if (alignment.spread_m > 0) {
-    covariance.topLeftCorner<3, 3>() = alignment.distortion.trace() / 3.0 /
-                                       (alignment.spread_m * alignment.spread_m) *
-                                       Eigen::Matrix3d::Identity();
+    const double angle_rad = std::sqrt(alignment.distortion.trace() / 3.0) / alignment.spread_m;
+    covariance = CovarianceAbout(Isotropic(angle_rad, 0.0), alignment.centre_m, moved);
   }
+  covariance.bottomRightCorner<3, 3>() += alignment.distortion;
   return covariance;
 }
 
@@ -165,7 +166,7 @@ MotionUncertainty Uncertainty(const UncertaintyInput& input) {
   MotionUncertainty parts;
   parts.surface = input.surface;
   parts.markers = CovarianceAbout(alignment.covariance, alignment.centre_m, moved);
-  parts.distortion = DistortionAt(alignment);
+  parts.distortion = DistortionAt(alignment, moved);
   parts.scale = ScaleOver(alignment, kScaleSigma, input.scale_doubt, input.centroid_m, moved);
   parts.frame = FrameOf(alignment, input.T_motion, moved);
   // Both sweeps contribute.

@@ -54,13 +54,27 @@ TEST(MotionUncertaintyTest, BreathingCountsByTheRiseOfTheChest) {
 }
 
 TEST(MotionUncertaintyTest, WhatTheMapsDisagreeByAtAPlaceIsNotAveragedAway) {
-  const MotionUncertainty uncertainty = Of(Pose::Identity());
+  Alignment about_body = SomeAlignment();
+  about_body.centre_m = kCentroid;
+  const MotionUncertainty uncertainty = Of(Pose::Identity(), about_body);
   EXPECT_NEAR(uncertainty.distortion(4, 4), kMillimetre2, 1e-12);
   EXPECT_NEAR(std::sqrt(uncertainty.distortion(1, 1)), 0.001 / 0.7, 1e-9);
-  Alignment along_x = SomeAlignment();
-  along_x.distortion = Eigen::Vector3d(9e-6, 0, 0).asDiagonal();
-  EXPECT_NEAR(Of(Pose::Identity(), along_x).distortion(3, 3), 9 * kMillimetre2, 1e-12);
-  EXPECT_EQ(Of(Pose::Identity(), along_x).distortion(4, 4), 0.0);
+  about_body.distortion = Eigen::Vector3d(9e-6, 0, 0).asDiagonal();
+  about_body.spread_m = 1e6;
+  const MotionUncertainty along_x = Of(Pose::Identity(), about_body);
+  EXPECT_NEAR(along_x.distortion(3, 3), 9 * kMillimetre2, 1e-12);
+  EXPECT_NEAR(along_x.distortion(4, 4), 0.0, 1e-15);
+}
+
+TEST(MotionUncertaintyTest, WhatTheMapsDisagreeByGrowsBesideTheMarkers) {
+  Alignment beside = SomeAlignment();
+  beside.centre_m = kCentroid - Eigen::Vector3d(0, 0.7, 0);
+  // Turned about an axis along x by 1 mm over the spread, a body one spread away along y is lifted
+  // by another millimetre.
+  const Matrix6d distortion = Of(Pose::Identity(), beside).distortion;
+  EXPECT_NEAR(distortion(5, 5), 2 * kMillimetre2, 1e-12);
+  EXPECT_NEAR(distortion(4, 4), kMillimetre2, 1e-12) << "not along the way";
+  EXPECT_NEAR(std::sqrt(distortion(0, 0)), 0.001 / 0.7, 1e-9);
 }
 
 TEST(MotionUncertaintyTest, FrameAndScaleCountOnlyForABodyThatMoved) {
