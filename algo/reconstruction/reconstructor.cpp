@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algo/reconstruction/reconstructor.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -10,11 +11,16 @@
 #include "algo/reconstruction/scene_assembly.hpp"
 #include "algo/reconstruction/scene_solver.hpp"
 #include "algo/surface/view_surface.hpp"
+#include "algo/tracking/map_budget.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "words/reconstruction.hpp"
 
 namespace plumb {
 namespace {
+
+// Keyframes of an answer that forms: those of a sweep of 100 frames at 15 Hz. It bounds the time
+// and the memory that it takes from a long sweep.
+constexpr std::size_t kMostUpToNow = 48;
 
 TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOptions& options) {
   TrackerOptions tracking;
@@ -119,7 +125,11 @@ Scene Reconstructor::Finish(const std::stop_token& stop,
 std::function<Scene(const std::stop_token&)> Reconstructor::SceneUpToNow() const {
   auto sweep = std::make_shared<TrackedSweep>(impl_->Sweep(impl_->tracker.map()));
   sweep->options.on_learned = {};
-  return [sweep](const std::stop_token& stop) { return SolveScene(std::move(*sweep), stop, {}); };
+  sweep->options.max_keyframes = std::min(sweep->options.max_keyframes, kMostUpToNow);
+  return [sweep](const std::stop_token& stop) {
+    BoundImages(kMostUpToNow, sweep->map);
+    return SolveScene(std::move(*sweep), stop, {});
+  };
 }
 
 }  // namespace plumb

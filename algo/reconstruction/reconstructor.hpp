@@ -54,8 +54,8 @@ class Reconstructor {
       const std::function<void(double fraction, const Message& what)>& progress = {});
 
   /// What makes the scene of the frames that were added until now, while more are added: for an
-  /// answer that forms during the sweep. Nothing is learned from it. Call the function once, from
-  /// any thread; it throws what Finish() does.
+  /// answer that forms during the sweep, from 48 keyframes at most. Nothing is learned from it.
+  /// Call the function once, from any thread; it throws what Finish() does.
   [[nodiscard]] std::function<Scene(const std::stop_token&)> SceneUpToNow() const;
 
  private:
