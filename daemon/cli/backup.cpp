@@ -21,6 +21,7 @@
 #include "drivers/files/unix_socket.hpp"
 #include "words/backup.hpp"
 #include "words/cli.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 namespace {
@@ -63,6 +64,8 @@ void PrintReport(Message (*done)(std::string_view, std::int64_t, std::int64_t, d
                                        static_cast<std::int64_t>(report.files),
                                        static_cast<double>(report.bytes) / 1e6)) +
                      "\n";
+  if (!report.unrehearsed.empty())
+    text += "  " + context.Said(say::upkeep::BackupNotRehearsed(report.unrehearsed)) + "\n";
   for (const Message& problem : report.problems) text += "  " + context.Said(problem) + "\n";
   PrintOut(text);
 }
