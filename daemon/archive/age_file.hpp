@@ -40,7 +40,7 @@ class AgeIdentity {
 /// True for a file that begins as every age file begins.
 [[nodiscard]] bool IsAgeFile(const std::filesystem::path& file);
 
-class AgeProcess;
+class HelperProcess;
 
 /// Encrypts what is written into an open file.
 class AgeWriter {
@@ -60,7 +60,7 @@ class AgeWriter {
  private:
   [[noreturn]] void FailAsAge();
 
-  std::unique_ptr<AgeProcess> process_;
+  std::unique_ptr<HelperProcess> process_;
   std::unique_ptr<Descriptor> input_;
 };
 

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -18,6 +19,8 @@
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/utf8.hpp"
+#include "daemon/archive/backup_parts.hpp"
+#include "daemon/archive/rehearsal.hpp"
 #include "daemon/archive/summed_folder.hpp"
 #include "daemon/database/audit_store.hpp"
 #include "daemon/database/database.hpp"
@@ -39,24 +42,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kBackupFormat = 1;
-constexpr const char* kAboutBackup = "backup.json";
-/// The other parts of a state folder that are copied if they exist.
-constexpr std::array<const char*, 4> kOtherFolders = {ScanFolders::kSetAside, "calibration",
-                                                      "imports", "sensor-profiles"};
 constexpr const char* kRestoring = ".restore";
-constexpr const char* kBackingUp = ".backup";
 /// The name of a display and the hash of its key. It is moved aside together with the database,
 /// because only that database records that the key has been used.
 constexpr const char* kProvisionedDisplay = "provisioned-display";
-
-/// True for the paths that a backup can contain: nothing outside it, nothing unknown.
-bool BackupMayHold(const std::string& path) {
-  const std::string first = fs::path(path).begin()->string();
-  return path == kDatabaseFile ||
-         (first != path &&
-          (first == kScansFolder ||
-           std::find(kOtherFolders.begin(), kOtherFolders.end(), first) != kOtherFolders.end()));
-}
 
 const SummedKind kBackupKind{.name = "backup",
                              .about_file = kAboutBackup,
@@ -99,7 +88,7 @@ class Writing {
           const std::stop_token& stop)
       : state_(state),
         target_(target),
-        output_(target, kBackupKind, BackupOutput(), recipients, stop) {}
+        output_(target, kBackupKind, BackupOutput(), recipients, stop, Tap(recipients)) {}
 
   BackupReport Write(Database& database) {
     const DatabaseCopy copy(state_, database);
@@ -120,10 +109,18 @@ class Writing {
             .whole_scans = std::move(whole_),
             .bytes = output_.bytes(),
             .problems = output_.problems(),
-            .target = target_};
+            .target = target_,
+            .unrehearsed = unrehearsed_};
   }
 
  private:
+  ArchiveTap Tap(const AgeRecipients& recipients) {
+    if (recipients.empty()) return {};
+    rehearsal_.emplace(state_);
+    return {.take = [this](std::span<const std::uint8_t> bytes) { rehearsal_->Take(bytes); },
+            .before_commit = [this] { unrehearsed_ = rehearsal_->End(); }};
+  }
+
   using Stored = std::map<std::string, std::vector<FileDigest>>;
 
   /// As stored in the copy of the database, not as they have changed since.
@@ -179,6 +176,8 @@ class Writing {
   }
 
   fs::path state_, target_;
+  std::optional<Rehearsal> rehearsal_;
+  Message unrehearsed_;
   SummedWriter output_;
   std::vector<std::string> whole_;
 };

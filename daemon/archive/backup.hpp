@@ -34,6 +34,8 @@ struct BackupReport {
   std::vector<Message> problems;
   /// Of a backup that was made: its place, which ends in ".tar.age" if it is encrypted.
   std::filesystem::path target = {};
+  /// Of an encrypted backup that was made: why its restore was not rehearsed; empty: it was.
+  Message unrehearsed = {};
   /// Of RestoreOver(): folder with what was stored before; empty if there was nothing.
   std::filesystem::path replaced = {};
 };
@@ -44,9 +46,11 @@ struct BackupReport {
 /// Backs up an open store, whose files must not be removed meanwhile. The database is copied as of
 /// one moment, with the scans that it then contains. Files are copied (sharing blocks until one
 /// side is written to, if the file system can); each is read once. An older backup at `target` is
-/// replaced, and nothing else.
+/// replaced, and nothing else. For recipients, its restore is rehearsed (rehearsal.hpp) before it
+/// appears.
 /// @param target  Changed as by EncryptedName() for recipients.
-/// @throws IoError if the backup cannot be written; Interrupted
+/// @throws IoError if the backup cannot be written; DataError if it could not be restored;
+///         Interrupted
 [[nodiscard]] BackupReport WriteBackup(const std::filesystem::path& state, Database& database,
                                        const std::filesystem::path& target,
                                        const std::stop_token& stop = {},

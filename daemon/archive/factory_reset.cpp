@@ -30,8 +30,9 @@ constexpr std::size_t kMaxRequestBytes = 4096;
 constexpr const char* kKeep = "keep_records";
 constexpr const char* kWipe = "wipe";
 constexpr const char* kOfFileSystem = "lost+found";  // root's, on the root of a disk
+constexpr const char* kOfProvisionedDisplay = "provisioned-display";
 /// Items beside the database that are neither records nor belong to the sensor.
-constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", "provisioned-display",
+constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", kOfProvisionedDisplay,
                                           "updates"};
 
 struct Request {
@@ -107,7 +108,13 @@ Message KeepRecords(const fs::path& state, const Actor& actor) {
     change.Log(actor, "system.factory_reset", "", done);
     change.Commit();
   }
-  for (const fs::path& copy : OldCopies(state)) RemoveAccountsFromCopy(copy);
+  for (const fs::path& copy : OldCopies(state)) {
+    RemoveAccountsFromCopy(copy);
+    Remove(copy / kOfProvisionedDisplay);  // the hash of its key
+  }
+  // Nobody can look for accounts in these, and the records in use have just been opened.
+  for (const fs::path& entry : EntriesOf(state))
+    if (entry.filename().string().starts_with(kDamagedPrefix)) Remove(entry);
   for (const char* name : kOfPageAndUpdates) Remove(state / name);
   return done;
 }

@@ -78,14 +78,16 @@ std::vector<std::string> FilesBelow(const fs::path& top, const fs::path& folder)
 }
 
 SummedWriter::SummedWriter(const fs::path& target, const SummedKind& kind, OutputKind output,
-                           const AgeRecipients& recipients, std::stop_token stop)
+                           const AgeRecipients& recipients, std::stop_token stop, ArchiveTap tap)
     : kind_(kind),
       output_(target, OutputAt(target, kind, std::move(output))),
-      stop_(std::move(stop)) {
+      stop_(std::move(stop)),
+      tap_(std::move(tap)) {
   if ((target.extension() == kAgeSuffix) == recipients.empty())
     throw InvalidRequest(say::backup::NoRecipient(target.string()));
   ::chmod(output_.path().c_str(), 0700);  // it contains patients' data
-  if (IsTarName(target)) tar_ = std::make_unique<TarWriter>(output_.path() / kArchive, recipients);
+  if (IsTarName(target))
+    tar_ = std::make_unique<TarWriter>(output_.path() / kArchive, recipients, tap_.take);
 }
 
 TarWriter::Added SummedWriter::Copied(const fs::path& from, const std::string& path) {
@@ -145,6 +147,7 @@ void SummedWriter::Commit(Json about) {
   tar_->AddText(kSumsFile, sums_);
   tar_->AddText(kind_.about_file, text);
   tar_->Close();
+  if (tap_.before_commit) tap_.before_commit();
   output_.CommitFile(output_.path() / kArchive);
 }
 

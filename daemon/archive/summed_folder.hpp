@@ -49,6 +49,12 @@ struct BackupKeys {
 [[nodiscard]] std::vector<std::string> FilesBelow(const std::filesystem::path& top,
                                                   const std::filesystem::path& folder);
 
+/// Follows an archive that is being written.
+struct ArchiveTap {
+  TarStreamTake take = {};                   ///< Each piece, before it is encrypted.
+  std::function<void()> before_commit = {};  ///< Once all is written. May throw: nothing appears.
+};
+
 /// A folder or an archive that is being written. It appears with Commit(), or not at all.
 class SummedWriter {
  public:
@@ -56,7 +62,7 @@ class SummedWriter {
   /// @param recipients  None: nothing is encrypted.
   /// @throws InvalidRequest without recipients for a target that ends in ".age"; IoError
   SummedWriter(const std::filesystem::path& target, const SummedKind& kind, OutputKind output,
-               const AgeRecipients& recipients, std::stop_token stop);
+               const AgeRecipients& recipients, std::stop_token stop, ArchiveTap tap = {});
 
   /// Copies a file of another folder. Returns the digest of its content; nothing if it cannot be
   /// read or named, which is then reported as a problem.
@@ -79,6 +85,7 @@ class SummedWriter {
   AtomicFolder output_;
   std::unique_ptr<TarWriter> tar_;
   std::stop_token stop_;
+  ArchiveTap tap_;
   std::string sums_;
   std::size_t files_ = 0;
   std::uint64_t bytes_ = 0;

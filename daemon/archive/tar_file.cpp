@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -85,9 +86,41 @@ bool IsPlainPath(const std::string& path) {
          });
 }
 
+void ReadTarStream(
+    int input, const std::stop_token& stop,
+    const std::function<TarStreamTake(const std::string& path, std::uint64_t bytes)>& begin) {
+  const Reader reader(::archive_read_new());
+  const auto fail = [&] { throw DataError(say::backup::NoTar(ReasonOf(reader.get()))); };
+  if (!reader || ::archive_read_support_format_tar(reader.get()) != ARCHIVE_OK ||
+      ::archive_read_open_fd(reader.get(), input, kTarPiece) != ARCHIVE_OK)
+    fail();
+  std::vector<std::uint8_t> piece(kTarPiece);
+  std::set<std::string> names;
+  for (archive_entry* entry = nullptr;;) {
+    const int result = ::archive_read_next_header(reader.get(), &entry);
+    if (result == ARCHIVE_EOF) break;
+    if (result != ARCHIVE_OK) fail();
+    const std::string name = NameOf(entry);
+    if (names.size() >= kMaxFiles) throw DataError(say::backup::TarTooMany());
+    if (!names.insert(name).second) throw DataError(say::backup::TarTwice(name));
+    const std::int64_t size = ::archive_entry_size(entry);
+    if (size < 0) throw DataError(say::backup::TarCut(name));
+    const TarStreamTake take = begin(name, static_cast<std::uint64_t>(size));
+    for (la_ssize_t count = 1; count > 0;) {
+      CheckStop(stop);
+      count = ::archive_read_data(reader.get(), piece.data(), piece.size());
+      if (count < 0) fail();
+      take({piece.data(), static_cast<std::size_t>(count)});
+    }
+  }
+  while (::read(input, piece.data(), piece.size()) > 0) {  // so that the writer gets rid of it
+  }
+}
+
 void TarWriter::Sink::Take(std::span<const std::uint8_t> bytes) {
   if (is_closed || error) return;
   try {
+    if (tee) tee(bytes);
     if (age) return age->Write(bytes);
     WriteAll(*fd, {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, file);
   } catch (const IoError& failure) {
@@ -95,8 +128,8 @@ void TarWriter::Sink::Take(std::span<const std::uint8_t> bytes) {
   }
 }
 
-TarWriter::TarWriter(fs::path file, const AgeRecipients& recipients)
-    : sink_{.file = std::move(file), .fd = nullptr, .age = nullptr} {
+TarWriter::TarWriter(fs::path file, const AgeRecipients& recipients, TarStreamTake tee)
+    : sink_{.file = std::move(file), .fd = nullptr, .age = nullptr, .tee = std::move(tee)} {
   sink_.fd = std::make_unique<Descriptor>(
       ::open(sink_.file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
   if (sink_.fd->get() < 0) throw IoError(DescribeWriteError(sink_.file, errno));

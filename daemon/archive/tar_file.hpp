@@ -32,12 +32,23 @@ namespace plumb {
 /// Plain path of a file in folders, without "..", ".", empty parts or control characters.
 [[nodiscard]] bool IsPlainPath(const std::string& path);
 
+using TarStreamTake = std::function<void(std::span<const std::uint8_t>)>;
+
+/// Reads an archive from its beginning to the end of the input, which may be a socket.
+/// @param begin  Called with path and length of each file; what it returns takes the content.
+/// @throws DataError with the reason why it is refused; Interrupted
+void ReadTarStream(
+    int input, const std::stop_token& stop,
+    const std::function<TarStreamTake(const std::string& path, std::uint64_t bytes)>& begin);
+
 /// Writes an archive, for its owner alone. Not flushed to the disk.
 class TarWriter {
  public:
   /// @param recipients  Not empty: the archive is encrypted for them before it reaches the disk.
+  /// @param tee  Also gets the archive, before it is encrypted.
   /// @throws IoError
-  explicit TarWriter(std::filesystem::path file, const AgeRecipients& recipients = {});
+  explicit TarWriter(std::filesystem::path file, const AgeRecipients& recipients = {},
+                     TarStreamTake tee = {});
   ~TarWriter();
   TarWriter(const TarWriter&) = delete;
   TarWriter& operator=(const TarWriter&) = delete;
@@ -65,7 +76,8 @@ class TarWriter {
     std::filesystem::path file;
     std::unique_ptr<Descriptor> fd;
     std::unique_ptr<AgeWriter> age;  ///< Null: nothing is encrypted.
-    bool is_closed = false;          ///< Nothing is written any more.
+    TarStreamTake tee;
+    bool is_closed = false;  ///< Nothing is written any more.
     std::optional<Message> error = {};
     void Take(std::span<const std::uint8_t> bytes);
   };

@@ -16,6 +16,7 @@
 #include "daemon/database/retry_while_busy.hpp"
 #include "daemon/database/schema.hpp"
 #include "daemon/records/clock_doubt.hpp"
+#include "daemon/state_folder/old_copies.hpp"
 #include "daemon/state_folder/restore_note.hpp"
 #include "daemon/state_folder/scan_numbers.hpp"
 #include "drivers/files/file_io.hpp"
@@ -26,9 +27,6 @@ namespace plumb {
 namespace fs = std::filesystem;
 
 namespace {
-
-/// Prefix of folders in the state folder that keep the files of a damaged database.
-constexpr const char* kDamagedPrefix = "damaged-";
 
 FolderPlace PlaceOf(const fs::path& folder) {
   struct stat status {};
@@ -196,6 +194,8 @@ Store::Store(const fs::path& folder, const StoreOptions& options)
   NoteRestore(folders.state(), *database_.ForChanges());
   NumberScansAbove(*database_.ForChanges(), LastScanNumber(folders));
   std::error_code error;
+  for (const char* name : {kBackingUp, kRehearsing})  // of a backup that was cut off
+    fs::remove_all(folders.state() / name, error);
   fs::create_directories(folders.scans(), error);
   if (error) throw DiskRefused(DescribeWriteError(folders.scans(), error.value()));
   scans_place_ = PlaceOf(folders.scans());

@@ -9,6 +9,9 @@
 
 namespace plumb {
 
+/// Prefix of folders in the state folder that keep the files of a damaged database.
+inline constexpr const char* kDamagedPrefix = "damaged-";
+
 /// Sorted by name. Without copies of damaged databases (damaged-*), which cannot be searched.
 [[nodiscard]] std::vector<std::filesystem::path> OldCopies(const std::filesystem::path& state);
 

@@ -12,6 +12,9 @@ class Database;
 inline constexpr const char* kRestoringOver = ".recovery";
 /// In a restored state folder, until its audit log has the entry.
 inline constexpr const char* kRestored = "restored.json";
+/// Scratch folders in the state folder, with copies of records while a backup is made.
+inline constexpr const char* kBackingUp = ".backup";
+inline constexpr const char* kRehearsing = ".rehearsal";
 
 /// True after RestoreOver() was interrupted, such as by a power cut, after it had unpacked the
 /// backup and before that was in place. It can be called again.

@@ -352,6 +352,7 @@ void StorageUpkeep::BackUp(
         loop_.Post("backup", [this, done, error, report, is_beside_scans, folder] {
           if (error.empty() && folder.parent_path() == BackupTarget().parent_path()) {
             backup_fault_ = {};
+            backup_unrehearsed_ = report.unrehearsed;
             backup_is_beside_scans_ = is_beside_scans;
             backup_faults_.erase(report.target);
             NoteOutside();
@@ -442,6 +443,8 @@ std::vector<Message> StorageUpkeep::Warnings(bool is_demo) const {
   if (config_.appliance.backup_folder.empty() && !is_demo)
     warnings.push_back(say::upkeep::NoBackup());
   if (!backup_fault_.empty()) warnings.push_back(say::upkeep::BackupFailed(backup_fault_));
+  if (!backup_unrehearsed_.empty())
+    warnings.push_back(say::upkeep::BackupNotRehearsed(backup_unrehearsed_));
   for (const auto& [place, fault] : backup_faults_) {
     if (!fault.empty()) warnings.push_back(say::upkeep::BackupNotAsMade(fault));
   }

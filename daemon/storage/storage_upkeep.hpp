@@ -106,7 +106,7 @@ class StorageUpkeep {
   Message record_fault_;              ///< That the audit log is not as it was written.
   bool is_database_checked_ = false;  ///< By the start; the first check here can do without.
   std::int64_t lost_entries_ = 0;     ///< Of the audit log: the state folder was rolled back.
-  Message backup_fault_;
+  Message backup_fault_, backup_unrehearsed_;
   std::optional<std::chrono::system_clock::time_point> backup_made_at_;
   bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.
   int ticks_to_disk_check_ = kDiskCheckTicks;

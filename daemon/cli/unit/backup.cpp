@@ -11,6 +11,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/archive/backup.hpp"
+#include "daemon/archive/rehearsal.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
 #include "daemon/cli/unit/backup_keys.hpp"
 #include "daemon/cli/commands.hpp"
@@ -20,6 +21,7 @@
 #include "drivers/files/unix_socket.hpp"
 #include "words/backup.hpp"
 #include "words/cli.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 namespace {
@@ -30,7 +32,7 @@ struct BackupArguments {
   fs::path folder;
   RecipientOptions recipients;
   IdentityOptions keys;
-  bool verify_only = false;
+  bool verify_only = false, rehearse = false;
   std::optional<fs::path> state;
 };
 
@@ -62,6 +64,8 @@ void PrintReport(Message (*done)(std::string_view, std::int64_t, std::int64_t, d
                                        static_cast<std::int64_t>(report.files),
                                        static_cast<double>(report.bytes) / 1e6)) +
                      "\n";
+  if (!report.unrehearsed.empty())
+    text += "  " + context.Said(say::upkeep::BackupNotRehearsed(report.unrehearsed)) + "\n";
   for (const Message& problem : report.problems) text += "  " + context.Said(problem) + "\n";
   PrintOut(text);
 }
@@ -119,6 +123,10 @@ int Backup(BackupArguments& options, const CommandContext& context) {
 int Restore(BackupArguments& options, const CommandContext& context) {
   const fs::path backup = fs::absolute(options.folder);
   if (options.verify_only) return Verify(options, context);
+  if (options.rehearse) {
+    RehearseRestore(STDIN_FILENO, *options.state, context.stop);
+    return kDone;
+  }
   const BackupKeys keys = options.keys.Read();
   const fs::path state = ConfigOf(options).state;
   PrintReport(say::cli::Restored, state, RestoreBackup(backup, state, context.stop, keys), context);
@@ -158,6 +166,12 @@ Command AddRestore(CLI::App& app) {
   options->keys.AddTo(app);
   app.add_flag("--verify", options->verify_only,
                "Verify every file of the backup, and restore nothing");
+  app.add_flag(
+         "--rehearse", options->rehearse,
+         "Read an archive from the standard input (folder: -), unpack it into an empty folder "
+         "and open it as plumbd does at a start; plumbd does so with each encrypted backup "
+         "before it is encrypted")
+      ->needs("--state");
   return [options](const CommandContext& context) { return Restore(*options, context); };
 }
 

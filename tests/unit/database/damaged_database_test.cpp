@@ -24,6 +24,7 @@
 #include "drivers/files/file_io.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/database/rows_of.hpp"
 
 namespace plumb {
 namespace {
@@ -32,6 +33,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::MessageOf;
+using testing::RowsOf;
 
 constexpr std::size_t kLongest = std::size_t{1} << 26U;
 
@@ -51,25 +53,6 @@ void Place(const fs::path& folder, const Files& files) {
   fs::remove_all(folder);
   fs::create_directories(folder);
   for (const auto& [end, bytes] : files) WriteWholeFile(folder / (kDatabaseFile + end), bytes);
-}
-
-/// Everything that the tables hold, and the tables themselves.
-std::string RowsOf(Database& database) {
-  const auto text = [](const Statement& row) { return row.Text(0); };
-  std::string rows;
-  for (const std::string& sql : database.All("SELECT sql FROM sqlite_master ORDER BY name", text))
-    rows += sql + "\n";
-  for (const std::string& table :
-       database.All("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name", text)) {
-    std::string columns;
-    for (const std::string& column :
-         database.All(fmt::format("SELECT name FROM pragma_table_info('{}')", table), text))
-      columns += fmt::format("{}quote(\"{}\")", columns.empty() ? "" : " || ',' || ", column);
-    for (const std::string& row :
-         database.All(fmt::format("SELECT {} FROM \"{}\" ORDER BY 1", columns, table), text))
-      rows += fmt::format("{}: {}\n", table, row);
-  }
-  return rows;
 }
 
 /// One change, as a service of the store makes it.
@@ -188,13 +171,18 @@ TEST_F(DamagedDatabaseTest, ADamagedLogIsRefusedWithoutTheMark) {
 
 TEST_F(DamagedDatabaseTest, NothingConfirmedIsCutOff) {
   std::mt19937 random(14);
+  std::map<Outcome, int> num;
   for (int round = 0; round < Rounds() / 4; ++round) {
     for (const char* end : {"", "-wal"}) {
       Files files = days_.at(2);
       files.at(end).resize(random() % files.at(end).size());
-      EXPECT_EQ(Try(files, rows_.at(2)), Outcome::kRefused) << end << files.at(end).size();
+      const Outcome outcome = Try(files, rows_.at(2));
+      ++num[outcome];
+      EXPECT_NE(outcome, Outcome::kSilent) << end << files.at(end).size();
     }
   }
+  // The log may end with frames of an earlier one, which nobody misses.
+  EXPECT_GT(num[Outcome::kRefused], 9 * num[Outcome::kSame]);
   Files files = days_.at(2);
   files.erase("-wal");
   EXPECT_EQ(Try(files, rows_.at(2)), Outcome::kRefused) << "a missing log";

@@ -399,9 +399,13 @@ TEST_F(OldCopiesTest, ACopyWithoutChecksumsIsChangedAsItIs) {
 TEST_F(OldCopiesTest, AFactoryResetRemovesTheAccountsOfCopiesToo) {
   (void)Restored();
   EXPECT_THAT(CopiedDatabase(), ::testing::HasSubstr("hush-hush"));
+  WriteWholeFile(copy() / "provisioned-display", std::string("hush-hush"));
+  fs::create_directory(state() / "damaged-0123");
+  WriteWholeFile(state() / "damaged-0123" / "plumb.db", std::string("hush-hush"));
   RequestFactoryReset(state(), FactoryReset::kKeepRecords, kAnna);
   (void)CarryOutFactoryReset(state());
-  EXPECT_THAT(CopiedDatabase(), ::testing::Not(::testing::HasSubstr("hush-hush")));
+  for (const auto& [path, bytes] : testing::FilesBelow(state()))
+    EXPECT_THAT(bytes, ::testing::Not(::testing::HasSubstr("hush-hush"))) << path;
   EXPECT_TRUE(Database(copy() / "plumb.db", Database::Access::kReadOnly)
                   .Has("SELECT 1 FROM patients WHERE code = 'A'"))
       << "records are kept";
