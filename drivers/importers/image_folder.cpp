@@ -133,6 +133,7 @@ CameraFile SevenScenesCamera() {
   camera.color = {.width = 640, .height = 480, .fx = 585, .fy = 585, .cx = 320, .cy = 240};
   camera.depth_scale = 1000.0;
   camera.depth_camera_unknown = true;
+  camera.depth_sensor = DepthSensor::kStructuredLight;
   return camera;
 }
 

@@ -13,10 +13,10 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
-#include "algo/types/depth_sensor.hpp"
 #include "drivers/files/image_file.hpp"
 #include "drivers/importers/byte_reader.hpp"
 #include "drivers/importers/ros_bag.hpp"
+#include "drivers/replay/device_class.hpp"
 #include "words/foreign.hpp"
 #include "words/recording.hpp"
 
@@ -347,11 +347,7 @@ void RealSenseBag::StateCamera() {
   } else {
     facts_.warnings.push_back(say::foreign::UnitMissing());
   }
-  // The D400 family; the L500 family measures time of flight.
-  if (facts_.name.find("RealSense D4") != std::string::npos)
-    facts_.camera["depth_sensor"] = Name(DepthSensor::kActiveStereo);
-  else if (facts_.name.find("RealSense L5") != std::string::npos)
-    facts_.camera["depth_sensor"] = Name(DepthSensor::kTimeOfFlight);
+  if (const auto sensor = ClassOfDevice(facts_.name)) facts_.camera["depth_sensor"] = Name(*sensor);
   StateDepthCamera();
 }
 
