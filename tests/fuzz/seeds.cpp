@@ -4,15 +4,16 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
-#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/stored_scene.hpp"
 #include "daemon/files/trajectory_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 #include "drivers/replay/tum_writer.hpp"
 #include "tests/support/result_with.hpp"
 #include "tests/unit/importers/bag_writer.hpp"
+#include "tests/unit/importers/ros2_writer.hpp"
 #ifdef PLUMB_WITH_DICOM
 #include "tests/unit/dicom/small_files.hpp"
 #endif
@@ -85,6 +86,23 @@ void WriteRecorded(const fs::path& root) {
     bag.KeyValue(stream.topic + "/image/metadata", "Sensor Timestamp", "1000000", 1.0);
   }
   WriteWholeFile(Folder(root / "bag") / "lz4", bag.Finish());
+  std::vector<testing::Ros2Message> ros2;
+  for (const bool is_depth : {true, false}) {
+    const std::string camera = is_depth ? "/c/depth/" : "/c/color/";
+    const std::string pixels(is_depth ? 32 : 48, 'a');
+    ros2.push_back({camera + "camera_info", "sensor_msgs/msg/CameraInfo",
+                    testing::Ros2Camera(4, 2, 2, 4, 4, {0, 0, 0, 0, 0})});
+    ros2.push_back({camera + "image_raw", "sensor_msgs/msg/Image",
+                    testing::Ros2Image(1.0, camera, is_depth ? "16UC1" : "rgb8", 4, 4, pixels)});
+  }
+  ros2.push_back({"/tf_static", "tf2_msgs/msg/TFMessage",
+                  testing::Ros2Transforms({{"/c/depth/", "/c/color/", 0.01, 0, 0}})});
+  using testing::Container;
+  for (const auto& [name, container] : {std::pair{"db3", Container::kDatabase},
+                                        {"mcap", Container::kMcapPlain},
+                                        {"mcap_lz4", Container::kMcapLz4},
+                                        {"mcap_zstd", Container::kMcapZstd}})
+    WriteWholeFile(root / "bag" / name, testing::InContainer(ros2, container));
   const fs::path stream = Folder(root / "stream");
   const std::vector<std::string> texts = {
       R"({"fx": 600, "fy": 600, "cx": 320, "cy": 240, "depth_scale": 1000})",
