@@ -7,6 +7,7 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/importers/image_folder.hpp"
+#include "drivers/importers/phone_folder.hpp"
 #include "drivers/replay/tum_recording.hpp"
 #include "words/foreign.hpp"
 
@@ -50,13 +51,14 @@ std::optional<fs::path> RosBagIn(const fs::path& folder) {
 
 bool IsImportable(const fs::path& path) {
   if (IsTumRecording(path)) return false;
-  return IsFileRecording(path) || IsImageFolder(path) || RosBagIn(path);
+  return IsFileRecording(path) || IsPhoneFolder(path) || IsImageFolder(path) || RosBagIn(path);
 }
 
 std::unique_ptr<ImportedRecording> OpenImported(const fs::path& path,
                                                 const RecordingDefaults& defaults) {
   std::error_code error;
   if (const auto bag = RosBagIn(path)) return OpenFileRecording(*bag, defaults);
+  if (IsPhoneFolder(path)) return OpenPhoneFolder(path, defaults);
   if (fs::is_directory(path, error)) return OpenImageFolderRecording(path, defaults);
   return OpenFileRecording(path, defaults);
 }

@@ -108,7 +108,10 @@ void WriteRecorded(const fs::path& root) {
       R"({"fx": 600, "fy": 600, "cx": 320, "cy": 240, "depth_scale": 1000})",
       "Camera.fx: 517.3\nCamera.fy: 516.5\nCamera.cx: 318.6\nCamera.cy: 255.3\n",
       "585.5 0 320\n0 586 240\n0 0 1\n",
-      R"({"protocol":"plumb stream","version":1,"serial":"a","camera":{"image_width":640,"image_height":480,"camera_matrix":[600,0,320,0,600,240,0,0,1],"distortion_coefficients":[0,0,0,0,0],"depth_scale":1000}})"};
+      R"({"protocol":"plumb stream","version":1,"serial":"a","camera":{"image_width":640,"image_height":480,"camera_matrix":[600,0,320,0,600,240,0,0,1],"distortion_coefficients":[0,0,0,0,0],"depth_scale":1000}})",
+      "",
+      R"({"K":[351,0,0,0,351,0,181,240,1],"w":360,"h":480,"fps":60,"frameTimestamps":[0,0.02]})",
+      "338, 0, 179\n0, 338, 119\n0, 0, 1\n0.1, 000000, 0, 0, 0\n0.2, 000001, 0, 0, 0\n"};
   for (std::size_t i = 0; i < texts.size(); ++i)
     WriteWholeFile(stream / std::to_string(i), static_cast<char>(i) + texts[i]);
 }
