@@ -17,13 +17,14 @@ namespace plumb {
 
 /// What was recognised of a recording of another program.
 struct ImportedFacts {
-  std::string format;                  ///< Such as "RealSense .bag".
-  std::string name, serial, firmware;  ///< Of the sensor; empty where nothing states it.
-  std::string calibration;             ///< Where the camera is from.
-  CameraFile camera;                   ///< With the depth camera as the recording states it.
-  std::optional<double> stereo_baseline_m;
+  std::string format;  ///< Such as "RealSense .bag".
+  std::string name = {}, serial = {},
+              firmware = {};     ///< Of the sensor; empty where nothing states it.
+  std::string calibration = {};  ///< Where the camera is from.
+  CameraFile camera = {};        ///< With the depth camera as the recording states it.
+  std::optional<double> stereo_baseline_m = {};
   std::int64_t color_images = 0;
-  std::vector<double> depth_s;  ///< Stamps of the depth images.
+  std::vector<double> depth_s = {};  ///< Stamps of the depth images.
 };
 
 /// Frames of another program's recording. Depth that is not registered is registered here. Next()

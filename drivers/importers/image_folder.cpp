@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 #include <string_view>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include "algo/base/parse_number.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
+#include "drivers/importers/folder_recording.hpp"
 #include "drivers/importers/recorded_file.hpp"
 #include "drivers/replay/foreign_calibration.hpp"
 #include "words/foreign.hpp"
@@ -32,44 +32,6 @@ struct Layout {
   std::string color, depth;                     ///< Folders; empty: the recording's own.
   std::string_view color_ending, depth_ending;  ///< Empty: any image.
 };
-
-bool EndsLike(const std::string& name, std::string_view ending, bool is_depth) {
-  if (!ending.empty()) return name.ends_with(ending);
-  return name.ends_with(".png") ||
-         (!is_depth && (name.ends_with(".jpg") || name.ends_with(".jpeg")));
-}
-
-/// The last number in a name, by which colour and depth images are paired.
-std::optional<std::int64_t> NumberOf(std::string_view name) {
-  const std::size_t end = name.find_last_of("0123456789");
-  if (end == std::string_view::npos) return std::nullopt;
-  const std::size_t before = name.find_last_not_of("0123456789", end);
-  const std::size_t begin = before == std::string_view::npos ? 0 : before + 1;
-  return ParseNumber<std::int64_t>(name.substr(begin, end + 1 - begin));
-}
-
-using Numbered = std::map<std::int64_t, std::string>;
-
-Numbered ImagesIn(const fs::path& folder, const std::string& sub, std::string_view ending,
-                  bool is_depth) {
-  Numbered images;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder / sub, error), end; entry != end;
-       entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (!EndsLike(name, ending, is_depth)) continue;
-    const std::string stem = ending.empty() ? entry->path().stem().string()
-                                            : name.substr(0, name.size() - ending.size());
-    const std::optional<std::int64_t> number = NumberOf(stem);
-    if (!number) throw DataError(say::foreign::NameWithoutNumber((folder / sub / name).string()));
-    if (images.size() >= kMostRecordedImages)
-      throw DataError(say::foreign::TooManyImages(kMostRecordedImages));
-    if (!images.emplace(*number, sub.empty() ? name : sub + "/" + name).second)
-      throw DataError(say::foreign::NumberTwice((folder / sub).string(), *number));
-  }
-  if (error) throw DataError(say::foreign::Unreadable());
-  return images;
-}
 
 /// The time that a name states: seconds with decimals, or a whole number of milli-, micro- or
 /// nanoseconds since 1970, told apart by its length.
@@ -92,7 +54,7 @@ std::vector<IndexEntry> StampedIn(const fs::path& folder, const std::string& sub
   for (fs::directory_iterator entry(folder / sub, error), end; entry != end;
        entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (!EndsLike(name, {}, is_depth)) continue;
+    if (!IsImageName(name, {}, is_depth)) continue;
     const std::optional<double> time_s = StampOf(entry->path().stem().string());
     if (!time_s || images.size() >= kMostRecordedImages) return {};
     images.push_back({*time_s, sub + "/" + name});
@@ -108,7 +70,7 @@ bool HasImages(const fs::path& folder, const Layout& layout) {
     std::error_code error;
     for (fs::directory_iterator entry(folder / sub, error), end; entry != end;
          entry.increment(error))
-      if (EndsLike(entry->path().filename().string(), ending, is_depth)) return true;
+      if (IsImageName(entry->path().filename().string(), ending, is_depth)) return true;
     return false;
   };
   return has(layout.color, layout.color_ending, false) &&
@@ -133,6 +95,7 @@ CameraFile SevenScenesCamera() {
   camera.color = {.width = 640, .height = 480, .fx = 585, .fy = 585, .cx = 320, .cy = 240};
   camera.depth_scale = 1000.0;
   camera.depth_camera_unknown = true;
+  camera.depth_sensor = DepthSensor::kStructuredLight;
   return camera;
 }
 
@@ -185,8 +148,8 @@ void AddPairs(const Numbered& color, const Numbered& depth, double rate_hz, Imag
 /// Images that are numbered only, and their camera.
 FoundCamera TakeNumbered(const fs::path& folder, const Layout& layout,
                          const RecordingDefaults& defaults, ImageFolder& contents) {
-  const Numbered color = ImagesIn(folder, layout.color, layout.color_ending, false);
-  const Numbered depth = ImagesIn(folder, layout.depth, layout.depth_ending, true);
+  const Numbered color = NumberedImages(folder, layout.color, layout.color_ending, false);
+  const Numbered depth = NumberedImages(folder, layout.depth, layout.depth_ending, true);
   FoundCamera found = CameraOf(folder, layout, folder / color.begin()->second);
   const double rate_hz = defaults.rate_hz.value_or(found.rate_hz.value_or(kUsualRate_hz));
   contents.warnings.push_back(say::foreign::RateAssumed(rate_hz));
@@ -196,46 +159,6 @@ FoundCamera TakeNumbered(const fs::path& folder, const Layout& layout,
   return found;
 }
 
-class ImageFolderRecording : public ImportedRecording {
- public:
-  ImageFolderRecording(const fs::path& folder, const Layout& layout,
-                       const RecordingDefaults& defaults) {
-    ImageFolder contents;
-    contents.folder = folder;
-    contents.color_list = folder / layout.color;
-    contents.depth_list = folder / layout.depth;
-    if (!layout.color.empty()) {
-      contents.color = StampedIn(folder, layout.color, false);
-      contents.depth = StampedIn(folder, layout.depth, true);
-    }
-    const bool is_stamped = !contents.color.empty() && !contents.depth.empty();
-    const FoundCamera found = is_stamped
-                                  ? CameraOf(folder, layout, folder / contents.color.front().file)
-                                  : TakeNumbered(folder, layout, defaults, contents);
-    contents.camera = found.camera;
-    contents.intrinsics_assumed = found.assumed;
-    if (found.assumed) contents.warnings.push_back(say::foreign::PublishedCamera(layout.format));
-    facts_ = {.format = layout.format,
-              .name = found.sensor_name,
-              .serial = found.serial,
-              .firmware = {},
-              .calibration = found.file,
-              .camera = found.camera,
-              .stereo_baseline_m = {},
-              .color_images = std::ssize(contents.color),
-              .depth_s = {}};
-    for (const IndexEntry& entry : contents.depth) facts_.depth_s.push_back(entry.time_s);
-    frames_ = OpenImageFolder(std::move(contents), defaults);
-  }
-  [[nodiscard]] const StreamInfo& info() const override { return frames_->info(); }
-  [[nodiscard]] const ImportedFacts& facts() const override { return facts_; }
-  [[nodiscard]] std::optional<Frame> Next() override { return frames_->Next(); }
-
- private:
-  ImportedFacts facts_;
-  std::unique_ptr<FrameSource> frames_;
-};
-
 }  // namespace
 
 bool IsImageFolder(const fs::path& folder) { return LayoutOf(folder).has_value(); }
@@ -244,7 +167,27 @@ std::unique_ptr<ImportedRecording> OpenImageFolderRecording(const fs::path& fold
                                                             const RecordingDefaults& defaults) {
   const std::optional<Layout> layout = LayoutOf(folder);
   if (!layout) throw DataError(say::foreign::NoCalibration(folder.string()));
-  return std::make_unique<ImageFolderRecording>(folder, *layout, defaults);
+  ImageFolder contents;
+  contents.folder = folder;
+  contents.color_list = folder / layout->color;
+  contents.depth_list = folder / layout->depth;
+  if (!layout->color.empty()) {
+    contents.color = StampedIn(folder, layout->color, false);
+    contents.depth = StampedIn(folder, layout->depth, true);
+  }
+  const bool is_stamped = !contents.color.empty() && !contents.depth.empty();
+  const FoundCamera found = is_stamped
+                                ? CameraOf(folder, *layout, folder / contents.color.front().file)
+                                : TakeNumbered(folder, *layout, defaults, contents);
+  contents.camera = found.camera;
+  contents.intrinsics_assumed = found.assumed;
+  if (found.assumed) contents.warnings.push_back(say::foreign::PublishedCamera(layout->format));
+  return OpenListedFolder(std::move(contents),
+                          {.format = layout->format,
+                           .name = found.sensor_name,
+                           .serial = found.serial,
+                           .calibration = found.file},
+                          defaults);
 }
 
 }  // namespace plumb

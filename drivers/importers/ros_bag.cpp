@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/importers/ros_bag.hpp"
 
-#include <lz4frame.h>
-
 #include <algorithm>
-#include <memory>
 #include <optional>
 #include <string_view>
 #include <utility>
 
 #include "algo/base/errors.hpp"
 #include "drivers/importers/byte_reader.hpp"
+#include "drivers/importers/unpack.hpp"
 #include "words/foreign.hpp"
 
 namespace plumb {
@@ -18,28 +16,8 @@ namespace {
 
 constexpr std::string_view kFirstLine = "#ROSBAG V2.0\n";
 constexpr std::size_t kMaxHeader = std::size_t{1} << 20;
-constexpr std::size_t kMaxChunk = std::size_t{256} << 20;
-constexpr std::size_t kMaxConnections = 10'000;
 constexpr std::uint8_t kOpMessage = 2, kOpBag = 3, kOpIndex = 4, kOpChunk = 5, kOpInfo = 6,
                        kOpConnection = 7;
-
-void UnpackLz4(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) {
-  LZ4F_dctx* created = nullptr;
-  if (LZ4F_isError(LZ4F_createDecompressionContext(&created, LZ4F_VERSION)) != 0)
-    throw DataError(say::foreign::BagPacking());
-  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(
-      created, &LZ4F_freeDecompressionContext);
-  std::size_t left = 1;
-  while (left != 0) {
-    std::size_t made = out.size(), used = packed.size();
-    left = LZ4F_decompress(context.get(), out.data(), &made, packed.data(), &used, nullptr);
-    if (LZ4F_isError(left) != 0 || (made == 0 && used == 0))
-      throw DataError(say::foreign::BagPacking());
-    out = out.subspan(made);
-    packed = packed.subspan(used);
-  }
-  if (!out.empty() || !packed.empty()) throw DataError(say::foreign::BagPacking());
-}
 
 }  // namespace
 
@@ -116,8 +94,8 @@ RosBag::Record RosBag::RecordAt(std::uint64_t offset) const {
 std::vector<std::uint8_t> RosBag::Unpacked(const Record& record) const {
   const auto size = record.fields.Get<std::uint32_t>("size");
   const std::string& packing = record.fields.Text("compression");
-  if (size > kMaxChunk || record.size > kMaxChunk)
-    throw DataError(say::foreign::BagChunk(static_cast<std::int64_t>(kMaxChunk >> 20U)));
+  if (size > kMostChunkBytes || record.size > kMostChunkBytes)
+    throw DataError(say::foreign::BagChunk(static_cast<std::int64_t>(kMostChunkBytes >> 20U)));
   if (packing == "bz2") throw DataError(say::foreign::BagBz2());
   std::vector<std::uint8_t> packed = BytesAt(record.data, record.size);
   if (packing == "none") {
@@ -140,9 +118,8 @@ void RosBag::VisitChunk(std::uint64_t place, std::span<const std::uint8_t> chunk
     if (op != kOpConnection && op != kOpMessage) throw DataError(say::foreign::BagOperation(op));
     const auto number = fields.Get<std::uint32_t>("conn");
     if (op == kOpConnection) {
-      if (connections_.size() >= kMaxConnections) throw DataError(say::foreign::BagField());
-      connections_.try_emplace(number,
-                               BagConnection{fields.Text("topic"), Fields(data).Text("type")});
+      if (connections_.size() >= kMostTopics) throw DataError(say::foreign::BagField());
+      connections_.try_emplace(number, RosTopic{fields.Text("topic"), Fields(data).Text("type")});
       continue;
     }
     const auto connection = connections_.find(number);
@@ -173,19 +150,8 @@ void RosBag::ForEach(const Visit& visit) {
   }
 }
 
-std::span<const std::uint8_t> RosBag::Read(const BagMessage& message) {
-  auto found = std::ranges::find(unpacked_, message.chunk, &Chunk::place);
-  if (found == unpacked_.end()) {
-    found = unpacked_.begin() + static_cast<std::ptrdiff_t>(next_);
-    next_ = (next_ + 1) % unpacked_.size();
-    found->place = 0;  // If unpacking fails, the entry must not pass for the old chunk.
-    found->bytes = Unpacked(RecordAt(message.chunk));
-    found->place = message.chunk;
-  }
-  // The file may have changed since it was read.
-  if (message.offset > found->bytes.size() || message.size > found->bytes.size() - message.offset)
-    throw DataError(say::foreign::Unreadable());
-  return std::span<const std::uint8_t>(found->bytes).subspan(message.offset, message.size);
+std::span<const std::uint8_t> RosBag::Read(const RosMessage& message) {
+  return unpacked_.Read(message, [this](std::uint64_t place) { return Unpacked(RecordAt(place)); });
 }
 
 }  // namespace plumb

@@ -11,6 +11,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/image_file.hpp"
 #include "drivers/importers/byte_reader.hpp"
+#include "drivers/replay/device_class.hpp"
 #include "words/foreign.hpp"
 #include "words/recording.hpp"
 
@@ -136,6 +137,7 @@ std::uint64_t SensFile::ReadHeader() {
                    {"depth_image_height", depth_height_},
                    {"depth_camera_matrix", CameraMatrix(depth)},
                    {"depth_distortion_coefficients", {0, 0, 0, 0, 0}}};
+  if (const auto sensor = ClassOfDevice(facts_.name)) facts_.camera["depth_sensor"] = Name(*sensor);
   if (color_pose == kIdentity && depth_pose == kIdentity)
     facts_.camera["T_color_depth"] = kIdentity;
   else

@@ -13,6 +13,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/replay/device_class.hpp"
 #include "words/foreign.hpp"
 
 namespace plumb {
@@ -106,6 +107,7 @@ std::optional<ForeignCalibration> OfJson(std::string_view text, const std::strin
   found.sensor_name = TextIn(json, "device_name");
   found.serial = TextIn(json, "serial_number");
   found.camera = Checked(stated, name, width, height);
+  found.camera.depth_sensor = ClassOfDevice(found.sensor_name);
   return found;
 }
 

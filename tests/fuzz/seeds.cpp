@@ -4,15 +4,16 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
-#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/stored_scene.hpp"
 #include "daemon/files/trajectory_file.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 #include "drivers/replay/tum_writer.hpp"
 #include "tests/support/result_with.hpp"
 #include "tests/unit/importers/bag_writer.hpp"
+#include "tests/unit/importers/ros2_writer.hpp"
 #ifdef PLUMB_WITH_DICOM
 #include "tests/unit/dicom/small_files.hpp"
 #endif
@@ -85,12 +86,32 @@ void WriteRecorded(const fs::path& root) {
     bag.KeyValue(stream.topic + "/image/metadata", "Sensor Timestamp", "1000000", 1.0);
   }
   WriteWholeFile(Folder(root / "bag") / "lz4", bag.Finish());
+  std::vector<testing::Ros2Message> ros2;
+  for (const bool is_depth : {true, false}) {
+    const std::string camera = is_depth ? "/c/depth/" : "/c/color/";
+    const std::string pixels(is_depth ? 32 : 48, 'a');
+    ros2.push_back({camera + "camera_info", "sensor_msgs/msg/CameraInfo",
+                    testing::Ros2Camera(4, 2, 2, 4, 4, {0, 0, 0, 0, 0})});
+    ros2.push_back({camera + "image_raw", "sensor_msgs/msg/Image",
+                    testing::Ros2Image(1.0, camera, is_depth ? "16UC1" : "rgb8", 4, 4, pixels)});
+  }
+  ros2.push_back({"/tf_static", "tf2_msgs/msg/TFMessage",
+                  testing::Ros2Transforms({{"/c/depth/", "/c/color/", 0.01, 0, 0}})});
+  using testing::Container;
+  for (const auto& [name, container] : {std::pair{"db3", Container::kDatabase},
+                                        {"mcap", Container::kMcapPlain},
+                                        {"mcap_lz4", Container::kMcapLz4},
+                                        {"mcap_zstd", Container::kMcapZstd}})
+    WriteWholeFile(root / "bag" / name, testing::InContainer(ros2, container));
   const fs::path stream = Folder(root / "stream");
   const std::vector<std::string> texts = {
       R"({"fx": 600, "fy": 600, "cx": 320, "cy": 240, "depth_scale": 1000})",
       "Camera.fx: 517.3\nCamera.fy: 516.5\nCamera.cx: 318.6\nCamera.cy: 255.3\n",
       "585.5 0 320\n0 586 240\n0 0 1\n",
-      R"({"protocol":"plumb stream","version":1,"serial":"a","camera":{"image_width":640,"image_height":480,"camera_matrix":[600,0,320,0,600,240,0,0,1],"distortion_coefficients":[0,0,0,0,0],"depth_scale":1000}})"};
+      R"({"protocol":"plumb stream","version":1,"serial":"a","camera":{"image_width":640,"image_height":480,"camera_matrix":[600,0,320,0,600,240,0,0,1],"distortion_coefficients":[0,0,0,0,0],"depth_scale":1000}})",
+      "",
+      R"({"K":[351,0,0,0,351,0,181,240,1],"w":360,"h":480,"fps":60,"frameTimestamps":[0,0.02]})",
+      "338, 0, 179\n0, 338, 119\n0, 0, 1\n0.1, 000000, 0, 0, 0\n0.2, 000001, 0, 0, 0\n"};
   for (std::size_t i = 0; i < texts.size(); ++i)
     WriteWholeFile(stream / std::to_string(i), static_cast<char>(i) + texts[i]);
 }

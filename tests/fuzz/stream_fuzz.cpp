@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as the first message of a program that delivers frames, and as a calibration of
-// another program; the first byte chooses the reader.
+// Any bytes as the first message of a program that delivers frames, as a calibration of
+// another program, and as what apps of phones state; the first byte chooses the reader.
 #include <string>
 
+#include "drivers/importers/phone_metadata.hpp"
 #include "drivers/replay/foreign_calibration.hpp"
 #include "drivers/stream/stream_protocol.hpp"
 
@@ -15,6 +16,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     constexpr const char* kNames[] = {"camera.json", "camera.yaml", "camera.txt"};
     if (data[0] < 3)
       (void)plumb::ParseForeignCalibration(text, kNames[data[0]], 640, 480);
+    else if (data[0] == 5)
+      (void)plumb::ParseRecord3d(text, "metadata.json");
+    else if (data[0] == 6)
+      (void)plumb::ParseStray(text, text);
     else
       (void)plumb::stream::ParseHello(text, data[0] == 4);
   });

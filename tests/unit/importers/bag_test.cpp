@@ -336,8 +336,8 @@ TEST(BagRefusalTest, TheChildTellsWhatIsWrong) {
 }
 
 TEST(BagRefusalTest, FormatsThatAreNotReadAreNamedWithWhatConvertsThem) {
-  EXPECT_THAT(MessageOf<DataError>([] { RefuseUnreadFormat("sweep.mcap"); }),
-              AllOf(HasSubstr("ROS 2"), HasSubstr("rosbags-convert")));
+  EXPECT_THAT(MessageOf<DataError>([] { RefuseUnreadFormat("sweep.db3.zstd"); }),
+              AllOf(HasSubstr("ROS 2"), HasSubstr("zstd -d")));
   EXPECT_NO_THROW(RefuseUnreadFormat("sweep.oni"));
 }
 

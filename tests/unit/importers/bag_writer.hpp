@@ -27,6 +27,10 @@ class Packed {
     bytes_ += text;
     return *this;
   }
+  Packed& Raw(const std::string& bytes) {
+    bytes_ += bytes;
+    return *this;
+  }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
 
  private:

@@ -14,7 +14,9 @@
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 #include "drivers/importers/import.hpp"
+#include "drivers/replay/device_class.hpp"
 #include "drivers/replay/foreign_calibration.hpp"
+#include "drivers/replay/tum_writer.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -66,6 +68,33 @@ TEST(ImageFolderTest, AnOpen3dFolderIsReadWithItsColumnsRateAndUnit) {
   EXPECT_NEAR(first.depth_m.at<float>(5, 5), 1.0, 1e-6);
   EXPECT_EQ(first.depth_m.at<float>(0, 0), 0.0F);
   EXPECT_EQ(first.color_rgb.at<cv::Vec3b>(1, 1), cv::Vec3b(0, 100, 200));
+}
+
+TEST(ImageFolderTest, TheClassOfTheDeviceReachesTheFramesAndTheImportedFolder) {
+  const TempFolder folder;
+  WriteImages(folder / "color", folder / "depth", "{}.png", "{}.png", 0, 3, 640, 480);
+  const std::string_view open3d = kOpen3d;
+  for (const auto& [device, sensor] : {std::pair{"Azure Kinect", DepthSensor::kTimeOfFlight},
+                                       {"Orbbec Femto Bolt", DepthSensor::kTimeOfFlight},
+                                       {"Kinect for Windows v2", DepthSensor::kTimeOfFlight},
+                                       {"iPhone 15 Pro", DepthSensor::kLidar},
+                                       {"Intel RealSense D455", DepthSensor::kActiveStereo},
+                                       {"ASUS Xtion PRO LIVE", DepthSensor::kStructuredLight}}) {
+    std::string text(open3d);
+    text.replace(text.find("Intel RealSense D435"), 20, device);
+    WriteWholeFile(folder / "intrinsic.json", text);
+    const auto recording = OpenImported(folder.path());
+    EXPECT_EQ(recording->facts().camera.depth_sensor, sensor) << device;
+    EXPECT_EQ(recording->info().depth_sensor, sensor) << device;
+    EXPECT_EQ(recording->info().depth_noise, ClassOf(sensor).noise) << device;
+    const TempFolder out;
+    TumWriter writer(out.path(), recording->info(), {.depth_scale = 5000.0, .jpeg_quality = 0});
+    while (const auto frame = recording->Next()) writer.Add(*frame);
+    writer.Finish();
+    EXPECT_EQ(OpenTumRecording(out.path())->info().depth_sensor, sensor) << device;
+  }
+  EXPECT_EQ(ClassOfDevice("Kinect"), std::nullopt) << "three classes have had that name";
+  EXPECT_EQ(ClassOfDevice(""), std::nullopt);
 }
 
 TEST(ImageFolderTest, PartnersHaveTheSameNumberAndTheRateCanBeStated) {

@@ -86,6 +86,7 @@ TEST(SensTest, FramesComeBackWithBothCameras) {
   const auto recording = OpenImported(folder / "scene.sens");
   EXPECT_EQ(recording->facts().format, "ScanNet .sens");
   EXPECT_EQ(recording->facts().name, "StructureSensor");
+  EXPECT_EQ(recording->facts().camera.depth_sensor, DepthSensor::kStructuredLight);
   EXPECT_EQ(recording->info().intrinsics.fy, 61);
   EXPECT_EQ(recording->facts().camera.depth_camera.value().intrinsics.fx, 30);
   for (int i = 0; i < kFrames; ++i) {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Recordings of realsense-viewer and librealsense2, which are ROS 1 bags with topics of their own.
-// Also what `rosbag record` writes of a camera's ROS 1 driver.
+// What ROS records of a depth camera's driver, and recordings of realsense-viewer and
+// librealsense2, which are ROS 1 bags with topics of their own.
 #pragma once
 
 #include <memory>
 
 #include "drivers/importers/recorded_file.hpp"
+#include "drivers/importers/ros_messages.hpp"
 
 namespace plumb {
 
@@ -15,6 +16,6 @@ namespace plumb {
 /// the warnings.
 /// @throws DataError for a damaged file, one without depth or colour, a lens model that Plumb does
 ///         not know, and kinds of images that it does not read.
-[[nodiscard]] std::unique_ptr<RecordedFile> OpenRealSenseBag(FileBytes bytes);
+[[nodiscard]] std::unique_ptr<RecordedFile> OpenRosRecording(std::unique_ptr<RosMessages> messages);
 
 }  // namespace plumb

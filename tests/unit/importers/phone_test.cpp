@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// Folders as Record3D and Stray Scanner export them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <random>
+
+#include <fmt/format.h>
+#include <opencv2/core.hpp>
+
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
+#include "drivers/importers/import.hpp"
+#include "drivers/importers/phone_metadata.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+using testing::TempFolder;
+
+// The keys of a real export, which holds its images upright.
+constexpr std::string_view kRecord3d =
+    R"({"dh":64,"frameTimestamps":[0,0.0167,0.0334,0.0501],"dw":48,"fps":60,
+    "poses":[[0,0,0,1,0,0,0]],"K":[351,0,0,0,351.5,0,181.25,240.75,1],"initPose":[0,0,0,1,0,0,0],
+    "h":480,"cameraType":1,"w":360})";
+constexpr std::string_view kMatrix = "338.5, 0.0, 179.25\n0.0, 338.5, 119.75\n0.0, 0.0, 1.0\n";
+constexpr std::string_view kOdometry =
+    "timestamp, frame, x, y, z, qx, qy, qz, qw\n"
+    "2931.10, 000000, 0, 0, 0, 0, 0, 0, 1\n2931.12, 000001, 0, 0, 0, 0, 0, 0, 1\n"
+    "2931.15, 000002, 0, 0, 0, 0, 0, 0, 1\n2931.16, 000003, 0, 0, 0, 0, 0, 0, 1\n";
+
+void WriteImages(const fs::path& folder, const char* name, cv::Size color, cv::Size depth) {
+  fs::create_directories(folder / "rgb");
+  fs::create_directories(folder / "depth");
+  for (int i = 0; i < 4; ++i) {
+    const std::string stem = fmt::format(fmt::runtime(name), i);
+    WriteWholeFile(folder / "rgb" / (stem + ".jpg"),
+                   EncodeJpeg(cv::Mat(color, CV_8UC3, cv::Scalar(200, 20 * i, 10)), 95));
+    WritePng(folder / "depth" / (stem + ".png"), cv::Mat(depth, CV_16UC1, cv::Scalar(800 + i)));
+  }
+}
+
+TEST(PhoneFolderTest, Record3dGivesCameraStampsAndItsClass) {
+  const TempFolder folder;
+  // The archive holds one folder, and people unpack it and name what is around it.
+  WriteImages(folder / "EXR_RGBD", "{}", {360, 480}, {48, 64});
+  WriteWholeFile(folder / "EXR_RGBD/metadata.json", kRecord3d);
+  ASSERT_TRUE(IsImportable(folder.path()));
+  const auto recording = OpenImported(folder.path());
+  EXPECT_EQ(recording->facts().format, "Record3D");
+  EXPECT_EQ(recording->info().depth_sensor, DepthSensor::kLidar);
+  const Intrinsics& color = recording->info().intrinsics;
+  EXPECT_EQ(color.width, 360);
+  EXPECT_EQ(color.fx, 351);
+  EXPECT_EQ(color.fy, 351.5);
+  EXPECT_EQ(color.cx, 181.25);
+  EXPECT_EQ(color.cy, 240.75);
+  const Intrinsics& depth = recording->facts().camera.depth_camera.value().intrinsics;
+  EXPECT_EQ(depth.width, 48);
+  EXPECT_NEAR(depth.fx, 351 / 7.5, 1e-9);
+  // Pixel centres are at integers: (181.25 + 0.5) / 7.5 - 0.5.
+  EXPECT_NEAR(depth.cx, 181.75 / 7.5 - 0.5, 1e-9);
+  const Frame first = recording->Next().value(), second = recording->Next().value();
+  EXPECT_NEAR(second.depth_time_s - first.depth_time_s, 0.0167, 1e-9);
+  EXPECT_NEAR(second.depth_m.at<float>(240, 180), 0.801, 1e-5);
+  EXPECT_NEAR(second.color_rgb.at<cv::Vec3b>(9, 9)[0], 200, 6);
+}
+
+TEST(PhoneFolderTest, TheCameraAboveTheScreenProjectsDots) {
+  std::string text(kRecord3d);
+  text.replace(text.find("\"cameraType\":1"), 14, "\"cameraType\":0");
+  EXPECT_EQ(ParseRecord3d(text, "a")->sensor, DepthSensor::kStructuredLight);
+  EXPECT_EQ(ParseRecord3d("{\"fps\":30}", "a"), std::nullopt);
+}
+
+TEST(PhoneFolderTest, StrayScannerWithFramesGivesCameraAndStamps) {
+  const TempFolder folder;
+  WriteImages(folder.path(), "{:06}", {360, 240}, {48, 32});
+  WriteWholeFile(folder / "camera_matrix.csv", kMatrix);
+  WriteWholeFile(folder / "odometry.csv", kOdometry);
+  fs::remove(folder / "depth/000001.png");
+  const auto recording = OpenImported(folder.path());
+  EXPECT_EQ(recording->facts().format, "Stray Scanner");
+  EXPECT_EQ(recording->info().depth_sensor, DepthSensor::kLidar);
+  EXPECT_EQ(recording->info().intrinsics.cy, 119.75);
+  EXPECT_EQ(recording->info().num_frames, 3);
+  EXPECT_THAT(EnglishTexts(recording->info().warnings), Contains(HasSubstr("1 image has")));
+  (void)recording->Next();
+  const Frame second = recording->Next().value();
+  EXPECT_NEAR(second.color_time_s, 2931.15, 1e-9);
+  EXPECT_NEAR(second.depth_m.at<float>(120, 180), 0.802, 1e-5);
+}
+
+TEST(PhoneFolderTest, WhatCannotBeReadIsNamedWithTheCommandThatConvertsIt) {
+  const TempFolder folder;
+  WriteImages(folder.path(), "{:06}", {360, 240}, {48, 32});
+  WriteWholeFile(folder / "camera_matrix.csv", kMatrix);
+  WriteWholeFile(folder / "odometry.csv", kOdometry);
+  const auto refusal = [&] {
+    return MessageOf<DataError>([&] { (void)OpenImported(folder.path()); });
+  };
+  fs::remove_all(folder / "rgb");
+  WriteWholeFile(folder / "rgb.mp4", std::string_view("film"));
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("rgb.mp4"), HasSubstr("ffmpeg -noautorotate")));
+  WriteImages(folder.path(), "{:06}", {360, 240}, {48, 48});
+  EXPECT_THAT(refusal(), HasSubstr("48x48")) << "not the colour camera's view";
+  fs::remove_all(folder / "depth");
+  fs::create_directories(folder / "depth");
+  WriteWholeFile(folder / "depth/0.exr", std::string_view("exr"));
+  EXPECT_THAT(refusal(), HasSubstr("oiiotool"));
+}
+
+TEST(PhoneFolderTest, FiveHundredDamagedTextsAreReadOrRefused) {
+  std::mt19937 random(29);
+  int num_refused = 0;
+  for (int i = 0; i < 500; ++i) {
+    std::string json(kRecord3d), matrix(kMatrix), odometry(kOdometry);
+    for (std::string* text : {&json, &matrix, &odometry}) {
+      for (int change = 0; change < 1 + i % 4; ++change)
+        (*text)[random() % text->size()] = static_cast<char>(random() % 128);
+      if (i % 5 == 0) text->resize(random() % text->size());
+    }
+    try {
+      (void)ParseRecord3d(json, "metadata.json");
+      (void)ParseStray(matrix, odometry);
+    } catch (const DataError& error) {
+      EXPECT_STRNE(error.what(), "");
+      ++num_refused;
+    }
+  }
+  EXPECT_GT(num_refused, 100);
+}
+
+}  // namespace
+}  // namespace plumb

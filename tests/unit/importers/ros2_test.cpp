@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings of ROS 2, in SQLite and in MCAP, from a writer of the test's own.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <random>
+
+#include <opencv2/core.hpp>
+
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
+#include "drivers/importers/import.hpp"
+#include "drivers/importers/open_recorded_file.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/importers/ros2_writer.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using testing::Container;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+using ::testing::Not;
+using testing::Ros2Message;
+using testing::TempFolder;
+
+constexpr int kFrames = 4;
+constexpr std::uint32_t kWidth = 64, kHeight = 48, kDepthWidth = 32, kDepthHeight = 24;
+
+/// What a test changes of the recording.
+struct Ros2 {
+  std::string color_encoding = "bgr8", depth_encoding = "16UC1";
+  bool packed = false, frames = true;
+};
+
+double StampOf(int frame) { return 1700000000.25 + frame / 30.0; }
+
+std::string PixelsOf(const cv::Mat& image) {
+  return {reinterpret_cast<const char*>(image.data), image.total() * image.elemSize()};
+}
+std::string TextOf(const std::vector<std::uint8_t>& bytes) { return {bytes.begin(), bytes.end()}; }
+
+Ros2Message ColorMessage(const Ros2& ros, int i) {
+  const cv::Mat bgr(kHeight, kWidth, CV_8UC3, cv::Scalar(10, 20 * i, 200));
+  const std::string frame = "camera_color_optical_frame";
+  if (!ros.packed)
+    return {
+        "/camera/color/image_raw", "sensor_msgs/msg/Image",
+        testing::Ros2Image(StampOf(i), frame, ros.color_encoding, kWidth, kHeight, PixelsOf(bgr))};
+  const cv::Mat rgb(kHeight, kWidth, CV_8UC3, cv::Scalar(200, 20 * i, 10));
+  return {"/camera/color/image_raw/compressed", "sensor_msgs/msg/CompressedImage",
+          testing::Ros2Packed(StampOf(i), frame, "rgb8; jpeg compressed bgr8",
+                              TextOf(EncodeJpeg(rgb, 95)))};
+}
+
+Ros2Message DepthMessage(const Ros2& ros, int i) {
+  const bool is_float = ros.depth_encoding == "32FC1";
+  cv::Mat depth(kDepthHeight, kDepthWidth, is_float ? CV_32FC1 : CV_16UC1,
+                cv::Scalar(is_float ? 1.5 + 0.001 * i : 1500 + i));
+  if (is_float) {
+    depth.at<float>(0, 0) = NAN;
+    depth.at<float>(0, 1) = INFINITY;
+  }
+  const std::string frame = "camera_depth_optical_frame";
+  const double stamp_s = StampOf(i) + 0.004;
+  if (!ros.packed)
+    return {"/camera/depth/image_rect_raw", "sensor_msgs/msg/Image",
+            testing::Ros2Image(stamp_s, frame, ros.depth_encoding, kDepthWidth, kDepthHeight,
+                               PixelsOf(depth))};
+  return {"/camera/depth/image_rect_raw/compressedDepth", "sensor_msgs/msg/CompressedImage",
+          testing::Ros2Packed(stamp_s, frame, "16UC1; compressedDepth png",
+                              std::string(12, '\1') + TextOf(EncodePng(depth)))};
+}
+
+std::vector<Ros2Message> Messages(const Ros2& ros = {}) {
+  std::vector<Ros2Message> messages = {
+      {"/rosout", "rcl_interfaces/msg/Log", std::string("\0\1\0\0 any", 8)},
+      {"/camera/color/camera_info", "sensor_msgs/msg/CameraInfo",
+       testing::Ros2Camera(60.25, 31.5, 23.25, kWidth, kHeight,
+                           {0.05, -0.02, 0.001, 0.002, 0.003})},
+      {"/camera/depth/camera_info", "sensor_msgs/msg/CameraInfo",
+       testing::Ros2Camera(30.5, 15.25, 11.75, kDepthWidth, kDepthHeight, {0, 0, 0, 0, 0})}};
+  if (ros.frames)
+    // The colour camera is 15 mm to the left of the depth camera, and each has a frame between.
+    messages.push_back({"/tf_static", "tf2_msgs/msg/TFMessage",
+                        testing::Ros2Transforms(
+                            {{"camera_link", "camera_depth_frame", 0.0, 0.1, 0.0},
+                             {"camera_depth_frame", "camera_depth_optical_frame", 0.0, 0.0, 0.0},
+                             {"camera_link", "camera_color_frame", -0.015, 0.1, 0.0},
+                             {"camera_color_frame", "camera_color_optical_frame", 0, 0, 0.001}})});
+  for (int i = 0; i < kFrames; ++i) {
+    messages.push_back(DepthMessage(ros, i));
+    messages.push_back(ColorMessage(ros, i));
+  }
+  for (std::size_t i = 0; i < messages.size(); ++i) messages[i].time_ns = 1'000'000 * (i + 1);
+  return messages;
+}
+
+FileBytes InMemory(const std::vector<std::uint8_t>& bytes) {
+  return {.size = bytes.size(), .read = [&bytes](std::uint64_t offset, std::span<std::uint8_t> to) {
+            if (offset > bytes.size() || to.size() > bytes.size() - offset) return false;
+            std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(offset), to.size(), to.begin());
+            return true;
+          }};
+}
+
+class Ros2Test : public ::testing::TestWithParam<Container> {};
+INSTANTIATE_TEST_SUITE_P(Containers, Ros2Test,
+                         ::testing::Values(Container::kDatabase, Container::kMcapFlat,
+                                           Container::kMcapPlain, Container::kMcapLz4,
+                                           Container::kMcapZstd));
+
+TEST_P(Ros2Test, CamerasTransformsAndFramesComeBack) {
+  const TempFolder folder;
+  const bool is_database = GetParam() == Container::kDatabase;
+  const fs::path file = folder / (is_database ? "sweep.db3" : "sweep.mcap");
+  WriteWholeFile(file, testing::InContainer(Messages(), GetParam()));
+  ASSERT_TRUE(IsImportable(file));
+  const auto recording = OpenImported(file);
+  EXPECT_EQ(recording->facts().format, is_database ? "ROS 2 .db3" : "ROS 2 .mcap");
+  const Intrinsics& color = recording->info().intrinsics;
+  EXPECT_EQ(color.width, 64);
+  EXPECT_EQ(color.fx, 60.25);
+  EXPECT_EQ(color.cy, 23.25);
+  EXPECT_EQ(color.distortion, (std::array<double, 8>{0.05, -0.02, 0.001, 0.002, 0.003}));
+  const DepthCamera& depth = recording->facts().camera.depth_camera.value();
+  EXPECT_EQ(depth.intrinsics.width, 32);
+  EXPECT_EQ(depth.intrinsics.fx, 30.5);
+  EXPECT_TRUE(depth.T_color_depth.translation().isApprox(Eigen::Vector3d(0.015, 0, -0.001)));
+  EXPECT_EQ(recording->info().num_frames, kFrames);
+  for (int i = 0; i < kFrames; ++i) {
+    const Frame frame = recording->Next().value();
+    EXPECT_NEAR(frame.color_time_s, StampOf(i), 2e-6);
+    EXPECT_NEAR(frame.depth_time_s, StampOf(i) + 0.004, 2e-6);
+    EXPECT_EQ(frame.color_rgb.at<cv::Vec3b>(5, 5), cv::Vec3b(200, 20 * i, 10));
+    EXPECT_NEAR(frame.depth_m.at<float>(24, 32), 1.5 + 1e-3 * i - 0.001, 1e-5);
+  }
+  EXPECT_FALSE(recording->Next());
+}
+
+TEST_P(Ros2Test, PackedImagesAreUnpacked) {
+  const std::vector<std::uint8_t> bytes =
+      testing::InContainer(Messages({.packed = true}), GetParam());
+  const auto file = OpenRecordedFile(InMemory(bytes));
+  ASSERT_EQ(file->facts().color_s.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(file->facts().camera["camera_matrix"][0], 60.25);
+  EXPECT_EQ(file->facts().camera["depth_camera_matrix"][0], 30.5);
+  EXPECT_NEAR(file->Color(2).at<cv::Vec3b>(20, 20)[0], 200, 6);
+  EXPECT_EQ(file->Depth(2).at<std::uint16_t>(5, 5), 1502);
+}
+
+TEST_P(Ros2Test, DamagedFilesAreReadOrRefused) {
+  std::mt19937 random(23);
+  const std::vector<std::uint8_t> good =
+      testing::InContainer(Messages({.packed = true}), GetParam());
+  int num_refused = 0;
+  for (int i = 0; i < 500; ++i) {
+    std::vector<std::uint8_t> bytes = good;
+    for (int change = 0; change < 1 + i % 8; ++change)
+      bytes[random() % (i % 2 == 0 ? 1000 : bytes.size())] = static_cast<std::uint8_t>(random());
+    if (i % 5 == 0) bytes.resize(random() % bytes.size());
+    if (i % 7 == 0 && bytes.size() > 64)
+      std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(random() % (bytes.size() - 8)), 4,
+                  std::uint8_t{0xff});
+    try {
+      const auto file = OpenRecordedFile(InMemory(bytes));
+      for (std::size_t k = 0; k < file->facts().color_s.size(); ++k) (void)file->Color(k);
+      for (std::size_t k = 0; k < file->facts().depth_s.size(); ++k) (void)file->Depth(k);
+    } catch (const DataError& error) {
+      EXPECT_STRNE(error.what(), "");
+      ++num_refused;
+    }
+  }
+  EXPECT_GT(num_refused, 100);
+}
+
+RecordedFacts FactsOf(const std::vector<Ros2Message>& messages) {
+  const std::vector<std::uint8_t> bytes = testing::InContainer(messages, Container::kMcapPlain);
+  return OpenRecordedFile(InMemory(bytes))->facts();
+}
+
+TEST(Ros2FactsTest, DepthInMetresKeepsItsUnitAndItsHoles) {
+  const std::vector<std::uint8_t> bytes =
+      testing::InContainer(Messages({.depth_encoding = "32FC1"}), Container::kDatabase);
+  const auto file = OpenRecordedFile(InMemory(bytes));
+  const double units_per_metre = file->facts().camera["depth_scale"];
+  const cv::Mat depth = file->Depth(3);
+  EXPECT_NEAR(depth.at<std::uint16_t>(5, 5) / units_per_metre, 1.503, 1e-4);
+  EXPECT_EQ(depth.at<std::uint16_t>(0, 0), 0);
+  EXPECT_EQ(depth.at<std::uint16_t>(0, 1), 0);
+}
+
+TEST(Ros2FactsTest, WithoutTransformsThatIsSaid) {
+  EXPECT_THAT(EnglishTexts(FactsOf(Messages({.frames = false})).warnings),
+              Contains(HasSubstr("where the depth camera is")));
+  std::vector<Ros2Message> ring = Messages({.frames = false});
+  ring.push_back({"/tf_static", "tf2_msgs/msg/TFMessage",
+                  testing::Ros2Transforms({{"camera_depth_optical_frame", "b", 1, 0, 0},
+                                           {"b", "camera_depth_optical_frame", 1, 0, 0}})});
+  EXPECT_THAT(EnglishTexts(FactsOf(ring).warnings),
+              Contains(HasSubstr("where the depth camera is")));
+}
+
+TEST(Ros2FactsTest, ImagesOfOneFrameAreOfOneCamera) {
+  std::vector<Ros2Message> messages = Messages({.frames = false});
+  for (Ros2Message& message : messages)
+    if (message.topic.find("/depth/image") != std::string::npos)
+      message.data = testing::Ros2Image(StampOf(0) + 1e-9 * static_cast<double>(message.time_ns),
+                                        "camera_color_optical_frame", "16UC1", kDepthWidth,
+                                        kDepthHeight, std::string(std::size_t{2} * 32 * 24, '\3'));
+  const RecordedFacts facts = FactsOf(messages);
+  EXPECT_EQ(facts.camera["T_color_depth"][3], 0.0);
+  EXPECT_THAT(EnglishTexts(facts.warnings), Not(Contains(HasSubstr("where the depth camera is"))));
+}
+
+TEST(Ros2FactsTest, AlignedDepthIsPreferredAndNeedsNoTransforms) {
+  std::vector<Ros2Message> messages = Messages({.frames = false});
+  for (int i = 0; i < kFrames; ++i)
+    messages.push_back(
+        {"/camera/aligned_depth_to_color/image_raw", "sensor_msgs/msg/Image",
+         testing::Ros2Image(StampOf(i), "camera_color_optical_frame", "16UC1", kWidth, kHeight,
+                            std::string(std::size_t{2} * 64 * 48, '\3'))});
+  messages.push_back({"/camera/aligned_depth_to_color/camera_info", "sensor_msgs/msg/CameraInfo",
+                      testing::Ros2Camera(60.25, 31.5, 23.25, kWidth, kHeight, {})});
+  const RecordedFacts facts = FactsOf(messages);
+  EXPECT_EQ(facts.camera["depth_registered"], 1);
+  EXPECT_EQ(facts.depth_s.size(), static_cast<std::size_t>(kFrames));
+}
+
+TEST(Ros2FactsTest, MessagesOutOfOrderAreSorted) {
+  std::vector<Ros2Message> messages = Messages();
+  std::swap(messages[messages.size() - 1], messages[messages.size() - 3]);
+  const RecordedFacts facts = FactsOf(messages);
+  ASSERT_EQ(facts.color_s.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_NEAR(facts.color_s.back(), StampOf(kFrames - 1), 1e-6);
+}
+
+TEST(Ros2FactsTest, ADatabaseWithALogOrPackedMessagesIsRead) {
+  std::vector<std::uint8_t> bytes = testing::AsDatabase(Messages(), true);
+  bytes[18] = bytes[19] = 2;  // As a recorder leaves it that kept a log of writes.
+  const auto file = OpenRecordedFile(InMemory(bytes));
+  EXPECT_EQ(file->Depth(1).at<std::uint16_t>(5, 5), 1501);
+}
+
+TEST(Ros2RefusalTest, AFolderOfRosIsReadByItsOneFile) {
+  const TempFolder folder;
+  WriteWholeFile(folder / "metadata.yaml", std::string_view("rosbag2_bagfile_information:\n"));
+  EXPECT_FALSE(IsImportable(folder.path()));
+  WriteWholeFile(folder / "sweep_0.db3", testing::AsDatabase(Messages()));
+  ASSERT_TRUE(IsImportable(folder.path()));
+  EXPECT_EQ(OpenImported(folder.path())->info().num_frames, kFrames);
+  WriteWholeFile(folder / "sweep_1.db3", testing::AsDatabase(Messages()));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenImported(folder.path()); }),
+              HasSubstr("ros2 bag convert"));
+}
+
+TEST(Ros2RefusalTest, WhatCannotBeReadIsNamed) {
+  std::vector<std::uint8_t> bytes = testing::InContainer(Messages(), Container::kMcapLz4);
+  bytes.resize(bytes.size() / 2);
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenRecordedFile(InMemory(bytes)); }),
+              AllOf(HasSubstr("cut off at byte"), HasSubstr("mcap recover")));
+  std::vector<std::uint8_t> other = testing::AsDatabase({});
+  const std::string_view table = "messages";  // In what SQLite keeps of each table.
+  for (auto at = other.begin();
+       (at = std::search(at, other.end(), table.begin(), table.end())) != other.end();)
+    *at = 'M';
+  for (auto at = other.begin();
+       (at = std::search(at, other.end(), table.begin() + 1, table.end())) != other.end();)
+    *at = 'x';
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenRecordedFile(InMemory(other)); }),
+              AllOf(HasSubstr("ROS 2"), HasSubstr("rtabmap-export")));
+  std::vector<Ros2Message> big_endian = Messages();
+  for (Ros2Message& message : big_endian) message.data[1] = '\0';
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)FactsOf(big_endian); }), HasSubstr("big-endian"));
+}
+
+}  // namespace
+}  // namespace plumb
