@@ -250,6 +250,9 @@ void ReadSensor(Section section, ApplianceConfig& appliance) {
   section.Take("driver", appliance.sensor_driver, say::config::ExpectedSensorDriver(),
                [](const std::string& s) { return !s.empty() && s.size() <= 64; });
   section.TakePath("socket", appliance.sensor_socket);
+  section.TakePath("library", appliance.sensor_library);
+  section.TakeNumber("exposure_us", appliance.sensor_exposure_us, 0, 33000,
+                     say::config::Microseconds());
   section.RejectUnknownKeys();
 }
 
@@ -439,6 +442,9 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("appliance.sensor_serial", in_use.appliance.sensor_serial, next.appliance.sensor_serial);
   keep("sensor.driver", in_use.appliance.sensor_driver, next.appliance.sensor_driver);
   keep("sensor.socket", in_use.appliance.sensor_socket, next.appliance.sensor_socket);
+  keep("sensor.library", in_use.appliance.sensor_library, next.appliance.sensor_library);
+  keep("sensor.exposure_us", in_use.appliance.sensor_exposure_us,
+       next.appliance.sensor_exposure_us);
   keep("button.chip", in_use.panel.button_chip, next.panel.button_chip);
   keep("button.line", in_use.panel.button_line, next.panel.button_line);
   keep("button.active_low", in_use.panel.button_active_low, next.panel.button_active_low);

@@ -28,7 +28,9 @@ struct ApplianceConfig {
   std::string sensor_serial;         ///< Use only this sensor; empty: the first one.
   std::string sensor_driver;         ///< Driver of the sensors; empty: the first of the build.
   std::filesystem::path sensor_socket =
-      "/run/plumb/sensor.sock";  ///< Where the driver "stream" listens.
+      "/run/plumb/sensor.sock";          ///< Where the driver "stream" listens.
+  std::filesystem::path sensor_library;  ///< Of the driver "realsense"; empty: the newest found.
+  double sensor_exposure_us = 0.0;       ///< Of colour during a scan; 0: automatic.
   /// Scans start from what earlier scans learned about this sensor unit.
   bool sensor_profiles = true;
   /// Limit for all scans; the oldest are removed first. Not set: a fraction of the disk.

@@ -11,6 +11,8 @@ namespace plumb {
   SensorSettings settings;
   settings.calibration_folder = config.appliance.calibration;
   settings.stream_socket = config.appliance.sensor_socket;
+  settings.library = config.appliance.sensor_library;
+  settings.exposure_us = config.appliance.sensor_exposure_us;
   settings.room_markers = config.markers.Or(settings.room_markers);
   return settings;
 }

@@ -195,7 +195,7 @@ std::optional<Frame> FileRecording::Next() {
   }
   const cv::Mat units = ReadImage(Kind::kDepth, frame.depth_time_s, last_depth_s_);
   frame.index = next_index_++;
-  frame.depth_m = stream::DepthInMetres(units, *hello_.camera.depth_scale);
+  frame.depth_m = DepthInMetres(units, *hello_.camera.depth_scale);
   if (registration_) frame.depth_m = registration_->Register(frame.depth_m);
   return frame;
 }

@@ -76,6 +76,14 @@ void FrameBox::SetFailed(bool failed) noexcept {
   changed_.notify_all();
 }
 
+void FrameBox::Fail(Message why) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!why_failed_) why_failed_ = std::move(why);
+  }
+  changed_.notify_all();
+}
+
 void FrameBox::Interrupt() noexcept {
   {
     const std::lock_guard lock(mutex_);
@@ -126,6 +134,7 @@ std::optional<FrameBox::Pair> FrameBox::Take() {
     NoteAbsence();
     if (interrupted_) return std::nullopt;
     if (lost_) throw DeviceLost(say::sensor::Unplugged(name_));
+    if (why_failed_) throw DeviceError(*why_failed_);
     if (failed_) throw DeviceError(say::sensor::DriverError(name_));
     if (std::min(absent_, std::max(longest_gap_, listened_ - last_arrival_)) >= stall_time_) {
       const auto absent = std::chrono::duration_cast<std::chrono::milliseconds>(

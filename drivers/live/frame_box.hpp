@@ -41,6 +41,7 @@ class FrameBox {
   void CountGaps(StreamKind kind, std::int64_t number);
   void Lose() noexcept;                  ///< The unit was unplugged for good.
   void SetFailed(bool failed) noexcept;  ///< The driver reports an error, or its end.
+  void Fail(Message why);                ///< For good: Take() throws a DeviceError with it.
   void Interrupt() noexcept;             ///< Cannot be undone.
   void Flush() noexcept;
   void KeepStamps(bool keep);  ///< Starts keeping stamps for StampsOf().
@@ -84,6 +85,7 @@ class FrameBox {
   int skip_ = 0;
   bool lost_ = false;
   bool failed_ = false;
+  std::optional<Message> why_failed_;
   bool interrupted_ = false;
 };
 

@@ -30,6 +30,10 @@ struct SensorSettings {
   std::filesystem::path calibration_folder = "/var/lib/plumb/calibration";
   /// Where the driver "stream" listens.
   std::filesystem::path stream_socket = "/run/plumb/sensor.sock";
+  /// Of the driver "realsense": file or name of its library; empty: the newest installed one.
+  std::filesystem::path library = {};
+  /// Exposure of colour images during a scan; 0: automatic.
+  double exposure_us = 0.0;
   /// Used where the calibration file states nothing.
   RoomMarkers room_markers = {};
   /// The value above describes the room: a calibration file that states other markers is
@@ -94,7 +98,7 @@ struct SensorDriver {
                                              const std::stop_token&, const SetUpProgress&)>
       set_up;
   /// May be empty. Must not throw.
-  std::function<std::vector<SensorFinding>()> examine = {};
+  std::function<std::vector<SensorFinding>(const SensorSettings&)> examine = {};
 };
 
 /// Opens a sensor as SensorProvider::Open() does, and checks what its driver states of it, so that

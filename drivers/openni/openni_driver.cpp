@@ -47,7 +47,9 @@ void ExamineUsb(std::vector<SensorFinding>& findings) {
                    : say::sensor::UsbSensorWithSpeed(sensor.model, id, sensor.bus, sensor.address,
                                                      sensor.speed);
       }();
-      if (const std::string sdk = SdkOf(sensor.vendor, sensor.product); !sdk.empty()) {
+      if (IsRealSense(sensor.vendor)) {
+        findings.push_back({State::kNote, say::sensor::Usb(), found, say::sensor::UseRealsense()});
+      } else if (const std::string sdk = SdkOf(sensor.vendor, sensor.product); !sdk.empty()) {
         findings.push_back({State::kNote, say::sensor::Usb(), found, say::stream::Deliver(sdk)});
       } else if (NeedsForeignDriver(sensor.vendor)) {
         findings.push_back({State::kNote, say::sensor::Usb(), found, say::sensor::ForeignDriver()});
@@ -83,7 +85,7 @@ void ExamineDrivers(std::vector<SensorFinding>& findings) {
   }
 }
 
-std::vector<SensorFinding> Examine() {
+std::vector<SensorFinding> Examine(const SensorSettings&) {
   std::vector<SensorFinding> findings;
   ExamineUsb(findings);
   ExamineDrivers(findings);

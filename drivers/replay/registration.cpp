@@ -18,8 +18,16 @@ constexpr double kOverlap =
 constexpr double kMinColorDepth_m = 0.05;
 constexpr double kMaxReach_px =
     8.0;  // of one sample; a colour image has at most a few times the resolution of its depth image
+constexpr int kSaturatedUnits = 65535;
 
 }  // namespace
+
+cv::Mat DepthInMetres(const cv::Mat& units, double units_per_metre) {
+  cv::Mat depth_m;
+  units.convertTo(depth_m, CV_32F, 1.0 / units_per_metre);
+  depth_m.setTo(0.0F, units == kSaturatedUnits);
+  return depth_m;
+}
 
 DepthRegistration::DepthRegistration(const Intrinsics& depth, const Intrinsics& color,
                                      const Pose& T_color_depth)

@@ -12,6 +12,9 @@
 
 namespace plumb {
 
+/// CV_32FC1 in metres of 16-bit depth; 0 and 65535 units are no measurement.
+[[nodiscard]] cv::Mat DepthInMetres(const cv::Mat& units, double units_per_metre);
+
 /// Projects each depth pixel forward onto the colour image, over the area that it covers there,
 /// with the nearest surface on top.
 ///

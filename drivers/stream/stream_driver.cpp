@@ -9,7 +9,6 @@
 #include "algo/base/errors.hpp"
 #include "drivers/live/boxed_sensor.hpp"
 #include "drivers/live/sensor_calibration.hpp"
-#include "drivers/replay/registration.hpp"
 #include "drivers/stream/feeder_server.hpp"
 #include "words/sensor.hpp"
 
@@ -39,31 +38,17 @@ class StreamSensor : public BoxedSensor {
  public:
   StreamSensor(const SensorSettings& settings, const Feeder& feeder, std::shared_ptr<FrameBox> box,
                std::shared_ptr<FeederServer> server)
-      : BoxedSensor(feeder.description, std::move(box)),
-        server_(std::move(server)),
-        units_per_metre_(feeder.hello.camera.depth_scale.value()) {
+      : BoxedSensor(feeder.description, std::move(box)), server_(std::move(server)) {
     SetInfo(InfoOf(settings, feeder));
+    std::optional<DepthRegistration> registration;
     if (const std::optional<DepthCamera>& depth = feeder.hello.camera.depth_camera)
-      registration_.emplace(depth->intrinsics, info().intrinsics, depth->T_color_depth);
-  }
-  [[nodiscard]] std::optional<Frame> Next() override {
-    std::optional<FrameBox::Pair> pair = box().Take();
-    if (!pair) return std::nullopt;
-    Frame frame;
-    frame.index = pair->index;
-    frame.color_time_s = 1e-6 * static_cast<double>(pair->images.color_us);
-    frame.depth_time_s = 1e-6 * static_cast<double>(pair->images.depth_us);
-    frame.color_rgb = std::move(pair->images.color);
-    frame.depth_m = stream::DepthInMetres(pair->images.depth, units_per_metre_);
-    if (registration_) frame.depth_m = registration_->Register(frame.depth_m);
-    return frame;
+      registration.emplace(depth->intrinsics, info().intrinsics, depth->T_color_depth);
+    SetDepth(feeder.hello.camera.depth_scale.value(), std::move(registration));
   }
   void LockExposure(bool locked) override { server_->Tell({{"lock_exposure", locked}}); }
 
  private:
   const std::shared_ptr<FeederServer> server_;
-  const double units_per_metre_;
-  std::optional<DepthRegistration> registration_;
 };
 
 class StreamProvider : public SensorProvider {

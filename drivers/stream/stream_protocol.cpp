@@ -19,7 +19,6 @@ using nlohmann::json;
 constexpr std::array kKeys = {"protocol", "version",      "name",   "serial",
                               "rate_hz",  "color_format", "camera", "recording"};
 constexpr std::size_t kMaxName = 64;
-constexpr std::uint16_t kSaturated = 65535;
 
 void CheckKeys(const json& hello) {
   for (const auto& entry : hello.items()) {
@@ -93,13 +92,6 @@ cv::Mat ImageFor(Kind kind, std::uint64_t size, const Hello& hello) {
                                camera.width, camera.height));
   }
   return cv::Mat(camera.height, camera.width, is_depth ? CV_16UC1 : CV_8UC3);
-}
-
-cv::Mat DepthInMetres(const cv::Mat& units, double units_per_metre) {
-  cv::Mat depth_m;
-  units.convertTo(depth_m, CV_32F, 1.0 / units_per_metre);
-  depth_m.setTo(0.0F, units == kSaturated);
-  return depth_m;
 }
 
 }  // namespace plumb::stream

@@ -70,7 +70,4 @@ struct Hello {
 /// @throws DataError if the size that the header states is another.
 [[nodiscard]] cv::Mat ImageFor(Kind kind, std::uint64_t size, const Hello& hello);
 
-/// CV_32FC1 in metres; 0 and 65535 units are no measurement.
-[[nodiscard]] cv::Mat DepthInMetres(const cv::Mat& units, double units_per_metre);
-
 }  // namespace plumb::stream

@@ -94,7 +94,8 @@ UsbSensor Describe(libusb_device* device, const libusb_device_descriptor& descri
   if (speed == LIBUSB_SPEED_LOW || speed == LIBUSB_SPEED_FULL) {
     sensor.problems.push_back(say::sensor::UsbSlow(sensor.speed));
   }
-  const bool needs_usb3 = !SdkOf(sensor.vendor, sensor.product).empty();
+  const bool needs_usb3 =
+      IsRealSense(sensor.vendor) || !SdkOf(sensor.vendor, sensor.product).empty();
   if (needs_usb3 && speed == LIBUSB_SPEED_HIGH)
     sensor.problems.push_back(say::stream::Usb2(sensor.speed));
   if (!needs_usb3 && BehindUsb3(device)) {
@@ -116,10 +117,11 @@ std::optional<std::string> UsbSensorModel(std::uint16_t vendor, std::uint16_t pr
 }
 
 std::string SdkOf(std::uint16_t vendor, std::uint16_t product) {
-  if (vendor == kIntel) return "librealsense2";
   if (vendor == kMicrosoft && product == 0x097c) return "libk4a";
   return {};
 }
+
+bool IsRealSense(std::uint16_t vendor) { return vendor == kIntel; }
 
 bool NeedsForeignDriver(std::uint16_t vendor) { return vendor != kPrimeSense; }
 

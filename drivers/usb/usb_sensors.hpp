@@ -28,8 +28,10 @@ struct UsbSensor {
 [[nodiscard]] std::optional<std::string> UsbSensorModel(std::uint16_t vendor,
                                                         std::uint16_t product);
 /// The maker's library by which a program delivers the frames of such a sensor to the driver
-/// "stream"; empty for sensors that have a driver of OpenNI2.
+/// "stream"; empty for sensors that have a driver.
 [[nodiscard]] std::string SdkOf(std::uint16_t vendor, std::uint16_t product);
+/// Of the driver "realsense".
+[[nodiscard]] bool IsRealSense(std::uint16_t vendor);
 /// Debian's OpenNI2 has no driver for sensors of this vendor: it comes from their maker.
 [[nodiscard]] bool NeedsForeignDriver(std::uint16_t vendor);
 

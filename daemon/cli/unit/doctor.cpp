@@ -15,9 +15,9 @@
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
-#include "daemon/cli/unit/burn_in.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
+#include "daemon/cli/unit/burn_in.hpp"
 #include "daemon/cli/unit/doctor_report.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/config/sensor_settings.hpp"
@@ -91,8 +91,9 @@ void CheckAttached(DoctorReport& report, const SensorDriver& driver, const Senso
 
 void CheckSensor(DoctorReport& report, const Config& config) try {
   const SensorDriver& driver = BuiltInSensors().Choose(config.appliance.sensor_driver, false);
+  const SensorSettings settings = SensorSettingsOf(config);
   if (driver.examine) {
-    for (const SensorFinding& finding : driver.examine()) {
+    for (const SensorFinding& finding : driver.examine(settings)) {
       if (finding.state == SensorFinding::State::kGood)
         report.Good(finding.what, finding.found);
       else if (finding.state == SensorFinding::State::kNote)
@@ -101,7 +102,6 @@ void CheckSensor(DoctorReport& report, const Config& config) try {
         report.Bad(finding.what, finding.found, finding.remedy);
     }
   }
-  const SensorSettings settings = SensorSettingsOf(config);
   try {
     CheckAttached(report, driver, settings, config.appliance.sensor_serial);
   } catch (const DeviceError& error) {

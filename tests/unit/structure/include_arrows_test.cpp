@@ -56,6 +56,8 @@ const Arrows kAllowed = {
     {"drivers/files", {"algo/base"}},
     {"drivers/replay", {"algo/base", "algo/types", "drivers/files"}},
     {"drivers/stream", {"algo/base", "drivers", "drivers/files", "drivers/replay", "drivers/live"}},
+    {"drivers/realsense",
+     {"algo/base", "algo/types", "drivers/live", "drivers/replay", "drivers/usb"}},
     {"drivers/importers",
      {"algo/base", "algo/types", "drivers", "drivers/files", "drivers/replay", "drivers/stream"}},
     {"drivers/dicom", {"algo/base", "algo/types", "drivers", "drivers/files"}},
