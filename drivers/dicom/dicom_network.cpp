@@ -36,7 +36,7 @@ std::unique_ptr<DcmTransportLayer> MakeDicomTls(const DicomTlsFiles& files, Dico
   if (!layer->checkPrivateKeyMatchesCertificate())
     throw DataError(say::dicom::TlsPair(files.key, files.certificate));
   check(layer->addTrustedCertificateFile(files.trusted.c_str(), DCF_Filetype_PEM), files.trusted);
-  check(layer->setTLSProfile(TSP_Profile_BCP195), files.certificate);
+  check(layer->setTLSProfile(TSP_Profile_BCP195_ND), files.certificate);
   check(layer->activateCipherSuites(), files.certificate);
   layer->setCertificateVerification(DCV_requireCertificate);
   return layer;
