@@ -105,6 +105,7 @@ constexpr auto kCommands = std::to_array<CommandEntry>({
      AddImportDicom},
     {"export-dicom", "Write a result, its pictures and the scanned surface as DICOM files",
      AddExportDicom},
+    {"send-dicom", "Send DICOM files to an archive or another node (C-STORE)", AddSendDicom},
     {"evaluate",
      "Measure the accuracy on a suite of recordings with truth, and show the paper's table",
      AddEvaluate},

@@ -52,6 +52,7 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddImport(CLI::App& app);
 [[nodiscard]] Command AddImportDicom(CLI::App& app);
 [[nodiscard]] Command AddExportDicom(CLI::App& app);
+[[nodiscard]] Command AddSendDicom(CLI::App& app);
 [[nodiscard]] Command AddEvaluate(CLI::App& app);
 [[nodiscard]] Command AddRecord(CLI::App& app);
 [[nodiscard]] Command AddMarkers(CLI::App& app);

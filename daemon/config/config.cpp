@@ -21,6 +21,7 @@
 #include "algo/base/units.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/config/config_section.hpp"
+#include "daemon/config/dicom_settings.hpp"
 #include "daemon/config/toml.hpp"
 #include "words/config.hpp"
 
@@ -40,21 +41,6 @@ std::string ReadText(const std::filesystem::path& file, const Message& what) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw DataError(say::config::CannotOpen(what, file.string()));
   return {std::istreambuf_iterator<char>(in), {}};
-}
-
-/// TOML has no control characters except tab and line ends. A file that lost its content in a power
-/// cut is often full of zero bytes.
-bool IsControl(char c) {
-  return (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7f;
-}
-
-void RefuseControlCharacters(const std::string& text, const std::string& name) {
-  std::int64_t line = 1;
-  for (const char c : text) {
-    line += c == '\n' ? 1 : 0;
-    if (IsControl(c))
-      throw DataError(say::config::ControlCharacter(name, line, static_cast<unsigned char>(c)));
-  }
 }
 
 void ReadMarkers(Section section, StatedMarkers& markers) {
@@ -355,18 +341,11 @@ PageTransport TransportOf(const WebConfig& web, bool is_loopback) {
   return web.plain_http ? PageTransport::kPlainOnNetwork : PageTransport::kOwnTls;
 }
 
-toml::table ParseToml(const std::string& text, const std::string& name) try {
-  RefuseControlCharacters(text, name);
-  return toml::parse(text, name);
-} catch (const toml::parse_error& error) {
-  throw DataError(say::config::NotToml(name, error.source().begin.line, error.description()));
-}
-
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
   const toml::table root = ParseToml(text, name);
   RejectUnknownTables(root, name,
                       {"markers", "reconstruct", "compare", "check", "iec", "appliance", "storage",
-                       "sensor", "button", "light", "monitor", "web", "update"});
+                       "sensor", "button", "light", "monitor", "web", "update", "dicom"});
   Config config;
   config.given = GivenIn(root);
   ReadMarkers(Section(root, "markers", name), config.markers);
@@ -381,6 +360,7 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
   ReadMonitor(Section(root, "monitor", name), config.panel);
   ReadWeb(Section(root, "web", name), config.web);
   ReadUpdate(Section(root, "update", name), config.update);
+  (void)ReadDicomSettings(Section(root, "dicom", name));  // of plumb-dicomd: only checked
   return config;
 }
 

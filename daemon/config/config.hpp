@@ -147,6 +147,7 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///     [monitor]      gate_chip, gate_line, gate_active_low
 ///     [web]          listen, tls_certificate, tls_key, plain_http, host_names, metrics_token_file
 ///     [update]       folder, max_bundle_mb
+///     [dicom]        (checked only; dicom_settings.hpp)
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed
 /// is an error.

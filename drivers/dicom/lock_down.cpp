@@ -47,6 +47,48 @@ constexpr auto kAllowed = std::to_array<unsigned>({
 #endif
 });
 
+constexpr auto kTraffic = std::to_array<unsigned>({
+    SYS_sendto,
+    SYS_recvfrom,
+    SYS_sendmsg,
+    SYS_recvmsg,
+    SYS_shutdown,
+    SYS_setsockopt,
+    SYS_getsockopt,
+    SYS_pselect6,
+    SYS_getpeername,
+    SYS_getsockname,
+    SYS_fcntl,
+    SYS_uname,
+#ifdef SYS_select
+    SYS_select,
+#endif
+});
+constexpr auto kConnecting = std::to_array<unsigned>({SYS_socket, SYS_connect});
+constexpr auto kStoring = std::to_array<unsigned>({
+    SYS_openat,
+    SYS_newfstatat,
+    SYS_renameat2,
+    SYS_unlinkat,
+    SYS_fsync,
+    SYS_getdents64,
+    SYS_umask,
+    SYS_faccessat,
+    SYS_statx,
+    SYS_writev,
+    SYS_ftruncate,
+#ifdef SYS_rename
+    SYS_open,
+    SYS_stat,
+    SYS_lstat,
+    SYS_access,
+    SYS_rename,
+    SYS_unlink,
+#else
+    SYS_renameat,
+#endif
+});
+
 sock_filter Load(std::size_t offset) {
   return BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<unsigned>(offset));
 }
@@ -58,17 +100,23 @@ sock_filter UnlessSkip(unsigned value) { return BPF_JUMP(BPF_JMP | BPF_JEQ | BPF
 
 }  // namespace
 
-void LockDown() {
+void LockDown([[maybe_unused]] Allowed allowed) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   // The sanitizers' own work needs more.
 #else
   std::vector<sock_filter> filter = {
       Load(offsetof(seccomp_data, arch)), BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kArchitecture, 1, 0),
       Return(SECCOMP_RET_KILL_PROCESS), Load(offsetof(seccomp_data, nr))};
-  for (const unsigned call : kAllowed) {
-    filter.push_back(UnlessSkip(call));
-    filter.push_back(Return(SECCOMP_RET_ALLOW));
-  }
+  const auto allow = [&](const auto& calls) {
+    for (const unsigned call : calls) {
+      filter.push_back(UnlessSkip(call));
+      filter.push_back(Return(SECCOMP_RET_ALLOW));
+    }
+  };
+  allow(kAllowed);
+  if (allowed != Allowed::kComputing) allow(kTraffic);
+  if (allowed == Allowed::kNetwork) allow(kConnecting);
+  if (allowed == Allowed::kStore) allow(kStoring);
   filter.push_back(Return(SECCOMP_RET_ERRNO | EPERM));
   const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
   if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||

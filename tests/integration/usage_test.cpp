@@ -54,6 +54,11 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
       {"import-dicom", "structures.dcm", "plan.dcm"},
       {"export-dicom", "result", "--reference", "a", "--current", "b"},
       {"export-dicom", "result", "--reference", "a", "--out", "x"},
+      {"send-dicom", "a.dcm"},
+      {"send-dicom", "a.dcm", "--to", "ARCHIVE"},
+      {"send-dicom", "a.dcm", "--to", "ARCHIVE@host:0"},
+      {"send-dicom", "a.dcm", "--to", "ARCHIVE@host:104", "--from", "SEVENTEEN-LETTERS"},
+      {"send-dicom", "a.dcm", "--to", "ARCHIVE@host:104", "--tls-key", "k.pem"},
       {"simulate", "--suite", "ct", "--out", "x", "--ct-quirk", "fax"},
       {"info"},
       {"info", "a", "--verbose"}};

@@ -89,6 +89,11 @@ files_are_there() {
     plumbd/usr/lib/tmpfiles.d/plumb.conf; do
     [ -s "tree/$file" ] || { echo "missing: $file"; bad=1; }
   done
+  for file in bin/plumb-dicomd lib/plumb/plumb-dicom-{reader,sender,writer} \
+    lib/sysusers.d/plumb-dicom.conf; do
+    [ -s "tree/plumb-dicom/usr/$file" ] || { echo "missing: $file"; bad=1; }
+  done
+  [ -s tree/plumb-dicom/lib/systemd/system/plumb-dicomd.service ] || { echo "no unit"; bad=1; }
   grep -q '^ExecStart=/usr/bin/plumbd' tree/plumbd/lib/systemd/system/plumbd.service ||
     { echo "the unit starts another program"; bad=1; }
   return $bad

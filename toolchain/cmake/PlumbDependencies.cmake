@@ -27,6 +27,13 @@ if(PLUMB_WITH_DICOM)
     find_library(PLUMB_DCMTK_${part} ${part} REQUIRED)
     target_link_libraries(plumb_dcmtk INTERFACE ${PLUMB_DCMTK_${part}})
   endforeach()
+  # The part that speaks over a network.
+  add_library(plumb_dcmtk_network INTERFACE)
+  foreach(part dcmtls dcmnet)
+    find_library(PLUMB_DCMTK_${part} ${part} REQUIRED)
+    target_link_libraries(plumb_dcmtk_network INTERFACE ${PLUMB_DCMTK_${part}})
+  endforeach()
+  target_link_libraries(plumb_dcmtk_network INTERFACE plumb_dcmtk)
 endif()
 
 # Digests, of the command line too.

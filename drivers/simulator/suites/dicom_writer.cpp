@@ -85,7 +85,9 @@ std::string WholeFile(const PlanningFile& file, const std::string& data) {
 std::string Head(const PlanningFile& file, const char* modality) {
   return Value(0x00080005, "CS", "ISO_IR 192") + Value(0x00080016, "UI", file.class_uid) +
          Value(0x00080018, "UI", file.instance_uid) + Value(0x00080060, "CS", modality) +
-         Value(0x00100010, "PN", file.patient_name) + Value(0x00100020, "LO", file.patient_id);
+         Value(0x00100010, "PN", file.patient_name) + Value(0x00100020, "LO", file.patient_id) +
+         // Archives take nothing without a study and a series.
+         Value(0x0020000D, "UI", "2.25.1309") + Value(0x0020000E, "UI", file.instance_uid + ".1");
 }
 
 std::string DateOf(const PlanningFile& file) { return file.date.substr(0, 8); }

@@ -445,5 +445,27 @@ TEST_F(RegionTest, RefusesWhatIsNoRegion) {
   EXPECT_THROW((void)ReadRegion("/nonexistent.json"), DataError);
 }
 
+TEST(ConfigTest, ReceivingDicomNeedsKnownSendersAndTlsOrAPrivateAddress) {
+  const std::string known = "[dicom]\nenabled = true\nsenders = [\"TPS@10.1.2.3\"]\n";
+  EXPECT_EQ(ErrorOf("[dicom]\n"), "no error");
+  EXPECT_EQ(ErrorOf(known + "listen = \"192.168.1.20:11112\"\n"), "no error");
+  EXPECT_THAT(ErrorOf(known), HasSubstr("needs dicom.listen"));
+  EXPECT_THAT(ErrorOf("[dicom]\nenabled = true\nlisten = \"10.0.0.1:11112\"\n"),
+              HasSubstr("needs dicom.senders"));
+  for (const char* open : {"0.0.0.0", "[::]", "8.8.8.8", "172.32.0.1", "[2001:db8::1]"})
+    EXPECT_THAT(ErrorOf(known + fmt::format("listen = \"{}:11112\"\n", open)),
+                HasSubstr("without TLS"))
+        << open;
+  const std::string tls = "tls_certificate = \"/c\"\ntls_key = \"/k\"\n";
+  EXPECT_THAT(ErrorOf(known + tls + "listen = \"0.0.0.0:11112\"\n"), HasSubstr("all three"));
+  EXPECT_EQ(ErrorOf(known + tls + "tls_trusted = \"/t\"\nlisten = \"0.0.0.0:11112\"\n"),
+            "no error");
+  for (const char* wrong : {"TPS", "@10.0.0.1", "TPS@host", "SEVENTEEN-LETTERS@10.0.0.1"})
+    EXPECT_THAT(ErrorOf(fmt::format("[dicom]\nsenders = [\"{}\"]\n", wrong)),
+                HasSubstr("dicom.senders"))
+        << wrong;
+  EXPECT_THAT(ErrorOf("[dicom]\nport = 104\n"), HasSubstr("port"));
+}
+
 }  // namespace
 }  // namespace plumb

@@ -91,8 +91,8 @@ const Arrows kAllowed = {
 
     {"daemon/loop", {}},
     {"daemon/config",
-     {"algo/base", "algo/types", "algo/reconstruction", "algo/comparison", "drivers/live",
-      "daemon/files"}},
+     {"algo/base", "algo/types", "algo/reconstruction", "algo/comparison", "drivers/files",
+      "drivers/live", "daemon/files"}},
     {"daemon/pipeline",
      {"algo/base", "algo/types", "algo/reconstruction", "algo/acceptance", "drivers/replay",
       "daemon/loop"}},
@@ -105,6 +105,7 @@ const Arrows kAllowed = {
     {"daemon/dicom",
      {"algo/base", "algo/planning", "drivers/dicom", "drivers/files", "daemon/files",
       "daemon/scan_files", "daemon/result"}},
+    {"daemon/dicomd", {"algo/base", "drivers/files", "daemon/config"}},
     {"daemon/sheets", {"algo/base", "algo/types", "algo/comparison"}},
     {"daemon/scan_files", {"algo/base", "drivers/files"}},
     {"daemon/database",
@@ -172,7 +173,9 @@ const Arrows kAllowed = {
     {"daemon/python",
      {"algo/base", "algo/types", "algo/comparison", "drivers/replay", "daemon/config",
       "daemon/pipeline", "daemon/files", "daemon/evaluation"}},
-    {"daemon", {"algo/base", "daemon/loop", "daemon/config", "daemon/plumbd", "daemon/cli"}},
+    {"daemon",
+     {"algo/base", "drivers/dicom", "daemon/loop", "daemon/config", "daemon/plumbd", "daemon/cli",
+      "daemon/dicomd"}},
 };
 
 struct Include {
