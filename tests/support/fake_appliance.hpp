@@ -174,6 +174,7 @@ class FakeAppliance : public web::BackgroundWork,
                    Done done) override;
   std::function<std::filesystem::path(const web::SentPlanning&)> import_planning;
   web::SentPlanning sent_planning;  ///< The last one.
+  Message planning_doubt;  ///< Why the files may be another patient's; empty: they are not.
   void PlanReference(const Actor& actor, const std::string& id, int revision,
                      const ReferencePlan& plan, Done done) override;
   /// Cautions are asked for where a test judges the quality.

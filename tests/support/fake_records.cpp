@@ -358,6 +358,10 @@ void FakeAppliance::AddPlanning(const Actor& actor, const std::string& patient_i
   } catch (const DataError& error) {
     return Finish(done, Refused(ChangeResult::kInvalid, error.message()));
   }
+  if (!planning_doubt.empty() && !sent.is_same_patient)
+    return Finish(done, Refused(ChangeResult::kConflict, planning_doubt));
+  if (!planning_doubt.empty() && sent.reason.empty())
+    return Finish(done, Refused(ChangeResult::kConflict, say::store::PlanningNeedsReason()));
   Scan scan;
   scan.id = fmt::format("ct{:04}", next_id_++);
   scan.patient_id = patient_id;

@@ -345,6 +345,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     check.num_markers = 12;
     service.next_check = check;
   }
+  if (name == "foreignfiles") service.planning_doubt = say::store::PlanningPatientDiffers(1);
   if (name == "stranger") service.next_recorded = recorder.Once(name, Stranger);
   if (name == "across") service.next_recorded = recorder.RecordAcross();
   if (name == "room") {
@@ -524,12 +525,12 @@ void ServePlanning(FakeAppliance& service, const fs::path& root) {
     SplitPlanning(sent.file, sent.structures_bytes, folder / "plan.dcm");
     PlanningChoice choice;
     if (!sent.roi.empty()) choice.roi = sent.roi;
-    const Scene read = ReadPlanning({.structures = sent.file,
-                                     .plan = folder / "plan.dcm",
-                                     .structures_name = "STRUCTURES",
-                                     .plan_name = "PLAN"},
-                                    choice);
-    WriteScene(read, folder / "scene");
+    const ReadPlan read = ReadPlanning({.structures = sent.file,
+                                        .plan = folder / "plan.dcm",
+                                        .structures_name = "STRUCTURES",
+                                        .plan_name = "PLAN"},
+                                       choice);
+    WriteScene(read.scene, folder / "scene");
     return folder;
   };
 }

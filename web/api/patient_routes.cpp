@@ -163,7 +163,8 @@ SentPlanning ParsePlanning(const Request& request) {
                     .structures_bytes = 0,
                     .roi = text("roi", kMaxPlanningName),
                     .beam = text("isocentre_of", kMaxPlanningName),
-                    .reason = text("reason", kMaxReason)};
+                    .reason = text("reason", kMaxReason),
+                    .is_same_patient = text("same_patient", 3) == "yes"};
   const auto number = ParseNumber<std::uint64_t>(bytes);
   if (!number || *number > kMaxPlanningFile)
     throw DataError(
