@@ -20,6 +20,12 @@ std::string HexOfKeyed(std::string_view key, std::string_view text) {
 
 }  // namespace
 
+std::string MakePatientKey() {
+  std::string key(kPatientKeyBytes, '\0');
+  randombytes_buf(key.data(), key.size());
+  return key;
+}
+
 std::string PatientHash(std::string_view key, std::string_view patient_id) {
   static_assert(kPatientKeyBytes == crypto_auth_hmacsha256_KEYBYTES);
   const std::size_t first = patient_id.find_first_not_of(' ');

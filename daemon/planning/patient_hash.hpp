@@ -9,6 +9,8 @@
 namespace plumb {
 
 inline constexpr std::size_t kPatientKeyBytes = 32;
+/// A random one.
+[[nodiscard]] std::string MakePatientKey();
 
 /// Keyed hash of a Patient ID, with a mark of the key; spaces around the ID do not count, as in
 /// DICOM. Without the key, IDs of few digits cannot be found by trying them all.

@@ -18,7 +18,6 @@
 #include "daemon/result/posture_doubt.hpp"
 #include "daemon/result/scan_quality.hpp"
 #include "daemon/unit/page_identity.hpp"
-#include "web/security/secrets.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
 #include "words/upkeep.hpp"
@@ -57,9 +56,19 @@ class WebPatients final : public web::PatientService {
 
   void ChangePatient(const Actor& actor, const std::string& id, const CourseNotes& wanted,
                      const std::optional<CourseNotes>& shown, Done done) override {
-    store_.Write(&Store::patients, std::move(done), [=](PatientStore& patients) {
-      patients.Change(actor, id, wanted.site, wanted.note, shown);
-    });
+    store_.Write(&Store::patients, std::move(done),
+                 [=](PatientStore& patients) { patients.Change(actor, id, wanted, shown); });
+  }
+
+  std::optional<std::string> Photo(const std::string& id) override {
+    return store_.Read(&Store::patients,
+                       [&](PatientStore& patients) { return patients.Photo(id); });
+  }
+
+  void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
+                Done done) override {
+    store_.Write(&Store::patients, std::move(done),
+                 [=](PatientStore& patients) { patients.SetPhoto(actor, id, jpeg); });
   }
 
   void ArchivePatient(const Actor& actor, const std::string& id, bool archived,
@@ -208,9 +217,7 @@ struct PlanningImport {
                                                .plan_name = "PLAN"},
                                               choice);
       std::filesystem::remove(plan);  // it names the patient
-      patient_hash =
-          PatientHash(ReadOrMakeSecret(key_file, [] { return web::RandomBytes(kPatientKeyBytes); }),
-                      patient_id);
+      patient_hash = PatientHash(ReadOrMakeSecret(key_file, MakePatientKey), patient_id);
       CompareWithEarlierPlan(earlier, scene);
       posture = scene.planning->posture;
       WriteScene(scene, staging / "scene");
@@ -296,147 +303,147 @@ class WebReferences final : public web::ReferenceService {
     auto import = std::make_shared<PlanningImport>();
     const auto staging = [](Store& store) { return store.folders.Staging("planning"); };
     import->staging = store_.Read(staging);
-    import->key_file =
-        store_.Read([](Store& store) { return store.folders.state() / kPatientKeyFile;
-  });
-  import->earlier = EarlierPlanning(patient_id);
-  const auto work = [import, sent] { import->Read(sent); };
-  const auto read = [=, this, plan = DefaultPlan(settings)]() mutable {
-    if (import->refusal) return done(*import->refusal);
-    const Message doubt = WhyOtherPatient(patient_id, import->patient_hash);
-    if (!doubt.empty() && !sent.is_same_patient) return done(AnswerOf(doubt));
-    if (!doubt.empty() && sent.reason.empty())
-      return done(AnswerOf(say::store::PlanningNeedsReason()));
-    plan.posture = Name(import->posture);
-    plan.isocentre_m = {0, 0, 0};
-    plan.couch_markers = false;
-    const ReferenceOrigin origin{.source = ReferenceSource::kPlanningCt,
-                                 .patient_hash = import->patient_hash,
-                                 .confirmed = doubt};
-    const Done stored = Stored(actor, plan, sent.reason, origin, done);
-    store_.Write(&Store::scans, stored, [=](ScanStore& scans) {
-      return scans.AddMade({.patient_id = patient_id,
-                            .reference_id = {},
-                            .purpose = ScanPurpose::kReference,
-                            .sensor_serial = {},
-                            .reason = sent.reason},
-                           import->staging);
-    });
-  };
-  if (!background_.RunInBackground(web::BackgroundPool::kFiles, work, read))
-    done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
-}
+    const auto state = [](Store& store) { return store.folders.state(); };
+    import->key_file = store_.Read(state) / kPatientKeyFile;
+    import->earlier = EarlierPlanning(patient_id);
+    const auto work = [import, sent] { import->Read(sent); };
+    const auto read = [=, this, plan = DefaultPlan(settings)]() mutable {
+      if (import->refusal) return done(*import->refusal);
+      const Message doubt = WhyOtherPatient(patient_id, import->patient_hash);
+      if (!doubt.empty() && !sent.is_same_patient) return done(AnswerOf(doubt));
+      if (!doubt.empty() && sent.reason.empty())
+        return done(AnswerOf(say::store::PlanningNeedsReason()));
+      plan.posture = Name(import->posture);
+      plan.isocentre_m = {0, 0, 0};
+      plan.couch_markers = false;
+      const ReferenceOrigin origin{.source = ReferenceSource::kPlanningCt,
+                                   .patient_hash = import->patient_hash,
+                                   .confirmed = doubt};
+      const Done stored = Stored(actor, plan, sent.reason, origin, done);
+      store_.Write(&Store::scans, stored, [=](ScanStore& scans) {
+        return scans.AddMade({.patient_id = patient_id,
+                              .reference_id = {},
+                              .purpose = ScanPurpose::kReference,
+                              .sensor_serial = {},
+                              .reason = sent.reason},
+                             import->staging);
+      });
+    };
+    if (!background_.RunInBackground(web::BackgroundPool::kFiles, work, read))
+      done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
+  }
 
   void PlanReference(const Actor& actor, const std::string& id, int revision,
                      const ReferencePlan& plan, Done done) override {
-  if (const auto planning = PlanningOf(FindReference(id))) {
-    const bool is_same = plan.posture == Name(planning->posture) && !plan.couch_markers &&
-                         plan.isocentre_m == std::array<double, 3>{0, 0, 0};
-    if (!is_same) return done(Refused(ChangeResult::kInvalid, say::scan::PlanningIsFixed()));
-  }
-  store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
-    const std::string planned = references.Plan(actor, id, revision, plan);
-    return planned == id ? std::string() : planned;  // only a new version was made
-  });
-}
-
-void ApproveReference(const Actor& actor, const std::string& id, int revision,
-                      const std::string& digest, const web::Considered& considered,
-                      Done done) override {
-  const std::optional<Reference> reference = FindReference(id);
-  const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
-  // What no sensor took needs neither a checked room nor a warm sensor.
-  const bool is_sweep = !PlanningOf(reference);
-  if (is_sweep && RefuseIf(references_.WhyNot(scan), done)) return;
-  if (is_sweep && scan && considered.reason.empty() &&
-      !QualityOf(*scan, FilesOf(*scan), references_.warm_up_min()).cautions.empty())
-    return done(AnswerOf(say::store::ReferenceNeedsReason()));
-  const auto contradicts = std::make_shared<bool>(false);
-  const auto work = [=, this] {
-    try {
-      if (is_sweep && reference) *contradicts = ContradictsItsPosture(*reference);
-    } catch (const std::exception& error) {  // Approve() compares every file, and says it
-      Log(LogLevel::kError,
-          fmt::format("cannot read the scene of reference {}: {}", id, error.what()));
+    if (const auto planning = PlanningOf(FindReference(id))) {
+      const bool is_same = plan.posture == Name(planning->posture) && !plan.couch_markers &&
+                           plan.isocentre_m == std::array<double, 3>{0, 0, 0};
+      if (!is_same) return done(Refused(ChangeResult::kInvalid, say::scan::PlanningIsFixed()));
     }
-  };
-  const auto approve = [=, this] {
-    if (*contradicts && !considered.posture) return done(AnswerOf(say::store::ReferencePosture()));
-    store_.Write(&Store::references, done, [=](ReferenceStore& references) {
-      references.Approve(actor, id, revision, digest, /*two_users=*/true, considered.reason,
-                         /*posture_confirmed=*/*contradicts);
+    store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
+      const std::string planned = references.Plan(actor, id, revision, plan);
+      return planned == id ? std::string() : planned;  // only a new version was made
     });
-  };
-  if (!background_.RunInBackground(web::BackgroundPool::kReads, work, approve))
-    done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
-}
-
-private:
-/// Whether the surface speaks against the planned posture. Reads the whole scene.
-bool ContradictsItsPosture(const Reference& reference) {
-  const std::optional<Scan> scan = ScanOf(reference.scan_id);
-  const auto posture = Named<PatientPosture>(reference.plan.posture);
-  if (!posture || !scan || scan->folder.empty()) return false;
-  const Scene scene = ReadScene(scan->folder / "scene");
-  const std::optional<Pose> room = room_.AxesIn(scene.markers);
-  return room && ContradictsPosture(scene, *room, *posture);
-}
-
-std::optional<Scan> ScanOf(const std::string& scan_id) {
-  return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
-}
-
-/// The plan that a reference was imported from; nothing for a sweep.
-std::optional<PlanningSource> PlanningOf(const std::optional<Reference>& reference) {
-  const auto scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
-  if (!scan || scan->folder.empty() || !scan->sensor_serial.empty()) return std::nullopt;
-  return ReadStoredScene(scan->folder / "scene").scene.planning;
-}
-
-/// What speaks against these files being this patient's; empty: nothing.
-Message WhyOtherPatient(const std::string& patient_id, const std::string& hash) {
-  const KnownPlanning known = store_.Read(&Store::references, [&](ReferenceStore& references) {
-    return references.PlanningOf(patient_id, hash);
-  });
-  if (!known.other_code.empty()) return say::store::PlanningPatientOf(known.other_code);
-  if (known.version == 0) return {};
-  switch (ComparePatientHashes(known.patient_hash, hash)) {
-    case SamePatient::kSame:
-      return {};
-    case SamePatient::kOther:
-      return say::store::PlanningPatientDiffers(known.version);
-    case SamePatient::kUnknown:
-      return say::store::PlanningPatientUnknown(known.version);
   }
-  return {};
-}
 
-/// Scene folder of the newest reference of this patient; empty if it has none.
-std::filesystem::path EarlierPlanning(const std::string& patient_id) {
-  const std::vector<Reference> all = References(patient_id);
-  const auto scan = all.empty() ? std::optional<Scan>() : ScanOf(all.front().scan_id);
-  return scan && !scan->folder.empty() ? scan->folder / "scene" : std::filesystem::path();
-}
+  void ApproveReference(const Actor& actor, const std::string& id, int revision,
+                        const std::string& digest, const web::Considered& considered,
+                        Done done) override {
+    const std::optional<Reference> reference = FindReference(id);
+    const std::optional<Scan> scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
+    // What no sensor took needs neither a checked room nor a warm sensor.
+    const bool is_sweep = !PlanningOf(reference);
+    if (is_sweep && RefuseIf(references_.WhyNot(scan), done)) return;
+    if (is_sweep && scan && considered.reason.empty() &&
+        !QualityOf(*scan, FilesOf(*scan), references_.warm_up_min()).cautions.empty())
+      return done(AnswerOf(say::store::ReferenceNeedsReason()));
+    const auto contradicts = std::make_shared<bool>(false);
+    const auto work = [=, this] {
+      try {
+        if (is_sweep && reference) *contradicts = ContradictsItsPosture(*reference);
+      } catch (const std::exception& error) {  // Approve() compares every file, and says it
+        Log(LogLevel::kError,
+            fmt::format("cannot read the scene of reference {}: {}", id, error.what()));
+      }
+    };
+    const auto approve = [=, this] {
+      if (*contradicts && !considered.posture)
+        return done(AnswerOf(say::store::ReferencePosture()));
+      store_.Write(&Store::references, done, [=](ReferenceStore& references) {
+        references.Approve(actor, id, revision, digest, /*two_users=*/true, considered.reason,
+                           /*posture_confirmed=*/*contradicts);
+      });
+    };
+    if (!background_.RunInBackground(web::BackgroundPool::kReads, work, approve))
+      done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
+  }
 
-/// What follows once the scene is a scan: the draft made of it.
-Done Stored(const Actor& actor, const ReferencePlan& plan, const std::string& reason,
-            const ReferenceOrigin& origin, Done done) {
-  return [=, this, done = std::move(done)](const Change& change) {
-    if (change.result != ChangeResult::kDone) return done(change);
-    store_.Write(&Store::references, done, [=, scan = change.id](ReferenceStore& references) {
-      return references.Add(actor, scan, reason, plan, origin);
+ private:
+  /// Whether the surface speaks against the planned posture. Reads the whole scene.
+  bool ContradictsItsPosture(const Reference& reference) {
+    const std::optional<Scan> scan = ScanOf(reference.scan_id);
+    const auto posture = Named<PatientPosture>(reference.plan.posture);
+    if (!posture || !scan || scan->folder.empty()) return false;
+    const Scene scene = ReadScene(scan->folder / "scene");
+    const std::optional<Pose> room = room_.AxesIn(scene.markers);
+    return room && ContradictsPosture(scene, *room, *posture);
+  }
+
+  std::optional<Scan> ScanOf(const std::string& scan_id) {
+    return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
+  }
+
+  /// The plan that a reference was imported from; nothing for a sweep.
+  std::optional<PlanningSource> PlanningOf(const std::optional<Reference>& reference) {
+    const auto scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
+    if (!scan || scan->folder.empty() || !scan->sensor_serial.empty()) return std::nullopt;
+    return ReadStoredScene(scan->folder / "scene").scene.planning;
+  }
+
+  /// What speaks against these files being this patient's; empty: nothing.
+  Message WhyOtherPatient(const std::string& patient_id, const std::string& hash) {
+    const KnownPlanning known = store_.Read(&Store::references, [&](ReferenceStore& references) {
+      return references.PlanningOf(patient_id, hash);
     });
-  };
-}
+    if (!known.other_code.empty()) return say::store::PlanningPatientOf(known.other_code);
+    if (known.version == 0) return {};
+    switch (ComparePatientHashes(known.patient_hash, hash)) {
+      case SamePatient::kSame:
+        return {};
+      case SamePatient::kOther:
+        return say::store::PlanningPatientDiffers(known.version);
+      case SamePatient::kUnknown:
+        return say::store::PlanningPatientUnknown(known.version);
+    }
+    return {};
+  }
 
-const ReferenceGate& references_;
-const CurrentSession& session_;
-const RoomInUse& room_;
-StoreAccess& store_;
-web::BackgroundWork& background_;
+  /// Scene folder of the newest reference of this patient; empty if it has none.
+  std::filesystem::path EarlierPlanning(const std::string& patient_id) {
+    const std::vector<Reference> all = References(patient_id);
+    const auto scan = all.empty() ? std::optional<Scan>() : ScanOf(all.front().scan_id);
+    return scan && !scan->folder.empty() ? scan->folder / "scene" : std::filesystem::path();
+  }
+
+  /// What follows once the scene is a scan: the draft made of it.
+  Done Stored(const Actor& actor, const ReferencePlan& plan, const std::string& reason,
+              const ReferenceOrigin& origin, Done done) {
+    return [=, this, done = std::move(done)](const Change& change) {
+      if (change.result != ChangeResult::kDone) return done(change);
+      store_.Write(&Store::references, done, [=, scan = change.id](ReferenceStore& references) {
+        return references.Add(actor, scan, reason, plan, origin);
+      });
+    };
+  }
+
+  const ReferenceGate& references_;
+  const CurrentSession& session_;
+  const RoomInUse& room_;
+  StoreAccess& store_;
+  web::BackgroundWork& background_;
 };  // namespace
 
-}  // namespace plumb
+}  // namespace
 
 std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance, CurrentSession& session,
                                                      const ReferenceGate& references,

@@ -134,7 +134,7 @@ await h.step('a session compares with what was chosen for it', async () => {
   await h.look(planner, 'captured-result');
 });
 
-await h.step('files that may be another patient’s are refused until a person has looked', async () => {
+await h.step('another patient’s files are refused until a person has looked', async () => {
   h.tell('foreignfiles');
   await planner.goto(`${h.url}#/patient/${patient}`);
   await planner.getByText('Reference from the planning CT').click();

@@ -31,6 +31,11 @@ class PatientService {
   ///        what is stored is replaced in any case.
   virtual void ChangePatient(const Actor& actor, const std::string& id, const CourseNotes& wanted,
                              const std::optional<CourseNotes>& shown, Done done) = 0;
+  /// The photo of the set-up sheet as JPEG; nothing if there is none (background).
+  [[nodiscard]] virtual std::optional<std::string> Photo(const std::string& id) = 0;
+  /// @param jpeg  At most kMaxPhoto bytes; empty: the photo is removed.
+  virtual void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
+                        Done done) = 0;
   /// Moves the patient to the archive or back. kConflict while a session of the patient is open.
   virtual void ArchivePatient(const Actor& actor, const std::string& id, bool archived,
                               Done done) = 0;
