@@ -138,7 +138,11 @@ void CheckNumber(const Json& row, const char* table, const char* column,
 
 void CheckMeaning(const Json& rows) {
   for (const Json& result : rows.at("results")) (void)SummaryOf(result.value("json", ""));
-  for (const Json& reference : rows.at("refs")) (void)ParsePlan(reference.value("plan", ""));
+  for (const Json& reference : rows.at("refs")) {
+    (void)ParsePlan(reference.value("plan", ""));
+    if (!Named<ReferenceSource>(reference.value("source", "sweep")))
+      Refuse("refs", "source", say::backup::RecordUnknown());
+  }
   for (const Json& scan : rows.at("scans")) {
     if (scan.value("outcome", "") == "running")
       Refuse("scans", "outcome", say::backup::RecordRunning());

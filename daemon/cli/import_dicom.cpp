@@ -66,7 +66,7 @@ int Run(const ImportDicomArguments& options, const CommandContext& context) {
   { const AtomicFolder check(options.out, SceneOutput()); }  // rejects a bad place before the work
   Progress progress(context.language);
   progress.Update(say::cli::ReadingDicom(), 0.1);
-  Scene scene = ReadPlanning({options.structures, options.plan}, options.choice);
+  Scene scene = ReadPlanning({options.structures, options.plan}, options.choice).scene;
   CompareWithEarlierPlan(options.out, scene);
   progress.Update(say::cli::Writing(), 0.9);
   WriteScene(scene, options.out, context.stop);

@@ -55,6 +55,7 @@ struct Prefix {
 // The first one that fits counts.
 constexpr std::array kPrefixes = {
     Prefix{"view.patient", kPatient},
+    Prefix{"view.photo", kPatient},
     Prefix{"view.reference", kReference},
     Prefix{"view.scan", kScan},
     Prefix{"download.numbers", kPatient},

@@ -227,6 +227,10 @@ ALTER TABLE sessions ADD COLUMN reference_id INTEGER REFERENCES refs(id) ON DELE
 ALTER TABLE refs ADD COLUMN source TEXT NOT NULL DEFAULT 'sweep';
 ALTER TABLE refs ADD COLUMN patient_hash TEXT NOT NULL DEFAULT '';
 ALTER TABLE sessions ADD COLUMN chosen_at_version INTEGER NOT NULL DEFAULT 0;
+-- How a patient is set up, and a photo taken with the sensor: JPEG, base64.
+ALTER TABLE patients ADD COLUMN immobilisation TEXT NOT NULL DEFAULT '';
+ALTER TABLE patients ADD COLUMN alert TEXT NOT NULL DEFAULT '';
+ALTER TABLE patients ADD COLUMN photo TEXT NOT NULL DEFAULT '';
 -- Backups that were made, when their bytes were last compared with the digest (verified_at: and were
 -- the same), and the scans of which each one holds every file as it was stored.
 CREATE TABLE backups (

@@ -17,10 +17,10 @@ namespace plumb {
 
 namespace fs = std::filesystem;
 
-Scene ReadPlanning(const PlanningFiles& files, const PlanningChoice& choice) {
+ReadPlan ReadPlanning(const PlanningFiles& files, const PlanningChoice& choice) {
   const StructureSet structures = ReadStructureSet(files.structures, files.structures_name);
   const TreatmentPlan plan = ReadTreatmentPlan(files.plan, files.plan_name);
-  return MakePlannedScene(structures, plan, choice);
+  return {.scene = MakePlannedScene(structures, plan, choice), .patient_id = plan.file.patient_id};
 }
 
 void CompareWithEarlierPlan(const fs::path& folder, Scene& scene) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "algo/planning/planned_scene.hpp"
 
@@ -16,10 +17,16 @@ struct PlanningFiles {
   std::filesystem::path structures_name = {}, plan_name = {};
 };
 
+struct ReadPlan {
+  Scene scene;
+  /// As the files state it; only to be compared (PatientHash()), never to be kept or shown.
+  std::string patient_id;
+};
+
 /// Both files are read by plumb-dicom-reader, a process of its own; takes up to a minute.
 /// @throws DataError as of MakePlannedScene() and for files that cannot be read; IoError if this
 ///         installation has no reader.
-[[nodiscard]] Scene ReadPlanning(const PlanningFiles& files, const PlanningChoice& choice);
+[[nodiscard]] ReadPlan ReadPlanning(const PlanningFiles& files, const PlanningChoice& choice);
 
 /// Says it among the warnings of `scene` if the scene in that folder, which it follows, is of a
 /// later plan.

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/patient_store.hpp"
 
+#include <sodium.h>
+
 #include <algorithm>
 
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/database/stored_values.hpp"
+#include "web/model/limits.hpp"
 #include "words/store.hpp"
 
 namespace plumb {
@@ -19,7 +22,8 @@ const std::string kPatientColumns =
     " (SELECT count(*) FROM scans WHERE scans.patient_id = patients.id AND outcome = 'done'),"
     " (SELECT id FROM refs WHERE refs.patient_id = patients.id AND approved_by = '' AND version > "
     "   (SELECT ifnull(max(version), 0) FROM refs AS r WHERE r.patient_id = patients.id AND "
-    "r.approved_by <> '') ORDER BY version DESC LIMIT 1), note, archived FROM patients ";
+    "r.approved_by <> '') ORDER BY version DESC LIMIT 1), note, archived, immobilisation, alert, "
+    "photo <> '' FROM patients ";
 
 /// The newest session for fractions of patient ?1, if it can be resumed: closed since ?2.
 constexpr const char* kResumable =
@@ -40,6 +44,9 @@ Patient ReadPatient(const Statement& row) {
           .num_scans = row.Integer(5),
           .draft_reference_id = row.Text(6),
           .note = row.Text(7),
+          .immobilisation = row.Text(9),
+          .alert = row.Text(10),
+          .has_photo = row.Integer(11) != 0,
           .archived = row.Integer(8) != 0};
 }
 
@@ -93,25 +100,74 @@ std::string PatientStore::Add(const Actor& actor, const std::string& code,
   return id;
 }
 
-void PatientStore::Change(const Actor& actor, const std::string& id, const std::string& site,
-                          const std::string& note, const std::optional<CourseNotes>& shown) {
+void PatientStore::Change(const Actor& actor, const std::string& id, const CourseNotes& wanted,
+                          const std::optional<CourseNotes>& shown) {
   const std::int64_t number = RequireId(id, "patient");
   StoreChange change(database_);
   const auto stored = change->First(
-      "SELECT site, note FROM patients WHERE id = ? AND id > 0",
-      [](const Statement& row) { return CourseNotes{.site = row.Text(0), .note = row.Text(1)}; },
+      "SELECT site, note, immobilisation, alert FROM patients WHERE id = ? AND id > 0",
+      [](const Statement& row) {
+        return CourseNotes{.site = row.Text(0),
+                           .note = row.Text(1),
+                           .immobilisation = row.Text(2),
+                           .alert = row.Text(3)};
+      },
       number);
   if (!stored) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
-  if (shown && *shown != *stored)
+  const auto differs = [](const auto& one, const auto& other) { return one && one != other; };
+  if (shown && (shown->site != stored->site || shown->note != stored->note ||
+                differs(shown->immobilisation, stored->immobilisation) ||
+                differs(shown->alert, stored->alert)))
     throw StoreRefusal(ChangeResult::kConflict, say::store::PatientChanged());
-  change->Run("UPDATE patients SET site = ?, note = ? WHERE id = ? AND id > 0", site, note, number);
+  change->Run(
+      "UPDATE patients SET site = ?, note = ?, immobilisation = ?, alert = ? WHERE id = ? AND id > "
+      "0",
+      wanted.site, wanted.note, wanted.immobilisation.value_or(*stored->immobilisation),
+      wanted.alert.value_or(*stored->alert), number);
   // Never the texts themselves: the log keeps its entries when a patient's data is removed.
-  const bool has_site = site != stored->site, has_note = note != stored->note;
-  change.Log(actor, "patient.change", id,
-             has_site && has_note ? say::store::LogSiteAndNote()
-             : has_site           ? say::store::LogSite()
-             : has_note           ? say::store::LogNote()
-                                  : Message());
+  const bool has_site = wanted.site != stored->site, has_note = wanted.note != stored->note;
+  const bool has_sheet = differs(wanted.immobilisation, stored->immobilisation) ||
+                         differs(wanted.alert, stored->alert);
+  if (has_sheet) change.Log(actor, "patient.set_up", id, {});
+  if (!has_sheet || has_site || has_note)
+    change.Log(actor, "patient.change", id,
+               has_site && has_note ? say::store::LogSiteAndNote()
+               : has_site           ? say::store::LogSite()
+               : has_note           ? say::store::LogNote()
+                                    : Message());
+  change.Commit();
+}
+
+std::optional<std::string> PatientStore::Photo(const std::string& id) {
+  const std::string stored =
+      database_.ForRows()
+          ->FirstText("SELECT photo FROM patients WHERE id = ? AND id > 0", ParseId(id))
+          .value_or("");
+  std::string jpeg(stored.size(), '\0');
+  std::size_t bytes = 0;
+  const bool is_read = sodium_base642bin(reinterpret_cast<unsigned char*>(jpeg.data()), jpeg.size(),
+                                         stored.data(), stored.size(), nullptr, &bytes, nullptr,
+                                         sodium_base64_VARIANT_ORIGINAL) == 0;
+  jpeg.resize(bytes);
+  // An imported record may hold anything.
+  if (!is_read || !jpeg.starts_with("\xFF\xD8")) return std::nullopt;
+  return jpeg;
+}
+
+void PatientStore::SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg) {
+  const std::int64_t number = RequireId(id, "patient");
+  if (jpeg.size() > kMaxPhoto)
+    throw StoreRefusal(ChangeResult::kInvalid, say::store::PhotoTooLarge());
+  std::string stored(sodium_base64_encoded_len(jpeg.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
+  sodium_bin2base64(stored.data(), stored.size(),
+                    reinterpret_cast<const unsigned char*>(jpeg.data()), jpeg.size(),
+                    sodium_base64_VARIANT_ORIGINAL);
+  stored.pop_back();  // the zero at its end
+  StoreChange change(database_);
+  change->Run("UPDATE patients SET photo = ? WHERE id = ? AND id > 0", stored, number);
+  if (change->num_changed() == 0)
+    throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
+  change.Log(actor, jpeg.empty() ? "patient.photo_remove" : "patient.photo", id, {});
   change.Commit();
 }
 

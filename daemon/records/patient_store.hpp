@@ -27,8 +27,12 @@ class PatientStore {
   std::string Add(const Actor& actor, const std::string& code, const std::string& site);
   /// @param shown  What the person has seen; kConflict if something else is stored by now. Not set:
   ///        what is stored is replaced in any case.
-  void Change(const Actor& actor, const std::string& id, const std::string& site,
-              const std::string& note, const std::optional<CourseNotes>& shown = {});
+  void Change(const Actor& actor, const std::string& id, const CourseNotes& wanted,
+              const std::optional<CourseNotes>& shown = {});
+  /// JPEG; nothing if there is none, or if it is not one.
+  [[nodiscard]] std::optional<std::string> Photo(const std::string& id);
+  /// kInvalid for more than kMaxPhoto bytes. @param jpeg  Empty: it is removed.
+  void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg);
   /// kConflict while a session of the patient is open.
   void Archive(const Actor& actor, const std::string& id, bool archived);
 

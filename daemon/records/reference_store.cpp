@@ -150,6 +150,29 @@ std::optional<Reference> ReferenceStore::OfSession(const std::string& session_id
       ReadReference, ParseId(session_id));
 }
 
+KnownPlanning ReferenceStore::PlanningOf(const std::string& patient_id, const std::string& hash) {
+  const std::optional<std::int64_t> patient = ParseId(patient_id);
+  const StoreDatabase::Held rows = database_.ForRows();
+  KnownPlanning known =
+      rows->First(
+              "SELECT version, patient_hash FROM refs WHERE patient_id = ? AND source = ? ORDER BY "
+              "version DESC LIMIT 1",
+              [](const Statement& row) {
+                return KnownPlanning{.version = static_cast<int>(row.Integer(0)),
+                                     .patient_hash = row.Text(1),
+                                     .other_code = {}};
+              },
+              patient, Name(ReferenceSource::kPlanningCt))
+          .value_or(KnownPlanning{});
+  known.other_code =
+      rows->FirstText(
+              "SELECT code FROM patients WHERE id <> ?1 AND ?2 <> '' AND id IN (SELECT patient_id "
+              "FROM refs WHERE patient_hash = ?2) LIMIT 1",
+              patient, hash)
+          .value_or("");
+  return known;
+}
+
 std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
                                 const std::string& reason, const ReferencePlan& plan,
                                 const ReferenceOrigin& origin) {
@@ -176,7 +199,10 @@ std::string ReferenceStore::Add(const Actor& actor, const std::string& scan_id,
       patient, patient, scan, StoredNow(), actor.user, reason, PlanJson(plan), Name(origin.source),
       origin.patient_hash);
   const std::string id = std::to_string(change->last_id());
-  change.Log(actor, "reference.add", id, say::store::LogReferenceScan(scan_id));
+  change.Log(actor, "reference.add", id,
+             origin.confirmed.empty()
+                 ? say::store::LogReferenceScan(scan_id)
+                 : say::store::LogPatientConfirmed(scan_id, origin.confirmed, reason));
   change.Commit();
   return id;
 }

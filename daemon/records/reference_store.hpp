@@ -13,6 +13,13 @@
 
 namespace plumb {
 
+/// The planning CTs that were imported.
+struct KnownPlanning {
+  int version = 0;           ///< Of the patient's newest; 0: there is none.
+  std::string patient_hash;  ///< Its ReferenceOrigin::patient_hash.
+  std::string other_code;    ///< Of another patient whose files had the same hash; empty: nobody's.
+};
+
 /// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds, and DataError
 /// for a plan that cannot be read, which is never replaced by a default.
 class ReferenceStore {
@@ -28,6 +35,9 @@ class ReferenceStore {
   [[nodiscard]] std::optional<Reference> Approved(const std::string& patient_id);
   /// What scans of this session are compared with; nothing before one is approved.
   [[nodiscard]] std::optional<Reference> OfSession(const std::string& session_id);
+
+  /// Whose planning CTs are known; `hash` of one that is to be imported for that patient.
+  [[nodiscard]] KnownPlanning PlanningOf(const std::string& patient_id, const std::string& hash);
 
   /// Creates a draft. Returns the id.
   std::string Add(const Actor& actor, const std::string& scan_id, const std::string& reason,

@@ -17,6 +17,7 @@
 #include "drivers/files/image_file.hpp"
 #include "web/exchange/local_time.hpp"
 #include "web/model/check.hpp"
+#include "web/model/course_statistics.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/numbers.hpp"
 #include "web/model/patient.hpp"
@@ -261,6 +262,33 @@ std::vector<CourseRow> TrendUntil(const ReportSources& stored, const Scan& scan,
   return rows;
 }
 
+/// The six in one line, as "−1.2 ± 0.8 mm"; a single value has no deviation.
+std::string SpreadText(const NumberSpreads& spreads, const Catalogue& language) {
+  constexpr std::array kNames = {say::result::kShortVertical, say::result::kShortLongitudinal,
+                                 say::result::kShortLateral,  say::result::kShortPitch,
+                                 say::result::kShortRoll,     say::result::kShortYaw};
+  std::string text;
+  for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
+    const NumberSpread& spread = spreads[i];
+    if (spread.count == 0) continue;
+    const int digits = kNumberAxes[i].is_shift() ? 1 : 2;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ";  ", Word(kNames.at(i), language),
+                        Said(spread.mean, digits, language));
+    if (spread.deviation) text += " \u00b1 " + Said(*spread.deviation, digits, language);
+  }
+  return text;
+}
+
+/// Over the fractions, where there are several.
+void AddStatistics(ReportFacts& facts, const std::vector<Scan>& scans, const Catalogue& language) {
+  const CourseStatistics course = StatisticsOf(scans);
+  if (course.fractions < 2) return;
+  facts.emplace_back(Word(say::result::kReportFirstScans, language),
+                     SpreadText(course.first, language));
+  facts.emplace_back(Word(say::result::kReportLastScans, language),
+                     SpreadText(course.last, language));
+}
+
 }  // namespace
 
 ScanReport DescribeScan(const ReportSources& stored, const Scan& scan, const Catalogue& language) {
@@ -306,6 +334,7 @@ CourseReport DescribeCourse(const ReportSources& stored, const Patient& patient,
     report.tolerance = {tolerance.shift_mm, tolerance.rotation_deg};
   }
   std::vector<Scan> scans = stored.scans.List(patient.id, kMaxScans);
+  AddStatistics(report.identity, scans, language);
   bool is_any_overdue = false, is_any_failed = false;
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != ScanOutcome::kDone) continue;

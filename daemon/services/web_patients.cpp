@@ -13,9 +13,11 @@
 #include "daemon/appliance/plan_options.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/planning/patient_hash.hpp"
 #include "daemon/planning/planning_import.hpp"
 #include "daemon/result/posture_doubt.hpp"
 #include "daemon/result/scan_quality.hpp"
+#include "daemon/unit/page_identity.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
 #include "words/upkeep.hpp"
@@ -54,9 +56,19 @@ class WebPatients final : public web::PatientService {
 
   void ChangePatient(const Actor& actor, const std::string& id, const CourseNotes& wanted,
                      const std::optional<CourseNotes>& shown, Done done) override {
-    store_.Write(&Store::patients, std::move(done), [=](PatientStore& patients) {
-      patients.Change(actor, id, wanted.site, wanted.note, shown);
-    });
+    store_.Write(&Store::patients, std::move(done),
+                 [=](PatientStore& patients) { patients.Change(actor, id, wanted, shown); });
+  }
+
+  std::optional<std::string> Photo(const std::string& id) override {
+    return store_.Read(&Store::patients,
+                       [&](PatientStore& patients) { return patients.Photo(id); });
+  }
+
+  void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
+                Done done) override {
+    store_.Write(&Store::patients, std::move(done),
+                 [=](PatientStore& patients) { patients.SetPhoto(actor, id, jpeg); });
   }
 
   void ArchivePatient(const Actor& actor, const std::string& id, bool archived,
@@ -170,10 +182,15 @@ class WebPatients final : public web::PatientService {
   StoreAccess& store_;
 };
 
+/// In the state folder; no backup has it, so that nobody finds the Patient IDs of one.
+constexpr const char* kPatientKeyFile = "patient.key";
+
 /// The files of a planning CT on their way to a scene in the staging folder.
 struct PlanningImport {
   std::filesystem::path staging, earlier;
+  std::filesystem::path key_file;
   PatientPosture posture = PatientPosture::kHeadFirstSupine;
+  std::string patient_hash;
   std::optional<Change> refusal;
 
   PlanningImport() = default;
@@ -194,12 +211,13 @@ struct PlanningImport {
       PlanningChoice choice;
       if (!sent.roi.empty()) choice.roi = sent.roi;
       if (!sent.beam.empty()) choice.beam = sent.beam;
-      Scene scene = ReadPlanning({.structures = sent.file,
-                                  .plan = plan,
-                                  .structures_name = "STRUCTURES",
-                                  .plan_name = "PLAN"},
-                                 choice);
+      auto [scene, patient_id] = ReadPlanning({.structures = sent.file,
+                                               .plan = plan,
+                                               .structures_name = "STRUCTURES",
+                                               .plan_name = "PLAN"},
+                                              choice);
       std::filesystem::remove(plan);  // it names the patient
+      patient_hash = PatientHash(ReadOrMakeSecret(key_file, MakePatientKey), patient_id);
       CompareWithEarlierPlan(earlier, scene);
       posture = scene.planning->posture;
       WriteScene(scene, staging / "scene");
@@ -285,14 +303,24 @@ class WebReferences final : public web::ReferenceService {
     auto import = std::make_shared<PlanningImport>();
     const auto staging = [](Store& store) { return store.folders.Staging("planning"); };
     import->staging = store_.Read(staging);
+    const auto state = [](Store& store) { return store.folders.state(); };
+    import->key_file = store_.Read(state) / kPatientKeyFile;
     import->earlier = EarlierPlanning(patient_id);
     const auto work = [import, sent] { import->Read(sent); };
     const auto read = [=, this, plan = DefaultPlan(settings)]() mutable {
       if (import->refusal) return done(*import->refusal);
+      const Message doubt = WhyOtherPatient(patient_id, import->patient_hash);
+      if (!doubt.empty() && !sent.is_same_patient) return done(AnswerOf(doubt));
+      if (!doubt.empty() && sent.reason.empty())
+        return done(AnswerOf(say::store::PlanningNeedsReason()));
       plan.posture = Name(import->posture);
       plan.isocentre_m = {0, 0, 0};
       plan.couch_markers = false;
-      store_.Write(&Store::scans, Stored(actor, plan, sent.reason, done), [=](ScanStore& scans) {
+      const ReferenceOrigin origin{.source = ReferenceSource::kPlanningCt,
+                                   .patient_hash = import->patient_hash,
+                                   .confirmed = doubt};
+      const Done stored = Stored(actor, plan, sent.reason, origin, done);
+      store_.Write(&Store::scans, stored, [=](ScanStore& scans) {
         return scans.AddMade({.patient_id = patient_id,
                               .reference_id = {},
                               .purpose = ScanPurpose::kReference,
@@ -372,6 +400,24 @@ class WebReferences final : public web::ReferenceService {
     return ReadStoredScene(scan->folder / "scene").scene.planning;
   }
 
+  /// What speaks against these files being this patient's; empty: nothing.
+  Message WhyOtherPatient(const std::string& patient_id, const std::string& hash) {
+    const KnownPlanning known = store_.Read(&Store::references, [&](ReferenceStore& references) {
+      return references.PlanningOf(patient_id, hash);
+    });
+    if (!known.other_code.empty()) return say::store::PlanningPatientOf(known.other_code);
+    if (known.version == 0) return {};
+    switch (ComparePatientHashes(known.patient_hash, hash)) {
+      case SamePatient::kSame:
+        return {};
+      case SamePatient::kOther:
+        return say::store::PlanningPatientDiffers(known.version);
+      case SamePatient::kUnknown:
+        return say::store::PlanningPatientUnknown(known.version);
+    }
+    return {};
+  }
+
   /// Scene folder of the newest reference of this patient; empty if it has none.
   std::filesystem::path EarlierPlanning(const std::string& patient_id) {
     const std::vector<Reference> all = References(patient_id);
@@ -380,11 +426,12 @@ class WebReferences final : public web::ReferenceService {
   }
 
   /// What follows once the scene is a scan: the draft made of it.
-  Done Stored(const Actor& actor, const ReferencePlan& plan, const std::string& reason, Done done) {
+  Done Stored(const Actor& actor, const ReferencePlan& plan, const std::string& reason,
+              const ReferenceOrigin& origin, Done done) {
     return [=, this, done = std::move(done)](const Change& change) {
       if (change.result != ChangeResult::kDone) return done(change);
       store_.Write(&Store::references, done, [=, scan = change.id](ReferenceStore& references) {
-        return references.Add(actor, scan, reason, plan, {.source = ReferenceSource::kPlanningCt});
+        return references.Add(actor, scan, reason, plan, origin);
       });
     };
   }
@@ -394,7 +441,7 @@ class WebReferences final : public web::ReferenceService {
   const RoomInUse& room_;
   StoreAccess& store_;
   web::BackgroundWork& background_;
-};
+};  // namespace
 
 }  // namespace
 

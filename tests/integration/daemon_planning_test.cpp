@@ -4,7 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
@@ -22,6 +25,7 @@ using nlohmann::json;
 using simulated::CtQuirk;
 using test::HttpClient;
 using test::kPassword;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::Plumbd;
 
@@ -68,14 +72,19 @@ class DaemonPlanningTest : public ::testing::Test {
     return T;
   }
 
-  test::HttpAnswer Upload(const simulated::PlanningCtOptions& options) {
+  /// @param patient_id  In the files; empty: as simulated.
+  /// @param form  More of what is said of the files.
+  test::HttpAnswer Upload(const simulated::PlanningCtOptions& options,
+                          const std::string& patient_id = {}, const std::string& form = {}) {
     const simulated::SuitePlan demo = DemoPlan();
-    const auto [structures, plan] = simulated::MakePlanningCt(
-        demo.scenes.front().body->surface, PlannedBody(demo.scenes.front()), options);
+    auto [structures, plan] = simulated::MakePlanningCt(demo.scenes.front().body->surface,
+                                                        PlannedBody(demo.scenes.front()), options);
+    if (!patient_id.empty()) structures.file.patient_id = plan.file.patient_id = patient_id;
     const std::string first = DicomBytes(structures);
     HttpClient sender = *planner_;
     sender.extra_headers["Content-Type"] = "application/octet-stream";
-    sender.extra_headers["X-Plumb-Planning"] = "structures_bytes=" + std::to_string(first.size());
+    sender.extra_headers["X-Plumb-Planning"] =
+        "structures_bytes=" + std::to_string(first.size()) + form;
     return sender.Ask("POST", "/api/v1/patients/" + patient_ + "/planning",
                       first + DicomBytes(plan));
   }
@@ -242,6 +251,44 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   EXPECT_FALSE(against_surface["compared_with"].is_object()) << against_surface.dump();
   EXPECT_NEAR(against_surface["correction"]["lateral_mm"].get<double>(), 0, 1.5);
   EXPECT_NEAR(against_surface["correction"]["vertical_mm"].get<double>(), 0, 1.5);
+}
+
+TEST_F(DaemonPlanningTest, FilesOfAnotherPatientAreRefusedUntilAPersonHasLooked) {
+  const std::string id = "KH-4711-SECRET";
+  ASSERT_EQ(Upload({}, id).status, 201) << "the first ones are nobody else's";
+  EXPECT_EQ(Upload({}, id + " ").status, 201) << "the same, padded";
+  const auto other = Upload({}, "KH-4712");
+  EXPECT_EQ(other.status, 409) << other.body;
+  EXPECT_EQ(other.json()["error_message"]["id"], "store.planning_patient_differs");
+  EXPECT_EQ(Upload({}, "KH-4712", "&same_patient=yes").json()["error_message"]["id"],
+            "store.planning_needs_reason");
+  const auto confirmed = Upload({}, "KH-4712", "&same_patient=yes&reason=renumbered");
+  EXPECT_EQ(confirmed.status, 201) << confirmed.body;
+  const json log = engineer_->Get("/api/v1/audit").json()["entries"];
+  const auto row = std::find_if(
+      log.begin(), log.end(), [](const json& entry) { return entry["action"] == "reference.add"; });
+  ASSERT_NE(row, log.end());
+  EXPECT_THAT((*row)["detail"].get<std::string>(),
+              AllOf(HasSubstr("another Patient ID"), HasSubstr("renumbered")));
+  EXPECT_EQ(Upload({}, "KH-4712").status, 201) << "what was confirmed counts from now on";
+
+  // The same files for another patient here.
+  const std::string first = patient_;
+  patient_ = planner_->Post("/api/v1/patients", {{"code", "CT-2"}, {"site", "thorax"}})
+                 .json()
+                 .value("id", "");
+  const auto mixed = Upload({}, id);
+  EXPECT_EQ(mixed.json()["error_message"]["id"], "store.planning_patient_of") << mixed.body;
+  EXPECT_THAT(mixed.body, HasSubstr("CT-1"));
+  EXPECT_EQ(Upload({}, "KH-9").status, 201);
+
+  // Nothing that is stored names the patient.
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path())) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+    EXPECT_EQ(bytes.find(id), std::string::npos) << entry.path();
+  }
 }
 
 }  // namespace

@@ -153,6 +153,12 @@ class FakeAppliance : public web::BackgroundWork,
   void RemoveTemplate(const Actor& actor, const std::string& site, Done done) override;
   void ChangePatient(const Actor& actor, const std::string& id, const CourseNotes& wanted,
                      const std::optional<CourseNotes>& shown, Done done) override;
+  std::optional<std::string> Photo(const std::string& id) override {
+    const auto found = photos_.find(id);
+    return found == photos_.end() ? std::nullopt : std::optional(found->second);
+  }
+  void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
+                Done done) override;
   void ArchivePatient(const Actor& actor, const std::string& id, bool archived, Done done) override;
   void WipePatient(const Actor& actor, const std::string& id, Done done) override;
   void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
@@ -174,6 +180,7 @@ class FakeAppliance : public web::BackgroundWork,
                    Done done) override;
   std::function<std::filesystem::path(const web::SentPlanning&)> import_planning;
   web::SentPlanning sent_planning;  ///< The last one.
+  Message planning_doubt;  ///< Why the files may be another patient's; empty: they are not.
   void PlanReference(const Actor& actor, const std::string& id, int revision,
                      const ReferencePlan& plan, Done done) override;
   /// Cautions are asked for where a test judges the quality.
@@ -303,6 +310,7 @@ class FakeAppliance : public web::BackgroundWork,
   int next_id_ = 1;
   std::map<std::string, Preferences> preferences_;
   std::map<std::string, int> num_fractions_;
+  std::map<std::string, std::string> photos_;
   std::map<std::string, TreatmentSession> sessions_;  ///< By id: all that were opened.
 };
 

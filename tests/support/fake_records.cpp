@@ -76,15 +76,33 @@ void FakeAppliance::ChangePatient(const Actor& actor, const std::string& id,
                                   const std::optional<CourseNotes>& shown, Done done) {
   for (Patient& patient : patients) {
     if (patient.id != id) continue;
-    if (shown && *shown != CourseNotes{.site = patient.site, .note = patient.note})
+    const auto differs = [](const auto& one, const std::string& other) {
+      return one && *one != other;
+    };
+    if (shown && (shown->site != patient.site || shown->note != patient.note ||
+                  differs(shown->immobilisation, patient.immobilisation) ||
+                  differs(shown->alert, patient.alert)))
       return Finish(done, Refused(ChangeResult::kConflict,
                                   "this patient was changed by somebody else meanwhile: look "
                                   "again, then save"));
     patient.site = wanted.site;
     patient.note = wanted.note;
+    patient.immobilisation = wanted.immobilisation.value_or(patient.immobilisation);
+    patient.alert = wanted.alert.value_or(patient.alert);
     return Did(actor, "patient.change", id, done);
   }
   Finish(done, Refused(ChangeResult::kNotFound, "there is no such patient"));
+}
+
+void FakeAppliance::SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
+                             Done done) {
+  Patient* patient = PatientOf(id);
+  if (patient == nullptr)
+    return Finish(done, Refused(ChangeResult::kNotFound, "there is no such patient"));
+  patient->has_photo = !jpeg.empty();
+  photos_.erase(id);
+  if (!jpeg.empty()) photos_[id] = jpeg;
+  Did(actor, jpeg.empty() ? "patient.photo_remove" : "patient.photo", id, done);
 }
 
 void FakeAppliance::ArchivePatient(const Actor& actor, const std::string& id, bool archived,
@@ -358,6 +376,10 @@ void FakeAppliance::AddPlanning(const Actor& actor, const std::string& patient_i
   } catch (const DataError& error) {
     return Finish(done, Refused(ChangeResult::kInvalid, error.message()));
   }
+  if (!planning_doubt.empty() && !sent.is_same_patient)
+    return Finish(done, Refused(ChangeResult::kConflict, planning_doubt));
+  if (!planning_doubt.empty() && sent.reason.empty())
+    return Finish(done, Refused(ChangeResult::kConflict, say::store::PlanningNeedsReason()));
   Scan scan;
   scan.id = fmt::format("ct{:04}", next_id_++);
   scan.patient_id = patient_id;

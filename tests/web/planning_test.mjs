@@ -134,4 +134,23 @@ await h.step('a session compares with what was chosen for it', async () => {
   await h.look(planner, 'captured-result');
 });
 
+await h.step('another patient’s files are refused until a person has looked', async () => {
+  h.tell('foreignfiles');
+  await planner.goto(`${h.url}#/patient/${patient}`);
+  await planner.getByText('Reference from the planning CT').click();
+  const box = planner.getByLabel('The files are of this patient');
+  equal(await box.isVisible(), false, 'nothing to confirm yet');
+  await send(planner, '');
+  await planner.getByRole('heading', { name: 'Another patient’s files?' }).waitFor();
+  await planner.locator('.planning-upload .caution', { hasText: 'another Patient ID' }).waitFor();
+  await h.look(planner, 'planning-other-patient');
+  await box.check();
+  await planner.getByRole('button', { name: 'Import' }).click();
+  await planner.getByText('state the reason why').first().waitFor();
+  await planner.locator('.planning-upload').getByLabel('Reason for the new reference')
+    .fill('the clinic changed its numbers');
+  await planner.getByRole('button', { name: 'Import' }).click();
+  await planner.waitForURL(/#\/plan\//);
+});
+
 await h.finish();

@@ -413,6 +413,7 @@ await h.step('patients, plans, the check, and what engineers see', async () => {
   await lookAll(
     { name: 'status', route: 'status', who: 'bob', hash: 'status', ready: 'tbody tr' },
     { name: 'patients', route: 'patients', who: 'bob', hash: 'patients', ready: 'tbody tr' },
+    { name: 'statistics', route: 'statistics', who: 'bob', hash: 'statistics', ready: 'tbody tr' },
     { name: 'patient', route: 'patient', who: 'bob', hash: `patient/${first.id}`,
       ready: '.digits' },
     { name: 'plan', route: 'plan', who: 'bob', hash: `plan/${second.draft}`,

@@ -38,6 +38,7 @@
 #include "daemon/planning/planning_import.hpp"
 #include "daemon/result/scan_quality.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 #include "drivers/simulator/suites/dicom_writer.hpp"
 #include "drivers/simulator/suites/planning_ct.hpp"
 #include "drivers/simulator/suites/suite_plan.hpp"
@@ -346,6 +347,14 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     check.num_markers = 12;
     service.next_check = check;
   }
+  if (name == "camera") {  // a picture of stripes
+    cv::Mat picture(240, 320, CV_8UC3);
+    for (int row = 0; row < picture.rows; ++row)
+      picture.row(row).setTo(cv::Scalar(row, 120, 255 - row));
+    const std::vector<std::uint8_t> jpeg = EncodeJpeg(picture, 70);
+    service.preview = std::make_shared<const std::string>(jpeg.begin(), jpeg.end());
+  }
+  if (name == "foreignfiles") service.planning_doubt = say::store::PlanningPatientDiffers(1);
   if (name == "stranger") service.next_recorded = recorder.Once(name, Stranger);
   if (name == "across") service.next_recorded = recorder.RecordAcross();
   if (name == "room") {
@@ -525,12 +534,12 @@ void ServePlanning(FakeAppliance& service, const fs::path& root) {
     SplitPlanning(sent.file, sent.structures_bytes, folder / "plan.dcm");
     PlanningChoice choice;
     if (!sent.roi.empty()) choice.roi = sent.roi;
-    const Scene read = ReadPlanning({.structures = sent.file,
-                                     .plan = folder / "plan.dcm",
-                                     .structures_name = "STRUCTURES",
-                                     .plan_name = "PLAN"},
-                                    choice);
-    WriteScene(read, folder / "scene");
+    const ReadPlan read = ReadPlanning({.structures = sent.file,
+                                        .plan = folder / "plan.dcm",
+                                        .structures_name = "STRUCTURES",
+                                        .plan_name = "PLAN"},
+                                       choice);
+    WriteScene(read.scene, folder / "scene");
     return folder;
   };
 }

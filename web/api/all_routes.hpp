@@ -27,6 +27,9 @@ void AddResultPage(Routes& routes, const Services& services);
 /// Adds the reports as PDF files, and the numbers of a patient as CSV and JSON.
 void AddExportRoutes(Routes& routes, const Services& services);
 
+/// Adds the statistics of set-up, of a patient and of all sites, the latter as CSV, too.
+void AddStatisticsRoutes(Routes& routes, const Services& services);
+
 /// Adds the room's calibration and its board as a PDF. Signing needs a password: see Accounts.
 void AddRoomCalibrationRoutes(Routes& routes, const Services& services);
 

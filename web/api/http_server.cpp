@@ -76,6 +76,7 @@ class HttpServer::Impl {
     AddMonitorApi(routes, services);
     AddResultPage(routes, services);
     AddExportRoutes(routes, services);
+    AddStatisticsRoutes(routes, services);
     AddRoomCalibrationRoutes(routes, services);
     LimitDisplays(router_, services);
     LogDisclosures(router_, services.audit, options_.now);

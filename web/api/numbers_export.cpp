@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "web/api/all_routes.hpp"
+#include "web/exchange/csv.hpp"
 #include "web/exchange/json.hpp"
 #include "web/exchange/zip_archive.hpp"
 #include "words/store.hpp"
@@ -18,21 +19,6 @@ namespace plumb::web {
 namespace {
 
 constexpr int kMaxScans = 1000;
-
-/// A cell that no spreadsheet interprets as a formula, quoted if necessary.
-std::string Cell(std::string text) {
-  if (!text.empty() && std::string_view("=+-@\t\r").find(text[0]) != std::string_view::npos)
-    text = "'" + text;
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
-/// Numbers are not user input: a leading minus is not escaped.
-std::string Number(const std::optional<double>& value) {
-  return value ? fmt::format("{:.4f}", *value) : std::string();
-}
 
 std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
   std::string text = "patient,scan,fraction,purpose,started_at,verdict";
@@ -47,14 +33,14 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
     const bool is_advice = scan->result && !ShownRows(*scan->result).empty();
     if (is_advice) rows = ShownRows(*scan->result);
     text +=
-        fmt::format("{},{},{},{},{},{}", Cell(patient.code), Cell(scan->id),
+        fmt::format("{},{},{},{},{},{}", CsvCell(patient.code), CsvCell(scan->id),
                     scan->fraction > 0 ? std::to_string(scan->fraction) : "", Name(scan->purpose),
                     TimeText(scan->started_at), scan->result ? Name(scan->result->verdict) : "");
-    for (const ShownRow& row : rows) text += "," + Number(row.value);
-    for (const ShownRow& row : rows) text += "," + Number(row.u95);
-    text += fmt::format(",{},{},{},{},{}", Cell(scan->accepted_by),
+    for (const ShownRow& row : rows) text += "," + CsvNumber(row.value);
+    for (const ShownRow& row : rows) text += "," + CsvNumber(row.u95);
+    text += fmt::format(",{},{},{},{},{}", CsvCell(scan->accepted_by),
                         scan->accepted_at ? TimeText(*scan->accepted_at) : "",
-                        Cell(scan->accepted_reason),
+                        CsvCell(scan->accepted_reason),
                         scan->daily_check != DailyCheck::kPassed ? "yes" : "no",
                         scan->daily_check == DailyCheck::kFailed ? "yes" : "no");
     for (const ShownRow& row : rows)

@@ -43,12 +43,20 @@ void AddPatientRoutes(Routes& routes, PatientService& patients) {
   routes.Write("PUT", "/api/v1/patients/{id}", Permission::kPatients, BodyKind::kJson,
                [&patients](const Request& request, const Done& done) {
                  Fields fields(request.body);
+                 const auto sheet = [&](const char* name) {
+                   return fields.Has(name) ? std::optional(fields.Text(name, 0, kMaxNote))
+                                           : std::nullopt;
+                 };
                  const CourseNotes wanted{.site = fields.Text("site", 0, kMaxSite),
-                                          .note = fields.Text("note", 0, kMaxNote)};
+                                          .note = fields.Text("note", 0, kMaxNote),
+                                          .immobilisation = sheet("immobilisation"),
+                                          .alert = sheet("alert")};
                  std::optional<CourseNotes> shown;
                  if (fields.Has("site_before") || fields.Has("note_before"))
-                   shown = {.site = fields.Text("site_before", 0, kMaxSite),
-                            .note = fields.Text("note_before", 0, kMaxNote)};
+                   shown = CourseNotes{.site = fields.Text("site_before", 0, kMaxSite),
+                                       .note = fields.Text("note_before", 0, kMaxNote),
+                                       .immobilisation = sheet("immobilisation_before"),
+                                       .alert = sheet("alert_before")};
                  fields.Finish();
                  patients.ChangePatient(request.actor(), request.arguments[0], wanted, shown, done);
                });
@@ -58,6 +66,29 @@ void AddPatientRoutes(Routes& routes, PatientService& patients) {
                  const bool archived = fields.Flag("archived");
                  fields.Finish();
                  patients.ArchivePatient(request.actor(), request.arguments[0], archived, done);
+               });
+}
+
+/// The photo is what the sensor sees when a person asks for it; a browser sends none.
+void AddPhotoRoutes(Routes& routes, PatientService& patients, ApplianceService& appliance) {
+  routes
+      .ReadInBackground("/api/v1/patients/{id}/photo", Permission::kView,
+                        [&patients](const Request& request) {
+                          const auto photo = patients.Photo(request.arguments[0]);
+                          return photo ? BodyResponse("image/jpeg", *photo)
+                                       : ErrorResponse(404, say::store::NoPhoto());
+                        })
+      .Discloses("view.photo");
+  routes.Write("POST", "/api/v1/patients/{id}/photo", Permission::kPatients, BodyKind::kNone,
+               [&patients, &appliance](const Request& request, const Done& done) {
+                 const auto picture = appliance.Preview();
+                 if (!picture)
+                   return done(Refused(ChangeResult::kConflict, say::web::NoCameraImage()));
+                 patients.SetPhoto(request.actor(), request.arguments[0], *picture, done);
+               });
+  routes.Write("DELETE", "/api/v1/patients/{id}/photo", Permission::kPatients, BodyKind::kNone,
+               [&patients](const Request& request, const Done& done) {
+                 patients.SetPhoto(request.actor(), request.arguments[0], {}, done);
                });
 }
 
@@ -163,7 +194,8 @@ SentPlanning ParsePlanning(const Request& request) {
                     .structures_bytes = 0,
                     .roi = text("roi", kMaxPlanningName),
                     .beam = text("isocentre_of", kMaxPlanningName),
-                    .reason = text("reason", kMaxReason)};
+                    .reason = text("reason", kMaxReason),
+                    .is_same_patient = text("same_patient", 3) == "yes"};
   const auto number = ParseNumber<std::uint64_t>(bytes);
   if (!number || *number > kMaxPlanningFile)
     throw DataError(
@@ -215,6 +247,7 @@ void AddReferenceRoutes(Routes& routes, ReferenceService& references) {
 
 void AddPatientApi(Routes& routes, const Services& services) {
   AddPatientRoutes(routes, services.patients);
+  AddPhotoRoutes(routes, services.patients, services.appliance);
   AddSessionRoutes(routes, services.patients);
   AddCourseRoutes(routes, services.patients, services.references, services.scans);
   AddTemplateRoutes(routes, services.settings);

@@ -331,6 +331,9 @@ void to_json(Json& json, const Patient& patient) {
           {"num_scans", patient.num_scans},
           {"draft_reference_id", TextOrNull(patient.draft_reference_id)},
           {"note", patient.note},
+          {"immobilisation", patient.immobilisation},
+          {"alert", patient.alert},
+          {"has_photo", patient.has_photo},
           {"archived", patient.archived},
           {"last_session", nullptr}};
   if (const auto& last = patient.last_session) {

@@ -33,8 +33,11 @@ struct Patient {
   std::int64_t num_scans = 0;
   /// The newest draft after the approved one; empty if there is none.
   std::string draft_reference_id;
-  std::string note = {};  ///< Note on this course, at most kMaxNote bytes; no name.
-  bool archived = false;  ///< Not in the list and not to be opened; nothing is deleted.
+  std::string note = {};            ///< Note on this course, at most kMaxNote bytes; no name.
+  std::string immobilisation = {};  ///< The set-up sheet: devices and how they are set.
+  std::string alert = {};           ///< What has to be known before the patient is set up.
+  bool has_photo = false;           ///< PatientService::Photo() has one.
+  bool archived = false;            ///< Not in the list and not to be opened; nothing is deleted.
   /// The newest session for fractions, if scans were completed in it and it was closed in the last
   /// kResumable_h hours. Not set in lists.
   std::optional<EndedSession> last_session = {};
@@ -43,6 +46,7 @@ struct Patient {
 /// People write these about a patient's course.
 struct CourseNotes {
   std::string site, note;
+  std::optional<std::string> immobilisation = {}, alert = {};  ///< Not set: they stay.
   bool operator==(const CourseNotes&) const = default;
 };
 

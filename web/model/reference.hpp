@@ -42,6 +42,9 @@ struct ReferenceOrigin {
   /// Keyed hash of the Patient ID in the files of a planning CT; empty for a sweep, and for files
   /// without one.
   std::string patient_hash = {};
+  /// Why it was not plain that the files are this patient's, for the log; a person confirmed it.
+  /// Never read back.
+  Message confirmed = {};
 };
 
 /// Immutable once approved; a change of plan creates a new version.

@@ -110,7 +110,7 @@ export const sendFile = (path, file, failed, onPart, headers = {}) => new Promis
     let answer = null;
     try { answer = JSON.parse(request.responseText); } catch { /* no answer of ours */ }
     if (request.status < 300) resolve(answer);
-    else reject(new Error(said(answer, 'error') ?? failed));
+    else reject(answer ? new ApiError(request.status, answer) : new Error(failed));
   };
   request.onerror = () => reject(new Error(failed));
   request.send(file);

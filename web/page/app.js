@@ -23,6 +23,7 @@ import { quickLogIn, quickPeople, rememberQuickPeople } from './screens/quick_lo
 import { showResult } from './screens/result.js';
 import { showScan } from './screens/scan.js';
 import { showSettings } from './screens/settings.js';
+import { showStatistics } from './screens/patient/statistics.js';
 import { showStatus } from './screens/status.js';
 import { showUpdate } from './screens/update.js';
 import { showUsers } from './screens/users.js';
@@ -32,6 +33,7 @@ import { S, said } from './words.js';
 const kScreens = {
   status: { show: showStatus, permission: 'view', nav: true },
   patients: { show: showPatients, permission: 'view', nav: true },
+  statistics: { show: showStatistics, permission: 'view', parent: 'patients' },
   patient: { show: showPatient, permission: 'view', parent: 'patients' },
   plan: { show: showPlan, permission: 'view', parent: 'patients' },
   scan: { show: showScan, permission: 'view', nav: true },

@@ -31,6 +31,11 @@ class PatientService {
   ///        what is stored is replaced in any case.
   virtual void ChangePatient(const Actor& actor, const std::string& id, const CourseNotes& wanted,
                              const std::optional<CourseNotes>& shown, Done done) = 0;
+  /// The photo of the set-up sheet as JPEG; nothing if there is none (background).
+  [[nodiscard]] virtual std::optional<std::string> Photo(const std::string& id) = 0;
+  /// @param jpeg  At most kMaxPhoto bytes; empty: the photo is removed.
+  virtual void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
+                        Done done) = 0;
   /// Moves the patient to the archive or back. kConflict while a session of the patient is open.
   virtual void ArchivePatient(const Actor& actor, const std::string& id, bool archived,
                               Done done) = 0;
@@ -67,6 +72,8 @@ struct SentPlanning {
   std::string roi;     ///< The contour that is the skin; empty: as the file states it.
   std::string beam;    ///< Whose isocentre counts; empty: all have the same.
   std::string reason;  ///< Reason for a new reference; may be empty.
+  /// A person has looked: they are this patient's, although nothing shows it. Needs a reason.
+  bool is_same_patient = false;
 };
 
 /// What an approval states about the doubts that there are: kConflict without it.
@@ -91,7 +98,8 @@ class ReferenceService {
                             const std::string& reason, Done done) = 0;
   /// Creates a draft from a planning CT: isocentre and posture are the plan's, and no later plan
   /// changes them. Returns the id. kInvalid for files that do not belong together or must not be
-  /// used, kFailed without a reader, kConflict while a session of the patient is open.
+  /// used, kFailed without a reader, kConflict while a session of the patient is open, and where
+  /// the Patient ID of the files is not that of earlier ones or is another patient's here.
   virtual void AddPlanning(const Actor& actor, const std::string& patient_id,
                            const SentPlanning& sent, Done done) = 0;
   /// A draft is changed in place. For an approved reference, creates a new draft with the next

@@ -265,6 +265,7 @@ TEST_F(PatientTransferTest, ARecordThatSaysWhatNoneCanIsRefused) {
           [](Json& rows) { rows["scans"][0]["started_at"] = std::int64_t{1} << 60; });
   refused("a scan that runs", [](Json& rows) { rows["scans"][0]["outcome"] = "running"; });
   refused("breaks a rule", [](Json& rows) { rows["scans"][0]["outcome"] = "splendid"; });
+  refused("refs.source", [](Json& rows) { rows["refs"][0]["source"] = "hearsay"; });
   refused("scans.reference_id", [](Json& rows) { rows["scans"][0]["reference_id"] = 4711; });
   refused("refs.scan_id", [](Json& rows) { rows["refs"][0]["scan_id"] = 1; });
   refused("results.scan_id", [](Json& rows) { rows["results"][0]["scan_id"] = 1; });

@@ -115,7 +115,7 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionKeepsWhatItHas) {
   EXPECT_EQ(store->patients.Find(patient)->site, "thorax");
   EXPECT_EQ(store->patients.Find(patient)->note, "");
   EXPECT_FALSE(store->patients.Find(patient)->archived);
-  store->patients.Change(kAnna, patient, "thorax", "note");
+  store->patients.Change(kAnna, patient, {.site = "thorax", .note = "note"});
   EXPECT_EQ(store->patients.Find(patient)->note, "note");
   EXPECT_EQ(store->scans.Find(accepted)->accepted_at, logged.time) << "taken from the log";
   EXPECT_FALSE(store->scans.Find(other)->accepted_at);

@@ -277,10 +277,10 @@ TEST_F(StoreSessionsTest, SiteAndNoteAreChangedAndTheirTextIsNotInTheLog) {
     Store store(folder_ / "state");
     patient = store.patients.Add(kAnna, "P-1", "thorx");
     EXPECT_EQ(store.patients.Find(patient)->note, "");
-    store.patients.Change(kBert, patient, "thorax", "arms up, knee rest");
-    EXPECT_EQ(RefusalOf([&] { store.patients.Change(kBert, "77", "", ""); }),
+    store.patients.Change(kBert, patient, {.site = "thorax", .note = "arms up, knee rest"});
+    EXPECT_EQ(RefusalOf([&] { store.patients.Change(kBert, "77", {.site = "", .note = ""}); }),
               ChangeResult::kNotFound);
-    EXPECT_EQ(RefusalOf([&] { store.patients.Change(kBert, "0", "", ""); }),
+    EXPECT_EQ(RefusalOf([&] { store.patients.Change(kBert, "0", {.site = "", .note = ""}); }),
               ChangeResult::kNotFound)
         << "the one of unassigned scans";
   }
@@ -292,10 +292,47 @@ TEST_F(StoreSessionsTest, SiteAndNoteAreChangedAndTheirTextIsNotInTheLog) {
   EXPECT_EQ(entry.user, "bert");
   EXPECT_EQ((entry.subject + entry.detail.English()).find("knee"), std::string::npos);
   EXPECT_EQ(entry.detail.English(), "site and note");
-  store.patients.Change(kBert, patient, "thorax", "");
+  store.patients.Change(kBert, patient, {.site = "thorax", .note = ""});
   EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(), "note");
-  store.patients.Change(kBert, patient, "pelvis", "");
+  store.patients.Change(kBert, patient, {.site = "pelvis", .note = ""});
   EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(), "site");
+}
+
+TEST_F(StoreSessionsTest, TheSetUpSheetIsKeptApartFromTheLogAndGoesWithThePatient) {
+  const std::string jpeg = std::string("\xFF\xD8\xFF", 3) + std::string(3000, 'p');
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "thorax");
+  EXPECT_FALSE(store.patients.Photo(patient));
+  store.patients.Change(
+      kBert, patient,
+      {.site = "thorax", .note = "", .immobilisation = "wing board", .alert = "pacemaker"});
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "patient.set_up");
+  store.patients.SetPhoto(kBert, patient, jpeg);
+  EXPECT_TRUE(store.patients.Find(patient)->has_photo);
+  EXPECT_EQ(store.patients.Photo(patient), jpeg);
+  // A change of the note leaves it as it is.
+  store.patients.Change(kBert, patient, {.site = "thorax", .note = "arms up"});
+  EXPECT_EQ(store.patients.Find(patient)->alert, "pacemaker");
+  EXPECT_EQ(store.patients.Find(patient)->immobilisation, "wing board");
+  EXPECT_EQ(RefusalOf([&] {
+              store.patients.Change(
+                  kBert, patient, {.site = "thorax", .note = "arms up", .alert = "none"},
+                  CourseNotes{.site = "thorax", .note = "arms up", .alert = "latex"});
+            }),
+            ChangeResult::kConflict)
+      << "somebody else has written another alert";
+  EXPECT_EQ(
+      RefusalOf([&] { store.patients.SetPhoto(kBert, patient, std::string(kMaxPhoto + 1, 'p')); }),
+      ChangeResult::kInvalid);
+  for (const AuditEntry& entry : store.audit.Find({0, 100}))
+    EXPECT_EQ(entry.detail.English().find("pacemaker"), std::string::npos) << entry.action;
+  // What an import brought is shown only if it can be a picture.
+  store.database().ForChanges()->Run("UPDATE patients SET photo = 'PHNjcmlwdD4='");
+  EXPECT_FALSE(store.patients.Photo(patient));
+  store.patients.SetPhoto(kBert, patient, jpeg);
+  store.patients.SetPhoto(kBert, patient, "");
+  EXPECT_FALSE(store.patients.Photo(patient));
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "patient.photo_remove");
 }
 
 TEST_F(StoreSessionsTest, AnArchivedPatientKeepsEverythingAndIsNotOpened) {

@@ -337,6 +337,13 @@ TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
                   .rows.back()
                   .accepted,
               HasSubstr("although not surely within tolerance by anna"));
+  EXPECT_EQ(ValueOf(course.identity, "<result.report_first_scans>"), "nothing") << "one answer";
+  const std::string other = AddScan(Approved(), kMove);
+  EXPECT_THAT(
+      ValueOf(
+          DescribeCourse(sources_, *store_.patients.Find(patient_), EnglishCatalogue()).identity,
+          "First scan of a fraction: mean \u00b1 SD"),
+      HasSubstr(" \u00b1 0.0;"));
   EXPECT_THAT(ValueOf(course.identity, "<result.report_approved_by>"), HasSubstr("clara"));
   EXPECT_EQ(ValueOf(course.identity, "<result.report_failed_mark>"), "nothing");
   const std::string failed = AddScan("", "", DailyCheck::kFailed);

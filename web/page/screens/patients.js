@@ -6,12 +6,14 @@ import {
   select, table, warn,
 } from '../dom.js';
 import { kFraction, kName, kNote, kReason, kSite } from '../limits.js';
-import { numbersLine } from '../numbers.js';
+import { numbersLine, toleranceOf } from '../numbers.js';
 import { lookOf, plainCode } from '../scanner.js';
 import { signedForm } from '../signed_form.js';
 import { S } from '../words.js';
 import { closeSession, openPatient, resumeSession } from '../treatment.js';
 import { sourceVersion } from './captured.js';
+import { photosTaken, setUpCard, setUpNote } from './patient/set_up_sheet.js';
+import { courseStatistics } from './patient/statistics.js';
 import { planningUpload } from './planning.js';
 import { acceptanceMark, ageText, blockNote, isAdvice, outcomeBadge } from './common.js';
 
@@ -87,7 +89,9 @@ export async function showPatients(place) {
   });
   clear(place, h('h1', {}, text.title),
     h('section', { class: 'card' }, field(text.search, search), missed, list,
-      h('label', { class: 'check below' }, archived, ' ', text.showArchived)),
+      h('label', { class: 'check below' }, archived, ' ', text.showArchived),
+      h('div', { class: 'row below' },
+        h('a', { class: 'button', href: '#/statistics' }, S.statistics.title))),
     may('patients') && card(text.add,
       form({ class: 'form inline' }, async () => {
         const body = { code: code.value.trim(), site: site.value.trim() };
@@ -157,6 +161,7 @@ function openButtons(patient, references) {
   choice?.addEventListener('change', () => { chosen = choice.value; });
   const compare = choice ? field(S.session.compareWith, choice) : h('div', {});
   const confirm = h('p', { class: 'lead' }, text.confirmWho(patient.code));
+  const sheet = setUpNote(patient) ?? h('div', {});
   const why = field(text.reason, reason);
   const { last_session: last } = patient;
   const fraction = action(last ? S.session.startNew : text.openFraction, open('fraction'),
@@ -182,6 +187,7 @@ function openButtons(patient, references) {
     compare.hidden = fraction.hidden;
     reference.hidden = isOpen('reference');
     confirm.hidden = fraction.hidden;  // who is open stands above
+    sheet.hidden = fraction.hidden;
     why.hidden = reference.hidden;
   };
   const block = blockNote((now) => {
@@ -189,7 +195,7 @@ function openButtons(patient, references) {
     draw();
   });
   const element = h('div', { class: 'form' },
-    confirm, compare,
+    confirm, sheet, compare,
     h('div', { class: 'row' }, resume, fraction, reference), block, question,
     !patient.approved_reference_id && hint(text.needsReference),
     why);
@@ -314,11 +320,14 @@ export async function showPatient(place, id) {
   const text = S.patients;
   const references = h('div', {});
   const scans = h('div', {});
+  const spread = h('div', {});
   const opening = h('div', {});
   const about = h('div', {});
+  const setUp = h('div', {});
   const heading = h('h1', {});
   const correction = h('div', { class: 'below' });
   let numbered;
+  let sheetShown;
   let approved;
   let told;
   let buttons = null;
@@ -326,11 +335,14 @@ export async function showPatient(place, id) {
   const weigh = () => opening.querySelector('.start-session')
     ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
   const load = async () => {
-    const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
-      get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
+    const [patient, found, history, course] = await Promise.all([get(`patients/${id}`, true),
+      get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true),
+      get(`patients/${id}/statistics`, true)]);
+    const onSheet = JSON.stringify([patient.alert, patient.immobilisation, patient.has_photo,
+      photosTaken(id)]);
     // A reason that was typed stays as long as nothing else is offered.
     const opens = `${patient.approved_reference_id} ${patient.archived} ${
-      patient.last_session?.id} ${patient.last_session?.fraction} ${
+      patient.last_session?.id} ${patient.last_session?.fraction} ${onSheet} ${
       found.references.filter((one) => one.approved_by).map((one) => one.id)}`;
     if (approved !== opens) {
       approved = opens;
@@ -344,8 +356,14 @@ export async function showPatient(place, id) {
       clear(heading, patient.code, ' ', h('small', {}, patient.site));
       clear(about, aboutPatient(patient, load));
     }
+    if (sheetShown !== onSheet) {
+      sheetShown = onSheet;
+      clear(setUp, setUpCard(patient, load));
+    }
     redraw(references, referenceTable(found.references));
     redraw(scans, scanTable(history.scans));
+    const approvedOne = found.references.find((one) => one.id === patient.approved_reference_id);
+    redraw(spread, courseStatistics(course, history.scans, toleranceOf(approvedOne)) ?? []);
     const sessions = JSON.stringify(history.scans.map((scan) => [scan.session_id, scan.fraction]));
     if (numbered !== sessions) {  // or a half-typed reason would be lost
       numbered = sessions;
@@ -365,7 +383,7 @@ export async function showPatient(place, id) {
         file(`report.pdf?language=${document.documentElement.lang}`, text.report),
         file('numbers.csv', text.csv), file('numbers.json', text.json),
         file(`course.zip?language=${document.documentElement.lang}`, text.course)),
-      correction),
+      correction), spread, setUp,
     about, may('wipe') && wipe(patient));
   let shownSession = null;
   const drawSession = () => {

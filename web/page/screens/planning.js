@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The planning CT as reference: its upload, and what its files state.
 import { sendFile } from '../api.js';
-import { field, fixed, form, h, hint } from '../dom.js';
+import { checkbox, clear, field, fixed, form, h, hint } from '../dom.js';
 import { kReason } from '../limits.js';
 import { S, saidEach } from '../words.js';
+import { sentence } from './common.js';
 
 const kDicom = '.dcm,application/dicom';
 
@@ -15,6 +16,15 @@ export function planningUpload(patient) {
   const name = () => h('input', { autocomplete: 'off', maxlength: 64 });
   const [roi, beam] = [name(), name()];
   const reason = h('input', { autocomplete: 'off', maxlength: kReason.maxlength });
+  // Shown where nothing proves that the files are this patient's.
+  const same = checkbox(text.samePatient, false);
+  const doubt = h('div', { class: 'below', hidden: true });
+  for (const input of [structures, plan]) {
+    input.addEventListener('change', () => {  // other files, another question
+      doubt.hidden = true;
+      same.box.checked = false;
+    });
+  }
   const bar = h('progress', { max: 1, value: 0, 'aria-label': text.sending, hidden: true });
   return h('details', { class: 'planning-upload below' }, h('summary', {}, text.title),
     hint(text.hint),
@@ -24,6 +34,7 @@ export function planningUpload(patient) {
         const [first, second] = [structures.files[0], plan.files[0]];
         const query = new URLSearchParams({ structures_bytes: first.size });
         const more = { roi, isocentre_of: beam, reason };
+        if (!doubt.hidden && same.box.checked) query.set('same_patient', 'yes');
         for (const [key, input] of Object.entries(more)) {
           if (input.value.trim()) query.set(key, input.value.trim());
         }
@@ -31,12 +42,19 @@ export function planningUpload(patient) {
           new Blob([first, second]), text.failed, (share) => { bar.value = share; },
           { 'X-Plumb-Planning': `${query}` });
         location.hash = `#/plan/${id}`;
+      } catch (error) {
+        if (error.body?.error_message?.id.startsWith('store.planning_patient')) {
+          clear(doubt, h('h3', {}, text.otherTitle),
+            h('p', { class: 'caution' }, sentence(error.message)), same.element);
+          doubt.hidden = false;
+        }
+        throw error;
       } finally {
         bar.hidden = true;
       }
     }, field(text.structures, structures), field(text.plan, plan),
     field(text.roi, roi, text.roiHint), field(text.beam, beam, text.beamHint),
-    field(S.patients.reason, reason), h('button', {}, text.send), bar));
+    field(S.patients.reason, reason), doubt, h('button', {}, text.send), bar));
 }
 
 /// What the files state, read-only. Nothing where the reference is a sweep.

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+// Set-up statistics over the fractions of a patient and over the patients of a site.
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <map>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "web/api/all_routes.hpp"
+#include "web/exchange/csv.hpp"
+#include "web/exchange/json.hpp"
+#include "web/model/course_statistics.hpp"
+#include "words/store.hpp"
+
+namespace plumb::web {
+namespace {
+
+constexpr int kMaxScansOfCourse = 1000;
+constexpr std::size_t kMaxCourses = 500;
+constexpr auto kMostTime = std::chrono::seconds(5);
+
+struct Course {
+  Patient patient;
+  CourseStatistics statistics;
+};
+/// The courses with an answer, newest first, and how many were not read for want of time.
+struct Courses {
+  std::vector<Course> all;
+  std::size_t left_out = 0;
+};
+
+Courses ReadCourses(PatientService& patients, ScanService& scans) {
+  std::vector<Patient> listed = patients.Patients();
+  std::erase_if(listed, [](const Patient& patient) { return patient.num_scans == 0; });
+  std::ranges::stable_sort(listed, std::ranges::greater(), &Patient::created_at);
+  const auto begun = std::chrono::steady_clock::now();
+  Courses courses;
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    if (i == kMaxCourses || std::chrono::steady_clock::now() - begun > kMostTime) {
+      courses.left_out = listed.size() - i;
+      break;
+    }
+    CourseStatistics statistics = StatisticsOf(scans.Scans(listed[i].id, kMaxScansOfCourse));
+    if (statistics.fractions > 0) courses.all.push_back({listed[i], std::move(statistics)});
+  }
+  return courses;
+}
+
+using Which = std::pair<const char*, NumberSpreads CourseStatistics::*>;
+constexpr std::array<Which, 2> kWhich = {Which{"first", &CourseStatistics::first},
+                                         Which{"last", &CourseStatistics::last}};
+
+/// Of each site, whose letter case does not count: its name and its courses.
+std::map<std::string, std::pair<std::string, std::vector<CourseStatistics>>> BySite(
+    const std::vector<Course>& courses) {
+  std::map<std::string, std::pair<std::string, std::vector<CourseStatistics>>> sites;
+  for (const Course& course : courses) {
+    std::string key = course.patient.site;
+    std::ranges::transform(key, key.begin(), [](unsigned char c) { return std::tolower(c); });
+    auto& [name, of_site] = sites[key];
+    if (name.empty()) name = course.patient.site;
+    of_site.push_back(course.statistics);
+  }
+  return sites;
+}
+
+Json CourseJson(const Patient& patient, const CourseStatistics& course) {
+  Json json = {
+      {"patient_id", patient.id},      {"code", patient.code},      {"site", patient.site},
+      {"fractions", course.fractions}, {"scans", course.scans},     {"accepted", course.accepted},
+      {"overrides", course.overrides}, {"minutes", course.minutes}, {"numbers", Json::array()}};
+  for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
+    Json number = {{"name", kNumberAxes[i].name}, {"unit", kNumberAxes[i].symbol()}};
+    for (const auto& [name, which] : kWhich) {
+      const NumberSpread& spread = (course.*which).at(i);
+      number[name] = {{"count", spread.count},
+                      {"mean", spread.count > 0 ? Json(spread.mean) : Json(nullptr)},
+                      {"deviation", spread.deviation}};
+    }
+    json["numbers"].push_back(std::move(number));
+  }
+  return json;
+}
+
+Json SiteJson(const std::string& site, const std::vector<CourseStatistics>& courses) {
+  Json json = {{"site", site}, {"courses", courses.size()}, {"numbers", Json::array()}};
+  for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
+    Json number = {{"name", kNumberAxes[i].name}, {"unit", kNumberAxes[i].symbol()}};
+    for (const auto& [name, which] : kWhich) {
+      const GroupSpread spread = GroupSpreadOf(courses, which, i);
+      number[name] = {{"courses", spread.courses},
+                      {"mean", spread.courses > 0 ? Json(spread.mean) : Json(nullptr)},
+                      {"systematic", spread.systematic},
+                      {"random", spread.random}};
+    }
+    json["numbers"].push_back(std::move(number));
+  }
+  return json;
+}
+
+Json StatisticsJson(const Courses& courses) {
+  Json json = {
+      {"courses", Json::array()}, {"sites", Json::array()}, {"left_out", courses.left_out}};
+  for (const auto& [patient, statistics] : courses.all)
+    json["courses"].push_back(CourseJson(patient, statistics));
+  for (const auto& [key, site] : BySite(courses.all))
+    json["sites"].push_back(SiteJson(site.first, site.second));
+  return json;
+}
+
+/// A line for each course, then one for each site: there the deviation is the systematic error.
+std::string StatisticsCsv(const Courses& courses) {
+  std::string text = "kind,site,patient,courses,fractions,scans,accepted,overrides,minutes";
+  for (const auto& [name, which] : kWhich)
+    for (const NumberAxis& axis : kNumberAxes)
+      for (const char* what : {"mean", "deviation", "random"})
+        text += fmt::format(",{}_{}_{}", name, what, axis.key);
+  text += "\r\n";
+  for (const auto& [patient, course] : courses.all) {
+    text += fmt::format("course,{},{},1,{},{},{},{},{}", CsvCell(patient.site),
+                        CsvCell(patient.code), course.fractions, course.scans, course.accepted,
+                        course.overrides, CsvNumber(course.minutes));
+    for (const auto& [name, which] : kWhich)
+      for (const NumberSpread& spread : course.*which)
+        text += fmt::format(",{},{},",
+                            CsvNumber(spread.count > 0 ? std::optional(spread.mean) : std::nullopt),
+                            CsvNumber(spread.deviation));
+    text += "\r\n";
+  }
+  for (const auto& [key, site] : BySite(courses.all)) {
+    text += fmt::format("site,{},,{},,,,,", CsvCell(site.first), site.second.size());
+    for (const auto& [name, which] : kWhich) {
+      for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
+        const GroupSpread spread = GroupSpreadOf(site.second, which, i);
+        text += fmt::format(
+            ",{},{},{}", CsvNumber(spread.courses > 0 ? std::optional(spread.mean) : std::nullopt),
+            CsvNumber(spread.systematic), CsvNumber(spread.random));
+      }
+    }
+    text += "\r\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+void AddStatisticsRoutes(Routes& routes, const Services& services) {
+  PatientService& patients = services.patients;
+  ScanService& scans = services.scans;
+  routes
+      .ReadInBackground("/api/v1/patients/{id}/statistics", Permission::kView,
+                        [&patients, &scans](const Request& request) {
+                          const auto patient = patients.FindPatient(request.arguments[0]);
+                          if (!patient) return ErrorResponse(404, say::store::NoPatient());
+                          return JsonResponse(CourseJson(
+                              *patient, StatisticsOf(scans.Scans(patient->id, kMaxScansOfCourse))));
+                        })
+      .Discloses("view.patient");
+  routes
+      .ReadInBackground("/api/v1/statistics", Permission::kView,
+                        [&patients, &scans](const Request&) {
+                          return JsonResponse(StatisticsJson(ReadCourses(patients, scans)));
+                        })
+      .Discloses("view.statistics");
+  routes
+      .ReadInBackground("/api/v1/statistics.csv", Permission::kView,
+                        [&patients, &scans](const Request&) {
+                          return Download("text/csv; charset=utf-8",
+                                          StatisticsCsv(ReadCourses(patients, scans)),
+                                          "plumb_statistics.csv");
+                        })
+      .Discloses("", "download.statistics");
+}
+
+}  // namespace plumb::web
