@@ -76,7 +76,7 @@ class DicomNetworkTest : public CommandLineTest {
   /// Makes NAME.pem and NAME.key, which sign themselves.
   void MakeCertificate(const std::string& name) {
     const RunResult made = plumb::Run(
-        {"openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj",
+        {"/usr/bin/openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj",
          "/CN=" + name, "-keyout", folder_ / (name + ".key"), "-out", folder_ / (name + ".pem")});
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
@@ -138,12 +138,16 @@ TEST_F(DicomNetworkTest, SilentAndSenselessConnectionsHoldNobodyUp) {
   ASSERT_TRUE(dicomd_->WaitForStderr("refused: no association"));
   const RunResult sent = Plumb({"send-dicom", plan_, "--to", Node()});
   EXPECT_EQ(sent.exit_code, 0) << sent.err;
-  // A fourth silent one is the last of this address: further ones are not served.
-  silent.push_back(Connected());
-  const RunResult refused = Plumb({"send-dicom", plan_, "--to", Node()});
-  EXPECT_EQ(refused.exit_code, 3);
-  EXPECT_TRUE(dicomd_->WaitForStderr("too many connections")) << dicomd_->err();
   EXPECT_EQ(Received().size(), 1U);
+}
+
+TEST_F(DicomNetworkTest, OneAddressHasFourConnectionsAtMost) {
+  Start();
+  std::vector<Descriptor> silent;
+  for (int i = 0; i < 4; ++i) silent.push_back(Connected());
+  EXPECT_EQ(Plumb({"send-dicom", plan_, "--to", Node()}).exit_code, 3);
+  EXPECT_TRUE(dicomd_->WaitForStderr("too many connections")) << dicomd_->err();
+  EXPECT_TRUE(Received().empty());
 }
 
 TEST_F(DicomNetworkTest, AFullSpoolStoresNothingMore) {
@@ -170,7 +174,9 @@ TEST_F(DicomNetworkTest, WithTlsOnlyATrustedCertificateMaySend) {
   EXPECT_EQ(send("other").exit_code, 3);
   EXPECT_EQ(Plumb({"send-dicom", plan_, "--to", Node()}).exit_code, 3);
   EXPECT_EQ(Received().size(), 1U);
-  ASSERT_TRUE(dicomd_->WaitForStderr("certificate verify failed"));
+  dicomd_->Signal(SIGTERM);
+  EXPECT_EQ(dicomd_->Wait(), 0);
+  EXPECT_THAT(dicomd_->err(), HasSubstr("certificate verify failed"));
 }
 
 TEST_F(DicomNetworkTest, WithoutBeingEnabledNothingIsReceived) {
