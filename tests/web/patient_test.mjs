@@ -69,7 +69,9 @@ await h.step('alert and immobilisation are shown where it is confirmed who is th
 await h.step('a photo is taken with the sensor on purpose, and removed', async () => {
   equal(await anna.locator('.set-up-photo').count(), 0, 'none was taken by itself');
   h.tell('camera');
-  await anna.waitForFunction(async () => (await fetch('/api/v1/preview')).ok);
+  for (const begun = Date.now(); (await h.api(anna, 'preview')).status !== 200;) {
+    check(Date.now() - begun < 30000, 'a picture of the camera');
+  }
   await onSheet(anna).getByRole('button', { name: 'Take a photo' }).click();
   const photo = onSheet(anna).locator('.set-up-photo');
   await photo.waitFor();

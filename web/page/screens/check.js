@@ -7,6 +7,7 @@ import {
 } from '../dom.js';
 import { kReason } from '../limits.js';
 import { signed } from '../numbers.js';
+import { controlLimits } from '../drawings/control_limits.js';
 import { markOf } from '../drawings/trend.js';
 import { signedForm } from '../signed_form.js';
 import { S, said, saidEach } from '../words.js';
@@ -92,12 +93,17 @@ function chart(name, checks) {
   const low = isSize({ name }) ? 0 : -limit;
   const values = points.map(({ item }) => item.value);
   const told = points.map(({ item }) => written(item));
-  const top = 1.1 * Math.max(limit, ...values);
-  const bottom = 1.1 * Math.min(low, ...values);
+  const control = controlLimits(values);
+  const reached = [...values, ...(control ? [control.low, control.high] : [])];
+  const top = 1.1 * Math.max(limit, ...reached);
+  const bottom = 1.1 * Math.min(low, ...reached);
   const x = (i) => kLeft + 14 + i / (points.length - 1) * (kWidth - kLeft - 42);
   const y = (value) => 8 + (top - value) / (top - bottom) * (kHeight - 32);
   const tick = (value) =>
     svg('text', { x: kLeft - 5, y: y(value) + 4, class: 'tick' }, plain(value));
+  const across = (value, look) => svg('line', {
+    x1: kLeft, x2: kWidth - 4, y1: y(value), y2: y(value), class: look,
+  });
   const every = Math.ceil(points.length / 5);
   return h('figure', { class: 'trend' },
     h('figcaption', {}, S.check.items[name], ' ', h('strong', {}, `${told.at(-1)} ${unit}`)),
@@ -108,6 +114,8 @@ function chart(name, checks) {
     svg('rect', {
       x: kLeft, width: kWidth - kLeft - 4, y: y(limit), height: y(low) - y(limit), class: 'zone',
     }), tick(limit), tick(0), low < 0 && tick(low),
+    control && [across(control.mean, 'control mean'), across(control.low, 'control'),
+      across(control.high, 'control')],
     svg('polyline', { points: values.map((v, i) => `${x(i)},${y(v)}`).join(' '), class: 'line' }),
     points.map(({ item }, i) =>
       markOf(item.passed ? 'within' : 'outside', x(i), y(item.value), 4)),
@@ -121,7 +129,7 @@ function trends(checks) {
   const charts = names.map((name) => chart(name, checks)).filter(Boolean);
   if (!charts.length) return null;
   return card(S.check.trend,
-    h('div', { class: 'trends' }, charts));
+    checks.length > 6 && hint(S.check.control), h('div', { class: 'trends' }, charts));
 }
 
 function earlier(checks) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Patients, their references and scans, and the treatment session that people open here.
-import { get, live, may, post, put, removeFor } from '../api.js';
+import { get, getOrNull, live, may, post, put, removeFor } from '../api.js';
 import {
   action, card, clear, done, enable, field, form, h, hint, localTime, redraw, row, say, signedTime,
   select, table, warn,
@@ -335,9 +335,8 @@ export async function showPatient(place, id) {
   const weigh = () => opening.querySelector('.start-session')
     ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
   const load = async () => {
-    const [patient, found, history, course] = await Promise.all([get(`patients/${id}`, true),
-      get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true),
-      get(`patients/${id}/statistics`, true)]);
+    const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
+      get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
     const onSheet = JSON.stringify([patient.alert, patient.immobilisation, patient.has_photo,
       photosTaken(id)]);
     // A reason that was typed stays as long as nothing else is offered.
@@ -362,8 +361,11 @@ export async function showPatient(place, id) {
     }
     redraw(references, referenceTable(found.references));
     redraw(scans, scanTable(history.scans));
-    const approvedOne = found.references.find((one) => one.id === patient.approved_reference_id);
-    redraw(spread, courseStatistics(course, history.scans, toleranceOf(approvedOne)) ?? []);
+    // Nothing waits for them.
+    getOrNull(`patients/${id}/statistics`).then((course) => {
+      const inUse = found.references.find((one) => one.id === patient.approved_reference_id);
+      redraw(spread, courseStatistics(course, history.scans, toleranceOf(inUse)) ?? []);
+    });
     const sessions = JSON.stringify(history.scans.map((scan) => [scan.session_id, scan.fraction]));
     if (numbered !== sessions) {  // or a half-typed reason would be lost
       numbered = sessions;

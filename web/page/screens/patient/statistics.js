@@ -3,7 +3,7 @@
 import { get } from '../../api.js';
 import { card, clear, field, fixed, h, hint, row, select, table } from '../../dom.js';
 import { trend } from '../../drawings/trend.js';
-import { withUnit } from '../../numbers.js';
+import { signed, withUnit } from '../../numbers.js';
 import { S } from '../../words.js';
 
 const digits = (unit) => (unit === '°' ? 2 : 1);
@@ -15,7 +15,7 @@ const axisName = ({ name }) => S.result.axes[name];
 /// "−1.2 ± 0.8 mm": mean and standard deviation.
 function meanWords({ mean, deviation }, unit) {
   if (mean === null) return S.none;
-  const value = fixed(mean, digits(unit));
+  const value = signed(mean, digits(unit));
   return withUnit(
     deviation === null ? value : `${value} ± ${fixed(deviation, digits(unit))}`, unit);
 }
@@ -45,7 +45,8 @@ function siteTable(site, which) {
   return table([text.number, text.courses, text.mean, text.systematic, text.random],
     site.numbers.map((number) => {
       const spread = number[which];
-      return row(axisName(number), spread.courses, cell(told(spread.mean, number.unit)),
+      const mean = meanWords({ mean: spread.mean, deviation: null }, number.unit);
+      return row(axisName(number), spread.courses, cell(mean),
         cell(told(spread.systematic, number.unit)), cell(told(spread.random, number.unit)));
     }), text.ofSite(site.site || S.none));
 }
