@@ -60,10 +60,11 @@ int Run(const ImportArguments& options, const CommandContext& context) {
 
 Command AddImport(CLI::App& app) {
   auto options = std::make_shared<ImportArguments>();
-  app.add_option("source", options->source,
-                 "Recording of another program: a bag of RealSense, ROS 1 or ROS 2 (.bag, .db3, "
-                 ".mcap), a ScanNet .sens, or a folder of images with a calibration; or any "
-                 "recording")
+  app.add_option(
+         "source", options->source,
+         "Recording of another program: a bag of RealSense, ROS 1 or ROS 2 (.bag, .db3, .mcap), "
+         "an Azure Kinect's .mkv, a ScanNet .sens, or a folder of images with a "
+         "calibration; or any recording")
       ->required()
       ->type_name("SOURCE");
   app.add_option("--out", options->out, "Recording to write: a folder in the TUM RGB-D layout")

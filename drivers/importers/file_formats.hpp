@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-enum class FileFormat { kRosBag, kRosDatabase, kMcap, kSens };
+enum class FileFormat { kRosBag, kRosDatabase, kMcap, kMatroska, kSens };
 
 inline constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
 
@@ -21,6 +21,7 @@ inline constexpr std::size_t kFirstBytes = 64;
   const std::string_view text(reinterpret_cast<const char*>(first.data()), first.size());
   if (text.starts_with("#ROSBAG V2.0\n")) return FileFormat::kRosBag;
   if (text.starts_with(kMcapMagic)) return FileFormat::kMcap;
+  if (text.starts_with("\x1a\x45\xdf\xa3")) return FileFormat::kMatroska;
   // Any database of SQLite; its reader looks for the tables of a ROS 2 bag.
   if (text.starts_with(std::string_view("SQLite format 3\0", 16))) return FileFormat::kRosDatabase;
   // Version 4, then the length of a name in 8 bytes, of which the upper six are 0.

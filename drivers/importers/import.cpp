@@ -23,9 +23,6 @@ struct Unread {
   const char* command;
 };
 constexpr std::array kUnread = {
-    Unread{".mkv", "Azure Kinect / Femto .mkv",
-           "python3 examples/python/reconstruction_system/sensors/azure_kinect_mkv_reader.py "
-           "--input FILE --output FOLDER (Open3D)"},
     Unread{".zstd", "ROS 2 bag, packed as a whole", "zstd -d FILE"},
     Unread{".r3d", "Record3D .r3d", "Record3D: export as EXR + RGB"},
 };

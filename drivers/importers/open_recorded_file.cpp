@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
+#include "drivers/importers/azure_mkv.hpp"
 #include "drivers/importers/file_formats.hpp"
 #include "drivers/importers/mcap_file.hpp"
 #include "drivers/importers/ros_bag.hpp"
@@ -26,6 +27,7 @@ std::unique_ptr<RecordedFile> OpenRecordedFile(FileBytes bytes) {
     return OpenRosRecording(OpenRosDatabase(std::move(bytes)));
   if (format == FileFormat::kMcap)
     return OpenRosRecording(std::make_unique<McapFile>(std::move(bytes)));
+  if (format == FileFormat::kMatroska) return OpenAzureMkv(std::move(bytes));
   if (format == FileFormat::kSens) return OpenSensFile(std::move(bytes));
   throw DataError(say::foreign::UnknownFormat());
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as a binary recording of another program: bags of ROS 1 and 2, ScanNet .sens.
+// Any bytes as a binary recording of another program: bags of ROS 1 and 2, Azure .mkv,
+// ScanNet .sens.
 #include <algorithm>
 
 #include "drivers/importers/open_recorded_file.hpp"

@@ -13,6 +13,7 @@
 #include "drivers/replay/tum_writer.hpp"
 #include "tests/support/result_with.hpp"
 #include "tests/unit/importers/bag_writer.hpp"
+#include "tests/unit/importers/mkv_writer.hpp"
 #include "tests/unit/importers/ros2_writer.hpp"
 #ifdef PLUMB_WITH_DICOM
 #include "tests/unit/dicom/small_files.hpp"
@@ -103,6 +104,13 @@ void WriteRecorded(const fs::path& root) {
                                         {"mcap_lz4", Container::kMcapLz4},
                                         {"mcap_zstd", Container::kMcapZstd}})
     WriteWholeFile(root / "bag" / name, testing::InContainer(ros2, container));
+  // Images of other sizes than stated: they are read last, and real ones are longer than inputs.
+  testing::AzureTruth azure;
+  azure.colors = azure.depths = {"any", "any"};
+  WriteWholeFile(root / "bag" / "mkv", testing::MkvWriter::Write(azure));
+  azure.groups = true;
+  azure.known_sizes = false;
+  WriteWholeFile(root / "bag" / "mkv_groups", testing::MkvWriter::Write(azure));
   const fs::path stream = Folder(root / "stream");
   const std::vector<std::string> texts = {
       R"({"fx": 600, "fy": 600, "cx": 320, "cy": 240, "depth_scale": 1000})",
