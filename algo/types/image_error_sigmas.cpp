@@ -19,9 +19,10 @@ namespace {
 // A phone's plane of a flat door wobbled by 13 mm and 0.9 deg below its range. With 8 mm and 0.8 %
 // heights of unit 82 have a sigma of 2.2 mm and scatter by 0.9; with these, 1.4 mm. Angles of two
 // scans are off by 0.04 to 0.10 deg beyond what the other causes state (units 82 and 85).
-// Surfaces of structured light turn with how the flanks were looked at: yaw of two scans scatters by
-// 0.04 to 0.05 deg where the other causes state 0.03 (units 91, 92 and 93), so that 68, 72 and 84 %
-// of its intervals held. The path is not turned there (0.01 deg), and active stereo shows none of it.
+// Surfaces of structured light turn with how the flanks were looked at: yaw of two scans scatters
+// by 0.04 to 0.05 deg where the other causes state 0.03 (units 91, 92 and 93), so that 68, 72 and
+// 84 % of its intervals held. The path is not turned there (0.01 deg), and active stereo shows none
+// of it.
 constexpr std::array<ImageErrorSigmas, 4> kImageErrors = {{
     {.body_turn_rad = 0.024 * kDegree},
     {},

@@ -14,11 +14,11 @@
 #include "algo/base/message.hpp"
 #include "daemon/appliance/button_watch.hpp"
 #include "daemon/appliance/current_scan.hpp"
-#include "daemon/monitoring/rest_watch.hpp"
-#include "daemon/scanning/scan_session.hpp"
 #include "daemon/appliance/scan_state.hpp"
 #include "daemon/appliance/shared_parts.hpp"
 #include "daemon/loop/event_loop.hpp"
+#include "daemon/monitoring/rest_watch.hpp"
+#include "daemon/scanning/scan_session.hpp"
 #include "daemon/unit/page_identity.hpp"
 #include "web/service/appliance_service.hpp"
 

@@ -6,8 +6,8 @@
 
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/plan_options.hpp"
-#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "words/monitoring.hpp"
 
 namespace plumb {

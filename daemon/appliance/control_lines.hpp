@@ -10,8 +10,8 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "algo/base/message.hpp"
-#include "daemon/scanning/scan_session.hpp"
 #include "daemon/appliance/scan_state.hpp"
+#include "daemon/scanning/scan_session.hpp"
 #include "daemon/sweep/sensor_thread.hpp"
 #include "drivers/indicator.hpp"
 

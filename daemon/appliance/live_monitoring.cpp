@@ -10,8 +10,8 @@
 #include "algo/base/message_json.hpp"
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
-#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "words/audit.hpp"
 #include "words/monitoring.hpp"
 

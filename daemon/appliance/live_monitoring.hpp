@@ -14,10 +14,10 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "algo/base/message.hpp"
-#include "daemon/monitoring/monitor_session.hpp"
 #include "daemon/appliance/notices.hpp"
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/work_thread.hpp"
+#include "daemon/monitoring/monitor_session.hpp"
 #include "drivers/indicator.hpp"
 #include "web/model/account.hpp"
 #include "web/model/monitoring.hpp"

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "algo/base/message.hpp"
-#include "daemon/scanning/unit_profile.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/scanning/unit_profile.hpp"
 #include "daemon/sweep/sensor_thread.hpp"
 #include "web/service/room_services.hpp"
 

@@ -6,8 +6,8 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
 #include "algo/base/units.hpp"
-#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/sweep/explain.hpp"
 #include "words/scan.hpp"
 

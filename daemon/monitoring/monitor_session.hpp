@@ -19,9 +19,9 @@
 #include "algo/monitoring/breath_gate.hpp"
 #include "algo/monitoring/monitor.hpp"
 #include "daemon/monitoring/monitor_recorder.hpp"
-#include "daemon/scanning/scan_session.hpp"
 #include "daemon/monitoring_files/monitoring_folder.hpp"
 #include "daemon/pipeline/live_feed.hpp"
+#include "daemon/scanning/scan_session.hpp"
 
 namespace plumb {
 

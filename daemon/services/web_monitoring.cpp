@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "algo/base/message_json.hpp"
+#include "daemon/loop/log.hpp"
 #include "daemon/monitoring/live_acceptance.hpp"
 #include "daemon/monitoring_files/monitoring_file.hpp"
-#include "daemon/loop/log.hpp"
 #include "words/audit.hpp"
 
 namespace plumb {

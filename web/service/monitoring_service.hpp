@@ -31,8 +31,8 @@ class MonitoringService {
   virtual void ForgetBreath(const Actor& actor, Done done) = 0;
   /// (background) Of a scan, oldest first: number and head of each, or why it cannot be read.
   [[nodiscard]] virtual nlohmann::json MonitorRecords(const std::string& scan_id) = 0;
-  /// (background) What one says in short (daemon/monitoring_files/monitoring_file.hpp); null if there is none.
-  /// One that cannot be read has a fault only.
+  /// (background) What one says in short (daemon/monitoring_files/monitoring_file.hpp); null if
+  /// there is none. One that cannot be read has a fault only.
   [[nodiscard]] virtual nlohmann::ordered_json MonitorReport(const std::string& scan_id,
                                                              int number) = 0;
   /// (background) Its frames as monitor.csv; empty if there is none, or it cannot be read.

@@ -7,8 +7,8 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/archive/patient_transfer.hpp"
-#include "daemon/cli/unit/backup_keys.hpp"
 #include "daemon/cli/commands.hpp"
+#include "daemon/cli/unit/backup_keys.hpp"
 #include "words/cli.hpp"
 
 namespace plumb {

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/units.hpp"
-#include "daemon/scanning/unit_profile.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/records/profile_shelf.hpp"
+#include "daemon/scanning/unit_profile.hpp"
 #include "tests/support/board_checks.hpp"
 #include "tests/support/synthetic_scene.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"

@@ -13,9 +13,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "daemon/files/scene_folder.hpp"
 #include "daemon/monitoring/live_acceptance.hpp"
 #include "daemon/monitoring_files/monitoring_file.hpp"
-#include "daemon/files/scene_folder.hpp"
 #include "tests/support/rest_frames.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "web/model/limits.hpp"
