@@ -152,8 +152,13 @@ nlohmann::json RealSenseStreams::CameraKeys() const {
   library_->Call(what, library_->get_video_stream_intrinsics, color_.profile, &color);
   library_->Call(what, library_->get_video_stream_intrinsics, depth_.profile, &depth);
   library_->Call(what, library_->get_extrinsics, depth_.profile, color_.profile, &pose);
+  const auto is_of = [](const RsIntrinsics& camera, const ChosenMode& mode) {
+    return camera.width == mode.width && camera.height == mode.height;
+  };
+  if (!is_of(color, color_) || !is_of(depth, depth_)) throw DeviceError(what);
   const double unit_m =
       static_cast<double>(library_->Call(what, library_->get_depth_scale, depth_.sensor));
+  if (!(unit_m > 0)) throw DeviceError(what);
   const auto matrix = [](const RsIntrinsics& c) {
     return std::array<double, 9>{c.fx, 0, c.ppx, 0, c.fy, c.ppy, 0, 0, 1};
   };

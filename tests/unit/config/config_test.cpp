@@ -145,6 +145,11 @@ TEST(ConfigTest, NamesLineKeyExpectedAndFound) {
   EXPECT_THAT(ErrorOf("[compare]\nisocentre_m = [1, 2]\n"), HasSubstr("[x, y, z]"));
   EXPECT_THAT(ErrorOf("[iec]\nT_iec_reference = [[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n"),
               HasSubstr("rigid transform"));
+  EXPECT_THAT(
+      ErrorOf("[sensor]\nexposure_us = 40000\n"),
+      AllOf(HasSubstr("sensor.exposure_us"), HasSubstr("33000"), HasSubstr("microseconds")));
+  EXPECT_THAT(ErrorOf("[sensor]\nlibrary = \"librealsense2.so\"\n"),
+              AllOf(HasSubstr("sensor.library"), HasSubstr("absolute path")));
   EXPECT_THAT(ErrorOf("compare = 3\n"), HasSubstr("a table"));
   EXPECT_THAT(ErrorOf("[compare\n"), AllOf(HasSubstr("test.toml:1:"), HasSubstr("not valid TOML")));
   EXPECT_THAT(ErrorOf("[web]\n[\0]\n"s), AllOf(HasSubstr("test.toml:2:"), HasSubstr("a byte 0")));
@@ -280,6 +285,10 @@ TEST(ConfigTest, APresetOfReconstructionsHoldsForComparisonsUnlessTheyHaveTheirO
 
 TEST(ConfigTest, WhatTakesEffectAtTheStartIsKeptAndNamed) {
   const std::string at_start = R"(
+[sensor]
+driver = "realsense"
+library = "/l"
+exposure_us = 8000
 [markers]
 dictionary = "DICT_4X4_50"
 length_m = 0.08
@@ -316,15 +325,16 @@ sensor_serial = "7"
 )";
   const Config in_use = ParseConfig("", "test.toml");
   Config next = ParseConfig(at_start + "quota_gb = 5\n[check]\nmin_views = 4\n", "test.toml");
-  EXPECT_THAT(KeepUntilRestart(in_use, next),
-              ::testing::UnorderedElementsAre(
-                  "markers.dictionary", "markers.length_m", "markers.reference", "button.chip",
-                  "button.line", "button.active_low", "light.chip", "light.red", "light.green",
-                  "light.blue", "light.beeper", "light.active_low", "monitor.gate_chip",
-                  "monitor.gate_line", "monitor.gate_active_low", "update.folder",
-                  "update.max_bundle_mb", "web.listen", "web.tls_certificate", "web.tls_key",
-                  "web.plain_http", "web.host_names", "appliance.state", "appliance.control",
-                  "appliance.calibration", "appliance.sensor_serial"));
+  EXPECT_THAT(
+      KeepUntilRestart(in_use, next),
+      ::testing::UnorderedElementsAre(
+          "markers.dictionary", "markers.length_m", "markers.reference", "button.chip",
+          "button.line", "button.active_low", "light.chip", "light.red", "light.green",
+          "light.blue", "light.beeper", "light.active_low", "monitor.gate_chip",
+          "monitor.gate_line", "monitor.gate_active_low", "update.folder", "update.max_bundle_mb",
+          "web.listen", "web.tls_certificate", "web.tls_key", "web.plain_http", "web.host_names",
+          "appliance.state", "appliance.control", "appliance.calibration",
+          "appliance.sensor_serial", "sensor.driver", "sensor.library", "sensor.exposure_us"));
   EXPECT_EQ(next.web.listen, in_use.web.listen);
   EXPECT_EQ(next.appliance.quota_gb, 5);
   EXPECT_EQ(next.check.min_views, 4);

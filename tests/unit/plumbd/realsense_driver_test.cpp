@@ -24,9 +24,9 @@ namespace {
 namespace fake = fake_realsense;
 using namespace std::chrono_literals;
 
-constexpr int kFrames = 60;
+constexpr int kFrames = 48;
 constexpr int kWidth = 640, kHeight = 480;
-constexpr std::int64_t kPeriod_us = 83'333;  // Slower than the sweep was, for busy machines.
+constexpr std::int64_t kPeriod_us = 125'000;  // Slower than the sweep was, for busy machines.
 constexpr const char* kSerial = "728612070259";
 
 struct SweepImages {

@@ -299,6 +299,12 @@ TEST_F(RealSenseTest, ADamagedFactoryCalibrationIsRefused) {
   unit.color_modes[0].camera.coefficients[0] = 0.1F;
   fake::Attach(unit);
   EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }), HasSubstr("model 3"));
+  fake::Reset();
+  unit = D435();
+  unit.depth_unit_m = 0.0F;
+  fake::Attach(unit);
+  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }),
+              HasSubstr("calibration of its factory"));
 }
 
 TEST_F(RealSenseTest, StampsPassTheEndOfTheCamerasCounter) {
