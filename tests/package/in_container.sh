@@ -46,7 +46,8 @@ echo data >/var/lib/plumb/scans-of-the-operator
 before=$(systemctl show plumbd -p MainPID --value)
 check "upgrade" 0 \
   "$(apt -o Dpkg::Options::=--force-confold install /debs/new/plumbd_*.deb /debs/new/plumb_*.deb)"
-check "another version" "*0.2*" "$(dpkg-query -W -f '${Version}' plumbd)"
+check "another version" "$(dpkg-deb -f /debs/new/plumbd_*.deb Version)" \
+  "$(dpkg-query -W -f '${Version}' plumbd)"
 check "the changed configuration is kept" "# changed by the operator" \
   "$(tail -1 /etc/plumb/plumb.toml)"
 await "page after the upgrade" '*"status":"ok"*' 20 health

@@ -842,7 +842,7 @@ await h.step('two at one plan: neither saves over or approves what they have not
 await h.step('two at one note: neither saves over what they have not seen', async () => {
   const path = 'patients/p0001';
   await anna.goto(`${h.url}#/patient/p0001`);
-  const note = anna.locator('textarea');
+  const note = anna.getByLabel('Note', { exact: true });
   await note.waitFor();
   // As if bob had just saved, and the page had not been notified yet.
   const requests = `**/api/v1/${path}`;
