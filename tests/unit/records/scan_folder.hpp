@@ -82,7 +82,10 @@ inline void MakeSchema9(const std::filesystem::path& database) {
       .Execute(
           "DROP TRIGGER scans_unavailable_message; ALTER TABLE scans DROP COLUMN failure_message; "
           "ALTER TABLE scans DROP COLUMN unavailable_message; ALTER TABLE refs DROP COLUMN "
-          "approved_digest; ALTER TABLE sessions DROP COLUMN reference_id; DROP TABLE "
+          "approved_digest; ALTER TABLE refs DROP COLUMN source; ALTER TABLE refs DROP COLUMN "
+          "patient_hash; ALTER TABLE sessions DROP COLUMN reference_id; ALTER TABLE sessions DROP "
+          "COLUMN chosen_at_version; ALTER TABLE patients DROP COLUMN immobilisation; ALTER TABLE "
+          "patients DROP COLUMN alert; ALTER TABLE patients DROP COLUMN photo; DROP TABLE "
           "backup_scans; DROP TABLE backups; DROP TABLE removals; DROP "
           "TABLE bin; DROP TABLE second_factors; DROP TABLE pins; PRAGMA user_version = 9");
 }

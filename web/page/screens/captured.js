@@ -8,7 +8,8 @@ import { S, said } from '../words.js';
 import { isAdvice } from './common.js';
 
 /// "planning CT, version 1"
-export const sourceVersion = ({ source, version }) => S.session.sourceVersion(source, version);
+export const sourceVersion = ({ source, version }) =>
+  S.session.sourceVersion[source === 'planning_ct' ? source : 'sweep'](version);
 
 /// The version that a session compares with, and of which source it is where that is not plain.
 export const comparesWith = ({ reference, other_reference: other }) => (
