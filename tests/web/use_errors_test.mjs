@@ -1094,7 +1094,8 @@ await h.step('site and note are corrected; an archived patient is out of the lis
   await bob.goto(`${h.url}#/patient/${open.id}`);
   await bob.getByLabel('Site').fill('pelvis');
   await bob.getByLabel('Note').fill('knee rest,\narms on the chest');
-  await bob.getByRole('button', { name: 'Save', exact: true }).click();
+  await bob.locator('form', { has: bob.getByLabel('Site') })
+    .getByRole('button', { name: 'Save', exact: true }).click();
   await bob.getByRole('heading', { name: 'PX-0002 pelvis' }).waitFor();
   equal((await h.api(bob, `patients/${open.id}`)).body.note, 'knee rest, arms on the chest',
     'one line');
