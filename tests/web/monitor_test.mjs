@@ -67,8 +67,9 @@ await h.step('the room shows the same, larger', async () => {
     .evaluate((element) => parseFloat(getComputedStyle(element).fontSize))));
   check(sizes[0] > 2 * sizes[1], `larger: ${sizes}`);
   await room.locator('.live-view').getByText('Not connected to a beam').waitFor();
-  equal(await room.evaluate(() => document.documentElement.scrollHeight
-    <= window.innerHeight + 1), true, 'nothing is below the screen');
+  // Nothing is below the screen, once it is drawn.
+  await room.waitForFunction(() =>
+    document.documentElement.scrollHeight <= window.innerHeight + 1);
   await h.look(room, 'monitor-room-in', { fullPage: false });
 });
 
