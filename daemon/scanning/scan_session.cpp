@@ -249,13 +249,18 @@ void ScanSession::FormAnswer(const ScanProgress& progress) {
       return CompareWith(reference_.get().scene, scene, stop, room);
     });
   }
+  // The least priority does not help where a quota limits both threads together.
+  if (progress.frame->fewer_keypoints || progress.frames_dropped > 0) {
+    is_late_ = true;
+    forming_->Stop();
+  }
   update_.forming = forming_->Newest();
   if (update_.guidance.advice == SweepAdvice::kNone && update_.forming &&
       update_.forming->is_enough)
     update_.guidance.advice = SweepAdvice::kEnough;
   const bool is_covered =
       !update_.surface || update_.surface->coverage.value_or(1.0) >= kFormFromCoverage;
-  if (!is_covered || now_s - formed_s_ < kFormEvery_s || !forming_->IsIdle()) return;
+  if (is_late_ || !is_covered || now_s - formed_s_ < kFormEvery_s || !forming_->IsIdle()) return;
   formed_s_ = now_s;
   forming_->Make(progress.sweep->SceneUpToNow(), update_.guidance.elapsed_s);
 }

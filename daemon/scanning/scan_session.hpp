@@ -172,6 +172,7 @@ class ScanSession {
   EndedScan outcome_;
   bool complete_reported_ = false;
   double reported_s_ = 0.0, shown_s_ = 0.0, formed_s_ = 0.0;
+  bool is_late_ = false;  ///< Tracking needs all the processor time: no more answers form.
   std::optional<FormingAnswers> forming_;  ///< While frames come, of a scan that is compared.
   std::atomic<double> heartbeat_s_;
   std::jthread thread_;  // last: starts when the members above are initialised
