@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pages of a database, or of its log of writes, that this process has read or written, in its
-// memory: the event loop reads rows and must not wait for a slow disk. The database belongs to one
-// process, so nobody else changes what is kept here.
+// A cache of the pages of a database, or of its log of writes, that this process has read or
+// written: the event loop reads rows and must not wait for a slow disk. Only one process may use
+// the database, so the cached pages cannot go stale.
 #pragma once
 
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The list of the checksums that the pages of a database had when they were last written, in a
-// file beside it. The checksum in a page cannot tell that a disk has lost a write: the page is then
-// whole, but of an earlier time.
+// A file beside the database that lists the checksum each page had when it was last written. The
+// checksum within a page cannot reveal that the disk lost a write, because the older page is
+// intact.
 #pragma once
 
 #include <cstdint>

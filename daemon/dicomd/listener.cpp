@@ -55,7 +55,7 @@ void LimitChild() {
   Limit(RLIMIT_FSIZE, kMostReceivedBytes);
   Limit(RLIMIT_CPU, kMostCpu_s);
   Limit(RLIMIT_CORE, 0);
-  ::signal(SIGXFSZ, SIG_IGN);  // the write fails instead, and the sender is told so
+  ::signal(SIGXFSZ, SIG_IGN);  // so that the write fails and the sender gets an error
   ::signal(SIGPIPE, SIG_IGN);
   sigset_t none;
   ::sigemptyset(&none);

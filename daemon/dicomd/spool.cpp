@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostFiles = 20'000;
-/// Without a visible file nobody is still receiving it after that time.
+/// A file that is still hidden after this time belongs to a transfer that was broken off.
 constexpr std::chrono::hours kUnfinished{1};
 
 std::string NowUtc(const char* format) {

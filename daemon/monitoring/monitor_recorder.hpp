@@ -27,8 +27,8 @@ struct MonitorRecordPlace {
 /// Thread-safe. What is added is on the disk a second later: that much is lost by a power cut.
 class MonitorRecorder {
  public:
-  /// @param told  Called at most once, on the recorder's thread, with the reason why it stopped
-  ///              before the session ended.
+  /// @param told  If recording stops before the session ends, called once with the reason, on the
+  ///              recorder's thread.
   MonitorRecorder(MonitorRecordPlace place, std::function<void(const Message&)> told);
   /// Writes down what was added, and waits for that.
   ~MonitorRecorder();

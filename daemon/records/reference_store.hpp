@@ -17,7 +17,8 @@ namespace plumb {
 struct KnownPlanning {
   int version = 0;           ///< Of the patient's newest; 0: there is none.
   std::string patient_hash;  ///< Its ReferenceOrigin::patient_hash.
-  std::string other_code;    ///< Of another patient whose files had the same hash; empty: nobody's.
+  std::string
+      other_code;  ///< Of another patient whose files have the same hash; empty if none has.
 };
 
 /// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds, and DataError

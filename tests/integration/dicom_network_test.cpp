@@ -16,6 +16,7 @@
 #include "drivers/files/descriptor.hpp"
 #include "tests/integration/command_line.hpp"
 #include "tests/support/http_client.hpp"
+#include "tests/support/skip.hpp"
 #include "tests/unit/dicom/small_files.hpp"
 
 namespace plumb {
@@ -220,7 +221,7 @@ class OrthancTest : public DicomNetworkTest {
 TEST_F(OrthancTest, APlanComesFromOrthancAndTheReportGoesBack) {
   Start();
   if (!StartOrthanc())
-    GTEST_SKIP() << "Orthanc is not installed (package orthanc, or PLUMB_ORTHANC)";
+    PLUMB_SKIP("Orthanc is not installed: apt install orthanc, or name it in PLUMB_ORTHANC");
   std::vector<std::string> pushed;
   for (const fs::path& file : {structures_, plan_}) {
     const auto stored = web_.Ask("POST", "/instances", ReadText(file)).json();

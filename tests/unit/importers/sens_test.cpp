@@ -16,12 +16,14 @@
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/importers/bag_writer.hpp"
+#include "tests/unit/importers/read_from_memory.hpp"
 
 namespace plumb {
 namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using testing::InMemory;
 using testing::MessageOf;
 using testing::Packed;
 using testing::TempFolder;
@@ -69,14 +71,6 @@ std::vector<std::uint8_t> Write(const Sens& sens) {
     bytes.append(packed.begin(), packed.begin() + static_cast<std::ptrdiff_t>(size));
   }
   return {bytes.begin(), bytes.end()};
-}
-
-FileBytes InMemory(const std::vector<std::uint8_t>& bytes) {
-  return {.size = bytes.size(), .read = [&bytes](std::uint64_t offset, std::span<std::uint8_t> to) {
-            if (offset > bytes.size() || to.size() > bytes.size() - offset) return false;
-            std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(offset), to.size(), to.begin());
-            return true;
-          }};
 }
 
 TEST(SensTest, FramesComeBackWithBothCameras) {
