@@ -12,9 +12,9 @@
 
 #include <Eigen/Core>
 
+#include "algo/acceptance/default_tolerance.hpp"
 #include "algo/acceptance/number_judgement.hpp"
 #include "algo/acceptance/verdict.hpp"
-#include "algo/base/default_tolerance.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/units.hpp"
 

@@ -9,7 +9,7 @@
 #include "algo/bundle/bundle_options.hpp"
 #include "algo/bundle/quadratic_term.hpp"
 #include "algo/map/map.hpp"
-#include "algo/sensor_model/calibration_prior.hpp"
+#include "algo/sensor_calibration/calibration_prior.hpp"
 
 namespace plumb {
 

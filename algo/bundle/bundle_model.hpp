@@ -9,7 +9,7 @@
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
-#include "algo/sensor_model/calibration_prior.hpp"
+#include "algo/sensor_calibration/calibration_prior.hpp"
 #include "algo/types/marker.hpp"
 
 namespace plumb::bundle {

@@ -5,8 +5,8 @@
 #include <stop_token>
 #include <vector>
 
-#include "algo/sensor_model/calibration_prior.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_calibration/calibration_prior.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 
 namespace plumb {
 

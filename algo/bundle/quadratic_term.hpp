@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "algo/sensor_model/calibration_model.hpp"
+#include "algo/sensor_calibration/calibration_model.hpp"
 
 namespace plumb {
 

@@ -4,7 +4,7 @@
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/map/map.hpp"
-#include "algo/sensor_model/calibration_model.hpp"
+#include "algo/sensor_calibration/calibration_model.hpp"
 
 namespace plumb {
 

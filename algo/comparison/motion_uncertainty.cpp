@@ -5,7 +5,7 @@
 
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
-#include "algo/types/image_error_sigmas.hpp"
+#include "algo/sensor_model/image_error_sigmas.hpp"
 
 namespace plumb {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/comparison/scene_alignment.hpp"
-#include "algo/types/depth_sensor.hpp"
+#include "algo/sensor_model/depth_sensor.hpp"
 
 namespace plumb {
 

@@ -6,8 +6,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "algo/sensor_model/profile_gate.hpp"
-#include "algo/sensor_model/sensor_profile.hpp"
+#include "algo/sensor_calibration/profile_gate.hpp"
+#include "algo/sensor_calibration/sensor_profile.hpp"
 
 namespace plumb {
 namespace {

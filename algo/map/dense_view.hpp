@@ -9,7 +9,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/base/intrinsics.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 
 namespace plumb {
 

@@ -11,7 +11,7 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/monitoring/block_image.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 #include "algo/types/point_cloud.hpp"
 
 namespace plumb {

@@ -8,7 +8,7 @@
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/reconstruction/breathing.hpp"
-#include "algo/sensor_model/calibration_model.hpp"
+#include "algo/sensor_calibration/calibration_model.hpp"
 
 namespace plumb {
 

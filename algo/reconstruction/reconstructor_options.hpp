@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "algo/sensor_model/sensor_profile.hpp"
+#include "algo/sensor_calibration/sensor_profile.hpp"
 #include "algo/types/scene.hpp"
 
 namespace plumb {

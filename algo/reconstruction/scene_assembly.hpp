@@ -8,7 +8,7 @@
 
 #include "algo/diagnosis/diagnosis.hpp"
 #include "algo/map/map.hpp"
-#include "algo/sensor_model/calibration_model.hpp"
+#include "algo/sensor_calibration/calibration_model.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "algo/types/frame.hpp"
 #include "algo/types/scene.hpp"

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "algo/sensor_model/calibration_model.hpp"
+#include "algo/sensor_calibration/calibration_model.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "algo/types/scene.hpp"
 

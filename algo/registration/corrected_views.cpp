@@ -10,7 +10,7 @@
 #include "algo/base/check_stop.hpp"
 #include "algo/geometry/back_projection.hpp"
 #include "algo/registration/depth_views.hpp"
-#include "algo/sensor_model/depth_correction.hpp"
+#include "algo/sensor_calibration/depth_correction.hpp"
 
 namespace plumb {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "algo/sensor_model/depth_correction.hpp"
+#include "algo/sensor_calibration/depth_correction.hpp"
 
 namespace plumb {
 

@@ -9,8 +9,8 @@
 #include "algo/bundle/quadratic_term.hpp"
 #include "algo/map/map.hpp"
 #include "algo/registration/depth_errors.hpp"
-#include "algo/sensor_model/calibration_prior.hpp"
-#include "algo/sensor_model/depth_field.hpp"
+#include "algo/sensor_calibration/calibration_prior.hpp"
+#include "algo/sensor_calibration/depth_field.hpp"
 
 namespace plumb {
 

@@ -11,7 +11,7 @@
 #include "algo/bundle/witnesses.hpp"
 #include "algo/registration/depth_views.hpp"
 #include "algo/registration/registration_options.hpp"
-#include "algo/sensor_model/sensor_profile.hpp"
+#include "algo/sensor_calibration/sensor_profile.hpp"
 
 namespace plumb {
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "algo/registration/depth_row.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 
 namespace plumb::dense {
 

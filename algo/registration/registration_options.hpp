@@ -6,8 +6,8 @@
 #include <functional>
 
 #include "algo/map/map.hpp"
-#include "algo/sensor_model/calibration_prior.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_calibration/calibration_prior.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 
 namespace plumb {
 

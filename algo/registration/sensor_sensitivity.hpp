@@ -4,7 +4,7 @@
 
 #include "algo/bundle/bundle_adjustment.hpp"
 #include "algo/registration/depth_views.hpp"
-#include "algo/types/sensor_sensitivity.hpp"
+#include "algo/sensor_model/sensor_sensitivity.hpp"
 
 namespace plumb {
 

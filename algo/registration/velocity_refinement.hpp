@@ -3,7 +3,7 @@
 #pragma once
 
 #include "algo/map/map.hpp"
-#include "algo/sensor_model/calibration_model.hpp"
+#include "algo/sensor_calibration/calibration_model.hpp"
 
 namespace plumb {
 

@@ -13,7 +13,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/geometry/back_projection.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 #include "algo/types/keyframe.hpp"
 #include "algo/types/point_cloud.hpp"
 

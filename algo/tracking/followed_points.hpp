@@ -13,9 +13,9 @@
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/map/map.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 #include "algo/tracking/keypoints.hpp"
 #include "algo/tracking/pose_optimizer.hpp"
-#include "algo/types/depth_noise.hpp"
 
 namespace plumb {
 

@@ -6,7 +6,7 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/map/dense_view.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 
 namespace plumb {
 

@@ -11,8 +11,8 @@
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/message.hpp"
-#include "algo/types/depth_noise.hpp"
-#include "algo/types/depth_sensor.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
+#include "algo/sensor_model/depth_sensor.hpp"
 #include "algo/types/marker.hpp"
 
 namespace plumb {

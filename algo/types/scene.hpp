@@ -11,12 +11,12 @@
 #include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "algo/base/pose.hpp"
-#include "algo/types/depth_sensor.hpp"
+#include "algo/sensor_model/depth_sensor.hpp"
+#include "algo/sensor_model/sensor_sensitivity.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/marker.hpp"
 #include "algo/types/planning_source.hpp"
 #include "algo/types/point_cloud.hpp"
-#include "algo/types/sensor_sensitivity.hpp"
 
 namespace plumb {
 

@@ -9,9 +9,9 @@
 #include "daemon/appliance/control_lines.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/database/store_json.hpp"
-#include "daemon/files/result_folder.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/loop/loop_report.hpp"
+#include "daemon/result/result_folder.hpp"
 #include "words/upkeep.hpp"
 
 namespace plumb {

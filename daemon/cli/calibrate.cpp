@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
-#include "algo/sensor_model/profile_gate.hpp"
+#include "algo/sensor_calibration/profile_gate.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/language.hpp"

@@ -14,10 +14,10 @@
 #include "daemon/cli/progress.hpp"
 #include "daemon/cli/work_digest.hpp"
 #include "daemon/files/atomic_folder.hpp"
-#include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
-#include "daemon/result/text_report.hpp"
+#include "daemon/reports/text_report.hpp"
+#include "daemon/result/result_folder.hpp"
 #include "words/cli.hpp"
 #include "words/progress.hpp"
 

@@ -15,10 +15,10 @@
 #include "daemon/evaluation/evaluation.hpp"
 #include "daemon/evaluation/live_accuracy.hpp"
 #include "daemon/evaluation/report.hpp"
-#include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
-#include "daemon/result/text_report.hpp"
+#include "daemon/reports/text_report.hpp"
+#include "daemon/result/result_folder.hpp"
 #include "drivers/dicom/planning_files.hpp"
 #include "drivers/files/file_io.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
-#include "daemon/files/mesh_file.hpp"
+#include "daemon/export_formats/mesh_file.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "words/cli.hpp"
 

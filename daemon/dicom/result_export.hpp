@@ -11,7 +11,7 @@
 
 #include "algo/base/message.hpp"
 #include "daemon/files/atomic_folder.hpp"
-#include "daemon/files/stored_result.hpp"
+#include "daemon/result/stored_result.hpp"
 #include "drivers/dicom/export_content.hpp"
 
 namespace plumb {

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "algo/types/sensor_sensitivity.hpp"
+#include "algo/sensor_model/sensor_sensitivity.hpp"
 
 namespace plumb {
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "algo/sensor_model/sensor_profile.hpp"
+#include "algo/sensor_calibration/sensor_profile.hpp"
 
 namespace plumb {
 

@@ -13,10 +13,10 @@
 #include "daemon/config/version.hpp"
 #include "daemon/evaluation/evaluation.hpp"
 #include "daemon/evaluation/report.hpp"
-#include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 #include "daemon/python/arrays.hpp"
+#include "daemon/result/result_folder.hpp"
 #include "drivers/replay/tum_recording.hpp"
 
 namespace py = pybind11;

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "algo/base/message.hpp"
-#include "algo/sensor_model/sensor_profile.hpp"
+#include "algo/sensor_calibration/sensor_profile.hpp"
 #include "web/model/sensor_profile.hpp"
 
 namespace plumb {

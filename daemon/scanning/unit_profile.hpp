@@ -9,7 +9,7 @@
 
 #include "algo/base/message.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
-#include "algo/sensor_model/profile_gate.hpp"
+#include "algo/sensor_calibration/profile_gate.hpp"
 #include "algo/types/scene.hpp"
 #include "daemon/records/profile_shelf.hpp"
 

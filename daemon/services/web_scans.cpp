@@ -14,8 +14,8 @@
 
 #include "daemon/files/compact_map.hpp"
 #include "daemon/loop/log.hpp"
-#include "daemon/result/reports.hpp"
-#include "daemon/result/scan_quality.hpp"
+#include "daemon/reports/reports.hpp"
+#include "daemon/reports/scan_quality.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
 

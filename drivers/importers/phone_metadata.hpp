@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "algo/types/depth_sensor.hpp"
+#include "algo/sensor_model/depth_sensor.hpp"
 
 namespace plumb {
 

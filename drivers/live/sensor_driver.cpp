@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 #include "words/sensor.hpp"
 
 namespace plumb {

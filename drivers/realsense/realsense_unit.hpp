@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "algo/types/depth_sensor.hpp"
+#include "algo/sensor_model/depth_sensor.hpp"
 #include "drivers/realsense/realsense_library.hpp"
 
 namespace plumb::realsense {

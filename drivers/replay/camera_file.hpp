@@ -9,7 +9,7 @@
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 #include "algo/types/frame.hpp"
 #include "algo/types/marker.hpp"
 

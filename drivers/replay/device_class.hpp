@@ -5,7 +5,7 @@
 #include <optional>
 #include <string_view>
 
-#include "algo/types/depth_sensor.hpp"
+#include "algo/sensor_model/depth_sensor.hpp"
 
 namespace plumb {
 

@@ -26,8 +26,8 @@
 #include "algo/published/paper_reconstruction.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "daemon/evaluation/evaluation.hpp"
-#include "daemon/files/result_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "daemon/result/result_folder.hpp"
 #include "drivers/simulator/suites/suite.hpp"
 #include "tests/bench/measured_run.hpp"
 

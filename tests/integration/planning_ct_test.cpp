@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "daemon/files/mesh_file.hpp"
+#include "daemon/export_formats/mesh_file.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "tests/integration/command_line.hpp"
 #include "tests/unit/dicom/small_files.hpp"

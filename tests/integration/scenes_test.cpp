@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include "algo/sensor_model/calibration_prior.hpp"
+#include "algo/sensor_calibration/calibration_prior.hpp"
 #include "tests/integration/command_line.hpp"
 
 namespace plumb {

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/files/stored_result.hpp"
+#include "daemon/result/stored_result.hpp"
 
 namespace plumb::testing {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "algo/base/units.hpp"
-#include "algo/sensor_model/calibration_prior.hpp"
+#include "algo/sensor_calibration/calibration_prior.hpp"
 
 namespace plumb::test {
 namespace {

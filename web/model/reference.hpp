@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "algo/base/default_tolerance.hpp"
+#include "algo/acceptance/default_tolerance.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "web/model/wall_clock.hpp"

@@ -26,7 +26,7 @@
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/language.hpp"
 #include "daemon/control/control_protocol.hpp"
-#include "daemon/files/stored_result.hpp"
+#include "daemon/result/stored_result.hpp"
 #include "drivers/files/unix_socket.hpp"
 #include "words/cli.hpp"
 #include "words/control.hpp"

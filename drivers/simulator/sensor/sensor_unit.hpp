@@ -9,7 +9,7 @@
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/names.hpp"
 #include "algo/base/pose.hpp"
-#include "algo/types/depth_sensor.hpp"
+#include "algo/sensor_model/depth_sensor.hpp"
 #include "drivers/simulator/sensor/faults.hpp"
 
 namespace plumb::simulated {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/result/text_report.hpp"
+#include "daemon/reports/text_report.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/files/result_folder.hpp"
+#include "daemon/result/result_folder.hpp"
 #include "tests/support/result_with.hpp"
 #include "words/direction.hpp"
 #include "words/number.hpp"

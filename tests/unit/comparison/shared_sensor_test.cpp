@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/units.hpp"
-#include "algo/sensor_model/profile_gate.hpp"
+#include "algo/sensor_calibration/profile_gate.hpp"
 
 namespace plumb {
 namespace {

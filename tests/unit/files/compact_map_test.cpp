@@ -16,7 +16,7 @@
 #include <opencv2/core.hpp>
 
 #include "algo/base/errors.hpp"
-#include "daemon/result/pdf_report.hpp"
+#include "daemon/reports/pdf_report.hpp"
 #include "drivers/files/image_file.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "words/direction.hpp"

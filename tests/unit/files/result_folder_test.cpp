@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/files/result_folder.hpp"
+#include "daemon/result/result_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/files/stored_result.hpp"
+#include "daemon/result/stored_result.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
-#include "daemon/files/result_folder.hpp"
+#include "daemon/result/result_folder.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/unit/files/small_output.hpp"
 

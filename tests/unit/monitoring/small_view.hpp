@@ -9,7 +9,7 @@
 #include "algo/base/pose.hpp"
 #include "algo/monitoring/block_image.hpp"
 #include "algo/monitoring/view_model.hpp"
-#include "algo/types/depth_noise.hpp"
+#include "algo/sensor_model/depth_noise.hpp"
 #include "algo/types/point_cloud.hpp"
 
 namespace plumb::test {

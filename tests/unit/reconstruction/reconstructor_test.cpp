@@ -11,7 +11,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
-#include "algo/sensor_model/calibration_prior.hpp"
+#include "algo/sensor_calibration/calibration_prior.hpp"
 #include "tests/unit/tracking/ball_sweep.hpp"
 
 namespace plumb {

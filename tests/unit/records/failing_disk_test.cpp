@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "daemon/archive/store_backup.hpp"
-#include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/result/result_folder.hpp"
 #include "tests/support/failing_calls.hpp"
 #include "tests/support/skip.hpp"
 #include "tests/support/temp_folder.hpp"

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/reports/text_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "algo/base/units.hpp"
+#include "algo/base/utf8.hpp"
+#include "words/number.hpp"
+#include "words/result.hpp"
+#include "words/text_report.hpp"
+
+namespace plumb {
+namespace {
+
+Message Title(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kInTolerance:
+      return say::text_report::InTolerance();
+    case Verdict::kUnsure:
+      return say::text_report::Unsure();
+    case Verdict::kMove:
+      return say::text_report::Move();
+    case Verdict::kNoAnswer:
+      break;
+  }
+  return say::text_report::NoAnswer();
+}
+
+Message RowMark(NumberJudgement judgement) {
+  return judgement == NumberJudgement::kOutside  ? say::text_report::RowMove()
+         : judgement == NumberJudgement::kWithin ? say::text_report::RowOk()
+                                                 : say::text_report::RowUnsure();
+}
+
+Message NumberName(std::string_view name) {
+  return Message::Stored("number." + std::string(name), {}, name);
+}
+
+/// Writes the report line by line.
+class Report {
+ public:
+  explicit Report(const Catalogue& language) : language_(language) {}
+
+  [[nodiscard]] std::string Said(const Message& message) const { return Text(message, language_); }
+  void Line(const std::string& line) { text_ += line + "\n"; }
+  /// A label in its column, and what it labels.
+  void Row(const Message& label, const Message& value) {
+    Line("  " + Left(Said(label), 16) + " " + Said(value));
+  }
+
+  void Correction(const StoredCorrection& correction, const StoredLimits& limits);
+  void Trust(const StoredResult& result);
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  static std::string Spaces(std::string_view text, std::size_t characters) {
+    const std::size_t has = Utf8Characters(text);
+    return std::string(has < characters ? characters - has : 0, ' ');
+  }
+  static std::string Left(const std::string& text, std::size_t characters) {
+    return text + Spaces(text, characters);
+  }
+  static std::string Right(const std::string& text, std::size_t characters) {
+    return Spaces(text, characters) + text;
+  }
+  /// A number with the decimal sign of the language.
+  [[nodiscard]] std::string Number(std::string number) const {
+    std::replace(number.begin(), number.end(), '.', language_.decimal);
+    return number;
+  }
+  [[nodiscard]] std::size_t MarkWidth() const {
+    std::size_t width = 0;
+    for (const NumberJudgement judgement :
+         {NumberJudgement::kOutside, NumberJudgement::kWithin, NumberJudgement::kUnsure})
+      width = std::max(width, Utf8Characters(Said(RowMark(judgement))));
+    return width;
+  }
+  void NumberRow(std::size_t number, const StoredCorrection& correction, double tolerance);
+
+  const Catalogue& language_;
+  std::string text_;
+};
+
+void Report::NumberRow(std::size_t number, const StoredCorrection& correction, double tolerance) {
+  const std::string label = "  " + Left(Said(NumberName(kNumberNames.at(number))), 14) + " ";
+  const std::optional<double>& value = correction.value.at(number);
+  if (!value) return Line(label + "  " + Said(say::text_report::Refused()));
+  const char* const unit = UnitOf(number);
+  const int digits = IsShift(number) ? 1 : 2;
+  // printed as zero, without sign and direction
+  const bool is_zero = std::abs(*value) < (digits == 1 ? 0.05 : 0.005);
+  const std::string numbers = Number(
+      fmt::format("{:>+9.{}f} {:<4}  ±{:>5.{}f}   {:>5.3g} {:<4}", is_zero ? 0.0 : *value, digits,
+                  unit, correction.u95.at(number).value_or(NAN), digits, tolerance, unit));
+  Line(label + numbers + " " + Left(Said(RowMark(correction.judgements.at(number))), MarkWidth()) +
+       "  " + (is_zero ? "" : Said(correction.words.at(number))));
+}
+
+void Report::Correction(const StoredCorrection& correction, const StoredLimits& limits) {
+  const Eigen::Vector3d& isocentre_m = correction.isocentre;
+  Line("\n" +
+       Said(say::text_report::Correction(isocentre_m.x(), isocentre_m.y(), isocentre_m.z())) +
+       "\n");
+  Line(Right(Said(say::text_report::Value()), 26) +
+       Right(Said(say::text_report::Confidence()), 12) +
+       Right(Said(say::text_report::Tolerance()), 12));
+  for (std::size_t i = 0; i < kNumberNames.size(); ++i)
+    NumberRow(i, correction, limits.ToleranceOf(i));
+}
+
+void Report::Trust(const StoredResult& result) {
+  Line("\n" + Said(say::text_report::Quality()) + "\n");
+  if (const auto& planned = result.compared_with)
+    Row(say::text_report::Reference(),
+        say::text_report::PlanningCt(planned->roi, planned->plan_label, planned->plan_date,
+                                     planned->posture));
+  if (const auto& alignment = result.alignment) {
+    const auto& used = alignment->markers_used;
+    Row(say::text_report::Markers(),
+        say::text_report::Matched(static_cast<std::int64_t>(used.size()),
+                                  {used.begin(), used.end()}, alignment->rms_m / kMillimetre));
+    for (const auto& [id, residual_m] : alignment->markers_rejected)
+      Row({}, say::text_report::MarkerMoved(id, residual_m / kMillimetre));
+  } else {
+    Row(say::text_report::Markers(), say::text_report::NoAlignment());
+  }
+  if (const auto& region = result.region)
+    Row(say::text_report::Region(),
+        say::text_report::Covered(100 * region->coverage, region->largest_hole_m / kMillimetre));
+  if (const auto& motion = result.motion) {
+    Row(say::text_report::Residual(),
+        say::text_report::Residuals(motion->residual_m.median / kMillimetre,
+                                    motion->residual_m.p95 / kMillimetre));
+    for (const StoredWeakDirection& weak : motion->weak_directions)
+      Row(say::text_report::Weak(),
+          say::text_report::WeakOf(NumberName(weak.name),
+                                   Number(fmt::format("{:.3g}", weak.u95)) + " " + weak.unit));
+  }
+  for (const Message& warning : result.warnings) Row(say::text_report::Warning(), warning);
+}
+
+}  // namespace
+
+std::string ComparisonText(const StoredResult& result, const Catalogue& language) {
+  Report report(language);
+  report.Line(report.Said(Title(result.verdict)));
+  for (const Message& reason : result.reasons) report.Line("  " + report.Said(reason));
+  if (result.correction) {
+    report.Correction(*result.correction, result.limits);
+    if (!result.body || !result.body->room_known)
+      report.Line("\n  " + report.Said(say::text_report::RoomUnknown()));
+  }
+  report.Trust(result);
+  report.Line("\n" + report.Said(say::result::Notice()));
+  return report.text();
+}
+
+std::string PictureSubtitle(const Comparison& comparison) {
+  std::string text = Title(comparison.verdict).English();
+  if (comparison.correction) {
+    const CouchNumbers& v = comparison.correction->value;
+    const auto shift = [](const std::optional<double>& mm) {
+      return mm ? fmt::format("{:+.1f}", *mm) : std::string("refused");
+    };
+    text += fmt::format(
+        "; apply vertical {}, longitudinal {}, lateral {} mm; pitch {:+.2f}, roll {:+.2f}, yaw "
+        "{:+.2f} deg",
+        shift(v.vertical_mm), shift(v.longitudinal_mm), shift(v.lateral_mm), v.pitch_deg,
+        v.roll_deg, v.yaw_deg);
+  } else if (!comparison.reasons.empty()) {
+    text += ": " + comparison.reasons.front().English();
+  }
+  return text;
+}
+
+}  // namespace plumb

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// A comparison as a table of text.
+#pragma once
+
+#include <string>
+
+#include "algo/base/message.hpp"
+#include "algo/comparison/comparison.hpp"
+#include "daemon/result/stored_result.hpp"
+
+namespace plumb {
+
+/// Verdict with its reasons, the six numbers by name with direction, uncertainty and tolerance, and
+/// the scan quality, in this language.
+[[nodiscard]] std::string ComparisonText(const StoredResult& result, const Catalogue& language);
+
+/// One line for a picture, in English: the verdict and the residual if nothing else is known.
+[[nodiscard]] std::string PictureSubtitle(const Comparison& comparison);
+
+}  // namespace plumb
