@@ -248,6 +248,10 @@ class JointRegistration {
     result_.evidence.solution = ToVector(result_.calibration);
     result_.evidence.information = last.information;
     result_.posterior = std::move(last.posterior);
+    const dense::Sensor sensor = dense::MakeSensor(stated_, result_.calibration);
+    result_.depth_errors_with_calibration = dense::FindDepthErrorColumns(
+        sensor, options_, map_, dense::MakeViews(sensor, result_.calibration, cells_, map_), pairs_,
+        options_.max_gate_m, result_.posterior, stop_);
   }
 
   const Intrinsics& stated_;
