@@ -492,4 +492,11 @@ double Consistency(const Sensor& sensor, const std::vector<View>& views,
   return all.empty() ? 0.0 : TakeMedian(all);
 }
 
+// The cells' noise is the same before and after. In two of nine sweeps of a LiDAR unit the medians
+// of 3 mm differed by 0.1 %, while the witnesses agreed better.
+bool AsConsistent(double before_m, double after_m) {
+  constexpr double kSaysNothing = 1.005;
+  return after_m <= kSaysNothing * before_m;
+}
+
 }  // namespace plumb::dense

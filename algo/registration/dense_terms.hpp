@@ -61,4 +61,7 @@ void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
 double Consistency(const Sensor& sensor, const std::vector<View>& views,
                    const std::vector<KeyframePair>& pairs, double gate_m);
 
+/// Whether held-out cells agree as well as before, up to a difference that says nothing.
+[[nodiscard]] bool AsConsistent(double before_m, double after_m);
+
 }  // namespace plumb::dense

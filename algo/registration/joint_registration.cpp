@@ -166,8 +166,9 @@ class JointRegistration {
     dense::DepthErrors errors_before;
     result_.consistency_before_m = Consistency(errors_before);
     result_.witnesses_before = Witnesses();
-    result_.accepted = result_.consistency_after_m <= result_.consistency_before_m &&
-                       !ContradictsWitnesses(result_.witnesses_before, result_.witnesses_after);
+    result_.accepted =
+        dense::AsConsistent(result_.consistency_before_m, result_.consistency_after_m) &&
+        !ContradictsWitnesses(result_.witnesses_before, result_.witnesses_after);
     if (!result_.accepted) {
       result_.depth_errors = std::move(errors_before);
       return false;

@@ -240,6 +240,13 @@ TEST(DenseTerms, FindsTheCurveThatDepthFollows) {
   EXPECT_LT(std::sqrt(left_m2 / wave_m2), 0.3);
 }
 
+TEST(DenseTerms, TakeADifferenceOfLessThanHalfAPercentForNone) {
+  EXPECT_TRUE(AsConsistent(0.002979, 0.002983));
+  EXPECT_TRUE(AsConsistent(0.003, 0.002));
+  EXPECT_TRUE(AsConsistent(0.001, 0.0010049));
+  EXPECT_FALSE(AsConsistent(0.001, 0.0010051));
+}
+
 TEST(DepthCurve, IsLinearBetweenItsKnotsAndConstantBeyond) {
   DepthCurve curve;
   for (int k = 0; k < DepthCurve::kSize; ++k) curve.knots_m[k] = 0.001 * k;
