@@ -174,7 +174,8 @@ MotionUncertainty Uncertainty(const UncertaintyInput& input) {
   for (const DepthSensor sensor : input.classes) {
     const ImageErrorSigmas& left = ImageErrorSigmasOf(sensor);
     Vector6d sigmas = Vector6d::Zero();
-    sigmas.head<3>() << left.body_tilt_rad, left.body_tilt_rad, left.body_turn_rad;
+    sigmas << left.body_tilt_rad, left.body_tilt_rad, left.body_turn_rad, left.body_shift_m,
+        left.body_shift_m, 0.0;
     parts.sensor += Matrix6d(sigmas.cwiseAbs2().asDiagonal());
   }
   parts.breathing =

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <span>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "algo/base/statistics.hpp"
 #include "algo/geometry/rigid_fit.hpp"
 #include "words/comparison.hpp"
 
@@ -250,6 +252,21 @@ Subset GoodMarkers(std::span<const SharedMarker> shared, Subset good,
   return agreeing;
 }
 
+// How much each marker says of the maps' distortion: one that was seen worse than most says how it
+// was seen. (A marker with a sigma of 13 mm, beside others with 0.3, made the distortion of a map
+// 1.5 instead of 0.5 mm.)
+std::vector<double> DistortionWeights(std::span<const SharedMarker> shared, const Subset& subset) {
+  std::vector<double> sigmas_m;
+  for (const std::size_t i : subset) sigmas_m.push_back(shared[i].sigma_m);
+  const double usual_m = TakeMedian(sigmas_m);
+  std::vector<double> weights;
+  for (const std::size_t i : subset) {
+    const double ratio = std::min(1.0, usual_m / shared[i].sigma_m);
+    weights.push_back(ratio * ratio);
+  }
+  return weights;
+}
+
 Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subset,
                         const RigidFit& fit) {
   Alignment alignment;
@@ -258,19 +275,22 @@ Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subs
   const auto count = static_cast<double>(subset.size());
   double sum = 0.0;
   double spread = 0.0;
-  for (const std::size_t i : subset) {
+  const std::vector<double> weights = DistortionWeights(shared, subset);
+  for (std::size_t k = 0; k < subset.size(); ++k) {
+    const std::size_t i = subset[k];
     const double residual = MarkerResidual(shared[i], fit.T_a_b);
     sum += residual * residual;
     spread += (CentreOf(shared[i].reference) - alignment.centre_m).squaredNorm();
     const Eigen::Vector3d off =
         CentreOf(shared[i].reference) - fit.T_a_b * CentreOf(shared[i].current);
-    alignment.distortion += off * off.transpose();
+    alignment.distortion += weights[k] * off * off.transpose();
     alignment.markers_used.push_back(shared[i].id);
   }
   alignment.rms_m = std::sqrt(sum / count);
   alignment.spread_m = std::sqrt(spread / count);
   // The fit has six degrees of freedom; each marker contributes three coordinates.
-  alignment.distortion *= 3.0 / std::max(3.0 * count - 6.0, 3.0);
+  const double weighed = std::accumulate(weights.begin(), weights.end(), 0.0);
+  alignment.distortion *= 3.0 / std::max(3.0 * weighed - 6.0, 3.0);
   alignment.covariance =
       VarianceFactor(shared, subset, fit.T_a_b) * FitCovariance(shared, subset, alignment.centre_m);
   return alignment;

@@ -279,7 +279,8 @@ class SceneSolver {
                    Scene& scene) const {
     if (scene.frame == SceneFrame::kReferenceMarker && !joint.posterior.empty()) {
       scene.sensitivity = SensitivityOf(sweep_.info.intrinsics, joint.calibration, joint.posterior,
-                                        map, *sweep_.info.room_markers.reference);
+                                        joint.depth_errors_with_calibration, map,
+                                        *sweep_.info.room_markers.reference);
       scene.sensitivity->stated_for_this_unit = !sweep_.info.intrinsics_assumed;
       scene.sensitivity->serial = sweep_.options.sensor_serial;
     }

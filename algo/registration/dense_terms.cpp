@@ -275,6 +275,116 @@ struct ErrorEquations {
   }
 };
 
+// What the errors of all images, and the curve behind them, have to do with the depth images: one
+// part for each pair and each face.
+class ErrorSums {
+ public:
+  ErrorSums(const Sensor& sensor, const JointRegistrationOptions& options, const TrackingMap& map,
+            const std::vector<View>& views, const std::vector<KeyframePair>& pairs, double gate_m,
+            const std::stop_token& stop)
+      : options_(options),
+        views_(views),
+        pairs_(pairs),
+        faces_(FindFaces(map)),
+        parts_(pairs.size() + faces_.size()),
+        curves_(has_curve() ? parts_.size() : 0) {
+    const std::vector<int> uses = UsesInPairs(views.size(), pairs);
+    const TermMaker maker{sensor, options, gate_m, kLattice};
+    tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
+      CheckStop(stop);
+      QuadraticTerm unused;
+      DepthCurvePart* const curve = has_curve() ? &curves_[i] : nullptr;
+      if (i >= pairs.size()) {
+        const Face& face = faces_[i - pairs.size()];
+        maker.SumFace(views[face.view], static_cast<int>(face.view), *face.observation,
+                      *face.marker, unused, parts_[i], curve);
+        return;
+      }
+      const auto a = static_cast<std::size_t>(pairs[i].a);
+      const auto b = static_cast<std::size_t>(pairs[i].b);
+      maker.SumPair(views[a], views[b], pairs[i], OffsetOfPair(i, kLattice),
+                    ShareOf(options, kLattice, uses[a], uses[b]), unused, parts_[i], curve);
+    });
+  }
+
+  [[nodiscard]] bool has_curve() const { return options_.depth_curve_sigma_m > 0; }
+  [[nodiscard]] Eigen::Index curve_at() const {
+    return static_cast<Eigen::Index>(3 * views_.size());
+  }
+
+  [[nodiscard]] ErrorEquations Equations() const {
+    ErrorEquations equations(size());
+    equations.H.diagonal().head(curve_at()) =
+        ImageErrorInformation(options_).replicate(static_cast<Eigen::Index>(views_.size()), 1);
+    equations.H.diagonal().tail(size() - curve_at()).array() =
+        1.0 / (options_.depth_curve_sigma_m * options_.depth_curve_sigma_m);
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      equations.Add(parts_[i], first(i), second(i));
+      if (has_curve()) equations.Add(curves_[i], first(i), second(i), curve_at());
+    }
+    return equations;
+  }
+
+  // The equations' dependence on poses, markers and calibration, times their covariance with the
+  // calibration.
+  [[nodiscard]] Eigen::MatrixXd Driven(const BundlePosterior& posterior) const {
+    Eigen::MatrixXd driven = Eigen::MatrixXd::Zero(size(), kCalibrationSize);
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const Eigen::Matrix<double, QuadraticTerm::kSize, kCalibrationSize> of_term =
+          CovarianceOf(i, posterior);
+      const Eigen::Matrix<double, 6, kCalibrationSize> of_images = parts_[i].H_x * of_term;
+      driven.middleRows<3>(first(i)) += of_images.topRows<3>();
+      if (first(i) != second(i)) driven.middleRows<3>(second(i)) += of_images.bottomRows<3>();
+      if (has_curve()) driven.bottomRows<DepthCurve::kSize>() += curves_[i].H_x * of_term;
+    }
+    return driven;
+  }
+
+ private:
+  [[nodiscard]] Eigen::Index size() const {
+    return curve_at() + (has_curve() ? DepthCurve::kSize : 0);
+  }
+  [[nodiscard]] const Face* FaceOf(std::size_t part) const {
+    return part < pairs_.size() ? nullptr : &faces_[part - pairs_.size()];
+  }
+  // Rows of the errors of a part's images; a face has one image.
+  [[nodiscard]] Eigen::Index first(std::size_t part) const {
+    const Face* const face = FaceOf(part);
+    return static_cast<Eigen::Index>(
+        3 * (face != nullptr ? face->view : static_cast<std::size_t>(pairs_[part].a)));
+  }
+  [[nodiscard]] Eigen::Index second(std::size_t part) const {
+    return FaceOf(part) != nullptr ? first(part) : Eigen::Index{3} * pairs_[part].b;
+  }
+
+  // Covariance of a part's unknowns, in the order of a QuadraticTerm, with the calibration.
+  [[nodiscard]] Eigen::Matrix<double, QuadraticTerm::kSize, kCalibrationSize> CovarianceOf(
+      std::size_t part, const BundlePosterior& posterior) const {
+    Eigen::Matrix<double, QuadraticTerm::kSize, kCalibrationSize> of_term =
+        Eigen::Matrix<double, QuadraticTerm::kSize, kCalibrationSize>::Zero();
+    const auto set = [&](int at, std::optional<Eigen::Index> row) {
+      if (row) of_term.middleRows<6>(at) = posterior.with_calibration.middleRows<6>(*row);
+    };
+    const Face* const face = FaceOf(part);
+    set(QuadraticTerm::kTwistA, posterior.CameraAt(static_cast<int>(first(part) / 3)));
+    set(QuadraticTerm::kTwistB, face != nullptr ? posterior.MarkerAt(face->observation->id)
+                                                : posterior.CameraAt(pairs_[part].b));
+    const CalibrationMatrix calibration = posterior.calibration();
+    of_term.middleRows<QuadraticTerm::kFocal>(QuadraticTerm::kFocalAt) =
+        calibration.middleRows<QuadraticTerm::kFocal>(kLensAt);
+    of_term.bottomRows<CalibrationModel::kDepthSize>() =
+        calibration.middleRows<CalibrationModel::kDepthSize>(kDepthAt);
+    return of_term;
+  }
+
+  const JointRegistrationOptions& options_;
+  const std::vector<View>& views_;
+  const std::vector<KeyframePair>& pairs_;
+  std::vector<Face> faces_;
+  std::vector<ImageErrorPart> parts_;
+  std::vector<DepthCurvePart> curves_;
+};
+
 }  // namespace
 
 std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,
@@ -344,46 +454,26 @@ DepthErrors FindDepthErrors(const Sensor& sensor, const JointRegistrationOptions
                             const std::vector<KeyframePair>& pairs, double gate_m,
                             const std::stop_token& stop) {
   if (!options.HasImageErrors()) return {};
-  const std::vector<Face> faces = FindFaces(map);
-  const std::vector<int> uses = UsesInPairs(views.size(), pairs);
-  const TermMaker maker{sensor, options, gate_m, kLattice};
-  const bool has_curve = options.depth_curve_sigma_m > 0;
-  std::vector<ImageErrorPart> parts(pairs.size() + faces.size());
-  std::vector<DepthCurvePart> curves(has_curve ? parts.size() : 0);
-  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
-    CheckStop(stop);
-    QuadraticTerm unused;
-    DepthCurvePart* const curve = has_curve ? &curves[i] : nullptr;
-    if (i >= pairs.size()) {
-      const Face& face = faces[i - pairs.size()];
-      maker.SumFace(views[face.view], static_cast<int>(face.view), *face.observation, *face.marker,
-                    unused, parts[i], curve);
-      return;
-    }
-    const auto a = static_cast<std::size_t>(pairs[i].a);
-    const auto b = static_cast<std::size_t>(pairs[i].b);
-    maker.SumPair(views[a], views[b], pairs[i], OffsetOfPair(i, kLattice),
-                  ShareOf(options, kLattice, uses[a], uses[b]), unused, parts[i], curve);
-  });
-  const auto curve_at = static_cast<Eigen::Index>(3 * views.size());
-  ErrorEquations equations(curve_at + (has_curve ? DepthCurve::kSize : 0));
-  equations.H.diagonal().head(curve_at) =
-      ImageErrorInformation(options).replicate(static_cast<Eigen::Index>(views.size()), 1);
-  equations.H.diagonal().tail(equations.H.rows() - curve_at).array() =
-      1.0 / (options.depth_curve_sigma_m * options.depth_curve_sigma_m);
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    const bool is_face = i >= pairs.size();
-    const auto a = static_cast<Eigen::Index>(
-        3 * (is_face ? faces[i - pairs.size()].view : static_cast<std::size_t>(pairs[i].a)));
-    const Eigen::Index b = is_face ? a : static_cast<Eigen::Index>(3 * pairs[i].b);
-    equations.Add(parts[i], a, b);
-    if (has_curve) equations.Add(curves[i], a, b, curve_at);
-  }
+  const ErrorSums sums(sensor, options, map, views, pairs, gate_m, stop);
+  const ErrorEquations equations = sums.Equations();
   const Eigen::VectorXd solution = -equations.H.ldlt().solve(equations.g);
   DepthErrors errors;
-  for (Eigen::Index k = 0; k < curve_at; k += 3) errors.images.emplace_back(solution.segment<3>(k));
-  if (has_curve) errors.curve.knots_m = solution.tail<DepthCurve::kSize>();
+  for (Eigen::Index k = 0; k < sums.curve_at(); k += 3)
+    errors.images.emplace_back(solution.segment<3>(k));
+  if (sums.has_curve()) errors.curve.knots_m = solution.tail<DepthCurve::kSize>();
   return errors;
+}
+
+DepthErrorColumns FindDepthErrorColumns(const Sensor& sensor,
+                                        const JointRegistrationOptions& options,
+                                        const TrackingMap& map, const std::vector<View>& views,
+                                        const std::vector<KeyframePair>& pairs, double gate_m,
+                                        const BundlePosterior& posterior,
+                                        const std::stop_token& stop) {
+  if (!options.HasImageErrors() || posterior.empty()) return {};
+  const ErrorSums sums(sensor, options, map, views, pairs, gate_m, stop);
+  return {.rows = -sums.Equations().H.ldlt().solve(sums.Driven(posterior)),
+          .num_images = views.size()};
 }
 
 double Consistency(const Sensor& sensor, const std::vector<View>& views,
@@ -400,6 +490,13 @@ double Consistency(const Sensor& sensor, const std::vector<View>& views,
   std::vector<float> all;
   for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
   return all.empty() ? 0.0 : TakeMedian(all);
+}
+
+// The cells' noise is the same before and after. In two of nine sweeps of a LiDAR unit the medians
+// of 3 mm differed by 0.1 %, while the witnesses agreed better.
+bool AsConsistent(double before_m, double after_m) {
+  constexpr double kSaysNothing = 1.005;
+  return after_m <= kSaysNothing * before_m;
 }
 
 }  // namespace plumb::dense

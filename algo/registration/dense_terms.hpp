@@ -6,6 +6,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "algo/bundle/bundle_adjustment.hpp"
 #include "algo/registration/depth_views.hpp"
 #include "algo/registration/registration_options.hpp"
 
@@ -47,9 +48,20 @@ void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
                                           const std::vector<KeyframePair>& pairs, double gate_m,
                                           const std::stop_token& stop);
 
+/// Covariance of the errors that FindDepthErrors() finds with the calibration, as they follow the
+/// poses, the markers and the calibration of the posterior.
+/// @param map  As the posterior states it; the views are of that state.
+[[nodiscard]] DepthErrorColumns FindDepthErrorColumns(
+    const Sensor& sensor, const JointRegistrationOptions& options, const TrackingMap& map,
+    const std::vector<View>& views, const std::vector<KeyframePair>& pairs, double gate_m,
+    const BundlePosterior& posterior, const std::stop_token& stop);
+
 /// Median absolute point-to-plane distance of the cells that MakeTerms() never uses, metres; 0
 /// without any.
 double Consistency(const Sensor& sensor, const std::vector<View>& views,
                    const std::vector<KeyframePair>& pairs, double gate_m);
+
+/// Whether held-out cells agree as well as before, up to a difference that says nothing.
+[[nodiscard]] bool AsConsistent(double before_m, double after_m);
 
 }  // namespace plumb::dense

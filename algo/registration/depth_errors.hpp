@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 
+#include "algo/sensor_calibration/calibration_prior.hpp"
+
 namespace plumb::dense {
 
 /// What one depth image errs by beside the calibration that all images share: an offset (metres)
@@ -60,6 +62,24 @@ struct DepthErrors {
     if (images.empty()) return 0.0;
     return ImageErrorJacobian(z_m, centred).dot(images[image]) + curve.Correction(z_m);
   }
+};
+
+/// Covariance of DepthErrors with the calibration. Errors are found where poses and calibration
+/// are, so they take up most of what a wrong calibration would do to the depth.
+struct DepthErrorColumns {
+  /// Three rows for each image, then one for each knot of the curve; empty: there are no errors.
+  Eigen::Matrix<double, Eigen::Dynamic, kCalibrationSize> rows;
+
+  std::size_t num_images = 0;
+
+  [[nodiscard]] bool empty() const { return rows.rows() == 0; }
+  [[nodiscard]] bool has_curve() const {
+    return rows.rows() > static_cast<Eigen::Index>(3 * num_images);
+  }
+  [[nodiscard]] auto OfImage(std::size_t image) const {
+    return rows.middleRows<3>(3 * static_cast<Eigen::Index>(image));
+  }
+  [[nodiscard]] auto OfCurve() const { return rows.bottomRows<DepthCurve::kSize>(); }
 };
 
 }  // namespace plumb::dense

@@ -74,6 +74,8 @@ struct DepthCurvePart {
   static constexpr int kSize = DepthCurve::kSize;
   Eigen::Matrix<double, kSize, kSize> H = Eigen::Matrix<double, kSize, kSize>::Zero();
   Eigen::Matrix<double, kSize, 6> H_errors = Eigen::Matrix<double, kSize, 6>::Zero();
+  Eigen::Matrix<double, kSize, QuadraticTerm::kSize> H_x =
+      Eigen::Matrix<double, kSize, QuadraticTerm::kSize>::Zero();
   DepthCurve::Knots g = DepthCurve::Knots::Zero();
 
   /// @param J  Derivative of the residual with respect to the images' errors, of which the offsets
@@ -89,6 +91,7 @@ struct DepthCurvePart {
       for (std::size_t k = 0; k < knots.size(); ++k)
         H(knots[i], knots[k]) += weight * along[i] * along[k];
       H_errors.row(knots[i]) += weight * along[i] * J.transpose();
+      H_x.row(knots[i]) += weight * along[i] * row.J.transpose();
       g[knots[i]] += weight * row.residual_m * along[i];
     }
   }

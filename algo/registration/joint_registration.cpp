@@ -166,8 +166,9 @@ class JointRegistration {
     dense::DepthErrors errors_before;
     result_.consistency_before_m = Consistency(errors_before);
     result_.witnesses_before = Witnesses();
-    result_.accepted = result_.consistency_after_m <= result_.consistency_before_m &&
-                       !ContradictsWitnesses(result_.witnesses_before, result_.witnesses_after);
+    result_.accepted =
+        dense::AsConsistent(result_.consistency_before_m, result_.consistency_after_m) &&
+        !ContradictsWitnesses(result_.witnesses_before, result_.witnesses_after);
     if (!result_.accepted) {
       result_.depth_errors = std::move(errors_before);
       return false;
@@ -248,6 +249,10 @@ class JointRegistration {
     result_.evidence.solution = ToVector(result_.calibration);
     result_.evidence.information = last.information;
     result_.posterior = std::move(last.posterior);
+    const dense::Sensor sensor = dense::MakeSensor(stated_, result_.calibration);
+    result_.depth_errors_with_calibration = dense::FindDepthErrorColumns(
+        sensor, options_, map_, dense::MakeViews(sensor, result_.calibration, cells_, map_), pairs_,
+        options_.max_gate_m, result_.posterior, stop_);
   }
 
   const Intrinsics& stated_;

@@ -35,6 +35,7 @@ struct JointRegistrationResult {
   std::vector<Pose> T_world_depth_sparse;
   /// Of the keyframes' depth images, where their class has such.
   dense::DepthErrors depth_errors;
+  dense::DepthErrorColumns depth_errors_with_calibration;  ///< Empty where `posterior` is.
   /// MarkerSigmas() of the map as it was left, with or without the dense terms.
   std::map<int, double> marker_sigmas_m;
   SweepEvidence evidence;  ///< Evidence about the sensor's calibration.

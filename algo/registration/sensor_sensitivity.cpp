@@ -61,8 +61,31 @@ CubeKey CubeOf(const Eigen::Vector3d& p) {
 struct ViewSum {
   Eigen::Vector3d in_marker = Eigen::Vector3d::Zero();
   Eigen::Vector3d in_color = Eigen::Vector3d::Zero();
-  Columns J_depth = Columns::Zero();  // In the depth camera's frame.
+  // In the depth camera's frame, as what follows.
+  Columns J_depth = Columns::Zero();
+  Eigen::Matrix3d J_image = Eigen::Matrix3d::Zero();  // Of the image's own error.
+  Eigen::Matrix<double, 3, dense::DepthCurve::kSize> J_curve =
+      Eigen::Matrix<double, 3, dense::DepthCurve::kSize>::Zero();
   double count = 0;
+
+  // @param along  Movement of the cell's point with its depth.
+  void AddErrors(const Eigen::Vector3d& along, const dense::View& view, std::size_t cell) {
+    const double z_m = view.keyframe->dense.z_m[cell];
+    J_image += along * dense::ImageErrorJacobian(z_m, view.cells->centred[cell]).transpose();
+    const dense::DepthCurve::Place place = dense::DepthCurve::At(z_m);
+    J_curve.col(place.knot) += (1.0 - place.share) * along;
+    J_curve.col(place.knot + 1) += place.share * along;
+  }
+  // Covariance of the sum of the points with the calibration where the camera stands, in the depth
+  // camera's frame.
+  [[nodiscard]] Columns Seen(const BundlePosterior& posterior,
+                             const dense::DepthErrorColumns& errors, std::size_t image) const {
+    Columns columns = J_depth * posterior.calibration();
+    if (errors.empty()) return columns;
+    columns += J_image * errors.OfImage(image);
+    if (errors.has_curve()) columns += J_curve * errors.OfCurve();
+    return columns;
+  }
 };
 
 std::map<CubeKey, ViewSum> SumCells(const dense::Sensor& sensor, const dense::View& view,
@@ -79,6 +102,7 @@ std::map<CubeKey, ViewSum> SumCells(const dense::Sensor& sensor, const dense::Vi
       sum.in_marker += p;
       sum.in_color += view.T_color_depth * p_depth;
       sum.J_depth += dense::CellJacobian(sensor, view, i);
+      sum.AddErrors(p_depth / p_depth.z(), view, i);
       sum.count += 1;
     }
   }
@@ -92,8 +116,9 @@ struct Sum {
 };
 
 std::map<CubeKey, Sum> SumPatches(const Intrinsics& stated, const CalibrationModel& calibration,
-                                  const BundlePosterior& posterior, const TrackingMap& map,
-                                  const MarkerFrame& frame) {
+                                  const BundlePosterior& posterior,
+                                  const dense::DepthErrorColumns& depth_errors,
+                                  const TrackingMap& map, const MarkerFrame& frame) {
   const dense::Cells cells = dense::MakeCells(stated, map);
   const dense::Sensor sensor = dense::MakeSensor(stated, calibration);
   const std::vector<dense::View> views = dense::MakeViews(sensor, calibration, cells, map);
@@ -108,7 +133,7 @@ std::map<CubeKey, Sum> SumPatches(const Intrinsics& stated, const CalibrationMod
     for (const auto& [key, view_sum] : seen[k]) {
       const Columns in_world =
           Moved(R_world_color, view_sum.in_color, view_sum.count, twist) +
-          views[k].T_world_depth.linear() * (view_sum.J_depth * posterior.calibration());
+          views[k].T_world_depth.linear() * view_sum.Seen(posterior, depth_errors, k);
       Sum& sum = sums[key];
       sum.centre += view_sum.in_marker;
       sum.covariance += frame.Seen(view_sum.in_marker, view_sum.count, in_world);
@@ -121,8 +146,9 @@ std::map<CubeKey, Sum> SumPatches(const Intrinsics& stated, const CalibrationMod
 }  // namespace
 
 SensorSensitivity SensitivityOf(const Intrinsics& stated, const CalibrationModel& calibration,
-                                const BundlePosterior& posterior, const TrackingMap& map,
-                                int reference_marker) {
+                                const BundlePosterior& posterior,
+                                const dense::DepthErrorColumns& depth_errors,
+                                const TrackingMap& map, int reference_marker) {
   SensorSensitivity result;
   result.stated = stated;
   result.estimate = ToVector(calibration);
@@ -146,7 +172,8 @@ SensorSensitivity SensitivityOf(const Intrinsics& stated, const CalibrationModel
     result.markers[id] = derivative(
         frame.Seen(frame.T_marker_world * marker.T_world_marker.translation(), 1, in_world));
   }
-  for (const auto& [key, sum] : SumPatches(stated, calibration, posterior, map, frame)) {
+  for (const auto& [key, sum] :
+       SumPatches(stated, calibration, posterior, depth_errors, map, frame)) {
     if (sum.count < kMinCells || result.surface.size() >= kMaxPatches) continue;
     result.surface.push_back({(sum.centre / sum.count).cast<float>(), static_cast<float>(sum.count),
                               derivative(sum.covariance / sum.count)});

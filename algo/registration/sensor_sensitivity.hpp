@@ -13,10 +13,12 @@ namespace plumb {
 /// normal distribution. Surface patches are what the depth images show under those poses, in cubes
 /// of the scene's frame.
 /// @param map  As the joint solve left it.
+/// @param depth_errors  How the errors of single depth images follow the calibration; or empty.
 /// @param reference_marker  Id of the marker of the map whose frame is the scene's.
 [[nodiscard]] SensorSensitivity SensitivityOf(const Intrinsics& stated,
                                               const CalibrationModel& calibration,
                                               const BundlePosterior& posterior,
+                                              const dense::DepthErrorColumns& depth_errors,
                                               const TrackingMap& map, int reference_marker);
 
 }  // namespace plumb

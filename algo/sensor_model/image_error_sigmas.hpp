@@ -17,6 +17,7 @@ struct ImageErrorSigmas {
   /// upright one, radians.
   double body_tilt_rad = 0.0;
   double body_turn_rad = 0.0;
+  double body_shift_m = 0.0;  ///< Of its place along the two level axes, in the same way.
 };
 
 /// Part of the table of classes, see ClassOf().

@@ -153,16 +153,21 @@ TEST(MotionUncertaintyTest, TheSensorsCovarianceTakesThePlaceOfTheUsualOne) {
                         .classes = std::move(classes)})
         .sensor;
   };
-  // Two scans by a time-of-flight camera: 0.12 deg each about a level axis.
+  // Two scans by a time-of-flight camera: 0.09 deg each about a level axis.
   const Matrix6d flight = of_classes({DepthSensor::kTimeOfFlight, DepthSensor::kTimeOfFlight});
-  EXPECT_NEAR(std::sqrt((flight - sensor)(0, 0)) / kDegree, 0.170, 0.001);
+  EXPECT_NEAR(std::sqrt((flight - sensor)(0, 0)) / kDegree, 0.127, 0.001);
   EXPECT_LT((flight - sensor)(2, 2), (flight - sensor)(1, 1));
   EXPECT_TRUE((flight - sensor).bottomRightCorner(3, 3).isZero(0.0));
+  // Two by a phone: 0.4 mm each along both level axes.
+  const Matrix6d phone = of_classes({DepthSensor::kLidar, DepthSensor::kLidar}) - sensor;
+  EXPECT_NEAR(std::sqrt(phone(3, 3)) / kMillimetre, 0.566, 0.001);
+  EXPECT_EQ(phone(4, 4), phone(3, 3));
+  EXPECT_EQ(phone(5, 5), 0.0) << "heights are what the calibration and the images' errors state";
   EXPECT_EQ(of_classes({DepthSensor::kActiveStereo, DepthSensor::kActiveStereo}), sensor);
-  // Of structured light only the turn about the vertical, 0.024 deg for each scan.
+  // By structured light: 0.024 deg each about the vertical, 0.018 deg about a level axis.
   const Matrix6d light = of_classes({DepthSensor::kStructuredLight, DepthSensor::kStructuredLight});
   EXPECT_NEAR(std::sqrt((light - sensor)(2, 2)) / kDegree, 0.034, 0.001);
-  EXPECT_EQ((light - sensor)(0, 0), 0.0);
+  EXPECT_NEAR(std::sqrt((light - sensor)(0, 0)) / kDegree, 0.0255, 0.0005);
   // 0.4 mm for each of the two sweeps.
   EXPECT_NEAR(std::sqrt(Of(Pose::Identity()).sensor(3, 3)) / kMillimetre, 0.566, 0.001);
 }

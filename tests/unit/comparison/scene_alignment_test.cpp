@@ -273,6 +273,24 @@ TEST(SceneAlignmentTest, DistortionIsWhatTheMapsDisagreeByAtAMarker) {
   EXPECT_NEAR(std::sqrt(distortion(0, 0)), 0.0, 0.0003);
 }
 
+TEST(SceneAlignmentTest, AMarkerThatWasHardlySeenSaysNothingOfTheDistortion) {
+  const MarkerMap room = Room(12);
+  const auto height_off_m = [&](double sigma_m) {
+    MarkerMap current = Seen(room, 0, 1);
+    const Eigen::Vector3d up = kTrue.linear().transpose() * Eigen::Vector3d::UnitZ();
+    for (auto& [id, marker] : current) {
+      const bool hardly = id == current.begin()->first;
+      for (Eigen::Vector3d& p : marker.corners)
+        p += (hardly ? 0.006 : id % 2 == 0 ? 0.0005 : -0.0005) * up;
+      marker.sigma_m = hardly ? sigma_m : 0.0005;
+    }
+    return std::sqrt(AlignScenes(room, current).alignment->distortion(2, 2));
+  };
+  EXPECT_NEAR(height_off_m(0.012), 0.0006, 0.0002);
+  // One that is as good as the others counts, if it was not found to have been moved.
+  EXPECT_GT(height_off_m(0.003), height_off_m(0.012));
+}
+
 TEST(SceneAlignmentTest, DamagedCornersAreNotShared) {
   const MarkerMap room = Room(4);
   MarkerMap current = Seen(room, 0, 1);

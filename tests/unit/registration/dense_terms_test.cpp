@@ -149,6 +149,63 @@ TEST(DenseTerms, FindsWhatEachImageErrsBy) {
                   .images.empty());
 }
 
+// Posterior in which nothing but the calibration is uncertain, each term by 1.
+BundlePosterior OfTheCalibrationAlone(std::size_t num_views) {
+  BundlePosterior posterior;
+  const auto at = static_cast<Eigen::Index>(6 * num_views);
+  posterior.with_calibration.setZero(at + kCalibrationSize, kCalibrationSize);
+  posterior.with_calibration.bottomRows<kCalibrationSize>().setIdentity();
+  for (std::size_t k = 0; k < num_views; ++k)
+    posterior.camera_rows.emplace_back(static_cast<Eigen::Index>(6 * k));
+  return posterior;
+}
+
+// Derivatives of what FindDepthErrors() finds, against its differences.
+TEST(DenseTerms, KnowsHowTheErrorsOfImagesFollowTheCalibrationAndThePoses) {
+  Scene scene({.num_keyframes = 6, .num_landmarks = 40, .dense = true});
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  JointRegistrationOptions options = OfAPhone();
+  options.depth_curve_sigma_m = 0.003;
+  const auto stacked = [&](const CalibrationModel& calibration) {
+    const Sensor sensor = MakeSensor(scene.truth.stated, calibration);
+    const DepthErrors found = FindDepthErrors(
+        sensor, options, scene.truth.map,
+        MakeViews(sensor, calibration, scene.cells, scene.truth.map), pairs, kGate_m, {});
+    Eigen::VectorXd all(3 * found.images.size() + DepthCurve::kSize);
+    for (std::size_t k = 0; k < found.images.size(); ++k)
+      all.segment<3>(3 * static_cast<Eigen::Index>(k)) = found.images[k];
+    all.tail<DepthCurve::kSize>() = found.curve.knots_m;
+    return all;
+  };
+  const Eigen::VectorXd before = stacked({});
+  BundlePosterior posterior = OfTheCalibrationAlone(scene.views.size());
+  const auto columns = [&] {
+    return FindDepthErrorColumns(scene.sensor, options, scene.truth.map, scene.views, pairs,
+                                 kGate_m, posterior, {});
+  };
+  constexpr double kStep = 1e-5;
+  const DepthErrorColumns of_calibration = columns();
+  for (const int term : {int{kDepthOffset}, int{kDepthScale}, int{kDepthSlopeX}}) {
+    CalibrationModel moved;
+    moved.depth[static_cast<std::size_t>(term)] = kStep;
+    const Eigen::VectorXd expected = (stacked(moved) - before) / kStep;
+    EXPECT_LT((of_calibration.rows.col(kDepthAt + term) - expected).norm(), 0.03 * expected.norm())
+        << CalibrationNames()[static_cast<std::size_t>(kDepthAt + term)];
+  }
+  // An offset of the calibration is found again in the images and the curve, which take it up.
+  const double taken_up = -of_calibration.OfImage(1)(0, kDepthAt + kDepthOffset);
+  EXPECT_GT(taken_up, 0.2);
+  EXPECT_LT(taken_up, 1.0);
+  // A camera that moves forward with the offset.
+  posterior.with_calibration(6 * 2 + 5, kDepthAt + kDepthOffset) = 1.0;
+  const Eigen::VectorXd with_pose = columns().rows.col(kDepthAt + kDepthOffset) -
+                                    of_calibration.rows.col(kDepthAt + kDepthOffset);
+  scene.truth.map.keyframes[2].T_world_color.translate(Eigen::Vector3d(0, 0, kStep));
+  const Eigen::VectorXd expected = (stacked({}) - before) / kStep;
+  EXPECT_LT((with_pose - expected).norm(), 0.03 * expected.norm());
+}
+
 // As a time-of-flight camera: an error that follows the depth, in waves of half a metre.
 TEST(DenseTerms, FindsTheCurveThatDepthFollows) {
   Scene scene({.num_keyframes = 6, .num_landmarks = 40, .dense = true});
@@ -181,6 +238,13 @@ TEST(DenseTerms, FindsTheCurveThatDepthFollows) {
     }
   }
   EXPECT_LT(std::sqrt(left_m2 / wave_m2), 0.3);
+}
+
+TEST(DenseTerms, TakeADifferenceOfLessThanHalfAPercentForNone) {
+  EXPECT_TRUE(AsConsistent(0.002979, 0.002983));
+  EXPECT_TRUE(AsConsistent(0.003, 0.002));
+  EXPECT_TRUE(AsConsistent(0.001, 0.0010049));
+  EXPECT_FALSE(AsConsistent(0.001, 0.0010051));
 }
 
 TEST(DepthCurve, IsLinearBetweenItsKnotsAndConstantBeyond) {

@@ -81,7 +81,7 @@ class SensitivityOfTest : public ::testing::Test {
     TrackingMap map = truth_.map;
     CalibrationModel calibration = sensor_;
     const BundleSummary summary = BundleAdjust(truth_.stated, options, {}, map, calibration);
-    stated_ = SensitivityOf(truth_.stated, sensor_, summary.posterior, truth_.map, kReference);
+    stated_ = SensitivityOf(truth_.stated, sensor_, summary.posterior, {}, truth_.map, kReference);
     const std::vector<Points> cells = CellsOf(truth_.stated, sensor_, truth_.map);
     for (std::size_t k = 0; k < cells.size(); ++k)
       for (std::size_t i = 0; i < cells[k].size(); ++i)
