@@ -76,6 +76,7 @@ Message NotWellDetermined(std::size_t number, double u95, double tolerance) {
 }
 
 void JudgeUncertainty(const Evidence& evidence, const AcceptanceLimits& limits, Reasons& reasons) {
+  const Message* doubt = nullptr;
   for (std::size_t i = 0; i < evidence.numbers.size(); ++i) {
     const std::optional<MeasuredNumber>& number = evidence.numbers[i];
     if (!number) {
@@ -86,8 +87,10 @@ void JudgeUncertainty(const Evidence& evidence, const AcceptanceLimits& limits, 
       reasons.push_back(say::acceptance::NotMeasured(NumberWord(i)));
     } else if (!(number->u95 > 0 && number->u95 <= ToleranceOf(limits, i))) {
       reasons.push_back(NotWellDetermined(i, number->u95, ToleranceOf(limits, i)));
+      if (doubt == nullptr) doubt = IsShift(i) ? &evidence.shift_doubt : &evidence.turn_doubt;
     }
   }
+  if (doubt != nullptr && !doubt->empty()) reasons.push_back(*doubt);
 }
 
 /// What is said of values that no gate refuses.

@@ -117,6 +117,8 @@ struct Evidence {
 
   /// Absent where not reported, as shifts with couch-fixed markers.
   std::array<std::optional<MeasuredNumber>, 6> numbers;
+  /// What makes shifts and rotations uncertain most of all; said where one is too uncertain.
+  Message shift_doubt, turn_doubt;
 
   static constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 };

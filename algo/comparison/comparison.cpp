@@ -357,6 +357,8 @@ class Comparer {
          .breathing_m = std::hypot(evidence_.reference_breathing_m, evidence_.current_breathing_m),
          .planned = planned_});
     motion.covariance = motion.uncertainty.Total();
+    evidence_.shift_doubt = LargestCause(motion.uncertainty, *result_.alignment, false);
+    evidence_.turn_doubt = LargestCause(motion.uncertainty, *result_.alignment, true);
     result_.motion = motion;
     Lap("motion", since_s);
     return true;

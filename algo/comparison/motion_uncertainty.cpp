@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algo/comparison/motion_uncertainty.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
 #include "algo/sensor_model/image_error_sigmas.hpp"
+#include "words/comparison.hpp"
 
 namespace plumb {
 namespace {
@@ -145,6 +148,30 @@ std::vector<std::pair<const char*, const Matrix6d*>> MotionUncertainty::Parts() 
     parts.emplace_back("slices", &slices);
   }
   return parts;
+}
+
+Message LargestCause(const MotionUncertainty& uncertainty, const Alignment& alignment,
+                     bool of_turns) {
+  namespace words = say::comparison;
+  const double off_m = std::sqrt(alignment.distortion.trace() / 3.0);
+  const Message of_markers = words::CauseMarkers(off_m / kMillimetre);
+  const std::array<std::pair<const Matrix6d*, Message>, 10> causes = {{
+      {&uncertainty.surface, words::CauseSurface()},
+      {&uncertainty.markers, of_markers},
+      {&uncertainty.distortion, of_markers},
+      {&uncertainty.scale, words::CauseScale()},
+      {&uncertainty.frame, words::CauseFrame()},
+      {&uncertainty.sensor, words::CauseSensor()},
+      {&uncertainty.breathing, words::CauseBreathing()},
+      {&uncertainty.room, words::CauseRoom()},
+      {&uncertainty.skin, words::CauseSkin()},
+      {&uncertainty.slices, words::CauseSlices()},
+  }};
+  const auto size = [&](const auto& cause) {
+    return of_turns ? cause.first->template topLeftCorner<3, 3>().trace()
+                    : cause.first->template bottomRightCorner<3, 3>().trace();
+  };
+  return std::ranges::max_element(causes, {}, size)->second;
 }
 
 Matrix6d CovarianceAbout(const Matrix6d& covariance, const Eigen::Vector3d& from_m,

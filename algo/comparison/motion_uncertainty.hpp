@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/comparison/scene_alignment.hpp"
 #include "algo/sensor_model/depth_sensor.hpp"
@@ -75,6 +76,11 @@ struct UncertaintyInput {
 };
 
 [[nodiscard]] MotionUncertainty Uncertainty(const UncertaintyInput& input);
+
+/// The largest of the causes, as a person may mend it.
+/// @param of_turns  Of the rotations, otherwise of the shifts at the centroid.
+[[nodiscard]] Message LargestCause(const MotionUncertainty& uncertainty,
+                                   const Alignment& alignment, bool of_turns);
 
 /// Moves a covariance (left perturbation) to another reference point.
 [[nodiscard]] Matrix6d CovarianceAbout(const Matrix6d& covariance, const Eigen::Vector3d& from_m,

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "words/comparison.hpp"
 #include "words/direction.hpp"
 
 namespace plumb {
@@ -174,6 +175,20 @@ TEST(AcceptanceTest, EveryValueAtItsTolerance) {
       EXPECT_EQ(verdict_at(kNan), Verdict::kNoAnswer) << kNumberNames[i];
     }
   }
+}
+
+TEST(AcceptanceTest, WhatMakesANumberTooUncertainIsSaidOnceAndOnlyThen) {
+  Evidence evidence = GoodEvidence();
+  evidence.shift_doubt = say::comparison::CauseSensor();
+  evidence.turn_doubt = say::comparison::CauseMarkers(4.0);
+  EXPECT_THAT(EnglishTexts(Decide(evidence, {}).reasons), ElementsAre(HasSubstr("every value")));
+  evidence.numbers[0]->u95 = evidence.numbers[2]->u95 = 3.1;
+  EXPECT_THAT(EnglishTexts(Decide(evidence, {}).reasons),
+              ElementsAre(HasSubstr("vertical"), HasSubstr("lateral"), HasSubstr("profile")));
+  evidence.numbers[0]->u95 = evidence.numbers[2]->u95 = 0.5;
+  evidence.numbers[4]->u95 = 1.1;
+  EXPECT_THAT(EnglishTexts(Decide(evidence, {}).reasons),
+              ElementsAre(HasSubstr("roll"), HasSubstr("by 4.0 mm")));
 }
 
 TEST(AcceptanceTest, AnUncertaintyIsWrittenWithoutAnExponent) {

@@ -47,6 +47,20 @@ TEST(MotionUncertaintyTest, TheTotalIsTheSumOfItsNamedParts) {
   EXPECT_TRUE(sum.isApprox(uncertainty.Total()));
 }
 
+TEST(MotionUncertaintyTest, TheLargestCauseIsNamedForShiftsAndForRotations) {
+  MotionUncertainty uncertainty;
+  uncertainty.surface.diagonal() << 0, 0, 4e-6, 0, 0, 0;
+  uncertainty.sensor.diagonal() << 0, 0, 3e-6, 0, 0, 1e-6;
+  uncertainty.distortion.diagonal() << 0, 0, 0, 0, 9e-7, 0;
+  const auto cause = [&](bool of_turns) {
+    return LargestCause(uncertainty, SomeAlignment(), of_turns).id();
+  };
+  EXPECT_EQ(cause(true), "comparison.cause_surface");
+  EXPECT_EQ(cause(false), "comparison.cause_sensor");
+  uncertainty.distortion(5, 5) = 2e-7;
+  EXPECT_EQ(cause(false), "comparison.cause_markers");
+}
+
 TEST(MotionUncertaintyTest, BreathingCountsByTheRiseOfTheChest) {
   const Matrix6d breathing = Of(Pose::Identity()).breathing;
   EXPECT_NEAR(std::sqrt(breathing(3, 3)), 0.1 * 0.005, 1e-9);
