@@ -22,7 +22,7 @@
 #include "daemon/database/scan_folders.hpp"
 #include "daemon/database/schema.hpp"
 #include "daemon/database/stored_values.hpp"
-#include "daemon/records/imported_room.hpp"
+#include "daemon/imports/imported_room.hpp"
 #include "daemon/records/store.hpp"
 #include "daemon/scan_files/file_copy.hpp"
 #include "drivers/files/file_io.hpp"

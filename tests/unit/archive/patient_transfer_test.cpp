@@ -10,7 +10,7 @@
 
 #include "daemon/archive/backup.hpp"
 #include "daemon/database/store_json.hpp"
-#include "daemon/records/imported_room.hpp"
+#include "daemon/imports/imported_room.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/support/board_checks.hpp"
 #include "tests/support/message_of.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/records/imported_room.hpp"
+#include "daemon/imports/imported_room.hpp"
 
 #include <unistd.h>
 
