@@ -114,6 +114,8 @@ constexpr auto kCommands = std::to_array<CommandEntry>({
     {"doctor", "Check what is attached, permitted and configured, with advice", AddDoctor},
     {"status", "Show the status of a running plumbd: state, sensor, scan, last result", AddStatus},
     {"press", "Press the button of a running plumbd", AddPress},
+    {"test-message", "Send a test message to those whom [messages] of plumbd names",
+     AddTestMessage},
     {"presence", "Show the code by which a log-in proves that it comes from the room", AddPresence},
     {"watch", "Print the events of a running plumbd, one JSON object per line", AddWatch},
     {"sim", "Plug, unplug, stall or advance the virtual sensor of a running plumbd", AddSim},

@@ -60,6 +60,7 @@ Appliance::Appliance(SharedParts& shared)
       session_(shared.session),
       store_thread_(shared.store_thread),
       monitoring_(shared.monitoring),
+      messages_(shared.messages),
       sensors_(shared.sensors),
       button_(loop_, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }),
       rest_(loop_, sensors_, [this] { PublishState(); }) {
@@ -368,6 +369,14 @@ void Appliance::OnTick() {
   upkeep_.Tick(IsRunning());
   button_.Tick();
   WatchRest();
+  LookForMessages();
+}
+
+void Appliance::LookForMessages() {
+  constexpr int kMessageTicks = 30;
+  if (!messages_.IsSetUp() || --ticks_to_messages_ > 0) return;
+  ticks_to_messages_ = kMessageTicks;
+  messages_.Look(WebStatus());
 }
 
 bool Appliance::WorkersAreAlive() const {

@@ -126,6 +126,7 @@ class Appliance : private StorageUser {
   void OnEnded(const EndedScan& outcome);
   void Count(const EndedScan& outcome);
   void OnTick();
+  void LookForMessages();
   [[nodiscard]] std::uint64_t NeededBytes() const;
   [[nodiscard]] Answer WhyFull() const;
   [[nodiscard]] Answer WhyNoSpace() const;
@@ -151,6 +152,7 @@ class Appliance : private StorageUser {
   CurrentSession& session_;
   WorkThread& store_thread_;
   LiveMonitoring& monitoring_;
+  MessagesOut& messages_;
   SensorThread& sensors_;
   Message space_fault_;  ///< Why no scan can be stored although the store works.
   ScanState state_;
@@ -160,6 +162,7 @@ class Appliance : private StorageUser {
   ScanCounts counts_;        ///< Since the start.
   std::string last_serial_;  ///< Serial of the last used sensor.
   PageNotes page_;
+  int ticks_to_messages_ = 0;  ///< Until what needs a person is looked for.
   IndicatorPattern shown_ = IndicatorPattern::kOff;
   std::function<void()> stopped_;
   EventLoop::Source result_timer_, limit_timer_, tick_timer_;

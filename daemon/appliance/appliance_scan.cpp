@@ -134,6 +134,8 @@ ScanJob Appliance::MakeJob(const Settings& settings) {
     job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
     job.compare.now_s = SteadySeconds;
     job.room = room_.OfJob();
+    job.reference_room = [state = storage_.state(), patient = scan_.patient_id,
+                          scan = reference->scan_id] { return RoomOfImport(state, patient, scan); };
   }
   return job;
 }

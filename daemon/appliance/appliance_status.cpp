@@ -198,7 +198,10 @@ Json Appliance::StatusJson() {
   PutMessage(status, "reason", FaultReason());
   PutMessage(status, "rolled_back", rolled_back_);
   PutMessages(status, "warning", StorageWarnings());
-  PutMessages(status["page"], "warning", page_.warnings);
+  std::vector<Message> warnings = page_.warnings;
+  for (const MessageWay& way : messages_.status())
+    if (!way.failure.empty()) warnings.push_back(way.failure);
+  PutMessages(status["page"], "warning", warnings);
   PutMessage(status["sensor"], "profile_fault", profiles_.drift());
   return status;
 }
@@ -248,6 +251,9 @@ Status Appliance::WebStatus() {
   status.warnings = page_.warnings;
   if (!profiles_.drift().empty()) status.warnings.push_back(profiles_.drift());
   status.rolled_back = rolled_back_;
+  status.messages = messages_.status();
+  for (const MessageWay& way : status.messages)
+    if (!way.failure.empty()) status.warnings.push_back(way.failure);
   room_.Report(status);
   ReadStoredOrFail(status);
   return status;

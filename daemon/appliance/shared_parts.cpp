@@ -12,6 +12,13 @@ StorageOptions StorageOf(const ApplianceParts& parts) {
   return options;
 }
 
+OccasionRules RulesOf(const Config& config) {
+  return {.check_due_min = config.messages.check_due_min,
+          .check_on_weekends = config.messages.check_on_weekends,
+          .backup_hours = config.appliance.backup_hours,
+          .makes_backups = !config.appliance.backup_folder.empty()};
+}
+
 }  // namespace
 
 SharedParts::SharedParts(EventLoop& its_loop, ApplianceParts its_parts)
@@ -28,6 +35,8 @@ SharedParts::SharedParts(EventLoop& its_loop, ApplianceParts its_parts)
       references(store, given.config, !given.demo_patient.empty(),
                  [this] { return sensors.snapshot(); }),
       session(loop, given.config, [this] { session_unused(); }),
+      messages(loop, given.config.messages, RulesOf(given.config),
+               [this] { notices.TellPage(web::EventKind::kStatus); }),
       sensors(given.make_provider,
               SensorThreadOptions{.serial = given.config.appliance.sensor_serial,
                                   .before_scan = given.before_scan},

@@ -13,6 +13,7 @@
 #include "daemon/appliance/unit_profiles.hpp"
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/work_thread.hpp"
+#include "daemon/messages_out/messages_out.hpp"
 #include "daemon/storage/storage_upkeep.hpp"
 #include "daemon/storage/storage_watch.hpp"
 #include "daemon/sweep/sensor_thread.hpp"
@@ -41,6 +42,7 @@ struct SharedParts {
   CurrentSession session;
   WorkThread store_thread{256};  ///< Changes of the store, one after the other, off the loop.
   LiveMonitoring monitoring{loop, notices, store_thread};
+  MessagesOut messages;
   WorkThread check_thread{4};  ///< Reads stored files; changes do not wait for it.
   SensorThread sensors;        // last: its events use the members above
 };

@@ -22,6 +22,7 @@
 #include "daemon/database/scan_folders.hpp"
 #include "daemon/database/schema.hpp"
 #include "daemon/database/stored_values.hpp"
+#include "daemon/imports/imported_room.hpp"
 #include "daemon/records/store.hpp"
 #include "daemon/scan_files/file_copy.hpp"
 #include "drivers/files/file_io.hpp"
@@ -80,10 +81,6 @@ std::optional<std::int64_t> FindCode(Database& database, const std::string& code
                                code);
 }
 
-fs::path ImportedFile(const fs::path& state, std::int64_t patient) {
-  return state / kImports / fmt::format("{}.json", patient);
-}
-
 /// The record of an earlier import; null if the patient was created here.
 Json EarlierEvidence(const fs::path& state, std::int64_t patient) {
   std::error_code error;
@@ -92,6 +89,19 @@ Json EarlierEvidence(const fs::path& state, std::int64_t patient) {
   Json earlier = ParseBoundedJsonOrNothing<Json>(ReadTextFile(file, kMaxRecord));
   if (earlier.is_discarded()) throw DataError(say::backup::ImportRecordDamaged(file.string()));
   return earlier;
+}
+
+/// In which room each reference was scanned, by the number of its scan: here, or where an earlier
+/// import says.
+Json RoomsOf(Database& database, const Json& rows, const Json& earlier) {
+  const Json known = earlier.is_object() ? earlier.value("rooms_here", Json()) : Json();
+  const Json own = OwnRoomJson(database);
+  Json rooms = Json::object();
+  for (const Json& reference : rows["refs"]) {
+    const std::string scan = std::to_string(reference["scan_id"].get<std::int64_t>());
+    rooms[scan] = known.is_object() && known.contains(scan) ? known[scan] : own;
+  }
+  return rooms;
 }
 
 }  // namespace
@@ -107,9 +117,11 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
     throw DataError(say::backup::ExportNoPatient(code.substr(0, kMaxName), state.string()));
   const Json rows = PatientRows(*database, *patient);
   const TemporaryFolder own(fs::temp_directory_path(), "plumb-");
+  const Json earlier = EarlierEvidence(state, *patient);
   WriteWholeFile(own.path() / kRecord, Json{{"rows", rows},
                                             {"evidence", PatientEvidence(*database, *patient)},
-                                            {"earlier", EarlierEvidence(state, *patient)}}
+                                            {"rooms", RoomsOf(*database, rows, earlier)},
+                                            {"earlier", earlier}}
                                            .dump(1, ' ', false, Json::error_handler_t::replace));
   SummedWriter output(target, kExportKind,
                       {say::output::PatientExport(),
@@ -248,6 +260,7 @@ class PatientImport {
       }
       fs::create_directories(store_.folders.state() / kImports);
       moved.push_back(ImportedFile(store_.folders.state(), patient));
+      NoteRooms();
       WriteWholeFile(moved.back(), record_.dump(1, ' ', false, Json::error_handler_t::replace));
       GiveToOwnerOf(store_.folders.state(), store_.folders.state() / kImports);
       for (const fs::path& path : moved) GiveToOwnerOf(store_.folders.state(), path);
@@ -267,6 +280,19 @@ class PatientImport {
       Remove(moved);
       throw;
     }
+  }
+
+  /// The rooms of the references by their new numbers; null where the export knows none.
+  void NoteRooms() {
+    const Json rooms = record_.value("rooms", Json());
+    Json here = Json::object();
+    for (const Json& reference : rows().at("refs")) {
+      const std::int64_t scan = reference.at("scan_id");
+      const auto found = rooms.find(std::to_string(scan));
+      here[std::to_string(new_ids_["scans"].at(scan))] =
+          rooms.is_object() && found != rooms.end() ? *found : Json();
+    }
+    record_["rooms_here"] = std::move(here);
   }
 
   static void Remove(const std::vector<fs::path>& moved) {

@@ -60,6 +60,7 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddStatus(CLI::App& app);
 [[nodiscard]] Command AddPress(CLI::App& app);
 [[nodiscard]] Command AddPresence(CLI::App& app);
+[[nodiscard]] Command AddTestMessage(CLI::App& app);
 [[nodiscard]] Command AddWatch(CLI::App& app);
 [[nodiscard]] Command AddSim(CLI::App& app);
 [[nodiscard]] Command AddUpdate(CLI::App& app);

@@ -281,11 +281,27 @@ void ReadPanel(Section button, Section light, PanelConfig& panel) {
   light.RejectUnknownKeys();
 }
 
+/// Without what would make an address of a file in it another one.
+bool IsChannelUrl(const std::string& text) {
+  const auto url = ParsePlainUrl(text);
+  return url && url->path.find_first_of("?#") == std::string::npos &&
+         (url->scheme == "https" || (url->scheme == "http" && !url->LeavesTheMachine()));
+}
+
 void ReadUpdate(Section section, UpdateConfig& update) {
   section.TakePath("folder", update.folder);
   section.Take("max_bundle_mb", update.max_bundle_mb, say::config::ExpectedWholeNumber(1, 65536),
                [](int n) { return n >= 1 && n <= 65536; });
+  section.Take("channel", update.channel, say::config::ExpectedChannel(), IsChannelUrl);
+  section.Take("channel_name", update.channel_name, say::config::ExpectedChannelName(),
+               [](const std::string& s) { return s == "stable" || s == "test"; });
+  constexpr std::size_t kKeyLength = 44;  // 32 bytes in base64
+  section.Take("channel_key", update.channel_key, say::config::ExpectedChannelKey(),
+               [](const std::string& s) { return s.size() == kKeyLength && s.back() == '='; });
+  section.TakePath("trusted", update.trusted);
   section.RejectUnknownKeys();
+  if (!update.channel.empty() && update.channel_key.empty())
+    throw DataError(say::config::ChannelNeedsKey());
 }
 
 void ReadWeb(Section section, WebConfig& web) {
@@ -343,9 +359,10 @@ PageTransport TransportOf(const WebConfig& web, bool is_loopback) {
 
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
   const toml::table root = ParseToml(text, name);
-  RejectUnknownTables(root, name,
-                      {"markers", "reconstruct", "compare", "check", "iec", "appliance", "storage",
-                       "sensor", "button", "light", "monitor", "web", "update", "dicom"});
+  RejectUnknownTables(
+      root, name,
+      {"markers", "reconstruct", "compare", "check", "iec", "appliance", "storage", "sensor",
+       "button", "light", "monitor", "web", "update", "messages", "dicom"});
   Config config;
   config.given = GivenIn(root);
   ReadMarkers(Section(root, "markers", name), config.markers);
@@ -360,6 +377,7 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
   ReadMonitor(Section(root, "monitor", name), config.panel);
   ReadWeb(Section(root, "web", name), config.web);
   ReadUpdate(Section(root, "update", name), config.update);
+  config.messages = ReadMessagesSettings(Section(root, "messages", name));
   (void)ReadDicomSettings(Section(root, "dicom", name));  // of plumb-dicomd: only checked
   return config;
 }
@@ -443,7 +461,12 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("web.plain_http", in_use.web.plain_http, next.web.plain_http);
   keep("web.host_names", in_use.web.host_names, next.web.host_names);
   keep("web.metrics_token_file", in_use.web.metrics_token_file, next.web.metrics_token_file);
+  keep("messages", in_use.messages, next.messages);
   keep("update.folder", in_use.update.folder, next.update.folder);
+  keep("update.channel", in_use.update.channel, next.update.channel);
+  keep("update.channel_name", in_use.update.channel_name, next.update.channel_name);
+  keep("update.channel_key", in_use.update.channel_key, next.update.channel_key);
+  keep("update.trusted", in_use.update.trusted, next.update.trusted);
   keep("update.max_bundle_mb", in_use.update.max_bundle_mb, next.update.max_bundle_mb);
   return kept;
 }

@@ -15,6 +15,7 @@
 #include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/types/marker.hpp"
+#include "daemon/config/messages_settings.hpp"
 #include "daemon/files/age_recipients.hpp"
 
 namespace plumb {
@@ -78,6 +79,11 @@ struct WebConfig {
 struct UpdateConfig {
   std::filesystem::path folder = "/var/lib/plumb/updates";  ///< Bundles: NAME.raucb.
   int max_bundle_mb = 2048;
+  /// Folder of a web server with a signed index, https://...; empty: none is looked at.
+  std::string channel;
+  std::string channel_name = "stable";  ///< Of the index: stable or test.
+  std::string channel_key;              ///< Public key of the index: Ed25519, base64.
+  std::filesystem::path trusted;        ///< Certificates, PEM; empty: those of the system.
 };
 
 struct ListenAddress {
@@ -109,6 +115,7 @@ struct Config {
   PanelConfig panel;
   WebConfig web;
   UpdateConfig update;
+  MessagesSettings messages;
   std::optional<std::filesystem::path>
       region_file;  ///< Absolute, or relative to the configuration file's folder.
   /// A scene whose markers are the taught ones of the room; absolute, or relative in the same way.
@@ -146,7 +153,8 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///     [light]        chip, red, green, blue, beeper, active_low
 ///     [monitor]      gate_chip, gate_line, gate_active_low
 ///     [web]          listen, tls_certificate, tls_key, plain_http, host_names, metrics_token_file
-///     [update]       folder, max_bundle_mb
+///     [update]       folder, max_bundle_mb, channel, channel_name, channel_key, trusted
+///     [messages]     (messages_settings.hpp)
 ///     [dicom]        (checked only; dicom_settings.hpp)
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed

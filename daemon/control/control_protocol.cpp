@@ -94,7 +94,7 @@ struct CommandSyntax {
   std::array<std::string_view, 2> keys;  ///< Beside "command"; empty: none.
   void (*read)(const Json& json, ControlRequest& request);
 };
-constexpr std::array<CommandSyntax, 10> kCommands = {{
+constexpr std::array<CommandSyntax, 11> kCommands = {{
     {"status", Kind::kStatus, {}, ReadNothing},
     {"press", Kind::kPress, {"long"}, ReadPress},
     {"watch", Kind::kWatch, {}, ReadNothing},
@@ -105,6 +105,7 @@ constexpr std::array<CommandSyntax, 10> kCommands = {{
     {"restart", Kind::kRestart, {}, ReadNothing},
     {"presence", Kind::kPresence, {}, ReadNothing},
     {"monitor", Kind::kMonitor, {"action"}, ReadMonitor},
+    {"test-message", Kind::kTestMessage, {}, ReadNothing},
 }};
 
 const CommandSyntax& SyntaxOf(std::string_view command) {
@@ -157,6 +158,8 @@ std::string ControlRequestText(const ControlRequest& request) {
       return ControlLine({{"command", "restart"}});
     case Kind::kPresence:
       return ControlLine({{"command", "presence"}});
+    case Kind::kTestMessage:
+      return ControlLine({{"command", "test-message"}});
     case Kind::kMonitor:
       return ControlLine({{"command", "monitor"}, {"action", request.starts ? "start" : "stop"}});
     case Kind::kSim:

@@ -18,9 +18,10 @@ namespace plumb {
 inline constexpr std::size_t kMaxControlLine = 4096;  ///< Bytes of a request.
 
 /// {"command": "status" | "press" | "watch" | "sim" | "backup" | "update" | "update-status" |
-/// "restart" | "presence" | "monitor", "long": bool with press, "action" and, optional, "argument":
-/// texts with sim, "folder": an absolute path with backup, and, optional, "recipients": public
-/// keys, "name": NAME.raucb with update, whose message carries the open file (SCM_RIGHTS)}
+/// "restart" | "presence" | "monitor" | "test-message", "long": bool with press, "action" and,
+/// optional, "argument": texts with sim, "folder": an absolute path with backup, and, optional,
+/// "recipients": public keys, "name": NAME.raucb with update, whose message carries the open file
+/// (SCM_RIGHTS)}
 struct ControlRequest {
   enum class Kind {
     kStatus,
@@ -32,7 +33,8 @@ struct ControlRequest {
     kUpdateStatus,
     kRestart,
     kPresence,
-    kMonitor
+    kMonitor,
+    kTestMessage
   };
   Kind kind = Kind::kStatus;
   bool is_long = false;  ///< kPress

@@ -33,6 +33,8 @@ std::string UpdateLine(const UpdateStatus& status) {
                          {"restart_needed", status.restart_needed}};
   PutMessage(line, "message", status.message);
   PutMessage(line, "failure", status.failure);
+  PutMessage(line, "offered", status.offered);
+  PutMessage(line, "channel_failure", status.channel_failure);
   PutMessage(line, "rolled_back", status.rolled_back);
   return ControlLine(line);
 }
@@ -49,6 +51,7 @@ Done ReplyWith(const ControlServer::Reply& reply) {
 
 ControlDesk::ControlDesk(EventLoop& loop, Appliance& appliance, StorageUpkeep& upkeep,
                          LiveMonitoring& monitoring, Updates& updates,
+                         web::MaintenanceService& maintenance,
                          std::function<void(const std::string&)> simulate,
                          std::function<std::string()> presence_code)
     : loop_(loop),
@@ -56,6 +59,7 @@ ControlDesk::ControlDesk(EventLoop& loop, Appliance& appliance, StorageUpkeep& u
       upkeep_(upkeep),
       monitoring_(monitoring),
       updates_(updates),
+      maintenance_(maintenance),
       simulate_(std::move(simulate)),
       presence_code_(std::move(presence_code)) {}
 
@@ -91,6 +95,8 @@ void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Rep
       return updates_.RestartSystem(kSocket, ReplyWith(reply));
     case Kind::kPresence:
       return reply(ControlLine({{"ok", true}, {"code", presence_code_()}}));
+    case Kind::kTestMessage:
+      return maintenance_.SendTestMessage(kSocket, ReplyWith(reply));
     case Kind::kSim:
       return Simulate(request, reply);
   }

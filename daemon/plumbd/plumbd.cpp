@@ -137,6 +137,7 @@ class Plumbd {
         http_(services_.services(), HttpOptions(config, page)),
         desk_(
             loop_, appliance_, shared_.upkeep, shared_.monitoring, services_.updates(),
+            services_.services().maintenance,
             [this](const std::string& command) { (void)sensors_->Command(command); },
             [this] { return http_.presence_code(); }),
         control_(loop_, ControlSocket(config),

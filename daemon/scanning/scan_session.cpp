@@ -75,6 +75,30 @@ std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Sc
   return used;
 }
 
+std::optional<ResultRoom> TakeOtherRoom(const ImportedRoom& elsewhere,
+                                        const std::optional<RoomAxes>& here,
+                                        CompareOptions& compare) {
+  const double lasers_m = compare.iec_u95_m.value_or(0.0),
+               lasers_rad = compare.iec_u95_rad.value_or(0.0);
+  CalibratedRoom& theirs = compare.reference_room.emplace();
+  theirs.why_not = elsewhere.why_not;
+  if (elsewhere.room) {
+    const RoomFit& fit = elsewhere.room->fit;
+    theirs.T_iec_reference = Pose::Identity();
+    theirs.u95_m = std::hypot(lasers_m, fit.shift_m);
+    theirs.u95_rad = std::hypot(lasers_rad, fit.turn_rad);
+    theirs.markers = fit.markers_iec;
+  }
+  compare.T_iec_reference.reset();
+  compare.why_no_room = here ? here->why_not : say::room::ElsewhereNeedsCalibration();
+  if (!compare.why_no_room.empty()) return std::nullopt;
+  compare.T_iec_reference = Pose::Identity();
+  compare.room_markers = here->markers_iec;
+  compare.iec_u95_m = std::hypot(lasers_m, here->shift_m);
+  compare.iec_u95_rad = std::hypot(lasers_rad, here->turn_rad);
+  return ResultRoom{here->version, {}};
+}
+
 ScanSession::ScanSession(ScanJob job, ScanCallbacks callbacks)
     : job_(std::move(job)),
       callbacks_(std::move(callbacks)),
@@ -305,9 +329,16 @@ Comparison ScanSession::CompareWith(const Scene& reference, const Scene& scene,
                                     std::optional<ResultRoom>& room) const {
   CompareOptions compare = job_.compare;
   compare.stop = stop;
-  room = TakeRoom(job_.room, reference, compare);
+  std::optional<ImportedRoom> elsewhere;
+  if (job_.reference_room && !reference.planning) elsewhere = job_.reference_room();
+  room = elsewhere ? TakeOtherRoom(*elsewhere, job_.room, compare)
+                   : TakeRoom(job_.room, reference, compare);
   try {
-    return Compare(reference, scene, compare);
+    Comparison comparison = Compare(reference, scene, compare);
+    if (elsewhere && elsewhere->room)
+      comparison.warnings.push_back(
+          say::room::ReferenceElsewhere(elsewhere->unit, elsewhere->version));
+    return comparison;
     // not an error of the sweep: another one would end the same way
   } catch (const DataError& error) {
     throw MessageError(say::scan::DoesNotFit(error.message()));

@@ -18,6 +18,7 @@
 #include "algo/comparison/comparison.hpp"
 #include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
+#include "daemon/imports/imported_room.hpp"
 #include "daemon/pipeline/live_feed.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 #include "daemon/records/check_json.hpp"
@@ -57,6 +58,9 @@ struct ScanJob {
   /// Why the reference differs from the approved one; empty if it does not. Called before it is
   /// read.
   std::function<Message(const std::stop_token&)> check_reference;
+  /// The room of another unit in which the reference was scanned; nothing: it was this one. Called
+  /// as check_reference; may be empty.
+  std::function<std::optional<ImportedRoom>()> reference_room;
   bool is_reference =
       false;  ///< The scene must be usable as a reference; otherwise there is no answer.
   /// If set, the scan is a daily check, of which only the numbers are kept.
@@ -77,6 +81,12 @@ struct ScanJob {
 /// reference from a planning CT has none and lies in those axes: the markers are handed on.
 [[nodiscard]] std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room,
                                                  const Scene& reference, CompareOptions& compare);
+
+/// Has a reference of another unit compared in the axes of both rooms, which takes a signed
+/// calibration of each. What `compare` states of the lasers of this room counts for both.
+[[nodiscard]] std::optional<ResultRoom> TakeOtherRoom(const ImportedRoom& elsewhere,
+                                                      const std::optional<RoomAxes>& here,
+                                                      CompareOptions& compare);
 
 /// Progress of the scan for the light, the page and `watch`.
 struct ScanUpdate {

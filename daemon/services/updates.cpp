@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/services/updates.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include "daemon/update/bundle_check.hpp"
 #include "daemon/update/bundle_copy.hpp"
 #include "words/audit.hpp"
+#include "words/channel.hpp"
 #include "words/scan.hpp"
 #include "words/upkeep.hpp"
 
@@ -54,6 +56,43 @@ Updates::Updates(EventLoop& loop, Appliance& appliance, CurrentSession& session,
                        }}) {
   session_.SetBlockingReason([this] { return WhyNotScan(); });
   restart_limit_ = loop_.MakeTimer("restart", [this] { OnStillRunning(); });
+  if (!options_.config.channel.empty()) WatchChannel();
+}
+
+void Updates::WatchChannel() {
+  const UpdateConfig& config = options_.config;
+  std::string url = config.channel;
+  while (url.ends_with('/')) url.pop_back();
+  const auto looked = alive_.WhileAlive([this](const ChannelLook& look) {
+    const bool is_news = look.name != look_.name && !look.name.empty();
+    look_ = look;
+    if (is_news)
+      options_.log(kInstaller, "update.offer", look.name,
+                   say::channel::IsOffered(look.version, look.name));
+    if (!look.failure.empty()) Log(LogLevel::kWarning, look.failure.English());
+    options_.changed();
+  });
+  channel_ = std::make_unique<ChannelWatch>(
+      ChannelOptions{.url = std::move(url),
+                     .channel = config.channel_name,
+                     .key = config.channel_key,
+                     .trusted = config.trusted,
+                     .folder = config.folder,
+                     .seen = options_.state / "channel-seen",
+                     .serial = options_.serial,
+                     .version = VersionOfSystem(options_.release, std::string(Version())),
+                     .max_bytes = static_cast<std::uint64_t>(config.max_bundle_mb) << 20},
+      [&loop = loop_, looked](const ChannelLook& look) {
+        loop.Post("channel", [looked, look] { looked(look); });
+      });
+}
+
+UpdateStatus Updates::GetUpdate() {
+  UpdateStatus status = updater_.status();
+  status.channel_failure = look_.failure;
+  const bool is_here = std::ranges::find(status.bundles, look_.name) != status.bundles.end();
+  if (is_here) status.offered = say::channel::IsOffered(look_.version, look_.name);
+  return status;
 }
 
 Updates::~Updates() { session_.SetBlockingReason({}); }

@@ -11,6 +11,7 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/control/attached_file.hpp"
 #include "daemon/loop/alive_flag.hpp"
+#include "daemon/update/channel.hpp"
 #include "daemon/update/system_restart.hpp"
 #include "daemon/update/updater.hpp"
 #include "daemon/update/usb_sticks.hpp"
@@ -20,8 +21,9 @@ namespace plumb {
 
 struct UpdatesOptions {
   UpdateConfig config;
-  std::filesystem::path state;                           ///< State folder for a factory reset.
-  std::filesystem::path sticks = "/run/plumb-stick";     ///< See UsbSticks.
+  std::filesystem::path state;                        ///< State folder for a factory reset.
+  std::filesystem::path sticks = "/run/plumb-stick";  ///< See UsbSticks.
+  std::string serial = {};  ///< Of this unit: its place in the fleet; empty: the host's name.
   std::filesystem::path release = "/etc/plumb-release";  ///< See VersionOfSystem().
   std::string bus_address = {};                          ///< Empty: the system bus.
   std::string boot = {};  ///< Unique for each start of the machine; empty if unknown.
@@ -43,7 +45,7 @@ class Updates : public web::UpdateService {
   Updates(const Updates&) = delete;
   Updates& operator=(const Updates&) = delete;
 
-  [[nodiscard]] UpdateStatus GetUpdate() override { return updater_.status(); }
+  [[nodiscard]] UpdateStatus GetUpdate() override;
   void AddBundle(const Actor& actor, const std::filesystem::path& file, const std::string& name,
                  Done done) override;
   void RemoveBundle(const Actor& actor, const std::string& name, Done done) override;
@@ -59,6 +61,7 @@ class Updates : public web::UpdateService {
   void ForgetRollBack(const Actor& actor, Done done) override;
 
  private:
+  void WatchChannel();
   /// Passes the answer on to `done` and writes it to the audit log.
   [[nodiscard]] Done LogInstall(const Actor& actor, const std::string& bundle, Done done);
   /// Why no update may begin now, during which no scan can begin: a scan runs, or a patient's
@@ -83,7 +86,9 @@ class Updates : public web::UpdateService {
   bool restarting_ = false, copying_ = false;
   Actor restarted_by_;
   EventLoop::Source restart_limit_;
+  ChannelLook look_;  ///< The newest.
   AliveFlag alive_;
+  std::unique_ptr<ChannelWatch> channel_;  ///< Null: no channel is configured.
   Updater updater_;  // Declared last, so destroyed first: its callbacks use the members above.
 };
 

@@ -16,6 +16,7 @@
 #include "daemon/unit/diagnostics.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/temporary.hpp"
+#include "words/messages.hpp"
 #include "words/upkeep.hpp"
 
 namespace plumb {
@@ -24,9 +25,9 @@ namespace {
 
 class WebMaintenance final : public web::MaintenanceService {
  public:
-  WebMaintenance(Appliance& appliance, StorageUpkeep& upkeep, const LoopMeter& meter,
-                 StoreAccess& store)
-      : appliance_(appliance), upkeep_(upkeep), meter_(meter), store_(store) {}
+  WebMaintenance(Appliance& appliance, StorageUpkeep& upkeep, MessagesOut& messages,
+                 const LoopMeter& meter, StoreAccess& store)
+      : appliance_(appliance), upkeep_(upkeep), messages_(messages), meter_(meter), store_(store) {}
 
   void MakeBackup(const Actor& actor, Done done) override {
     const std::filesystem::path folder = upkeep_.BackupTarget();
@@ -64,9 +65,22 @@ class WebMaintenance final : public web::MaintenanceService {
     });
   }
 
+  void SendTestMessage(const Actor& actor, Done done) override {
+    if (!messages_.IsSetUp()) return done(Refused(ChangeResult::kInvalid, say::messages::NoWay()));
+    const auto send = alive_.WhileAlive([this, done](const Change& logged) {
+      if (logged.result != ChangeResult::kDone) return done(logged);
+      messages_.Test([done](const Message& failure) {
+        done(Refused(failure.empty() ? ChangeResult::kDone : ChangeResult::kFailed, failure));
+      });
+    });
+    store_.Write(&Store::audit, send,
+                 [=](AuditStore& audit) { audit.Log(actor, "messages.test", "", Message()); });
+  }
+
  private:
   Appliance& appliance_;
   StorageUpkeep& upkeep_;
+  MessagesOut& messages_;
   const LoopMeter& meter_;
   StoreAccess& store_;
   AliveFlag alive_;
@@ -76,9 +90,10 @@ class WebMaintenance final : public web::MaintenanceService {
 
 std::unique_ptr<web::MaintenanceService> MakeWebMaintenance(Appliance& appliance,
                                                             StorageUpkeep& upkeep,
+                                                            MessagesOut& messages,
                                                             const LoopMeter& meter,
                                                             StoreAccess& store) {
-  return std::make_unique<WebMaintenance>(appliance, upkeep, meter, store);
+  return std::make_unique<WebMaintenance>(appliance, upkeep, messages, meter, store);
 }
 
 }  // namespace plumb

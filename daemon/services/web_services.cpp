@@ -2,9 +2,11 @@
 #include "daemon/services/web_services.hpp"
 
 #include <systemd/sd-id128.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstdlib>
+#include <fstream>
 #include <string>
 #include <utility>
 
@@ -19,6 +21,16 @@ std::string BootId() {
   sd_id128_t id{};
   std::array<char, SD_ID128_STRING_MAX> text{};
   return sd_id128_get_boot(&id) < 0 ? std::string() : sd_id128_to_string(id, text.data());
+}
+
+/// Of this unit, as it was provisioned; its host name otherwise.
+std::string UnitSerial() {
+  std::string serial;
+  std::ifstream file("/data/unit/serial");
+  if (std::getline(file, serial) && !serial.empty() && serial.size() <= 64) return serial;
+  std::array<char, 256> name{};
+  (void)::gethostname(name.data(), name.size() - 1);
+  return name.data();
 }
 
 }  // namespace
@@ -39,11 +51,13 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
       displays_(MakeWebDisplays(store_)),
       accounts_(MakeWebAccounts(store_)),
       settings_(MakeWebSettings(store_)),
-      maintenance_(MakeWebMaintenance(appliance, shared.upkeep, shared.loop.meter(), store_)),
+      maintenance_(MakeWebMaintenance(appliance, shared.upkeep, shared.messages,
+                                      shared.loop.meter(), store_)),
       updates_(
           shared.loop, appliance, shared.session, std::move(restart),
           {.config = shared.given.config.update,
            .state = shared.storage.state(),
+           .serial = UnitSerial(),
            .boot = BootId(),
            .run_in_background =
                [this](std::function<void()> work) {

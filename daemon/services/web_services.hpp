@@ -25,6 +25,7 @@ namespace plumb {
 [[nodiscard]] std::unique_ptr<web::DisplayService> MakeWebDisplays(StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::MaintenanceService> MakeWebMaintenance(Appliance& appliance,
                                                                           StorageUpkeep& upkeep,
+                                                                          MessagesOut& messages,
                                                                           const LoopMeter& meter,
                                                                           StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::MonitoringService> MakeWebMonitoring(LiveMonitoring& monitoring,

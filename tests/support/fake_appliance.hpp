@@ -282,6 +282,7 @@ class FakeAppliance : public web::BackgroundWork,
   void ResetToFactory(const Actor& actor, FactoryReset kind, Done done) override;
   void ForgetRollBack(const Actor& actor, Done done) override;
   void WriteDiagnostics(const Actor& actor, Done done) override;
+  void SendTestMessage(const Actor& actor, Done done) override;
 
   /// A reference made of a scan, as AddReference() does it, without the log.
   Reference& MakeReference(const Scan& scan, const std::string& by, const std::string& reason);

@@ -205,6 +205,15 @@ void FakeAppliance::ForgetRollBack(const Actor& actor, Done done) {
   Did(actor, "update.seen", "", done);
 }
 
+void FakeAppliance::SendTestMessage(const Actor& actor, Done done) {
+  if (status.messages.empty())
+    return Finish(done, Refused(ChangeResult::kInvalid, "no messages are set up"));
+  for (const MessageWay& way : status.messages)
+    if (!way.failure.empty()) return Finish(done, Refused(ChangeResult::kFailed, way.failure));
+  for (MessageWay& way : status.messages) ++way.sent;
+  Did(actor, "messages.test", "", done);
+}
+
 void FakeAppliance::WriteDiagnostics(const Actor& actor, Done done) {
   Log(actor, "diagnostics.write", "", {});
   Finish(done, {ChangeResult::kDone, {}, "", diagnostics_file});

@@ -100,6 +100,22 @@ void WriteStorage(const StorageStatus& storage, WallClock::time_point now, Metri
       .Sample(AgeOf(*storage.backup_made_at, now));
 }
 
+void WriteMessages(const std::vector<MessageWay>& ways, MetricsWriter& out) {
+  if (ways.empty()) return;
+  out.Family("messages", "counter", "", "Messages to people outside since the start.");
+  for (const MessageWay& way : ways) {
+    const auto count = [&](const char* outcome, std::int64_t number) {
+      out.Sample("_total", fmt::format("way=\"{}\",outcome=\"{}\"", Escaped(way.name), outcome),
+                 static_cast<double>(number));
+    };
+    count("sent", way.sent);
+    count("failed", way.failed);
+  }
+  out.Family("messages_failing", "gauge", "", "1: the newest attempt of this way failed.");
+  for (const MessageWay& way : ways)
+    out.Sample("", fmt::format("way=\"{}\"", Escaped(way.name)), !way.failure.empty());
+}
+
 void WriteScans(const ScanCounts& counts, MetricsWriter& out) {
   out.Family("scans", "counter", "", "Scans that ended since the start.");
   for (std::size_t i = 0; i < counts.verdicts.size(); ++i)
@@ -141,6 +157,7 @@ std::string MetricsText(const Status& status, const Health& health, WallClock::t
   WriteChecks(status, now, out);
   WriteStorage(status.storage, now, out);
   WriteScans(status.counts, out);
+  WriteMessages(status.messages, out);
   return out.Text();
 }
 

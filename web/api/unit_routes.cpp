@@ -126,6 +126,17 @@ void AddUpdateRoutes(Routes& routes, UpdateService& updates) {
                });
 }
 
+void AddMessageRoutes(Routes& routes, ApplianceService& appliance,
+                      MaintenanceService& maintenance) {
+  routes.Read("/api/v1/messages", Permission::kSettings, [&appliance](const Request&) {
+    return JsonResponse({{"ways", appliance.GetStatus().messages}});
+  });
+  routes.Write("POST", "/api/v1/messages/test", Permission::kSettings, BodyKind::kNone,
+               [&maintenance](const Request& request, const Done& done) {
+                 maintenance.SendTestMessage(request.actor(), done);
+               });
+}
+
 void AddMaintenanceRoutes(Routes& routes, MaintenanceService& maintenance, AuditLog& audit) {
   routes.ReadInBackground("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
     return JsonResponse({{"last", LastBackup(audit)}});
@@ -155,6 +166,7 @@ void AddUnitApi(Routes& routes, const Services& services) {
   AddApplianceRoutes(routes, services.appliance);
   AddSettingsRoutes(routes, services.settings, services.audit);
   AddUpdateRoutes(routes, services.updates);
+  AddMessageRoutes(routes, services.appliance, services.maintenance);
   AddMaintenanceRoutes(routes, services.maintenance, services.audit);
 }
 

@@ -322,6 +322,15 @@ void to_json(Json& json, const PlanTemplate& wanted) {
           {"changed_by", wanted.changed_by}};
 }
 
+void to_json(Json& json, const MessageWay& way) {
+  json = {{"name", way.name},
+          {"sent", way.sent},
+          {"failed", way.failed},
+          {"waiting", way.waiting},
+          {"sent_at", way.sent_at}};
+  PutMessage(json, "failure", way.failure);
+}
+
 void to_json(Json& json, const Patient& patient) {
   json = {{"id", patient.id},
           {"code", patient.code},
@@ -412,6 +421,8 @@ void to_json(Json& json, const UpdateStatus& update) {
           {"bundles", update.bundles},       {"restart_needed", update.restart_needed}};
   PutMessage(json, "message", update.message, "");
   PutMessage(json, "failure", update.failure);
+  PutMessage(json, "offered", update.offered);
+  PutMessage(json, "channel_failure", update.channel_failure);
   PutMessage(json, "rolled_back", update.rolled_back);
 }
 

@@ -57,6 +57,7 @@ namespace plumb {
 
 // These make nlohmann::json convert the values, also in lists and optionals.
 void to_json(web::Json& json, const Patient& patient);
+void to_json(web::Json& json, const MessageWay& way);
 void to_json(web::Json& json, const PlanTemplate& wanted);
 void to_json(web::Json& json, const Tolerance& tolerance);
 void to_json(web::Json& json, const Reference& reference);

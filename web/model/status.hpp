@@ -111,6 +111,15 @@ struct RoomOnMap {
   bool contradicts_posture = false;
 };
 
+/// One way by which people outside are told of what needs them.
+struct MessageWay {
+  std::string name;                   ///< mail, syslog or webhook.
+  std::int64_t sent = 0, failed = 0;  ///< Since the start; failed: given up.
+  std::int64_t waiting = 0;
+  Message failure = {};  ///< Of the newest attempt; empty if that one was taken.
+  std::optional<WallClock::time_point> sent_at = {};
+};
+
 struct Status {
   ApplianceState state = ApplianceState::kNoSensor;
   Message fault;  ///< In state kFault.
@@ -137,6 +146,7 @@ struct Status {
   std::vector<Message> warnings;  ///< About the set-up of the appliance.
   Message rolled_back;            ///< The same as in UpdateStatus.
   ScanCounts counts;
+  std::vector<MessageWay> messages;
 };
 
 struct UpdateStatus {
@@ -147,8 +157,10 @@ struct UpdateStatus {
   double fraction = 0.0;
   std::vector<std::string> bundles;  ///< Names of bundles on attached media.
   bool restart_needed = false;       ///< An update is installed and starts at the next restart.
-  Message failure;      ///< Why the last attempt was refused or failed; empty if it succeeded.
-  Message rolled_back;  ///< A sentence if the machine has gone back to the previous system.
+  Message failure;       ///< Why the last attempt was refused or failed; empty if it succeeded.
+  Message rolled_back;   ///< A sentence if the machine has gone back to the previous system.
+  Message offered = {};  ///< A bundle that came from the channel; empty: there is none.
+  Message channel_failure = {};  ///< Why the newest look at the channel failed.
 };
 
 struct Health {

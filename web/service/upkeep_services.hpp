@@ -41,6 +41,9 @@ class MaintenanceService {
   virtual void MakeBackup(const Actor& actor, Done done) = 0;
   /// Returns a file (without patient data) that is downloaded once and then removed.
   virtual void WriteDiagnostics(const Actor& actor, Done done) = 0;
+  /// Sends a test message by every way that the configuration names; answers when each has taken
+  /// it, or one has not (kFailed). kInvalid if it names none.
+  virtual void SendTestMessage(const Actor& actor, Done done) = 0;
 };
 
 /// The rules of services.hpp hold.

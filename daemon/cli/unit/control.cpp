@@ -313,6 +313,18 @@ Command AddPresence(CLI::App&) {
   };
 }
 
+Command AddTestMessage(CLI::App&) {
+  return [](const CommandContext& context) {
+    const Json answer = AskPlumbd(
+        context.control, {.kind = ControlRequest::Kind::kTestMessage, .action = {}, .argument = {}},
+        context.stop,
+        std::nullopt);  // a mail server has half a minute, and an earlier message may be on its way
+    if (!answer.value("ok", false)) throw DeviceError(WhyRefused(answer));
+    PrintOut(context.Said(say::cli::MessageSent()) + "\n");
+    return kDone;
+  };
+}
+
 Command AddWatch(CLI::App&) { return Watch; }
 
 Command AddSim(CLI::App& app) {

@@ -2,6 +2,7 @@
 // Scans of a still wall: how they end, and what they report meanwhile.
 #include "daemon/scanning/scan_session.hpp"
 
+#include <cmath>
 #include <condition_variable>
 #include <filesystem>
 #include <future>
@@ -15,6 +16,7 @@
 #include "daemon/files/scene_folder.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "words/room.hpp"
 
 namespace plumb {
 namespace {
@@ -74,6 +76,47 @@ class ScanSessionTest : public ::testing::Test {
   std::optional<EndedScan> outcome_;
   std::unique_ptr<ScanSession> session_;
 };
+
+TEST(TakeOtherRoomTest, BothRoomsCalibrationsAreInTheIntervals) {
+  ImportedRoom elsewhere{.unit = "plumb-a", .version = 2, .room = SignedRoom{}};
+  elsewhere.room->fit.markers_iec = {{4, {}}};
+  elsewhere.room->fit.shift_m = 0.004;
+  const RoomAxes here{.version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .shift_m = 0.012};
+  CompareOptions compare;
+  compare.iec_u95_m = 0.003;
+  const auto used = TakeOtherRoom(elsewhere, here, compare);
+  ASSERT_TRUE(used);
+  EXPECT_EQ(used->version, 7);
+  ASSERT_TRUE(compare.reference_room);
+  EXPECT_TRUE(compare.reference_room->markers.contains(4));
+  EXPECT_TRUE(compare.room_markers.contains(5));
+  EXPECT_NEAR(compare.reference_room->u95_m.value_or(0), 0.005, 1e-12);
+  EXPECT_NEAR(compare.iec_u95_m.value_or(0), std::hypot(0.003, 0.012), 1e-12);
+}
+
+TEST(TakeOtherRoomTest, WithoutACalibrationOnEitherSideThereIsNoAnswer) {
+  Scene reference;
+  reference.frame = SceneFrame::kReferenceMarker;
+  reference.height_map.emplace();
+  const auto reason = [&](const ImportedRoom& elsewhere, const std::optional<RoomAxes>& here) {
+    CompareOptions compare;
+    compare.T_iec_reference = Pose::Identity();  // what the configuration says does not do
+    EXPECT_FALSE(TakeOtherRoom(elsewhere, here, compare) && elsewhere.room);
+    const Comparison refused = Compare(reference, Scene{}, compare);
+    EXPECT_EQ(refused.verdict, Verdict::kNoAnswer);
+    return refused.reasons.empty() ? std::string() : refused.reasons.front().English();
+  };
+  const RoomAxes here{.version = 1, .markers_iec = {{5, {}}}, .why_not = {}};
+  const ImportedRoom unknown{
+      .unit = {}, .version = 0, .room = {}, .why_not = Message::Verbatim("not calibrated there")};
+  EXPECT_NE(reason(unknown, here).find("not calibrated there"), std::string::npos);
+  EXPECT_NE(reason(unknown, std::nullopt), "");
+  CompareOptions compare;
+  EXPECT_FALSE(
+      TakeOtherRoom({.unit = "a", .version = 1, .room = SignedRoom{}}, std::nullopt, compare));
+  EXPECT_EQ(compare.why_no_room, say::room::ElsewhereNeedsCalibration());
+  EXPECT_FALSE(compare.T_iec_reference);
+}
 
 TEST(TakeRoomTest, APlanningCtIsMetByTheRoomsMarkersWithTheSpreadOfTheCalibration) {
   Scene planned;

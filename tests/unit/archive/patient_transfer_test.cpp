@@ -10,6 +10,9 @@
 
 #include "daemon/archive/backup.hpp"
 #include "daemon/database/store_json.hpp"
+#include "daemon/imports/imported_room.hpp"
+#include "drivers/files/file_io.hpp"
+#include "tests/support/board_checks.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/result_with.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -191,6 +194,80 @@ TEST_F(PatientTransferTest, GoesRoundAndIsTheSame) {
   const auto before = first.scans.List(patient_, 10), now = store.scans.List(patient->id, 10);
   for (std::size_t i = 0; i < now.size(); ++i)
     EXPECT_EQ(FilesBelow(now[i].folder), FilesBelow(before[i].folder));
+}
+
+TEST_F(PatientTransferTest, TheRoomOfAReferenceComesAlongAndGoesOn) {
+  {
+    Store store(here());
+    for (int i = 0; i < 3; ++i) store.checks.Add(kAnna, "S1", testing::CheckOver(0.0));
+    const auto since = WallClock::now() - std::chrono::hours(1);
+    (void)store.room.Sign(kAnna, "S1", since, store.room.Candidate("S1", since).digest);
+  }
+  (void)ExportPatient(here(), "P-7", out());
+  (void)ImportPatient(out(), there());
+  std::string patient, scan;
+  {
+    Store store(there());
+    patient = store.patients.FindByCode("P-7")->id;
+    scan = store.references.List(patient).at(0).scan_id;
+  }
+  const auto room = RoomOfImport(there(), patient, scan);
+  ASSERT_TRUE(room && room->room) << (room ? room->why_not.English() : "none");
+  EXPECT_EQ(room->version, 1);
+  EXPECT_EQ(room->room->fit.markers_iec.size(), testing::MarkersOfRoom().size());
+  EXPECT_FALSE(RoomOfImport(there(), patient, "999")) << "a scan that was made here";
+  EXPECT_FALSE(RoomOfImport(here(), patient_, reference_)) << "where it came from";
+
+  // A third unit learns the room of the first from the second.
+  (void)ExportPatient(there(), "P-7", folder_ / "out2");
+  const fs::path third = folder_ / "third";
+  { Store store(third); }
+  (void)ImportPatient(folder_ / "out2", third);
+  {
+    Store store(third);
+    patient = store.patients.FindByCode("P-7")->id;
+    scan = store.references.List(patient).at(0).scan_id;
+  }
+  EXPECT_TRUE(RoomOfImport(third, patient, scan)->room);
+
+  // What is not as it was signed is no room.
+  std::string text = ReadTextFile(ImportedFile(third, std::stoll(patient)), 1 << 24);
+  constexpr std::string_view kSpread = R"(shift_m\":)";  // in a text within the text
+  text.at(text.find(kSpread, text.rfind("rooms_here")) + kSpread.size()) = '9';
+  std::ofstream(ImportedFile(third, std::stoll(patient))) << text;
+  const auto changed = RoomOfImport(third, patient, scan);
+  ASSERT_TRUE(changed);
+  EXPECT_FALSE(changed->room);
+  EXPECT_THAT(changed->why_not.English(), HasSubstr("not as it was signed"));
+}
+
+TEST_F(PatientTransferTest, AReferenceOfARoomThatIsNotCalibratedSaysSo) {
+  (void)ExportPatient(here(), "P-7", out());
+  (void)ImportPatient(out(), there());
+  Store store(there());
+  const std::string patient = store.patients.FindByCode("P-7")->id;
+  const auto room = RoomOfImport(there(), patient, store.references.List(patient).at(0).scan_id);
+  ASSERT_TRUE(room);
+  EXPECT_FALSE(room->room);
+  EXPECT_THAT(room->why_not.English(), HasSubstr("not calibrated"));
+}
+
+/// The rule where both units went on with a patient: nothing is merged, and none of them wins.
+TEST_F(PatientTransferTest, WhatWasChangedInBothUnitsStaysAsItIsInBoth) {
+  (void)ExportPatient(here(), "P-7", out());
+  (void)ImportPatient(out(), there());
+  {
+    Store first(here()), second(there());
+    (void)StoreScan(first, patient_);
+    (void)StoreScan(second, second.patients.FindByCode("P-7")->id);
+  }
+  const auto files_here = FilesBelow(here() / "scans"), files_there = FilesBelow(there() / "scans");
+  (void)ExportPatient(here(), "P-7", folder_ / "out2");
+  (void)ExportPatient(there(), "P-7", folder_ / "out3");
+  EXPECT_THROW((void)ImportPatient(folder_ / "out2", there()), std::invalid_argument);
+  EXPECT_THROW((void)ImportPatient(folder_ / "out3", here()), std::invalid_argument);
+  EXPECT_EQ(FilesBelow(here() / "scans"), files_here);
+  EXPECT_EQ(FilesBelow(there() / "scans"), files_there);
 }
 
 TEST_F(PatientTransferTest, ACodeWithOtherDataIsRefused) {

@@ -477,5 +477,46 @@ TEST(ConfigTest, ReceivingDicomNeedsKnownSendersAndTlsOrAPrivateAddress) {
   EXPECT_THAT(ErrorOf("[dicom]\nport = 104\n"), HasSubstr("port"));
 }
 
+TEST(ConfigTest, MessagesGoToPlainAddressesAndBeyondThisMachineOnlyWithTls) {
+  EXPECT_EQ(ErrorOf("[messages]\nmail_to = [\"a@b.example\"]\nmail_from = \"c@b.example\"\n"
+                    "mail_server = \"smtp://mail.b.example:587\"\nlanguage = \"de\"\n"
+                    "check_due = \"07:30\"\n"),
+            "no error");
+  EXPECT_THAT(ErrorOf("[messages]\nmail_to = [\"a@b.example\"]\n"), HasSubstr("mail_from"));
+  EXPECT_THAT(ErrorOf("[messages]\nmail_user = \"x\"\nmail_from = \"c@b\"\n"
+                      "mail_to = [\"a@b\"]\n"),
+              HasSubstr("mail_password_file"));
+  const auto refused = [](const char* key, const std::string& value) {
+    EXPECT_THAT(ErrorOf(fmt::format("[messages]\n{} = \"{}\"\n", key, value)), HasSubstr(key))
+        << value;
+  };
+  for (const char* from :
+       {"", "a", "a@b@c", "@b", "a@", "a b@c", "a@b\\r\\nRCPT TO:<x@y>", "<a@b>"})
+    refused("mail_from", from);
+  for (const char* server : {"mail", "http://mail", "smtp://u:p@mail", "smtp://mail:x", "smtp://"})
+    refused("mail_server", server);
+  for (const char* syslog : {"udp://logs:514", "tcp://logs", "tls://", "unix://log", "syslog"})
+    refused("syslog", syslog);
+  for (const char* hook : {"http://hook.b.example/", "ftp://hook", "https://user@hook/"})
+    refused("webhook", hook);
+  for (const char* due : {"9:00", "24:00", "09:60", "noon"}) refused("check_due", due);
+  refused("language", "it");
+  EXPECT_EQ(ErrorOf("[messages]\nsyslog = \"udp://[fd00::1]:514\"\n"
+                    "webhook = \"http://127.0.0.1:9/\"\n"),
+            "no error");
+}
+
+TEST(ConfigTest, AChannelOfUpdatesNeedsItsKeyAndTls) {
+  const std::string key = "channel_key = \"2RxgFSNjDpGISHQmSN0earBA6NTyA+BYzefuXmYB5ew=\"\n";
+  EXPECT_EQ(ErrorOf("[update]\nchannel = \"https://u.example/plumb\"\n" + key), "no error");
+  EXPECT_THAT(ErrorOf("[update]\nchannel = \"https://u.example/plumb\"\n"),
+              HasSubstr("channel_key"));
+  for (const char* url : {"http://u.example/plumb", "https://u.example/?x", "file:///plumb"})
+    EXPECT_THAT(ErrorOf(fmt::format("[update]\nchannel = \"{}\"\n", url) + key),
+                HasSubstr("update.channel"))
+        << url;
+  EXPECT_THAT(ErrorOf("[update]\nchannel_name = \"fast\"\n"), HasSubstr("channel_name"));
+}
+
 }  // namespace
 }  // namespace plumb

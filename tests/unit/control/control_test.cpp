@@ -50,6 +50,7 @@ TEST(ControlProtocolTest, EveryRequestReadsBack) {
         .name = "plumb-0.2_1.raucb"},
         ControlRequest{.kind = Kind::kUpdateStatus, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kPresence, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kTestMessage, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kRestart, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kMonitor, .starts = true, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kMonitor, .starts = false, .action = {}, .argument = {}},

@@ -187,6 +187,25 @@ TEST_F(ApiTest, ScanGoesFromPressToResultAndIsAudited) {
                                                 "technician cancel", "physicist login"}));
 }
 
+TEST_F(ApiTest, TheEngineerSeesWhomTheUnitTellsAndSendsATestMessage) {
+  HttpClient engineer = LoggedIn("engineer");
+  EXPECT_EQ(engineer.Get("/api/v1/messages").json()["ways"].size(), 0U);
+  EXPECT_EQ(engineer.Post("/api/v1/messages/test").status, 400);
+  loop_->Do([&] { service_.status.messages = {{.name = "mail", .sent = 2}}; });
+  EXPECT_EQ(LoggedIn("physicist").Post("/api/v1/messages/test").status, 403);
+  EXPECT_EQ(engineer.Post("/api/v1/messages/test").status, 200);
+  nlohmann::json way = engineer.Get("/api/v1/messages").json()["ways"][0];
+  EXPECT_EQ(way["name"], "mail");
+  EXPECT_EQ(way["sent"], 3);
+  EXPECT_TRUE(way["failure"].is_null());
+  loop_->Do([&] { service_.status.messages[0].failure = Message::Verbatim("no such host"); });
+  const HttpAnswer failed = engineer.Post("/api/v1/messages/test");
+  EXPECT_GE(failed.status, 500);
+  EXPECT_EQ(failed.json()["error"], "no such host");
+  way = engineer.Get("/api/v1/messages").json()["ways"][0];
+  EXPECT_EQ(way["failure"], "no such host");
+}
+
 TEST_F(ApiTest, ABackupIsMadeByTheEngineerAndWarningsReachTheStatus) {
   EXPECT_EQ(LoggedIn("technician").Post("/api/v1/backup").status, 403);
   EXPECT_EQ(LoggedIn("physicist").Post("/api/v1/backup").status, 403);

@@ -44,6 +44,7 @@ const std::set<std::string> kWithoutPatients = {
     "/api/v1/settings",
     "/api/v1/update",
     "/api/v1/backup",
+    "/api/v1/messages",
     "/api/v1/certificate",
 };
 

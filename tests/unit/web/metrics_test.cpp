@@ -39,6 +39,7 @@ Status SomeStatus(WallClock::time_point now) {
   status.counts.frames = 450;
   status.counts.frames_dropped = 7;
   status.counts.answer_s = 1.25;
+  status.messages = {{.name = "mail", .sent = 4, .failed = 1, .failure = Message::Verbatim("no")}};
   return status;
 }
 
@@ -67,6 +68,9 @@ TEST(Metrics, SayWhatTheStatusSays) {
         "plumb_check_limit_ratio{item=\"scale\"} 1.5\n", "plumb_scans_total{outcome=\"move\"} 3\n",
         "plumb_scans_total{outcome=\"failed\"} 1\n", "plumb_frames_total 450\n",
         "plumb_frames_dropped_total 7\n", "plumb_answer_seconds 1.25\n",
+        "plumb_messages_total{way=\"mail\",outcome=\"sent\"} 4\n",
+        "plumb_messages_total{way=\"mail\",outcome=\"failed\"} 1\n",
+        "plumb_messages_failing{way=\"mail\"} 1\n",
         "plumb_build_info{version=\"1.2 \\\"x\\\" \"} 1\n"})
     EXPECT_THAT(text, HasSubstr(line));
   EXPECT_THAT(text, Not(HasSubstr("\"moved\""))) << "what was not measured is not 0";
@@ -87,7 +91,7 @@ TEST(Metrics, AreOpenMetrics) {
   const std::regex unit_line("# UNIT (plumb_[a-z_]+) ([a-z]+)");
   const std::regex help_line("# HELP (plumb_[a-z_]+) [^\\\\\"]+\\.");
   const std::regex sample_line(
-      R"re((plumb_[a-z_]+)(\{[a-z_]+="(?:[^"\\]|\\["\\])*"\})? (-?[0-9.]+(?:e[-+][0-9]+)?))re");
+      R"re((plumb_[a-z_]+)(\{(?:,?[a-z_]+="(?:[^"\\]|\\["\\])*")+\})? (-?[0-9.]+(?:e[-+][0-9]+)?))re");
   std::smatch found;
   for (std::string line; std::getline(lines, line) && line != "# EOF";) {
     if (std::regex_match(line, found, type_line)) {

@@ -130,6 +130,8 @@ const std::map<std::string, std::string> kWhoMay = {
     {"PUT /api/v1/certificate", "E"},
     {"POST /api/v1/certificate/new", "E"},
     {"POST /api/v1/backup", "E"},
+    {"GET /api/v1/messages", "E"},
+    {"POST /api/v1/messages/test", "E"},
     {"POST /api/v1/diagnostics", "E"},
 };
 

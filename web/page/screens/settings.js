@@ -37,6 +37,31 @@ function backupCard() {
     hint(text.backupHint), last, now, running);
 }
 
+/// Who outside is told of what needs a person, and whether that works.
+function messagesCard() {
+  const text = S.settings;
+  const list = h('ul', { class: 'message-ways' });
+  const running = h('p', { class: 'hint', role: 'status' });
+  const draw = async () => {
+    const { ways } = await get('messages', true);
+    clear(list, ways.length === 0 && h('li', {}, text.messagesNone), ways.map((way) => h('li', {},
+      text.messageWay(way.name, way.sent, way.failed),
+      way.failure && [' ', h('span', { class: 'caution' }, said(way, 'failure'))])));
+  };
+  const test = action(text.messageTest, async () => {
+    running.textContent = text.messageSending;
+    try {
+      await postLong('messages/test');
+      done(text.messageSent);
+    } finally {
+      running.textContent = '';
+      await draw().catch(() => {});
+    }
+  }, {});
+  draw().catch((error) => clear(list, error.message));
+  return card(text.messages, hint(text.messagesHint), list, test, running);
+}
+
 const kCannotRead = /the stored settings cannot be read/;
 
 /// Returns what is stored, or why it cannot be read: then nothing is filled in, since a default
@@ -105,6 +130,6 @@ export async function showSettings(place) {
     h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
       field(text.posture, posture), field(text.accept_live, acceptLive), flags,
       editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),
-    profileCard(), editable && backupCard(),
+    profileCard(), editable && backupCard(), editable && messagesCard(),
     editable && certificateCard());
 }

@@ -137,6 +137,8 @@ export async function showUpdate(place) {
       installing && [h('p', { class: 'lead' }, text.installing, ' ', message),
         h('progress', { max: 1, value: update.fraction, 'aria-label': text.installing })],
       failure && !installing && h('p', { class: 'caution' }, failure),
+      update.offered && !installing && h('p', { class: 'lead' }, said(update, 'offered')),
+      update.channel_failure && h('p', { class: 'caution' }, said(update, 'channel_failure')),
       supported && onStick(update, button),
       supported ? bundles(update, button)
         : h('p', { class: 'caution' }, `${text.unsupported}: ${message}`),
