@@ -201,7 +201,10 @@ void ReceivedFiles::NoteReference(const std::vector<std::string>& names,
                                   const std::string& reference_id) {
   const std::lock_guard lock(mutex_);
   Load();
-  for (const std::string& name : names) known_[name].reference_id = reference_id;
+  for (const std::string& name : names) {
+    if (!known_.contains(name)) known_[name] = ReadOne(name);
+    known_[name].reference_id = reference_id;
+  }
   Store();
 }
 

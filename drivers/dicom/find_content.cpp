@@ -55,8 +55,10 @@ std::string WorklistText(const std::vector<WorklistStep>& steps) {
 
 std::vector<WorklistStep> ParseWorklist(std::string_view text) {
   try {
+    const auto json = ParseBoundedJson<nlohmann::ordered_json>(text);
+    if (!json.is_array()) throw DataError(say::dicom::ReaderVersion());
     std::vector<WorklistStep> steps;
-    for (const auto& one : ParseBoundedJson<nlohmann::ordered_json>(text))
+    for (const auto& one : json)
       steps.push_back({.patient_id = one.at("patient_id").get<std::string>(),
                        .time = one.at("time").get<std::string>()});
     return steps;
