@@ -3,8 +3,10 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daemon/config/config.hpp"
@@ -19,6 +21,7 @@ namespace plumb {
 /// Dependencies of an appliance. Borrowed objects live longer than it.
 struct ApplianceParts {
   Config config;
+  std::optional<std::filesystem::path> config_file = {};  ///< Where it was read; nothing: nowhere.
   std::function<std::unique_ptr<SensorProvider>()> make_provider;  ///< Called on the sensor thread.
   std::function<void()> before_scan;                               ///< See SensorThreadOptions.
   Button* button = nullptr;  ///< Null: presses come from elsewhere only.

@@ -62,12 +62,29 @@ std::optional<Listen> ListenOf(const std::string& text) {
   return Listen{.address = address, .port = *port};
 }
 
+/// "AETITLE@HOST:PORT"
+bool IsNode(const std::string& text) {
+  const std::size_t at = text.find('@'), colon = text.rfind(':');
+  if (at == std::string::npos || colon == std::string::npos || colon < at + 2) return false;
+  const auto port = ParseNumber<std::uint16_t>(std::string_view(text).substr(colon + 1));
+  return IsTitle(std::string_view(text).substr(0, at)) && port && *port != 0;
+}
+
+std::string HostOf(const std::string& node) {
+  const std::size_t at = node.find('@') + 1;
+  const std::string host = node.substr(at, node.rfind(':') - at);
+  return host.starts_with('[') && host.ends_with(']') ? host.substr(1, host.size() - 2) : host;
+}
+
 /// What several keys must fulfil together.
 void CheckTogether(const DicomSettings& settings) {
   const int given = static_cast<int>(!settings.tls_certificate.empty()) +
                     static_cast<int>(!settings.tls_key.empty()) +
                     static_cast<int>(!settings.tls_trusted.empty());
   if (given != 0 && given != 3) throw DataError(say::config::DicomTls());
+  // The list names patients by their identifiers.
+  if (given == 0 && !settings.worklist.empty() && !IsPrivateAddress(HostOf(settings.worklist)))
+    throw DataError(say::config::WorklistInTheClear(HostOf(settings.worklist)));
   if (!settings.enabled) return;
   if (settings.address.empty()) throw DataError(say::config::DicomListen());
   if (settings.senders.empty()) throw DataError(say::config::DicomSenders());
@@ -110,6 +127,9 @@ DicomSettings ReadDicomSettings(Section section) {
   section.TakePath("tls_trusted", settings.tls_trusted);
   section.TakePath("spool", settings.spool);
   section.TakeNumber("quota_mb", settings.quota_mb, 1, 1e6, say::config::Megabytes());
+  section.Take("worklist", settings.worklist, say::config::ExpectedDicomNode(), IsNode);
+  section.Take("worklist_station", settings.worklist_station, say::config::ExpectedAeTitle(),
+               [](const std::string& text) { return IsTitle(text); });
   section.TakeNumber("keep_days", settings.keep_days, 1, 365, say::config::Days());
   section.RejectUnknownKeys();
   CheckTogether(settings);

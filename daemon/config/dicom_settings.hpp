@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// [dicom] of the configuration: what plumb-dicomd may receive, and from whom.
+// [dicom] of the configuration: what plumb-dicomd may receive, and from whom; and whom plumbd asks
+// for the worklist.
 #pragma once
 
 #include <cstdint>
@@ -25,6 +26,8 @@ struct DicomSettings {
   std::filesystem::path tls_certificate, tls_key, tls_trusted;  ///< All or none.
   std::filesystem::path spool = "/var/lib/plumb-dicom";
   double quota_mb = 2000.0, keep_days = 14.0;
+  std::string worklist;          ///< Who is asked for it: "AETITLE@HOST:PORT"; empty: nobody.
+  std::string worklist_station;  ///< AE title of the station whose steps count; empty: all.
 };
 
 /// @throws DataError naming the key; also if something is to be received in the clear on an address

@@ -19,7 +19,7 @@ inline void KeepFreedMemory() {
   mallopt(M_TRIM_THRESHOLD, kKeptInTotal);
 }
 
-/// After a scan: hands all freed memory back to the system.
+/// After a scan, and from time to time between scans: hands all freed memory back to the system.
 inline void ReturnFreedMemory() { malloc_trim(0); }
 
 }  // namespace plumb

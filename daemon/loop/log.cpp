@@ -2,17 +2,14 @@
 #include "daemon/loop/log.hpp"
 
 #include <sys/stat.h>
-#include <sys/uio.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
-#include <vector>
 
 #include <fmt/format.h>
 
-#define SD_JOURNAL_SUPPRESS_LOCATION
-#include <systemd/sd-journal.h>
+#include "daemon/loop/journal_sender.hpp"
 
 namespace plumb {
 namespace {
@@ -43,13 +40,13 @@ const char* Name(LogLevel level) {
 }
 
 void ToJournal(LogLevel level, std::string_view message, LogFields fields) {
-  std::vector<std::string> lines = {fmt::format("MESSAGE={}", message),
-                                    fmt::format("PRIORITY={}", static_cast<int>(level)),
-                                    "SYSLOG_IDENTIFIER=plumbd"};
-  for (const auto& [name, value] : fields) lines.push_back(fmt::format("PLUMB_{}={}", name, value));
-  std::vector<iovec> parts;
-  for (std::string& line : lines) parts.push_back({line.data(), line.size()});
-  sd_journal_sendv(parts.data(), static_cast<int>(parts.size()));
+  // Never destroyed: threads may log until the very end.
+  static JournalSender& sender = *new JournalSender;
+  JournalSender::Fields all = {{"PRIORITY", fmt::format("{}", static_cast<int>(level))},
+                               {"SYSLOG_IDENTIFIER", "plumbd"}};
+  for (const auto& [name, value] : fields)
+    all.emplace_back(fmt::format("PLUMB_{}", name), fmt::format("{}", value));
+  sender.Send(message, all);
 }
 
 void ToStderr(LogLevel level, std::string_view message, LogFields fields) {

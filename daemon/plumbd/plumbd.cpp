@@ -53,6 +53,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::chrono::minutes kLookAtCertificate{1};
 constexpr int kDeviceFailed = 5;                 // exit code, the same as the command line's
 constexpr std::chrono::seconds kLongestEnd{10};  // less than the unit's TimeoutStopSec
 
@@ -124,6 +125,7 @@ class Plumbd {
         panel_(loop_, config.panel),
         shared_(loop_,
                 {.config = config,
+                 .config_file = ConfigFile(options),
                  .make_provider = [this] { return sensors_->MakeProvider(); },
                  .before_scan = [this] { sensors_->BeforeScan(); },
                  .button = panel_.button(),
@@ -159,7 +161,7 @@ class Plumbd {
       Log(LogLevel::kWarning, SlowTurnText(turn, unsaid));
     });
     tick_ = loop_.MakeTimer("watchdog", [this] { Tick(); });
-    certificate_timer_ = loop_.MakeTimer("certificate", [this] { NotePage(); });
+    certificate_timer_ = loop_.MakeTimer("certificate", [this] { LookAtCertificate(); });
   }
 
   ~Plumbd() {
@@ -216,6 +218,7 @@ class Plumbd {
                                           : "no password of the page has been guessed at lately");
       NotePage();
     };
+    options.is_clock_trusted = [this] { return !shared_.upkeep.is_clock_doubted(); };
     options.upload_folder = config.update.folder;
     options.doing = [this](std::string_view what) { loop_.meter().Part(what); };
     options.max_upload_bytes = static_cast<std::uint64_t>(config.update.max_bundle_mb) << 20;
@@ -231,7 +234,7 @@ class Plumbd {
     }
   }
 
-  /// What the status says of the page. The certificate may expire while the service runs.
+  /// What the status says of the page.
   void NotePage() {
     PageNotes page = page_;
     if (!certificate_pem_.empty()) {
@@ -245,7 +248,16 @@ class Plumbd {
     }
     if (page.are_guesses_running) page.warnings.push_back(say::web::GuessesRunning());
     appliance_.SetPage(std::move(page));
-    certificate_timer_.ArmAfter(std::chrono::hours(1));
+    certificate_timer_.ArmAfter(kLookAtCertificate);
+  }
+
+  /// It may end while the service runs, and the clock may step past its end.
+  void LookAtCertificate() {
+    certificate_timer_.ArmAfter(kLookAtCertificate);
+    if (!certificate_pem_.empty() &&
+        web::CertificateWarnings(certificate_pem_, std::chrono::system_clock::now()) !=
+            certificate_warnings_)
+      NotePage();
   }
 
   /// Prints the setup code once, as soon as the first account can be created, which is impossible

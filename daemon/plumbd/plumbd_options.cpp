@@ -33,16 +33,6 @@ Pose SimulatedRoom() {
   return T_iec_reference;
 }
 
-/// The file to read; nothing: the defaults.
-std::optional<fs::path> ConfigFile(const PlumbdOptions& options) {
-  std::error_code ignored;
-  if (options.config_file) return options.config_file;
-  if (options.use_default_config && options.simulated.empty() &&
-      fs::exists(kDefaultConfig, ignored))
-    return kDefaultConfig;
-  return std::nullopt;
-}
-
 /// Looks for the names line by line, because the file may not be valid TOML. A file that
 /// cannot be read may contain it.
 bool MayNameBackupKey(const fs::path& file) try {
@@ -75,6 +65,15 @@ void KeepPanelAndPage(const Config& salvaged, bool is_listen_given, Config& conf
 }
 
 }  // namespace
+
+std::optional<fs::path> ConfigFile(const PlumbdOptions& options) {
+  std::error_code ignored;
+  if (options.config_file) return options.config_file;
+  if (options.use_default_config && options.simulated.empty() &&
+      fs::exists(kDefaultConfig, ignored))
+    return kDefaultConfig;
+  return std::nullopt;
+}
 
 void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
   app.set_version_flag("--version", fmt::format("plumbd {}", Version()),

@@ -34,6 +34,9 @@ struct PlumbdOptions {
 
 void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options);
 
+/// The file to read; nothing: the defaults.
+[[nodiscard]] std::optional<std::filesystem::path> ConfigFile(const PlumbdOptions& options);
+
 /// The configuration from file and command line.
 /// @throws DataError for a file that cannot be used, std::invalid_argument for an option.
 [[nodiscard]] Config ReadConfiguration(const PlumbdOptions& options,

@@ -17,7 +17,7 @@
 #include "daemon/planning/planning_import.hpp"
 #include "daemon/reports/posture_doubt.hpp"
 #include "daemon/reports/scan_quality.hpp"
-#include "daemon/unit/page_identity.hpp"
+#include "daemon/services/patient_key.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
 #include "words/upkeep.hpp"
@@ -182,13 +182,10 @@ class WebPatients final : public web::PatientService {
   StoreAccess& store_;
 };
 
-/// In the state folder; no backup has it, so that nobody finds the Patient IDs of one.
-constexpr const char* kPatientKeyFile = "patient.key";
-
 /// The files of a planning CT on their way to a scene in the staging folder.
 struct PlanningImport {
   std::filesystem::path staging, earlier;
-  std::filesystem::path key_file;
+  std::filesystem::path state;
   PatientPosture posture = PatientPosture::kHeadFirstSupine;
   std::string patient_hash;
   std::optional<Change> refusal;
@@ -217,7 +214,7 @@ struct PlanningImport {
                                                .plan_name = "PLAN"},
                                               choice);
       std::filesystem::remove(plan);  // it names the patient
-      patient_hash = PatientHash(ReadOrMakeSecret(key_file, MakePatientKey), patient_id);
+      patient_hash = PatientHash(PatientKey(state), patient_id);
       CompareWithEarlierPlan(earlier, scene);
       posture = scene.planning->posture;
       WriteScene(scene, staging / "scene");
@@ -301,10 +298,13 @@ class WebReferences final : public web::ReferenceService {
     const Settings settings =
         store_.Read(&Store::settings, [](SettingsStore& stored) { return stored.Get(); });
     auto import = std::make_shared<PlanningImport>();
-    const auto staging = [](Store& store) { return store.folders.Staging("planning"); };
+    // An upload and received files may be on their way at the same time.
+    const auto staging = [name = fmt::format("planning-{}", ++num_imports_)](Store& store) {
+      return store.folders.Staging(name);
+    };
     import->staging = store_.Read(staging);
     const auto state = [](Store& store) { return store.folders.state(); };
-    import->key_file = store_.Read(state) / kPatientKeyFile;
+    import->state = store_.Read(state);
     import->earlier = EarlierPlanning(patient_id);
     const auto work = [import, sent] { import->Read(sent); };
     const auto read = [=, this, plan = DefaultPlan(settings)]() mutable {
@@ -441,7 +441,8 @@ class WebReferences final : public web::ReferenceService {
   const RoomInUse& room_;
   StoreAccess& store_;
   web::BackgroundWork& background_;
-};  // namespace
+  int num_imports_ = 0;
+};
 
 }  // namespace
 

@@ -43,6 +43,7 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
       patients_(MakeWebPatients(appliance, shared.session, shared.references, store_)),
       references_(
           MakeWebReferences(shared.references, shared.session, shared.room, store_, background_)),
+      planning_(MakeWebPlanning(shared.loop, shared.given.config_file, *references_, store_)),
       scans_(MakeWebScans(appliance, shared.references, shared.room, store_)),
       monitoring_(MakeWebMonitoring(shared.monitoring, store_)),
       checks_(MakeWebChecks(appliance, shared.references, store_)),

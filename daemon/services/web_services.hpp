@@ -2,7 +2,9 @@
 // The services of the page, implemented by the appliance.
 #pragma once
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/shared_parts.hpp"
@@ -34,6 +36,9 @@ namespace plumb {
                                                                    CurrentSession& session,
                                                                    const ReferenceGate& references,
                                                                    StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::PlanningService> MakeWebPlanning(
+    EventLoop& loop, std::optional<std::filesystem::path> config_file,
+    web::ReferenceService& references, StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::ReferenceService> MakeWebReferences(
     const ReferenceGate& references, const CurrentSession& session, const RoomInUse& room,
     StoreAccess& store, web::BackgroundWork& background);
@@ -60,6 +65,7 @@ class WebServices {
             .appliance = *button_,
             .patients = *patients_,
             .references = *references_,
+            .planning = *planning_,
             .scans = *scans_,
             .monitoring = *monitoring_,
             .checks = *checks_,
@@ -80,6 +86,7 @@ class WebServices {
   std::unique_ptr<web::ApplianceService> button_;
   std::unique_ptr<web::PatientService> patients_;
   std::unique_ptr<web::ReferenceService> references_;
+  std::unique_ptr<web::PlanningService> planning_;
   std::unique_ptr<web::ScanService> scans_;
   std::unique_ptr<web::MonitoringService> monitoring_;
   std::unique_ptr<web::CheckService> checks_;

@@ -16,6 +16,7 @@
 #include "daemon/archive/summed_folder.hpp"
 #include "daemon/database/database.hpp"
 #include "daemon/database/stored_values.hpp"
+#include "daemon/loop/freed_memory.hpp"
 #include "daemon/loop/give_way.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/records/clock_doubt.hpp"
@@ -66,8 +67,10 @@ void StorageUpkeep::StoreOpened(const Store& store) {
 
 void StorageUpkeep::Tick(bool is_running) {
   if (is_unusable_due_) CountUnusable();
-  if (clock_.Look(std::chrono::system_clock::now(), std::chrono::steady_clock::now()) > kLeap)
+  if (clock_.Look(std::chrono::system_clock::now(), std::chrono::steady_clock::now()) > kLeap) {
     NoteLeap();
+    ticks_to_removal_ = 0;  // or the page would say nothing of it for an hour
+  }
   if (is_running) return;
   if (--ticks_to_disk_check_ <= 0) CheckDiskAtOnce();
   if (--ticks_to_removal_ <= 0) RemoveScans();
@@ -241,6 +244,8 @@ void StorageUpkeep::EmptyLog() {
     const std::uintmax_t bytes = std::filesystem::file_size(
         storage_.state() / (std::string(kDatabaseFile) + "-wal"), missing);
     if (!missing && bytes > 0) (void)store_->database().ForChanges()->Checkpoint();
+    // Images that come and go while nothing is scanned leave holes between what stays.
+    ReturnFreedMemory();
   });
 }
 

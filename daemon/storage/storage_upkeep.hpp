@@ -58,6 +58,8 @@ class StorageUpkeep {
 
   /// What the page warns of. @param is_demo  The demo stores nothing of value.
   [[nodiscard]] std::vector<Message> Warnings(bool is_demo) const;
+  /// The clock is far ahead of everything that is stored, as of the last look.
+  [[nodiscard]] bool is_clock_doubted() const { return removals_.is_clock_doubted; }
   /// When the newest backup in the configured folder was made, as of the last look.
   [[nodiscard]] const std::optional<std::chrono::system_clock::time_point>& backup_made_at() const {
     return backup_made_at_;

@@ -4,21 +4,13 @@
 //
 // A separate process: what the other side answers is parsed by DCMTK. Once the files are in memory
 // and the certificates loaded, it can open nothing and start nothing; only the network remains.
-//
-// DCMTK's DcmSCU would be shorter, but it does not tell why an association was rejected.
-#include <arpa/inet.h>
-#include <netdb.h>
-#include <sys/socket.h>
-
 #include <dcmtk/config/osconfig.h>
 
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/assoc.h>
 #include <dcmtk/dcmnet/dimse.h>
 #include <dcmtk/dcmnet/diutil.h>
-#include <dcmtk/dcmtls/tlslayer.h>
 
-#include <array>
 #include <cstdio>
 #include <ctime>
 #include <exception>
@@ -33,6 +25,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/utf8.hpp"
+#include "drivers/dicom/dicom_association.hpp"
 #include "drivers/dicom/dicom_network.hpp"
 #include "drivers/dicom/export_wire.hpp"
 #include "drivers/dicom/lock_down.hpp"
@@ -43,7 +36,6 @@ namespace plumb {
 namespace {
 
 constexpr ReaderLimits kSenderLimits{.memory_bytes = std::uint64_t{2} << 30, .cpu_s = 120};
-constexpr std::size_t kMostContexts = 128;  // their numbers are odd and below 256
 
 /// A file to send, in memory.
 struct Sent {
@@ -82,150 +74,72 @@ std::vector<Sent> LoadAll(const std::vector<std::string>& files) {
   return all;
 }
 
-/// While files may still be read; DCMTK gets a number.
-std::string AddressOf(const DicomPeer& peer) {
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  const int error = ::getaddrinfo(peer.host.c_str(), nullptr, &hints, &found);
-  if (error != 0) throw DataError(say::dicom::NoHost(peer.host, ::gai_strerror(error)));
-  std::array<char, NI_MAXHOST> text{};
-  (void)::getnameinfo(found->ai_addr, found->ai_addrlen, text.data(), text.size(), nullptr, 0,
-                      NI_NUMERICHOST);
-  ::freeaddrinfo(found);
-  return text.data();
-}
-
-[[noreturn]] void FailOn(const OFCondition& condition, const DicomPeer& peer,
-                         T_ASC_Parameters* parameters) {
-  const std::string node = fmt::format("{}@{}:{}", peer.ae_title, peer.host, peer.port);
-  if (condition != DUL_ASSOCIATIONREJECTED)
-    throw DataError(say::dicom::NoAssociation(node, ValidUtf8(condition.text())));
-  T_ASC_RejectParameters why{};
-  ASC_getRejectParameters(parameters, &why);
-  switch (why.reason) {
-    case ASC_REASON_SU_CALLEDAETITLENOTRECOGNIZED:
-      throw DataError(say::dicom::CalledUnknown(node, peer.ae_title));
-    case ASC_REASON_SU_CALLINGAETITLENOTRECOGNIZED:
-      throw DataError(say::dicom::CallingUnknown(node));
-    default: {
-      OFString text;
-      ASC_printRejectParameters(text, &why);
-      throw DataError(say::dicom::Rejected(node, ValidUtf8(text.c_str())));
-    }
-  }
-}
-
-/// One association from its request to its release.
-class Association {
- public:
-  explicit Association(const DicomSendRequest& request) : request_(request) {
-    Check(ASC_initializeNetwork(NET_REQUESTOR, 0, kAssociatePatience_s, &network_));
-    Check(ASC_createAssociationParameters(&parameters_, ASC_DEFAULTMAXPDU));
-    if (!request.tls.empty()) {
-      tls_ = MakeDicomTls(request.tls, DicomRole::kSends);
-      Check(ASC_setTransportLayer(network_, tls_.get(), 0));
-      Check(ASC_setTransportLayerType(parameters_, OFTrue));
-    }
-    Check(ASC_setAPTitles(parameters_, request.own_ae_title.c_str(), request.peer.ae_title.c_str(),
-                          nullptr));
-    const std::string address = AddressOf(request.peer);
-    const std::string to = fmt::format("{}:{}", address, request.peer.port);
-    Check(ASC_setPresentationAddresses(parameters_, "localhost", to.c_str()));
-  }
-  // The process ends with its work; the kernel closes what is open.
-  Association(const Association&) = delete;
-  Association& operator=(const Association&) = delete;
-
-  void Request(const std::vector<Sent>& files) {
-    Propose(files);
-    // The parameters are the association's from now on.
-    const OFCondition asked = ASC_requestAssociation(network_, parameters_, &association_, nullptr,
-                                                     nullptr, DUL_NOBLOCK, kAssociatePatience_s);
-    if (asked.bad()) FailOn(asked, request_.peer, parameters_);
-    for (const Sent& file : files) (void)ContextFor(file);
-  }
-
-  void Send(Sent& file, unsigned short number) {
-    T_DIMSE_C_StoreRQ store{};
-    store.MessageID = number;
-    Put(store.AffectedSOPClassUID, file.class_uid);
-    Put(store.AffectedSOPInstanceUID, file.instance_uid);
-    store.DataSetType = DIMSE_DATASET_PRESENT;
-    store.Priority = DIMSE_PRIORITY_MEDIUM;
-    T_DIMSE_C_StoreRSP answer{};
-    DcmDataset* detail = nullptr;
-    const OFCondition sent = DIMSE_storeUser(
-        association_, ContextFor(file), &store, nullptr, file.format->getDataset(), &TellProgress,
-        nullptr, DIMSE_NONBLOCKING, kAnswerPatience_s, &answer, &detail, nullptr, 0);
-    delete detail;
-    if (sent.bad()) throw DataError(say::dicom::NotSent(file.name, ValidUtf8(sent.text())));
-    constexpr unsigned kWarnings = 0xB000, kKind = 0xF000;
-    if (answer.DimseStatus != STATUS_Success && (answer.DimseStatus & kKind) != kWarnings)
-      throw DataError(
-          say::dicom::NotStored(file.name, fmt::format("{:04X}, {}", answer.DimseStatus,
-                                                       DU_cstoreStatusString(answer.DimseStatus))));
-  }
-
-  void Release() { (void)ASC_releaseAssociation(association_); }
-
- private:
-  void Check(const OFCondition& condition) const {
-    if (condition.bad()) FailOn(condition, request_.peer, parameters_);
-  }
-
-  template <std::size_t size>
-  static void Put(char (&field)[size], const std::string& text) {
-    (void)std::snprintf(field, size, "%s", text.c_str());
-  }
-
-  void Propose(const std::vector<Sent>& files) {
-    std::set<std::pair<std::string, std::string>> proposed;
-    T_ASC_PresentationContextID next = 1;
-    for (const Sent& file : files) {
-      const DcmXfer stored(file.format->getDataset()->getOriginalXfer());
-      std::vector<const char*> syntaxes = {UID_LittleEndianExplicitTransferSyntax,
-                                           UID_LittleEndianImplicitTransferSyntax};
-      if (stored.isEncapsulated()) syntaxes = {stored.getXferID()};
-      if (!proposed.emplace(file.class_uid, syntaxes.front()).second) continue;
-      if (proposed.size() > kMostContexts)
-        throw DataError(say::dicom::TooMuchToSend(static_cast<std::int64_t>(kMostContexts),
-                                                  static_cast<std::int64_t>(kMostSentBytes >> 20)));
-      Check(ASC_addPresentationContext(parameters_, next, file.class_uid.c_str(), syntaxes.data(),
-                                       static_cast<int>(syntaxes.size())));
-      next = static_cast<T_ASC_PresentationContextID>(next + 2);
-    }
-  }
-
-  T_ASC_PresentationContextID ContextFor(const Sent& file) {
+void ProposeAll(DicomAssociation& association, const std::vector<Sent>& files) {
+  std::set<std::pair<std::string, std::string>> proposed;
+  for (const Sent& file : files) {
     const DcmXfer stored(file.format->getDataset()->getOriginalXfer());
-    const T_ASC_PresentationContextID context =
-        stored.isEncapsulated()
-            ? ASC_findAcceptedPresentationContextID(association_, file.class_uid.c_str(),
-                                                    stored.getXferID())
-            : ASC_findAcceptedPresentationContextID(association_, file.class_uid.c_str());
-    if (context == 0) {
-      const char* name = dcmFindNameOfUID(file.class_uid.c_str(), file.class_uid.c_str());
-      throw DataError(say::dicom::ClassRefused(request_.peer.ae_title, file.name, name));
-    }
-    return context;
+    std::vector<const char*> syntaxes = {UID_LittleEndianExplicitTransferSyntax,
+                                         UID_LittleEndianImplicitTransferSyntax};
+    if (stored.isEncapsulated()) syntaxes = {stored.getXferID()};
+    if (!proposed.emplace(file.class_uid, syntaxes.front()).second) continue;
+    if (proposed.size() > DicomAssociation::kMostContexts)
+      throw DataError(
+          say::dicom::TooMuchToSend(static_cast<std::int64_t>(DicomAssociation::kMostContexts),
+                                    static_cast<std::int64_t>(kMostSentBytes >> 20)));
+    association.Propose(file.class_uid, syntaxes);
   }
+}
 
-  static void TellProgress(void* /*data*/, T_DIMSE_StoreProgress* /*progress*/,
-                           T_DIMSE_C_StoreRQ* /*request*/) {
-    static std::time_t last = 0;
-    if (const std::time_t now = std::time(nullptr); now != last) {
-      last = now;
-      WriteToParent(ExportHeader{});
-    }
+T_ASC_PresentationContextID ContextFor(T_ASC_Association* association, const DicomPeer& peer,
+                                       const Sent& file) {
+  const DcmXfer stored(file.format->getDataset()->getOriginalXfer());
+  const T_ASC_PresentationContextID context =
+      stored.isEncapsulated()
+          ? ASC_findAcceptedPresentationContextID(association, file.class_uid.c_str(),
+                                                  stored.getXferID())
+          : ASC_findAcceptedPresentationContextID(association, file.class_uid.c_str());
+  if (context == 0) {
+    const char* name = dcmFindNameOfUID(file.class_uid.c_str(), file.class_uid.c_str());
+    throw DataError(say::dicom::ClassRefused(peer.ae_title, file.name, name));
   }
+  return context;
+}
 
-  const DicomSendRequest& request_;
-  std::unique_ptr<DcmTransportLayer> tls_;
-  T_ASC_Network* network_ = nullptr;
-  T_ASC_Parameters* parameters_ = nullptr;
-  T_ASC_Association* association_ = nullptr;
-};
+void TellProgress(void* /*data*/, T_DIMSE_StoreProgress* /*progress*/,
+                  T_DIMSE_C_StoreRQ* /*request*/) {
+  static std::time_t last = 0;
+  if (const std::time_t now = std::time(nullptr); now != last) {
+    last = now;
+    WriteToParent(ExportHeader{});
+  }
+}
+
+template <std::size_t size>
+void Put(char (&field)[size], const std::string& text) {
+  (void)std::snprintf(field, size, "%s", text.c_str());
+}
+
+void Send(T_ASC_Association* association, const DicomPeer& peer, Sent& file,
+          unsigned short number) {
+  T_DIMSE_C_StoreRQ store{};
+  store.MessageID = number;
+  Put(store.AffectedSOPClassUID, file.class_uid);
+  Put(store.AffectedSOPInstanceUID, file.instance_uid);
+  store.DataSetType = DIMSE_DATASET_PRESENT;
+  store.Priority = DIMSE_PRIORITY_MEDIUM;
+  T_DIMSE_C_StoreRSP answer{};
+  DcmDataset* detail = nullptr;
+  const OFCondition sent = DIMSE_storeUser(
+      association, ContextFor(association, peer, file), &store, nullptr, file.format->getDataset(),
+      &TellProgress, nullptr, DIMSE_NONBLOCKING, kAnswerPatience_s, &answer, &detail, nullptr, 0);
+  delete detail;
+  if (sent.bad()) throw DataError(say::dicom::NotSent(file.name, ValidUtf8(sent.text())));
+  constexpr unsigned kWarnings = 0xB000, kKind = 0xF000;
+  if (answer.DimseStatus != STATUS_Success && (answer.DimseStatus & kKind) != kWarnings)
+    throw DataError(say::dicom::NotStored(
+        file.name,
+        fmt::format("{:04X}, {}", answer.DimseStatus, DU_cstoreStatusString(answer.DimseStatus))));
+}
 
 int FailToSend(const std::exception& error) {
   const std::string text = ReaderErrorText(error);
@@ -238,12 +152,14 @@ int SendAll(const std::string& text) try {
   PrepareDicomNetwork();
   const DicomSendRequest request = ParseSendRequest(text);
   std::vector<Sent> files = LoadAll(request.files);
-  Association association(request);
+  DicomAssociation association(request.peer, request.own_ae_title, request.tls);
   LockDown(Allowed::kNetwork);
-  association.Request(files);
+  ProposeAll(association, files);
+  association.Request();
+  for (const Sent& file : files) (void)ContextFor(association.get(), request.peer, file);
   unsigned short number = 0;
   for (Sent& file : files) {
-    association.Send(file, ++number);
+    Send(association.get(), request.peer, file, ++number);
     WriteToParent(ExportHeader{.payload_bytes = number});
   }
   association.Release();

@@ -21,6 +21,7 @@ class FakeAppliance : public web::BackgroundWork,
                       public web::ApplianceService,
                       public web::PatientService,
                       public web::ReferenceService,
+                      public web::PlanningService,
                       public web::ScanService,
                       public web::MonitoringService,
                       public web::CheckService,
@@ -38,7 +39,7 @@ class FakeAppliance : public web::BackgroundWork,
   /// All of them are this object.
   [[nodiscard]] web::Services services() {
     return {*this, *this, *this, *this, *this, *this, *this, *this,
-            *this, *this, *this, *this, *this, *this, *this};
+            *this, *this, *this, *this, *this, *this, *this, *this};
   }
 
   // --- what tests turn
@@ -180,6 +181,13 @@ class FakeAppliance : public web::BackgroundWork,
                    Done done) override;
   std::function<std::filesystem::path(const web::SentPlanning&)> import_planning;
   web::SentPlanning sent_planning;  ///< The last one.
+  Received received;
+  TodaysWorklist worklist;
+  Received GetReceived() override { return received; }
+  /// As an upload of these files, each named as in `received`.
+  void ImportReceived(const Actor& actor, const std::string& patient_id,
+                      const web::ReceivedChoice& choice, Done done) override;
+  TodaysWorklist GetWorklist() override { return worklist; }
   Message planning_doubt;  ///< Why the files may be another patient's; empty: they are not.
   void PlanReference(const Actor& actor, const std::string& id, int revision,
                      const ReferencePlan& plan, Done done) override;

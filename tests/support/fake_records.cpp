@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "algo/base/errors.hpp"
+#include "words/scan.hpp"
 #include "words/store.hpp"
 
 namespace plumb::test {
@@ -369,7 +370,7 @@ void FakeAppliance::AddPlanning(const Actor& actor, const std::string& patient_i
   if (!FindPatient(patient_id))
     return Finish(done, Refused(ChangeResult::kNotFound, say::store::NoPatient()));
   sent_planning = sent;
-  uploaded_bytes = std::filesystem::file_size(sent.file);
+  if (!sent.file.empty()) uploaded_bytes = std::filesystem::file_size(sent.file);
   std::filesystem::path folder;
   try {
     if (import_planning) folder = import_planning(sent);
@@ -393,6 +394,28 @@ void FakeAppliance::AddPlanning(const Actor& actor, const std::string& patient_i
   draft.origin.source = ReferenceSource::kPlanningCt;
   const std::string id = draft.id;
   Did(actor, "reference.add", id, done, id);
+}
+
+void FakeAppliance::ImportReceived(const Actor& actor, const std::string& patient_id,
+                                   const web::ReceivedChoice& choice, Done done) {
+  const auto is_there = [&](const std::string& name) {
+    return std::ranges::any_of(received.files,
+                               [&](const ReceivedFile& file) { return file.name == name; });
+  };
+  if (!is_there(choice.structures) || !is_there(choice.plan))
+    return Finish(done, Refused(ChangeResult::kNotFound, say::scan::NoReceivedFile()));
+  web::SentPlanning sent;
+  sent.roi = choice.roi;
+  sent.beam = choice.beam;
+  sent.reason = choice.reason;
+  sent.is_same_patient = choice.is_same_patient;
+  AddPlanning(actor, patient_id, sent, [this, choice, done](const Change& change) {
+    for (ReceivedFile& file : received.files)
+      if (change.result == ChangeResult::kDone &&
+          (file.name == choice.structures || file.name == choice.plan))
+        file.reference_id = change.id;
+    done(change);
+  });
 }
 
 void FakeAppliance::PlanReference(const Actor& actor, const std::string& id, int revision,

@@ -153,4 +153,50 @@ await h.step('another patient’s files are refused until a person has looked', 
   await planner.waitForURL(/#\/plan\//);
 });
 
+await h.step('what the planning system sent is listed and imported from there', async () => {
+  h.tell('received');
+  await planner.goto(`${h.url}#/patients`);
+  await planner.goto(`${h.url}#/patient/${patient}`);
+  await planner.getByText('Reference from the planning CT').click();
+  const received = planner.getByRole('table', { name: 'From the planning system' });
+  await received.getByText('Plan THORAX').waitFor();
+  const rowOf = (text) => received.locator('tbody tr', { hasText: text });
+  equal(await rowOf('Plan THORAX').getByText('PLANNING, 192.168.1.20').count(), 1, 'from whom');
+  equal(await rowOf('PELVIS').getByRole('button').count(), 0, 'another patient’s');
+  equal(await rowOf('BREAST').getByText('its structure set was not received').count(), 1, 'alone');
+  equal(await received.getByText('It cannot be read.').count(), 1, 'damaged');
+  await planner.getByText('98 CT images are not used.').waitFor();
+  await h.look(planner, 'planning-received');
+  await second.goto(`${h.url}#/patient/${patient}`);
+  await second.getByText('Reference from the planning CT').click();
+  await second.getByText('Plan THORAX').waitFor();
+  await h.look(second, 'planning-received-phone');
+  await planner.locator('.planning-upload').getByLabel('Reason for the new reference')
+    .fill('a new plan');
+  await rowOf('Plan THORAX').getByRole('button', { name: 'Import' }).click();
+  await planner.getByRole('heading', { name: 'Another patient’s files?' }).waitFor();
+  await planner.getByLabel('The files are of this patient').check();
+  await rowOf('Plan THORAX').getByRole('button', { name: 'Import' }).click();
+  await planner.waitForURL(/#\/plan\//);
+  await planner.goto(`${h.url}#/patient/${patient}`);
+  await planner.getByText('Reference from the planning CT').click();
+  await rowOf('Plan THORAX').getByRole('link', { name: 'a reference' }).waitFor();
+});
+
+await h.step('the worklist of today stands above the patients and opens nothing', async () => {
+  h.tell(`worklist ${patient}`);
+  await planner.goto(`${h.url}#/patients`);
+  const today = planner.getByRole('table', { name: 'Today' });
+  await today.getByText('09:30').waitFor();
+  await planner.getByText('2 appointments are of patients who are not known here').waitFor();
+  await h.look(planner, 'worklist');
+  await second.goto(`${h.url}#/patients`);
+  await second.getByRole('table', { name: 'Today' }).waitFor();
+  await h.look(second, 'worklist-phone');
+  const before = (await h.api(planner, 'status')).body.session;
+  await today.getByRole('link', { name: 'CT-1' }).click();
+  await planner.waitForURL(new RegExp(`#/patient/${patient}`));
+  equal((await h.api(planner, 'status')).body.session?.id, before?.id, 'no session was changed');
+});
+
 await h.finish();

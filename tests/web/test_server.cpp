@@ -47,6 +47,7 @@
 #include "tests/support/synthetic_scene.hpp"
 #include "web/api/http_server.hpp"
 #include "words/check.hpp"
+#include "words/dicom.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
 #include "words/update.hpp"
@@ -291,6 +292,35 @@ nlohmann::ordered_json MonitorReportOf(const std::string& scan) {
       {"said", {{{"event", "zero"}, {"breathing", {{"amplitude_mm", 4.5}, {"period_s", 3.8}}}}}}};
 }
 
+/// A plan with its structure set, one without, another patient's and one that cannot be read.
+Received SomeReceived(const FakeAppliance& service) {
+  const auto file = [](const char* name, ReceivedKind kind, const char* label) {
+    return ReceivedFile{.name = name,
+                        .kind = kind,
+                        .received_at = "2026-03-01T09:30:00Z",
+                        .sender = "PLANNING",
+                        .address = "192.168.1.20",
+                        .bytes = 5000,
+                        .label = label};
+  };
+  Received received{
+      .is_on = true,
+      .files = {file("e", ReceivedKind::kPlan, "BREAST LEFT 2"),
+                file("d", ReceivedKind::kPlan, "PELVIS"), file("c", ReceivedKind::kOther, ""),
+                file("b", ReceivedKind::kPlan, "THORAX"),
+                file("a", ReceivedKind::kStructures, "THORAX CT")},
+      .images = 98};
+  received.files[1].structures = received.files[3].structures = "a";
+  received.files[1].patient_id = "other";
+  received.files[1].patient_code = "CT-2";
+  received.files[2].fault = say::dicom::CannotRead();
+  if (!service.patients.empty()) {
+    received.files[3].patient_id = service.patients.back().id;
+    received.files[3].patient_code = service.patients.back().code;
+  }
+  return received;
+}
+
 void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command) {
   std::istringstream words(command);
   std::string name;
@@ -353,6 +383,16 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
       picture.row(row).setTo(cv::Scalar(row, 120, 255 - row));
     const std::vector<std::uint8_t> jpeg = EncodeJpeg(picture, 70);
     service.preview = std::make_shared<const std::string>(jpeg.begin(), jpeg.end());
+  }
+  if (name == "received") service.received = SomeReceived(service);
+  if (name == "worklist") {  // PATIENT: at half past nine, beside two strangers
+    std::string patient;
+    words >> patient;
+    const auto known = service.FindPatient(patient);
+    service.worklist = {.is_on = true, .patients = {}, .unknown = 2};
+    if (known)
+      service.worklist.patients = {
+          {.time = "09:30", .patient_id = known->id, .patient_code = known->code}};
   }
   if (name == "foreignfiles") service.planning_doubt = say::store::PlanningPatientDiffers(1);
   if (name == "stranger") service.next_recorded = recorder.Once(name, Stranger);
@@ -531,10 +571,17 @@ void ServePlanning(FakeAppliance& service, const fs::path& root) {
   service.import_planning = [root, number = 0](const web::SentPlanning& sent) mutable {
     const fs::path folder = root / fmt::format("planned-{}", ++number);
     fs::create_directories(folder);
-    SplitPlanning(sent.file, sent.structures_bytes, folder / "plan.dcm");
+    fs::path structures = sent.file;
+    if (sent.file.empty()) {  // received, not sent
+      structures = folder / "structures.dcm";
+      fs::copy_file(root / "structures.dcm", structures);
+      fs::copy_file(root / "plan.dcm", folder / "plan.dcm");
+    } else {
+      SplitPlanning(sent.file, sent.structures_bytes, folder / "plan.dcm");
+    }
     PlanningChoice choice;
     if (!sent.roi.empty()) choice.roi = sent.roi;
-    const ReadPlan read = ReadPlanning({.structures = sent.file,
+    const ReadPlan read = ReadPlanning({.structures = structures,
                                         .plan = folder / "plan.dcm",
                                         .structures_name = "STRUCTURES",
                                         .plan_name = "PLAN"},

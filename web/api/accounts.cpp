@@ -18,6 +18,7 @@
 #include "web/model/account.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/wall_clock.hpp"
+#include "web/security/certificate_care.hpp"
 #include "web/security/password_rules.hpp"
 #include "web/security/secrets.hpp"
 #include "web/security/stored_password.hpp"
@@ -77,6 +78,8 @@ Accounts::Accounts(const Services& services, const HttpServerOptions& options,
       displays_(services.displays, options.tls.has_value(), options.now),
       devices_(options.device_key, options.tls.has_value()),
       worker_(options.password_operations, options.password_memory_bytes) {
+  if (certificate_)
+    certificate_end_ = FactsOfCertificate(certificate_->certificate_pem).valid_until;
   LookForAccounts();
   Expire();
 }
@@ -158,14 +161,15 @@ void Accounts::AddRoutes(Routes& routes) {
                auto form = ParseForm(request.body);
                if (!form || !IsPlainText((*form)["name"]) || (*form)["name"].size() > kMaxName ||
                    (*form)["password"].size() > kMaxPassword ||
-                   (*form)["second_factor"].size() > kMaxCode) {
+                   (*form)["second_factor"].size() > kMaxCode ||
+                   (*form)["presence"].size() > kMaxCode) {
                  return respond(ErrorResponse(400, say::web::NameAndPassword()));
                }
                LogIn(request,
                      {.name = (*form)["name"],
                       .password = (*form)["password"],
                       .second_factor = (*form)["second_factor"],
-                      .presence = {},
+                      .presence = (*form)["presence"],
                       .is_form = true},
                      respond);
              });

@@ -15,6 +15,7 @@
 #include "web/http/gate.hpp"
 #include "web/http/server_options.hpp"
 #include "web/security/device_cookies.hpp"
+#include "web/security/known_places.hpp"
 #include "web/security/login_limiter.hpp"
 #include "web/security/password_worker.hpp"
 #include "web/security/quick_logins.hpp"
@@ -72,6 +73,8 @@ class Accounts : public SessionLookup {
   /// Takes back a certificate that a person set and no browser has come back with in time, and
   /// renews one that this machine made for itself. Called from time to time.
   void CareForCertificate();
+  /// Time until the page's certificate ends; nothing without one.
+  [[nodiscard]] std::optional<std::chrono::seconds> CertificateLeft() const override;
   /// Ends idle sessions; follows the idle time of the settings; looks again for accounts that could
   /// not be read.
   void Expire();
@@ -82,10 +85,14 @@ class Accounts : public SessionLookup {
   void LogIn(const Request& request, LogInForm form, const Respond& respond);
   void FinishLogIn(const Actor& actor, const std::string& stored, const LogInForm& form,
                    const std::vector<std::string>& counters, const Respond& respond);
-  /// The counters for guesses at this name: only that of its browser if the person has logged in
-  /// from it before or is in the room, otherwise those of address and name.
-  [[nodiscard]] std::vector<std::string> CountersOf(const Request& request, const LogInForm& form,
-                                                    const std::string& stored);
+  struct Counters {
+    std::vector<std::string> names;
+    bool is_known = false;  ///< Guesses of strangers neither count for it nor delay it.
+  };
+  /// The counters for guesses at this name: only one of its own if the person is in the room, or
+  /// has logged in from this browser or address before, otherwise those of address and name.
+  [[nodiscard]] Counters CountersOf(const Request& request, const LogInForm& form,
+                                    const std::string& stored);
   /// Whether the request comes from a paired screen, or has the code that such a screen shows.
   [[nodiscard]] bool IsInTheRoom(const Request& request, const std::string& presence);
   void NoteGuesses(bool are_running);
@@ -180,6 +187,7 @@ class Accounts : public SessionLookup {
   const HttpServerOptions& options_;
   std::function<void(const TlsIdentity&)> serve_certificate_;
   std::optional<TlsIdentity> certificate_;  ///< The one that is served now.
+  std::time_t certificate_end_ = 0;
   /// A certificate that a person set is on trial until a browser has connected with it. Until then
   /// only the previous one is stored, so that a restart ends the trial, too.
   struct CertificateTrial {
@@ -187,12 +195,14 @@ class Accounts : public SessionLookup {
     std::chrono::steady_clock::time_point begun;
   };
   std::optional<CertificateTrial> trial_;
-  std::chrono::steady_clock::time_point next_certificate_care_{};
+  std::chrono::steady_clock::time_point next_certificate_care_{}, clock_steady_since_{};
+  std::chrono::system_clock::duration clock_ahead_{};  ///< Of the steady clock, at the last look.
   Sessions sessions_;
   Displays displays_;
   DeviceCookies devices_;
   QuickLogIns quick_;
   LoginLimiter limiter_;
+  KnownPlaces places_;
   Message accounts_fault_;  ///< Why no account can be seen; empty: they can.
   std::string setup_code_;  ///< Empty once there is an account.
   bool setting_up_ = false;

@@ -2,6 +2,11 @@
 // All routes. The API under /api/v1: JSON in, JSON and files out. web/openapi.yaml describes it.
 #pragma once
 
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+
 #include "web/exchange/routes.hpp"
 #include "web/service/services.hpp"
 
@@ -11,10 +16,14 @@ namespace plumb::web {
 
 /// Adds patients, sessions, references and templates of plans.
 void AddPatientApi(Routes& routes, const Services& services);
+/// Adds the upload of a planning CT, what was received from planning systems, and today's worklist.
+void AddPlanningApi(Routes& routes, const Services& services);
 /// Adds scans, their files, results and daily checks.
 void AddScanApi(Routes& routes, const Services& services);
 /// Adds GET /metrics for who knows the token. @param token  Empty: the route does not exist.
-void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::string& token);
+/// @param certificate_left  Time until the page's certificate ends; nothing without one.
+void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::string& token,
+                     std::function<std::optional<std::chrono::seconds>()> certificate_left);
 /// Adds status and button, settings, audit log, updates and maintenance.
 void AddUnitApi(Routes& routes, const Services& services);
 

@@ -32,6 +32,8 @@ constexpr std::chrono::milliseconds kCutEvery{1000};
 
 HttpServerOptions Completed(HttpServerOptions options) {
   if (!options.now) options.now = [] { return SteadyClock::now(); };
+  if (!options.wall_now) options.wall_now = [] { return std::chrono::system_clock::now(); };
+  if (!options.is_clock_trusted) options.is_clock_trusted = [] { return true; };
   return options;
 }
 
@@ -70,9 +72,11 @@ class HttpServer::Impl {
     Routes routes(router_, services.background);
     accounts_.AddRoutes(routes);
     AddPatientApi(routes, services);
+    AddPlanningApi(routes, services);
     AddScanApi(routes, services);
     AddUnitApi(routes, services);
-    AddMetricsRoute(routes, services.appliance, options_.metrics_token);
+    AddMetricsRoute(routes, services.appliance, options_.metrics_token,
+                    [this] { return accounts_.CertificateLeft(); });
     AddMonitorApi(routes, services);
     AddResultPage(routes, services);
     AddExportRoutes(routes, services);

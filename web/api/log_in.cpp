@@ -21,9 +21,11 @@ namespace {
 
 constexpr std::chrono::minutes kPresenceValid{10};
 
-std::string UpperCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+/// As it is compared: people leave out the dash, or type small letters.
+std::string Characters(const std::string& code) {
+  std::string text;
+  for (const unsigned char c : code)
+    if (std::isalnum(c) != 0) text += static_cast<char>(std::toupper(c));
   return text;
 }
 
@@ -80,9 +82,9 @@ std::string Accounts::presence_code() {
 bool Accounts::IsInTheRoom(const Request& request, const std::string& presence) {
   if (displays_.SessionOf(request)) return true;
   if (presence.empty()) return false;
-  const std::string given = UpperCase(presence), now = presence_code();
+  const std::string given = Characters(presence), now = Characters(presence_code());
   return IsSameSecret(given, now) ||
-         (!presence_before_.empty() && IsSameSecret(given, presence_before_));
+         (!presence_before_.empty() && IsSameSecret(given, Characters(presence_before_)));
 }
 
 Response Accounts::DescribePresence(const Request& request) {
@@ -96,13 +98,21 @@ void Accounts::NoteGuesses(bool are_running) {
   if (options_.on_guesses && were_running != are_running) options_.on_guesses(are_running);
 }
 
-std::vector<std::string> Accounts::CountersOf(const Request& request, const LogInForm& form,
-                                              const std::string& stored) {
+Accounts::Counters Accounts::CountersOf(const Request& request, const LogInForm& form,
+                                        const std::string& stored) {
+  const std::string network = NetworkOf(request.address);
   const auto cookie = CookieValue(request.Header("cookie"), devices_.NameFor(form.name));
   if (const auto device = cookie ? devices_.Identify(*cookie, form.name, stored) : std::nullopt)
-    return {"device " + *device};
-  if (IsInTheRoom(request, form.presence)) return {"room " + NetworkOf(request.address)};
-  return {"address " + NetworkOf(request.address), "name " + form.name};
+    return {{"device " + *device}, /*is_known=*/true};
+  if (IsInTheRoom(request, form.presence)) return {{"room " + network}, /*is_known=*/true};
+  const auto now = options_.now();
+  if (places_.Knows(form.name, network, now))
+    return {{"place " + network + " " + form.name}, /*is_known=*/true};
+  // An address counts once a minute for the name, so that one alone locks nobody out. (Not longer:
+  // each address could go on guessing for good once it had begun.)
+  const std::string begun = "begun " + network + " " + form.name;
+  if (limiter_.Wait(begun, now, /*most=*/1).count() > 0) return {{"address " + network}};
+  return {{"address " + network, "name " + form.name, begun}};
 }
 
 std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& counters) {
@@ -120,8 +130,7 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
   std::string password = std::exchange(form.password, {});
   const auto user = users_.FindUser(form.name);
   const std::string stored = user && !user->disabled ? user->password_hash : std::string();
-  const std::vector<std::string> counters = CountersOf(request, form, stored);
-  const bool is_known = counters.size() == 1;
+  const auto [counters, is_known] = CountersOf(request, form, stored);
   if (auto refusal = CountGuess(counters)) {
     if (!is_known) NoteGuesses(true);
     return respond(std::move(*refusal));
@@ -132,7 +141,7 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
   }
   const bool accepted = worker_.Verify(
       std::move(password), HashIn(stored), is_known,
-      [this, actor = Actor{form.name, request.address}, stored, form, counters,
+      [this, actor = Actor{form.name, request.address}, stored, form, counters = counters,
        respond](bool matches) {
         RespondGuarded(
             "login",
@@ -156,6 +165,7 @@ void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, const 
   PassSecondFactor(actor, *still, form.second_factor, fail,
                    [this, actor, user = *still, counters, is_form = form.is_form, respond] {
                      for (const std::string& counter : counters) limiter_.Succeeded(counter);
+                     places_.Remember(user.name, NetworkOf(actor.address), options_.now());
                      audit_.Log(actor, "login", "", {});
                      respond(Welcome(user, actor.address, is_form));
                    });

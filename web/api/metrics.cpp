@@ -137,7 +137,8 @@ void WriteScans(const ScanCounts& counts, MetricsWriter& out) {
 
 }  // namespace
 
-std::string MetricsText(const Status& status, const Health& health, WallClock::time_point now) {
+std::string MetricsText(const Status& status, const Health& health, WallClock::time_point now,
+                        std::optional<std::chrono::seconds> certificate_left) {
   MetricsWriter out;
   out.Family("build", "info", "", "The version that runs.")
       .Sample("_info", fmt::format("version=\"{}\"", Escaped(status.version)), 1);
@@ -154,6 +155,10 @@ std::string MetricsText(const Status& status, const Health& health, WallClock::t
       .Sample(static_cast<double>(status.warnings.size()));
   out.Family("references_waiting", "gauge", "", "References that wait for a plan or an approval.")
       .Sample(static_cast<double>(status.waiting.size()));
+  if (certificate_left)
+    out.Family("certificate_left_seconds", "gauge", "seconds",
+               "Time until the page's certificate ends; negative afterwards.")
+        .Sample(static_cast<double>(certificate_left->count()));
   WriteChecks(status, now, out);
   WriteStorage(status.storage, now, out);
   WriteScans(status.counts, out);
@@ -161,9 +166,10 @@ std::string MetricsText(const Status& status, const Health& health, WallClock::t
   return out.Text();
 }
 
-void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::string& token) {
+void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::string& token,
+                     std::function<std::optional<std::chrono::seconds>()> certificate_left) {
   if (token.empty()) return;
-  routes.Read("/metrics", Permission::kNone, [&appliance, token](const Request& request) {
+  routes.Read("/metrics", Permission::kNone, [=, &appliance](const Request& request) {
     constexpr std::string_view kBearer = "Bearer ";
     const std::string_view given = request.Header("authorization");
     if (!given.starts_with(kBearer) || !IsSameSecret(given.substr(kBearer.size()), token)) {
@@ -171,8 +177,8 @@ void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::str
       refused.headers.emplace_back("WWW-Authenticate", "Bearer");
       return refused;
     }
-    return BodyResponse(
-        kMetricsType, MetricsText(appliance.GetStatus(), appliance.GetHealth(), WallClock::now()));
+    return BodyResponse(kMetricsType, MetricsText(appliance.GetStatus(), appliance.GetHealth(),
+                                                  WallClock::now(), certificate_left()));
   });
 }
 

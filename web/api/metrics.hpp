@@ -13,7 +13,9 @@ inline constexpr const char* kMetricsType =
     "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 /// OpenMetrics 1.0. Nothing in it names a patient, a person or a scan.
-[[nodiscard]] std::string MetricsText(const Status& status, const Health& health,
-                                      WallClock::time_point now);
+/// @param certificate_left  As in AddMetricsRoute().
+[[nodiscard]] std::string MetricsText(
+    const Status& status, const Health& health, WallClock::time_point now,
+    std::optional<std::chrono::seconds> certificate_left = std::nullopt);
 
 }  // namespace plumb::web

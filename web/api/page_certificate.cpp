@@ -18,7 +18,9 @@ constexpr std::size_t kMaxChainBytes = 32 << 10, kMaxKeyBytes = 16 << 10;
 
 /// A certificate that a person set is taken back unless a browser has connected with it by then.
 constexpr std::chrono::seconds kTrial{120};
-constexpr std::chrono::hours kCareEvery{1};
+/// How often, and for how long the clock must have run without a step for its date to count.
+constexpr std::chrono::minutes kCareEvery{10}, kClockHeld{60};
+constexpr std::chrono::minutes kClockStep{1};
 
 /// The appliance itself, as the store names it.
 const Actor kSelf{.user = "plumbd", .address = ""};
@@ -89,6 +91,7 @@ void Accounts::ServeCertificate(const Actor& actor, const TlsIdentity& identity,
   const std::string before = tls_fingerprint();
   serve_certificate_(identity);
   certificate_ = identity;
+  certificate_end_ = FactsOfCertificate(identity.certificate_pem).valid_until;
   if (options_.on_certificate) options_.on_certificate(identity);
   audit_.Log(actor, replaced_by, "", say::audit::Certificate(before, identity.fingerprint));
 }
@@ -108,17 +111,31 @@ void Accounts::EndTrial(const char* log_as) {
   ServeCertificate(kSelf, before, log_as);
 }
 
+std::optional<std::chrono::seconds> Accounts::CertificateLeft() const {
+  if (!certificate_) return std::nullopt;
+  return std::chrono::seconds(certificate_end_ -
+                              std::chrono::system_clock::to_time_t(options_.wall_now()));
+}
+
 void Accounts::CareForCertificate() {
   const auto now = options_.now();
   if (!serve_certificate_) return;
+  const auto ahead = options_.wall_now().time_since_epoch() - now.time_since_epoch();
+  if (std::chrono::abs(ahead - clock_ahead_) > kClockStep) clock_steady_since_ = now;
+  clock_ahead_ = ahead;
   if (trial_ && now - trial_->begun >= kTrial) EndTrial("certificate.revert");
   if (trial_ || now < next_certificate_care_) return;
   next_certificate_care_ = now + kCareEvery;
   std::vector<std::string> names = OwnNames();
   names.insert(names.end(), options_.host_names.begin(), options_.host_names.end());
   try {
-    if (!IsDueForRenewal(certificate_->certificate_pem, WallClock::now(), names)) return;
-    const TlsIdentity identity = MakeTlsIdentity(options_.host_names);
+    // A clock that has just started or stepped may still be corrected.
+    const bool is_trusted = now - clock_steady_since_ >= kClockHeld && options_.is_clock_trusted();
+    const auto wall = options_.wall_now();
+    if (!IsDueForRenewal(certificate_->certificate_pem,
+                         is_trusted ? std::optional(wall) : std::nullopt, names))
+      return;
+    const TlsIdentity identity = MakeTlsIdentity(options_.host_names, wall);
     options_.keep_certificate(identity);
     ServeCertificate(kSelf, identity, "certificate.renew");
   } catch (const std::runtime_error& error) {

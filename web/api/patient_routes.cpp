@@ -3,7 +3,6 @@
 #include "web/api/all_routes.hpp"
 
 #include "algo/base/errors.hpp"
-#include "algo/base/parse_number.hpp"
 #include "web/exchange/json.hpp"
 #include "web/exchange/routes.hpp"
 #include "web/http/checks.hpp"
@@ -176,45 +175,6 @@ void AddTemplateRoutes(Routes& routes, SettingsService& settings) {
                });
 }
 
-/// What is said of the files stands in a header, as a form: names of contours are free texts, which
-/// the address does not take.
-SentPlanning ParsePlanning(const Request& request) {
-  const auto form = ParseForm(request.Header("x-plumb-planning"));
-  if (!form) throw DataError(say::web::Malformed());
-  const auto text = [&](const char* name, std::size_t most) {
-    const auto found = form->find(name);
-    const std::string value = found == form->end() ? std::string() : found->second;
-    if (value.size() > most)
-      throw DataError(say::web::FieldLength(name, 0, static_cast<std::int64_t>(most),
-                                            static_cast<std::int64_t>(value.size())));
-    return value;
-  };
-  const std::string bytes = text("structures_bytes", 20);
-  SentPlanning sent{.file = request.upload->path(),
-                    .structures_bytes = 0,
-                    .roi = text("roi", kMaxPlanningName),
-                    .beam = text("isocentre_of", kMaxPlanningName),
-                    .reason = text("reason", kMaxReason),
-                    .is_same_patient = text("same_patient", 3) == "yes"};
-  const auto number = ParseNumber<std::uint64_t>(bytes);
-  if (!number || *number > kMaxPlanningFile)
-    throw DataError(
-        say::web::FieldWholeRange("structures_bytes", static_cast<std::int64_t>(kMaxPlanningFile)));
-  sent.structures_bytes = *number;
-  return sent;
-}
-
-void AddPlanningRoute(Routes& routes, ReferenceService& references) {
-  Route& route =
-      routes.Write("POST", "/api/v1/patients/{id}/planning", Permission::kPlan, BodyKind::kFile,
-                   [&references](const Request& request, const Done& done) {
-                     references.AddPlanning(
-                         request.actor(), request.arguments[0], ParsePlanning(request),
-                         [done, kept = request.upload](const Change& change) { done(change); });
-                   });
-  route.most_bytes = 2 * kMaxPlanningFile;
-}
-
 void AddReferenceRoutes(Routes& routes, ReferenceService& references) {
   routes.Write("POST", "/api/v1/references", Permission::kPlan, BodyKind::kJson,
                [&references](const Request& request, const Done& done) {
@@ -251,7 +211,6 @@ void AddPatientApi(Routes& routes, const Services& services) {
   AddSessionRoutes(routes, services.patients);
   AddCourseRoutes(routes, services.patients, services.references, services.scans);
   AddTemplateRoutes(routes, services.settings);
-  AddPlanningRoute(routes, services.references);
   AddReferenceRoutes(routes, services.references);
 }
 

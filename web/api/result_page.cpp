@@ -99,12 +99,13 @@ std::string LoginForm(const Catalogue& language, const std::string& trouble) {
       "autocomplete=\"current-password\" required maxlength=\"{}\"></label>"
       "<label>{} <input name=\"second_factor\" autocomplete=\"one-time-code\" "
       "maxlength=\"32\"></label>"
+      "<label>{} <input name=\"presence\" autocomplete=\"off\" maxlength=\"32\"></label>"
       "<button class=\"primary\">{}</button></form>",
       Word(say::result::kPageLogIn, language),
       trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble),
       Word(say::result::kPageName, language), kMaxName, Word(say::result::kPagePassword, language),
       kMaxPassword, Word(say::result::kPageSecondFactor, language),
-      Word(say::result::kPageLogIn, language));
+      Word(say::result::kPagePresence, language), Word(say::result::kPageLogIn, language));
 }
 
 /// A row of the table.

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include <fmt/format.h>
+
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
 #include "web/http/checks.hpp"
@@ -144,8 +146,8 @@ void RespondInBackground(BackgroundWork& background, const std::string& name,
   respond(RetryLater(503, say::web::TooManyRequests(), std::chrono::seconds(2)));
 }
 
-void AddSecurityHeaders(Response& response, bool tls) {
-  const auto add = [&](const char* name, const char* value) {
+void AddSecurityHeaders(Response& response, std::optional<std::chrono::seconds> certificate_left) {
+  const auto add = [&](const char* name, const std::string& value) {
     response.headers.emplace_back(name, value);
   };
   add("Content-Security-Policy",
@@ -158,7 +160,10 @@ void AddSecurityHeaders(Response& response, bool tls) {
   add("Cross-Origin-Opener-Policy", "same-origin");
   add("Cross-Origin-Resource-Policy", "same-origin");
   add("Permissions-Policy", "camera=(), microphone=(), geolocation=(), usb=()");
-  if (tls) add("Strict-Transport-Security", "max-age=31536000");
+  constexpr std::chrono::seconds kYear{365 * 24 * 3600}, kNone{0};
+  if (certificate_left)
+    add("Strict-Transport-Security",
+        fmt::format("max-age={}", std::clamp(*certificate_left, kNone, kYear).count()));
   add("Cache-Control",
       response.cache_for_ever ? "public, max-age=31536000, immutable" : "no-store");
 }

@@ -3,8 +3,10 @@
 // type.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -27,6 +29,8 @@ class SessionLookup {
   [[nodiscard]] virtual const Message& accounts_fault() const = 0;
   /// Fingerprint of the server's certificate; empty without TLS.
   [[nodiscard]] virtual std::string tls_fingerprint() const = 0;
+  /// Time until that certificate ends, negative afterwards; nothing without TLS.
+  [[nodiscard]] virtual std::optional<std::chrono::seconds> CertificateLeft() const = 0;
 };
 
 class Gate {
@@ -39,6 +43,9 @@ class Gate {
   [[nodiscard]] std::variant<const Route*, Response> Admit(Request& request) const;
   /// Called with the complete body. Runs the handler; its exceptions become an answer.
   static void Handle(const Route& route, const Request& request, const Respond& respond);
+  [[nodiscard]] std::optional<std::chrono::seconds> CertificateLeft() const {
+    return sessions_.CertificateLeft();
+  }
 
  private:
   [[nodiscard]] bool IsOwnPage(const Request& request) const;
@@ -63,7 +70,9 @@ void RespondInBackground(BackgroundWork& background, const std::string& name,
                          std::function<Response()> make, const Respond& respond);
 
 /// The headers of every answer.
-/// @param tls  The answer is sent over TLS, and the browser must use TLS from now on.
-void AddSecurityHeaders(Response& response, bool tls);
+/// @param certificate_left  The answer is sent over TLS, and the browser must use TLS from now on,
+///        but not for longer than the certificate is valid: it would give nobody a way past an
+///        ended one, not even to replace it. Nothing: without TLS.
+void AddSecurityHeaders(Response& response, std::optional<std::chrono::seconds> certificate_left);
 
 }  // namespace plumb::web

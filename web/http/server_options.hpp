@@ -74,6 +74,10 @@ struct HttpServerOptions {
   std::chrono::seconds session_limit{12 * 3600};
   std::function<std::chrono::steady_clock::time_point()>
       now;  ///< For tests; empty: the steady clock.
+  std::function<std::chrono::system_clock::time_point()>
+      wall_now;  ///< For tests; empty: the wall clock. Of the certificate's dates only.
+  /// Whether the wall clock may decide that the unit's own certificate is renewed. Empty: it may.
+  std::function<bool()> is_clock_trusted;
   /// Called with the present activity of Run(): "GET /api/v1/scans/{id}" from the table of routes,
   /// and an empty text afterwards. May be empty.
   std::function<void(std::string_view what)> doing;

@@ -372,7 +372,7 @@ struct Transport::Callbacks {
     MHD_Response* made = MakeBody(transport, exchange);
     if (made == nullptr) return MHD_NO;
     Response& response = *exchange.response;
-    AddSecurityHeaders(response, transport.options_.tls.has_value());
+    AddSecurityHeaders(response, transport.gate_.CertificateLeft());
     MHD_add_response_header(made, MHD_HTTP_HEADER_CONTENT_TYPE, response.type.c_str());
     for (const auto& [name, value] : response.headers)
       MHD_add_response_header(made, name.c_str(), value.c_str());

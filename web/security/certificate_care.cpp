@@ -113,19 +113,22 @@ CertificateFacts FactsOfCertificate(const std::string& pem) {
   return facts;
 }
 
-bool IsDueForRenewal(const std::string& pem, std::chrono::system_clock::time_point now,
+bool IsDueForRenewal(const std::string& pem,
+                     std::optional<std::chrono::system_clock::time_point> now,
                      const std::vector<std::string>& names) {
   const std::vector<Certificate> chain = ChainOf(pem);
   const gnutls_x509_crt_t own = chain.front().get();
   if (chain.size() != 1 || gnutls_x509_crt_check_issuer(own, own) == 0 ||
       SubjectOf(chain.front()) != fmt::format("CN={}", kOwnSubject))
     return false;
-  const std::time_t time = std::chrono::system_clock::to_time_t(now);
   const std::time_t begin = gnutls_x509_crt_get_activation_time(own),
                     end = gnutls_x509_crt_get_expiration_time(own);
-  if (time < begin || end - time <= std::chrono::seconds(2 * kWarnBeforeEnd).count() ||
-      end - begin > std::chrono::seconds(kOwnValidity).count())
-    return true;
+  if (now) {
+    const std::time_t time = std::chrono::system_clock::to_time_t(*now);
+    if (time < begin || end - time <= std::chrono::seconds(2 * kWarnBeforeEnd).count() ||
+        end - begin > std::chrono::seconds(kOwnValidity).count())
+      return true;
+  }
   return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
     return gnutls_x509_crt_check_hostname(own, name.c_str()) == 0;
   });

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <ctime>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,9 +37,11 @@ struct CertificateFacts {
 /// within twice kWarnBeforeEnd, begins in the future (the clock was wrong), is valid for longer
 /// than kOwnValidity (as those of 0.2.0) or lacks one of `names`. A certificate that a person set
 /// is never due.
+/// @param now  Nothing: the clock cannot be trusted, so that dates do not count. A certificate that
+///        a wrong clock makes is one that no browser accepts once the clock is right.
 /// @throws DataError as CertificateWarnings().
 [[nodiscard]] bool IsDueForRenewal(const std::string& pem,
-                                   std::chrono::system_clock::time_point now,
+                                   std::optional<std::chrono::system_clock::time_point> now,
                                    const std::vector<std::string>& names);
 
 /// CheckedTlsIdentity() for an uploaded identity: also refuses what browsers would reject now: keys

@@ -8,6 +8,7 @@
 #include "web/service/background_work.hpp"
 #include "web/service/monitoring_service.hpp"
 #include "web/service/patient_services.hpp"
+#include "web/service/planning_service.hpp"
 #include "web/service/room_services.hpp"
 #include "web/service/scan_service.hpp"
 #include "web/service/upkeep_services.hpp"
@@ -28,6 +29,7 @@ struct Services {
   ApplianceService& appliance;
   PatientService& patients;
   ReferenceService& references;
+  PlanningService& planning;
   ScanService& scans;
   MonitoringService& monitoring;
   CheckService& checks;

@@ -7,10 +7,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <numeric>
 
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/security/device_cookies.hpp"
+#include "web/security/known_places.hpp"
 #include "web/security/login_limiter.hpp"
 #include "web/security/password_rules.hpp"
 #include "web/security/password_worker.hpp"
@@ -43,19 +45,35 @@ class LockoutTest : public WebTest {
   std::atomic<bool> guessed_ = false;
   /// The status of a login from an address, with the cookies of a browser.
   int LogInFrom(const std::string& address, const std::string& name, const std::string& password,
-                const HttpClient* browser = nullptr) {
+                const HttpClient* browser = nullptr, const std::string& presence = {}) {
     std::string cookies;
     if (browser != nullptr) {
       for (const auto& [key, value] : browser->device_cookies)
         cookies += (cookies.empty() ? "Cookie: " : "; ") + key + "=" + value;
     }
-    const std::string body = nlohmann::json{{"name", name}, {"password", password}}.dump();
+    const std::string body =
+        nlohmann::json{{"name", name}, {"password", password}, {"presence", presence}}.dump();
     HttpConnection connection(port_, address);
     connection.Send("POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\n" +
                     (cookies.empty() ? "" : cookies + "\r\n") +
                     "Content-Type: application/json\r\nContent-Length: " +
                     std::to_string(body.size()) + "\r\n\r\n" + body);
     return connection.Read().status;
+  }
+  /// What `plumb presence` shows.
+  std::string OnConsole() {
+    std::string code;
+    loop_->Do([&] { code = server_->presence_code(); });
+    return code;
+  }
+  static std::string Typed(std::string code) {
+    std::erase(code, '-');
+    for (char& c : code) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return code;
+  }
+  /// Enough addresses to slow a name down for those that are not known.
+  void GuessFromFiveAddresses(const std::string& name) {
+    for (int i = 1; i <= 5; ++i) (void)LogInFrom(fmt::format("127.0.1.{}", i), name, kWrong);
   }
 };
 
@@ -75,9 +93,73 @@ TEST_F(LockoutTest, ANameThatIsTriedFromManyAddressesIsSlowedDown) {
   EXPECT_EQ(LogInFrom("127.0.0.20", "physicist", kPassword), 200) << "another name";
 }
 
+TEST_F(LockoutTest, OneAddressThatGuessesLocksOutItselfAlone) {
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kWrong), 403) << i;
+  EXPECT_FALSE(guessed_);
+  EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword), 429);
+  EXPECT_TRUE(guessed_) << "shown on page and light";
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword), 200) << "another address";
+}
+
+TEST_F(LockoutTest, FourAddressesLockNobodyElseOutAndFiveDoForAMinute) {
+  const auto guess = [&](int first, int last) {
+    for (int i = first; i <= last; ++i) {
+      for (int k = 0; k < 6; ++k)
+        EXPECT_EQ(LogInFrom(fmt::format("127.0.1.{}", i), "technician", kWrong), k < 5 ? 403 : 429);
+    }
+  };
+  guess(1, 4);
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword), 200);
+  skipped_s_ += 61;
+  guess(1, 4);
+  // Who mistyped before the name was slowed down may go on.
+  EXPECT_EQ(LogInFrom("127.0.0.4", "technician", kWrong), 403);
+  EXPECT_EQ(LogInFrom("127.0.0.5", "technician", kPassword), 429) << "a sixth";
+  EXPECT_EQ(LogInFrom("127.0.0.4", "technician", kPassword), 200);
+  skipped_s_ += 61;
+  // An address that goes on guessing counts anew each minute.
+  guess(1, 5);
+  EXPECT_EQ(LogInFrom("127.0.0.5", "technician", kPassword), 429);
+  skipped_s_ += 61;
+  EXPECT_EQ(LogInFrom("127.0.0.5", "technician", kPassword), 200);
+}
+
+/// A workstation that forgets its cookies at each log-out.
+TEST_F(LockoutTest, AnAddressFromWhichThePersonLoggedInBeforeIsNotLockedOutByOthers) {
+  ASSERT_EQ(LogInFrom("127.0.0.5", "technician", kPassword), 200);
+  for (const char* name : {"technician", "physicist"}) GuessFromFiveAddresses(name);
+  EXPECT_EQ(LogInFrom("127.0.0.6", "technician", kPassword), 429) << "another address";
+  EXPECT_EQ(LogInFrom("127.0.0.5", "physicist", kPassword), 429) << "another person";
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(LogInFrom("127.0.0.5", "technician", kWrong), 403) << i;
+  EXPECT_EQ(LogInFrom("127.0.0.5", "technician", kPassword), 200);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(LogInFrom("127.0.0.5", "technician", kWrong), 403) << i;
+  EXPECT_EQ(LogInFrom("127.0.0.5", "technician", kPassword), 429) << "its own guesses count";
+}
+
+TEST(KnownPlacesTest, AreKnownForThirtyDaysAndBounded) {
+  using std::chrono::seconds;
+  web::KnownPlaces places;
+  const auto now = std::chrono::steady_clock::now();
+  places.Remember("anna", "10.0.0.1", now);
+  EXPECT_TRUE(places.Knows("anna", "10.0.0.1", now + web::KnownPlaces::kKnownFor - seconds(1)));
+  EXPECT_FALSE(places.Knows("anna", "10.0.0.1", now + web::KnownPlaces::kKnownFor));
+  EXPECT_FALSE(places.Knows("anna", "10.0.0.2", now));
+  EXPECT_FALSE(places.Knows("bob", "10.0.0.1", now));
+  const auto fill = [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i)
+      places.Remember("bob", std::to_string(i), now + seconds(i + 1));
+  };
+  fill(0, web::KnownPlaces::kMaxPlaces - 1);
+  EXPECT_TRUE(places.Knows("anna", "10.0.0.1", now)) << "as many as there may be";
+  fill(web::KnownPlaces::kMaxPlaces - 1, web::KnownPlaces::kMaxPlaces);
+  EXPECT_FALSE(places.Knows("anna", "10.0.0.1", now)) << "one more: the oldest goes";
+  EXPECT_TRUE(places.Knows("bob", "0", now));
+}
+
 TEST_F(LockoutTest, ABrowserThatLoggedInBeforeIsNotLockedOutByOthers) {
   const HttpClient browser = LoggedIn("technician");
   ASSERT_EQ(browser.device_cookies.size(), 1U);
+  GuessFromFiveAddresses("technician");
   for (int i = 0; i < 8; ++i) (void)LogInFrom("127.0.0.2", "technician", kWrong);
   EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword), 429) << "a browser that is not known";
   EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword, &browser), 200);
@@ -95,46 +177,63 @@ TEST_F(LockoutTest, WhoSeesAScreenInTheRoomIsNotLockedOutByOthers) {
   for (int i = 0; i < 30; ++i)
     (void)LogInFrom("127.0.1." + std::to_string(1 + i), "technician", kWrong);
   EXPECT_TRUE(guessed_) << "shown on page and light";
+  std::string from = "127.0.0.7";
   const auto log_in = [&](const std::string& presence, const char* password) {
-    return HttpClient(port_)
-        .Post("/api/v1/login",
-              {{"name", "technician"}, {"password", password}, {"presence", presence}})
-        .status;
+    return LogInFrom(from, "technician", password, nullptr, presence);
   };
   EXPECT_EQ(log_in("", kPassword), 429);
   EXPECT_EQ(log_in("2222-2222", kPassword), 429) << "a code that no screen shows";
   const std::string code = shown();
   EXPECT_EQ(code.size(), 9U);
   EXPECT_EQ(log_in(code, kPassword), 200);
+  from = "127.0.0.8";
+  EXPECT_EQ(log_in(Typed(code), kPassword), 200) << "small letters without the dash";
   EXPECT_EQ(HttpClient(port_).Get("/api/v1/displays/presence").status, 401);
   EXPECT_EQ(engineer.Get("/api/v1/displays/presence").status, 404);
-  std::string on_console;
-  loop_->Do([&] { on_console = server_->presence_code(); });
-  EXPECT_EQ(on_console, code);
+  EXPECT_EQ(OnConsole(), code);
   // Whoever is in the room guesses no faster than others.
   for (int i = 0; i < 5; ++i) EXPECT_EQ(log_in(code, kWrong), 403) << i;
   EXPECT_EQ(log_in(code, kPassword), 429);
-  skipped_s_ += 61;
-  // Codes change; the one before is taken for ten more minutes.
+}
+
+TEST_F(LockoutTest, CodesOfPresenceChangeAndTheOneBeforeIsTakenForTenMoreMinutes) {
+  const std::string code = OnConsole();
+  skipped_s_ += 599;
+  EXPECT_EQ(OnConsole(), code);
+  skipped_s_ += 2;
+  EXPECT_NE(OnConsole(), code);
+  GuessFromFiveAddresses("technician");
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword, nullptr, code), 200);
   skipped_s_ += 600;
-  std::string next;
-  loop_->Do([&] { next = server_->presence_code(); });
-  EXPECT_NE(next, code);
-  const auto guess = [&] {
-    for (int i = 0; i < 8; ++i) (void)LogInFrom("127.0.2.1", "technician", kWrong);
+  (void)OnConsole();
+  GuessFromFiveAddresses("technician");
+  EXPECT_EQ(LogInFrom("127.0.0.4", "technician", kPassword, nullptr, code), 429);
+  EXPECT_EQ(LogInFrom("127.0.0.4", "technician", kPassword, nullptr, OnConsole()), 200);
+}
+
+/// The page without script has a field for the code, too.
+TEST_F(LockoutTest, TheFormWithoutScriptTakesTheCode) {
+  EXPECT_THAT(HttpClient(port_).Get("/result").body, HasSubstr("name=\"presence\""));
+  GuessFromFiveAddresses("technician");
+  const auto post = [&](const std::string& presence) {
+    const std::string body =
+        fmt::format("name=technician&password={}&presence={}", "correct+horse+battery", presence);
+    HttpConnection connection(port_, "127.0.0.9");
+    connection.Send(
+        fmt::format("POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+                    "application/x-www-form-urlencoded\r\nContent-Length: {}\r\n\r\n{}",
+                    body.size(), body));
+    return connection.Read().status;
   };
-  guess();
-  EXPECT_EQ(log_in(code, kPassword), 200);
-  skipped_s_ += 600;
-  loop_->Do([&] { (void)server_->presence_code(); });
-  guess();
-  EXPECT_EQ(log_in(code, kPassword), 429);
+  EXPECT_EQ(post(""), 429);
+  EXPECT_EQ(post(std::string(33, 'A')), 400);
+  EXPECT_EQ(post(OnConsole()), 303);
 }
 
 TEST_F(LockoutTest, ThePairedScreenItselfIsNotLockedOut) {
   HttpClient engineer = LoggedIn("engineer"), screen(port_);
   Pair(screen, engineer);
-  for (int i = 0; i < 8; ++i) (void)LogInFrom("127.0.0.2", "technician", kWrong);
+  GuessFromFiveAddresses("technician");
   EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword), 429);
   EXPECT_EQ(screen.LogIn("technician", kPassword), 200);
 }
@@ -214,10 +313,7 @@ TEST_F(LockoutTest, ADeviceCookieHelpsOnlyItsOwnNameAndEndsWithThePassword) {
   HttpClient browser = LoggedIn("technician");
   HttpClient forged = browser;
   for (auto& [key, value] : forged.device_cookies) value.back() = value.back() == '0' ? '1' : '0';
-  for (int i = 0; i < 8; ++i) {
-    (void)LogInFrom("127.0.0.2", "technician", kWrong);
-    (void)LogInFrom("127.0.0.4", "physicist", kWrong);
-  }
+  for (const char* name : {"technician", "physicist"}) GuessFromFiveAddresses(name);
   EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword, &forged), 429);
   EXPECT_EQ(LogInFrom("127.0.0.3", "physicist", kPassword, &browser), 429) << "another name";
   const HttpClient old = browser;
@@ -233,7 +329,7 @@ TEST_F(LockoutTest, ADeviceCookieHelpsOnlyItsOwnNameAndEndsWithThePassword) {
 
 TEST_F(LockoutTest, GuessesAtTheLoginDoNotKeepWhoIsLoggedInFromSigning) {
   HttpClient client = LoggedIn("technician");
-  for (int i = 0; i < 8; ++i) (void)LogInFrom("127.0.0.2", "technician", kWrong);
+  GuessFromFiveAddresses("technician");
   const auto sign = [&](const std::string& password) {
     return client
         .Post("/api/v1/scans/none/accept-outside", {{"reason", "because"}, {"password", password}})

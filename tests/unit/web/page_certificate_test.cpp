@@ -5,7 +5,9 @@
 
 #include <unistd.h>
 
+#include <atomic>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -38,6 +40,13 @@ class PageCertificateTest : public WebTest {
         if (is_full_) throw IoError("no space left on the disk");
         kept_ = identity;
       };
+      options.metrics_token = kToken;
+      options.wall_now = [this] {
+        ++num_looks_;
+        return std::chrono::system_clock::now() +
+               std::chrono::seconds(skipped_s_ + clock_off_s_.load());
+      };
+      options.is_clock_trusted = [this] { return is_clock_trusted_.load(); };
     });
     const json body = {{"code", setup_code_}, {"name", "engineer"}, {"password", kPassword}};
     const std::string answer = Ask("POST", "/api/v1/setup", body);
@@ -117,7 +126,84 @@ class PageCertificateTest : public WebTest {
   std::optional<web::TlsIdentity> kept_;
   bool is_full_ = false;
   std::string session_, token_;
+
+  // --- its end
+  static constexpr const char* kToken = "a-token-of-more-than-thirty-two-letters";
+  std::atomic<long> clock_off_s_ = 0;  ///< The wall clock against the steady one.
+  std::atomic<bool> is_clock_trusted_ = true;
+
+  /// Sets both clocks to so many seconds before the end of what is served.
+  void SkipToBeforeEnd(long left_s, const web::TlsIdentity& served) {
+    skipped_s_ = 0;
+    clock_off_s_ = 0;
+    skipped_s_ = static_cast<int>(web::FactsOfCertificate(served.certificate_pem).valid_until -
+                                  std::time(nullptr) - left_s);
+  }
+  long MaxAge() {
+    const std::string answer = Ask("GET", "/health"), name = "Strict-Transport-Security: max-age=";
+    const auto at = answer.find(name);
+    return at == std::string::npos ? -1 : std::stol(answer.substr(at + name.size()));
+  }
+  long LeftInMetrics() {
+    std::ofstream(folder_ / "request")
+        << "GET /metrics HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAuthorization: "
+           "Bearer "
+        << kToken << "\r\n\r\n";
+    const std::string answer = Run(
+        fmt::format("timeout 60 openssl s_client -quiet -connect 127.0.0.1:{} < request > answer",
+                    port_),
+        "answer");
+    const std::string name = "\nplumb_certificate_left_seconds ";
+    const auto at = answer.find(name);
+    return at == std::string::npos ? 0 : std::stol(answer.substr(at + name.size()));
+  }
+  /// Waits until the server has looked at the clock twice more: at the second look it has done what
+  /// followed the first.
+  void LetItCare() {
+    const int before = num_looks_;
+    for (int k = 0; k < 1200 && num_looks_ < before + 2; ++k) usleep(50'000);
+    EXPECT_GE(num_looks_, before + 2);
+  }
+  std::atomic<int> num_looks_ = 0;
 };
+
+/// One that a person set is served until its end and afterwards: nobody is locked out by a browser
+/// that remembers to insist on TLS.
+TEST_F(PageCertificateTest, BrowsersInsistOnTlsNoLongerThanTheCertificateIsValid) {
+  EXPECT_EQ(MaxAge(), 365 * 24 * 3600) << "the unit's own is valid for longer";
+  const Certificate made = Made("rsa:2048");  // for 20 days
+  ASSERT_THAT(Put(made.chain, made.key), HasSubstr("HTTP/1.1 200"));
+  ASSERT_THAT(Ask("GET", "/api/v1/session"), HasSubstr("HTTP/1.1 200"));
+  EXPECT_NEAR(static_cast<double>(MaxAge()), 20 * 24 * 3600, 120);
+  EXPECT_NEAR(static_cast<double>(LeftInMetrics()), 20 * 24 * 3600, 120);
+  SkipToBeforeEnd(1000, *kept_);
+  EXPECT_NEAR(static_cast<double>(MaxAge()), 1000, 60);
+  SkipToBeforeEnd(-1000, *kept_);
+  EXPECT_EQ(MaxAge(), 0);
+  EXPECT_NEAR(static_cast<double>(LeftInMetrics()), -1000, 60);
+  LetItCare();
+  EXPECT_EQ(Shown(), made.fingerprint) << "what a person set is not replaced";
+}
+
+/// A clock that leaps past the end makes no certificate of the future, which no browser would take.
+TEST_F(PageCertificateTest, ItsOwnIsRenewedOnlyWhenTheClockHasHeldForAnHour) {
+  clock_off_s_ = 10L * 365 * 24 * 3600;
+  LetItCare();
+  EXPECT_EQ(Shown(), own_.fingerprint) << "at once";
+  skipped_s_ += 3500;
+  LetItCare();
+  EXPECT_EQ(Shown(), own_.fingerprint) << "not an hour yet";
+  is_clock_trusted_ = false;
+  skipped_s_ += 700;
+  LetItCare();
+  EXPECT_EQ(Shown(), own_.fingerprint) << "as long as the clock is doubted";
+  is_clock_trusted_ = true;
+  skipped_s_ += 700;
+  LetItCare();
+  EXPECT_NE(Shown(), own_.fingerprint);
+  EXPECT_EQ(Shown(), kept_->fingerprint);
+  EXPECT_GT(LeftInMetrics(), 800L * 24 * 3600);
+}
 
 TEST_F(PageCertificateTest, ANewConnectionIsShownTheNewOneAndTheLogHasBothFingerprints) {
   ASSERT_EQ(Shown(), own_.fingerprint);

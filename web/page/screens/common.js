@@ -22,6 +22,16 @@ export function faultWords(status) {
   return `${words}. ${S.faultHints[status.fault_kind] ?? ''}`.trim();
 }
 
+const kSettling_ms = 1000;
+/// Shows what the appliance knows at once, and again until it has finished looking, as long as
+/// `element` is on the page.
+export async function whenSettled(path, element, show) {
+  const found = await getOrNull(path);
+  if (!found || !element.isConnected) return;
+  show(found);
+  if (!found.is_settled) setTimeout(() => whenSettled(path, element, show), kSettling_ms);
+}
+
 /// The session that a scan belongs to, or null.
 export const sessionOf = (scan) => scan.session_id ?? null;
 

@@ -9,13 +9,15 @@ import { kFraction, kName, kNote, kReason, kSite } from '../limits.js';
 import { numbersLine, toleranceOf } from '../numbers.js';
 import { lookOf, plainCode } from '../scanner.js';
 import { signedForm } from '../signed_form.js';
-import { S } from '../words.js';
+import { S, said } from '../words.js';
 import { closeSession, openPatient, resumeSession } from '../treatment.js';
 import { sourceVersion } from './captured.js';
 import { photosTaken, setUpCard, setUpNote } from './patient/set_up_sheet.js';
 import { courseStatistics } from './patient/statistics.js';
 import { planningUpload } from './planning.js';
-import { acceptanceMark, ageText, blockNote, isAdvice, outcomeBadge } from './common.js';
+import {
+  acceptanceMark, ageText, blockNote, isAdvice, outcomeBadge, sentence, whenSettled,
+} from './common.js';
 
 const waitsFor = ({ planned_by: planner }) =>
   (planner ? S.patients.waits : S.patients.waitsForPlan);
@@ -28,6 +30,24 @@ function referenceState(patient) {
   const waits = draft && h('a', { href: `#/plan/${draft}`, class: 'badge move' },
     told ? waitsFor(told) : text.draft);
   return approved || waits ? [approved, approved && waits && ' ', waits] : text.noReference;
+}
+
+/// Whom the clinic's worklist expects today. A row leads to the patient and opens nothing.
+function todaysList() {
+  const text = S.patients;
+  const element = h('section', { class: 'card', hidden: true });
+  const show = (found) => {
+    element.hidden = !found.is_on;
+    const rows = found.patients.map((one) => row(one.time || S.none,
+      h('a', { href: `#/patient/${one.patient_id}` }, one.patient_code)));
+    const nobody = found.is_settled ? text.nobodyToday : text.todayAsked;
+    redraw(element, h('h2', {}, text.today),
+      found.fault && h('p', { class: 'caution' }, sentence(said(found, 'fault'))),
+      rows.length ? table([text.todayTime, text.code], rows, text.today)
+        : !found.fault && hint(nobody),
+      found.unknown > 0 && hint(text.todayUnknown(found.unknown)));
+  };
+  return { element, load: () => whenSettled('worklist', element, show) };
 }
 
 export async function showPatients(place) {
@@ -87,7 +107,8 @@ export async function showPatients(place) {
     say(text.noMatch(search.value.trim()));
     search.select();  // or the next code would be added to this one
   });
-  clear(place, h('h1', {}, text.title),
+  const today = todaysList();
+  clear(place, h('h1', {}, text.title), today.element,
     h('section', { class: 'card' }, field(text.search, search), missed, list,
       h('label', { class: 'check below' }, archived, ' ', text.showArchived),
       h('div', { class: 'row below' },
@@ -112,6 +133,7 @@ export async function showPatients(place) {
   // Not where a keyboard on the screen would cover the list.
   if (!matchMedia('(pointer: coarse)').matches) search.focus({ preventScroll: true });
   await load();
+  today.load();
   return live.listen((kind) => { if (kind === 'data') load().catch(() => {}); });
 }
 

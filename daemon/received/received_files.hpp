@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// What plumb-dicomd received, and what became of it.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "web/model/planning.hpp"
+
+namespace plumb {
+
+/// Reads the folder of plumb-dicomd, which is another account's: nothing there is changed. What was
+/// read of a file is kept in a file of our own, so that each is read once. Thread-safe.
+class ReceivedFiles {
+ public:
+  /// @param spool  Of plumb-dicomd.
+  /// @param notes  Our own file; what cannot be read is begun anew.
+  /// @param key  For PatientHash(); of the Patient ID only that is kept.
+  ReceivedFiles(std::filesystem::path spool, std::filesystem::path notes, std::string key);
+
+  struct Entry {
+    ReceivedFile file;
+    std::string patient_hash;  ///< Empty: the file states no Patient ID.
+  };
+  struct Listing {
+    std::vector<Entry> entries;  ///< Newest first.
+    int images = 0, unlisted = 0;
+  };
+  /// Files are read by plumb-dicom-reader, a few at each call.
+  /// @throws IoError if the folder or the notes cannot be read or written.
+  [[nodiscard]] Listing List();
+
+  /// @throws DataError if there is no such file.
+  [[nodiscard]] std::filesystem::path PathOf(const std::string& name) const;
+
+  /// A draft was made of them. @throws IoError
+  void NoteReference(const std::vector<std::string>& names, const std::string& reference_id);
+
+ private:
+  /// What is known of a file once it was read.
+  struct Known {
+    ReceivedKind kind = ReceivedKind::kOther;
+    std::string instance_uid = {}, structure_set_uid = {}, label = {}, patient_hash = {},
+                reference_id = {};
+    Message fault = {};
+  };
+
+  void Load();
+  void Store() const;
+  /// Names the structure set of each plan.
+  void JoinPlans(Listing& listing) const;
+  [[nodiscard]] Known ReadOne(const std::string& name) const;
+
+  const std::filesystem::path spool_, notes_;
+  const std::string key_;
+  std::mutex mutex_;
+  bool is_loaded_ = false;
+  std::map<std::string, Known> known_;  ///< By name.
+};
+
+}  // namespace plumb

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+// What comes by DICOM, on the page of a real plumbd: received files, and the worklist of DCMTK's
+// own server.
+#include <arpa/inet.h>
+#include <sys/socket.h>
+
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <thread>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drivers/files/descriptor.hpp"
+#include "tests/support/http_client.hpp"
+#include "tests/support/plumbd.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/skip.hpp"
+#include "tests/unit/dicom/small_files.hpp"
+
+namespace plumb {
+namespace {
+
+using nlohmann::json;
+using test::HttpClient;
+using test::kPassword;
+using testing::Plumbd;
+namespace fs = std::filesystem;
+
+constexpr const char* kId = "KH-4711-SECRET";
+
+/// One that is free now.
+int FreePort() {
+  const Descriptor bound(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(::bind(bound.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  socklen_t size = sizeof address;
+  EXPECT_EQ(::getsockname(bound.get(), reinterpret_cast<sockaddr*>(&address), &size), 0);
+  return ntohs(address.sin_port);
+}
+
+std::string LocalDay(int days_from_now) {
+  const std::time_t time = std::time(nullptr) + 24L * 3600 * days_from_now;
+  std::tm local{};
+  ::localtime_r(&time, &local);
+  return fmt::format("{:04}{:02}{:02}", local.tm_year + 1900, local.tm_mon + 1, local.tm_mday);
+}
+
+class DaemonDicomTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    fs::create_directory(folder_ / "spool");
+    worklist_port_ = FreePort();
+    std::ofstream(folder_ / "plumb.toml") << fmt::format(
+        "[dicom]\nenabled = true\nlisten = \"127.0.0.1:0\"\n"
+        "senders = [\"TPS@127.0.0.1\"]\nspool = \"{}\"\n"
+        "worklist = \"CLINIC@127.0.0.1:{}\"\n",
+        (folder_ / "spool").string(), worklist_port_);
+    dicomd_ = std::make_unique<Process>(std::vector<std::string>{
+        PLUMB_DICOMD_BINARY, "--config", (folder_ / "plumb.toml").string()});
+    ASSERT_TRUE(dicomd_->WaitForStderr(", in the clear")) << dicomd_->err();
+    const std::string& said = dicomd_->err();
+    dicomd_port_ = std::stoi(said.substr(said.find(" port ") + 6));
+    plumbd_ = std::make_unique<Plumbd>(
+        folder_.path(),
+        testing::PlumbdOptions{.arguments = {"--config", (folder_ / "plumb.toml").string()}});
+    for (int i = 0; i < 10 && !plumbd_->WaitUntilUp(); ++i) {
+    }
+    plumbd_->WaitForState("ready");
+    HttpClient engineer = plumbd_->MakeFirstAccount();
+    ASSERT_TRUE(test::AddAccount(plumbd_->port(), engineer, "planner", "physicist"));
+    planner_ = std::make_unique<HttpClient>(plumbd_->port());
+    ASSERT_EQ(planner_->LogIn("planner", kPassword), 200);
+    patient_ = planner_->Post("/api/v1/patients", {{"code", "CT-1"}, {"site", "thorax"}})
+                   .json()
+                   .value("id", "");
+  }
+
+  void SendSmallCt() {
+    auto [structures, plan] = SmallCt();
+    structures.file.patient_id = plan.file.patient_id = kId;
+    const RunResult sent =
+        plumb::Run({PLUMB_BINARY, "send-dicom",
+                    Written(folder_ / "structures.dcm", DicomBytes(structures)).string(),
+                    Written(folder_ / "plan.dcm", DicomBytes(plan)).string(), "--from", "TPS",
+                    "--to", fmt::format("PLUMB@127.0.0.1:{}", dicomd_port_)});
+    ASSERT_EQ(sent.exit_code, 0) << sent.err;
+    fs::remove(folder_ / "structures.dcm");
+    fs::remove(folder_ / "plan.dcm");
+  }
+
+  /// What a page shows once the appliance has looked, and `enough` holds.
+  json Settled(const char* path, const std::function<bool(const json&)>& enough) {
+    json found;
+    for (int i = 0; i < 600; ++i) {
+      const auto answer = planner_->Get(path);
+      EXPECT_EQ(answer.status, 200) << answer.body;
+      found = answer.json();
+      if (found.value("is_settled", false) && enough(found)) return found;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    ADD_FAILURE() << path << ": " << found.dump();
+    return found;
+  }
+  json ReceivedOf(const std::string& kind, const std::function<bool(const json&)>& enough) {
+    json one;
+    (void)Settled("/api/v1/planning/received", [&](const json& found) {
+      for (const json& file : found["files"])
+        if (file["kind"] == kind && file["is_read"] == true && enough(file)) one = file;
+      return !one.is_null();
+    });
+    return one;
+  }
+
+  testing::TempFolder folder_;
+  int worklist_port_ = 0, dicomd_port_ = 0;
+  std::unique_ptr<Process> dicomd_;
+  std::unique_ptr<Plumbd> plumbd_;
+  std::unique_ptr<HttpClient> planner_;
+  std::string patient_;
+};
+
+TEST_F(DaemonDicomTest, WhatWasReceivedIsListedAndImportedByAPersonOnly) {
+  EXPECT_TRUE(
+      Settled("/api/v1/planning/received", [](const json&) { return true; })["files"].empty());
+  SendSmallCt();
+  const json plan = ReceivedOf("plan", [](const json& file) { return file["structures"] != ""; });
+  const json structures = ReceivedOf("structures", [](const json&) { return true; });
+  EXPECT_EQ(plan["structures"], structures["name"]);
+  EXPECT_EQ(plan["sender"], "TPS");
+  EXPECT_EQ(plan["address"], "127.0.0.1");
+  EXPECT_EQ(plan["patient_code"], "") << "nobody's planning files state this Patient ID yet";
+  EXPECT_EQ(plan["reference_id"], "");
+  const std::string references = "/api/v1/patients/" + patient_ + "/references";
+  EXPECT_TRUE(planner_->Get(references).json()["references"].empty()) << "nothing by itself";
+
+  const auto import = [&](const json& body) {
+    return planner_->Post("/api/v1/patients/" + patient_ + "/planning/received", body);
+  };
+  EXPECT_EQ(import({{"structures", "20260101-000000-0"}, {"plan", plan["name"]}}).status, 404);
+  EXPECT_EQ(import({{"structures", "../../etc/passwd"}, {"plan", plan["name"]}}).status, 404);
+  EXPECT_EQ(import({{"structures", plan["name"]}, {"plan", structures["name"]}}).status, 400)
+      << "the wrong way round";
+  const auto imported = import({{"structures", structures["name"]}, {"plan", plan["name"]}});
+  ASSERT_EQ(imported.status, 201) << imported.body;
+  const std::string reference = imported.json()["id"];
+  EXPECT_EQ(planner_->Get(references).json()["references"].at(0)["id"], reference);
+  const json after =
+      ReceivedOf("plan", [](const json& file) { return file["reference_id"] != ""; });
+  EXPECT_EQ(after["reference_id"], reference);
+  EXPECT_EQ(after["patient_code"], "CT-1") << "by the keyed hash";
+
+  // Another patient's files are asked about, as at an upload.
+  const std::string other =
+      planner_->Post("/api/v1/patients", {{"code", "CT-2"}, {"site", "x"}}).json().value("id", "");
+  const auto mixed = planner_->Post("/api/v1/patients/" + other + "/planning/received",
+                                    {{"structures", structures["name"]}, {"plan", plan["name"]}});
+  EXPECT_EQ(mixed.status, 409) << mixed.body;
+  EXPECT_EQ(mixed.json()["error_message"]["id"], "store.planning_patient_of");
+
+  // Neither the state folder nor the journal names the patient.
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "state")) {
+    if (!entry.is_regular_file()) continue;
+    EXPECT_NE(entry.path().extension(), ".dcm") << entry.path();
+    std::ifstream in(entry.path(), std::ios::binary);
+    const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+    EXPECT_EQ(bytes.find(kId), std::string::npos) << entry.path();
+  }
+  EXPECT_EQ(plumbd_->log().find(kId), std::string::npos);
+}
+
+/// DCMTK's server of worklists, whose entries are files.
+class DaemonWorklistTest : public DaemonDicomTest {
+ protected:
+  static bool IsInstalled() {
+    return fs::exists("/usr/bin/wlmscpfs") && fs::exists("/usr/bin/dump2dcm");
+  }
+  void AddStep(const std::string& name, const std::string& id, const std::string& day,
+               const std::string& time) {
+    fs::create_directories(folder_ / "worklists/CLINIC");
+    std::ofstream(folder_ / "worklists/CLINIC/lockfile");
+    const fs::path text = folder_ / "step.txt";
+    std::ofstream(text) << fmt::format(
+        "(0008,0050) SH [{0}]\n(0010,0010) PN [Secret^Name]\n(0010,0020) LO [{1}]\n"
+        "(0010,0030) DA [19500101]\n(0010,0040) CS [O]\n(0020,000d) UI [2.25.{4}]\n"
+        "(0032,1060) LO [treatment]\n(0040,0100) SQ\n(fffe,e000) -\n(0008,0060) CS [RTIMAGE]\n"
+        "(0040,0001) AE [LINAC1]\n(0040,0002) DA [{2}]\n(0040,0003) TM [{3}]\n"
+        "(0040,0006) PN [A^B]\n(0040,0007) LO [fraction]\n(0040,0009) SH [{0}]\n"
+        "(fffe,e00d) -\n(fffe,e0dd) -\n(0040,1001) SH [{0}]\n",
+        name, id, day, time, std::hash<std::string>()(name));
+    const RunResult made = plumb::Run({"/usr/bin/dump2dcm", text.string(),
+                                       (folder_ / "worklists/CLINIC" / (name + ".wl")).string()});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  void StartWorklist() {
+    worklist_ = std::make_unique<Process>(std::vector<std::string>{"/usr/bin/wlmscpfs", "-dfp",
+                                                                   (folder_ / "worklists").string(),
+                                                                   std::to_string(worklist_port_)});
+    for (int i = 0; i < 200; ++i) {
+      const Descriptor probe(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+      sockaddr_in to{};
+      to.sin_family = AF_INET;
+      to.sin_port = htons(static_cast<std::uint16_t>(worklist_port_));
+      to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    ADD_FAILURE() << "wlmscpfs does not listen";
+  }
+  std::unique_ptr<Process> worklist_;
+};
+
+TEST_F(DaemonWorklistTest, TodaysPatientsAreThoseWhoseHashIsKnown) {
+  if (!IsInstalled()) PLUMB_SKIP("DCMTK's programs are not installed: apt install dcmtk");
+  SendSmallCt();
+  const json plan = ReceivedOf("plan", [](const json& file) { return file["structures"] != ""; });
+  ASSERT_EQ(planner_
+                ->Post("/api/v1/patients/" + patient_ + "/planning/received",
+                       {{"structures", plan["structures"]}, {"plan", plan["name"]}})
+                .status,
+            201);
+  AddStep("A1", kId, LocalDay(0), "093000");
+  AddStep("A2", "SOMEBODY-ELSE", LocalDay(0), "100000");
+  AddStep("A3", kId, LocalDay(1), "093000");
+  StartWorklist();
+  const json before = planner_->Get("/api/v1/status").json()["session"];
+  const json list = Settled("/api/v1/worklist", [](const json&) { return true; });
+  EXPECT_TRUE(list["is_on"].get<bool>());
+  EXPECT_TRUE(list["fault"].is_null()) << list.dump();
+  ASSERT_EQ(list["patients"].size(), 1U) << list.dump();
+  EXPECT_EQ(list["patients"][0]["time"], "09:30");
+  EXPECT_EQ(list["patients"][0]["patient_code"], "CT-1");
+  EXPECT_EQ(list["patients"][0]["patient_id"], patient_);
+  EXPECT_EQ(list["unknown"], 1);
+  EXPECT_EQ(list.dump().find(kId), std::string::npos);
+  EXPECT_EQ(planner_->Get("/api/v1/status").json()["session"], before) << "it changes no session";
+  EXPECT_EQ(plumbd_->log().find(kId), std::string::npos);
+}
+
+TEST_F(DaemonWorklistTest, AServerThatIsNotThereIsSaidAndHoldsNothingUp) {
+  const json list = Settled("/api/v1/worklist", [](const json&) { return true; });
+  EXPECT_TRUE(list["is_on"].get<bool>());
+  EXPECT_TRUE(list["patients"].empty());
+  EXPECT_EQ(list["fault_message"]["id"], "dicom.no_association") << list.dump();
+  EXPECT_EQ(planner_->Get("/api/v1/patients").status, 200);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// The folder of plumb-dicomd as the appliance reads it, and today's list made of a worklist.
+#include "daemon/received/received_files.hpp"
+
+#include <fstream>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/planning/patient_hash.hpp"
+#include "daemon/received/todays_list.hpp"
+#include "drivers/dicom/find_content.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/dicom/small_files.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ReceivedFilesTest : public ::testing::Test {
+ protected:
+  void SetUp() override { fs::create_directory(spool()); }
+
+  [[nodiscard]] fs::path spool() const { return folder_ / "spool"; }
+  [[nodiscard]] ReceivedFiles Files() const { return {spool(), folder_ / "received.json", key_}; }
+  /// As plumb-dicomd keeps a file.
+  void Keep(const std::string& name, const std::string& bytes,
+            const std::string& class_uid = "1.2.840.10008.5.1.4.1.1.481.5") const {
+    Written(spool() / (name + ".dcm"), bytes);
+    std::ofstream(spool() / (name + ".json")) << fmt::format(
+        R"({{"format":1,"received_at":"2026-03-01T09:30:00Z","calling_ae_title":"TPS",)"
+        R"("address":"10.1.2.3","class_uid":"{}","instance_uid":"1.2","bytes":{}}})",
+        class_uid, bytes.size());
+  }
+  void KeepSmallCt() const {
+    const auto [structures, plan] = SmallCt();
+    Keep("20260301-093000-0000000000000001", DicomBytes(structures));
+    Keep("20260301-093001-0000000000000002", DicomBytes(plan));
+  }
+
+  testing::TempFolder folder_;
+  const std::string key_ = std::string(kPatientKeyBytes, 'k');
+};
+
+TEST_F(ReceivedFilesTest, APlanIsJoinedWithItsStructureSetAndThePatientIsOnlyAHash) {
+  KeepSmallCt();
+  const auto listing = Files().List();
+  ASSERT_EQ(listing.entries.size(), 2U);
+  const auto& [plan, hash] = listing.entries[0];
+  EXPECT_EQ(plan.kind, ReceivedKind::kPlan) << "the newest first";
+  EXPECT_EQ(plan.structures, listing.entries[1].file.name);
+  EXPECT_EQ(plan.sender, "TPS");
+  EXPECT_EQ(plan.address, "10.1.2.3");
+  EXPECT_EQ(plan.received_at, "2026-03-01T09:30:00Z");
+  EXPECT_EQ(hash, PatientHash(key_, "SIM-1"));
+  EXPECT_EQ(ReadTextFile(folder_ / "received.json", 1 << 20).find("SIM-1"), std::string::npos);
+}
+
+TEST_F(ReceivedFilesTest, WhatBecameOfThemOutlivesARestartAndEndsWithTheFile) {
+  KeepSmallCt();
+  const std::string plan = "20260301-093001-0000000000000002";
+  Files().NoteReference({plan}, "7");
+  EXPECT_EQ(Files().List().entries[0].file.kind, ReceivedKind::kPlan);
+  EXPECT_EQ(Files().List().entries[0].file.reference_id, "7");
+  fs::remove(spool() / (plan + ".dcm"));
+  (void)Files().List();
+  KeepSmallCt();
+  EXPECT_EQ(Files().List().entries[0].file.reference_id, "") << "another file of that name";
+}
+
+TEST_F(ReceivedFilesTest, DamagedFilesNotesAndMemoryHideNothingElse) {
+  KeepSmallCt();
+  Keep("20260301-093002-0000000000000003", "no DICOM at all");
+  const auto damaged = Files().List().entries;
+  ASSERT_EQ(damaged.size(), 3U);
+  EXPECT_FALSE(damaged[0].file.fault.empty());
+  EXPECT_TRUE(damaged[1].file.fault.empty());
+  for (const char* wrong : {"{", "[]", "{\"files\":{\"20260301-093002-0000000000000003\":7}}",
+                            "{\"files\":{\"../x\":{}}}"}) {
+    std::ofstream(folder_ / "received.json") << wrong;
+    EXPECT_EQ(Files().List().entries.size(), 3U) << wrong;
+    std::ofstream(spool() / "20260301-093001-0000000000000002.json") << wrong;
+    const auto entries = Files().List().entries;
+    ASSERT_EQ(entries.size(), 3U) << wrong;
+    EXPECT_EQ(entries[1].file.kind, ReceivedKind::kPlan) << wrong;
+    EXPECT_EQ(entries[1].file.sender, "") << wrong;
+  }
+}
+
+TEST_F(ReceivedFilesTest, ImagesAreCountedAndOnlyNamesOfOursAreOpened) {
+  Keep("20260301-093000-0000000000000001", "an image", "1.2.840.10008.5.1.4.1.1.2");
+  Written(spool() / "a foreign name.dcm", "x");
+  ReceivedFiles files = Files();
+  EXPECT_EQ(files.List().images, 1);
+  EXPECT_TRUE(files.List().entries.empty());
+  EXPECT_NO_THROW((void)files.PathOf("20260301-093000-0000000000000001"));
+  for (const char* name :
+       {"", "../received", "a foreign name", "20260301-093000-000000000000000f", "/etc/passwd"})
+    EXPECT_THROW((void)files.PathOf(name), DataError) << name;
+}
+
+TEST_F(ReceivedFilesTest, EightAreReadAtOnceAndAHundredAreListed) {
+  for (int i = 0; i < 101; ++i) Keep(fmt::format("20260301-093000-{:016x}", i), "no DICOM");
+  ReceivedFiles files = Files();
+  const auto count_read = [&] {
+    const auto entries = files.List().entries;
+    return std::ranges::count_if(entries, [](const auto& one) { return one.file.is_read; });
+  };
+  EXPECT_EQ(count_read(), 8);
+  EXPECT_EQ(count_read(), 16);
+  EXPECT_EQ(files.List().entries.size(), 100U);
+  EXPECT_EQ(files.List().unlisted, 1);
+}
+
+TEST_F(ReceivedFilesTest, WithoutTheFolderTheReasonIsSaid) {
+  fs::remove_all(spool());
+  ReceivedFiles files = Files();
+  EXPECT_THROW((void)files.List(), IoError);
+}
+
+TEST(TodaysListTest, OnlyKnownPatientsAreNamedInTheOrderOfTheDay) {
+  const std::string key(kPatientKeyBytes, 'k');
+  const PlannedPatients known = {{PatientHash(key, "A"), {"1", "CT-1"}},
+                                 {PatientHash(key, "B"), {"2", "CT-2"}}};
+  const TodaysWorklist list = ListToday(
+      {{"A", "1015"}, {"B ", "0930"}, {"C", "0800"}, {"", "0700"}, {"A", "x"}}, key, known);
+  ASSERT_EQ(list.patients.size(), 3U);
+  EXPECT_EQ(list.patients[0].time, "");
+  EXPECT_EQ(list.patients[1].patient_code, "CT-2");
+  EXPECT_EQ(list.patients[1].time, "09:30");
+  EXPECT_EQ(list.patients[2].patient_id, "1");
+  EXPECT_EQ(list.unknown, 2);
+  EXPECT_EQ(ListToday({{"A", "1015"}}, std::string(kPatientKeyBytes, 'j'), known).unknown, 1)
+      << "another unit's key";
+}
+
+TEST(FindContentTest, RequestAndAnswerAreReadAsTheyWereWritten) {
+  const WorklistRequest request{.peer = {.ae_title = "RIS", .host = "10.0.0.1", .port = 104},
+                                .own_ae_title = "PLUMB",
+                                .station_ae_title = "LINAC1",
+                                .date = "20260301",
+                                .tls = {.certificate = "a", .key = "b", .trusted = "c"}};
+  const WorklistRequest read = ParseWorklistRequest(WorklistRequestText(request));
+  EXPECT_EQ(read.peer.port, 104);
+  EXPECT_EQ(read.station_ae_title, "LINAC1");
+  EXPECT_EQ(read.date, "20260301");
+  EXPECT_EQ(read.tls.trusted, "c");
+  const auto steps = ParseWorklist(WorklistText({{"A\"\n", "0930"}, {"", ""}}));
+  ASSERT_EQ(steps.size(), 2U);
+  EXPECT_EQ(steps[0].patient_id, "A\"\n");
+  for (const char* wrong : {"", "{}", "[1]", "[{\"patient_id\": 1, \"time\": \"\"}]", "[{}]"})
+    EXPECT_THROW((void)ParseWorklist(wrong), DataError) << wrong;
+  EXPECT_THROW((void)ParseWorklistRequest("[]"), DataError);
+}
+
+}  // namespace
+}  // namespace plumb

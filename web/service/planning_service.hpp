@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What comes over the clinic's network by DICOM: planning files, and the list of today's patients.
+#pragma once
+
+#include <string>
+
+#include "web/model/account.hpp"
+#include "web/model/change.hpp"
+#include "web/model/planning.hpp"
+
+namespace plumb::web {
+
+/// Received files to import for a patient.
+struct ReceivedChoice {
+  std::string structures, plan;  ///< Their names.
+  std::string roi, beam, reason;
+  bool is_same_patient = false;  ///< As in SentPlanning.
+};
+
+/// The rules of services.hpp hold.
+class PlanningService {
+ public:
+  virtual ~PlanningService() = default;
+
+  /// As it is known now; files that came since are read beside it (Received::is_settled).
+  [[nodiscard]] virtual Received GetReceived() = 0;
+  /// As ReferenceService::AddPlanning(): a draft, with every check and question of an upload.
+  /// kNotFound for files that are not there any more.
+  virtual void ImportReceived(const Actor& actor, const std::string& patient_id,
+                              const ReceivedChoice& choice, Done done) = 0;
+  /// As it is known now; the clinic's worklist is asked at most once a minute. Changes nothing.
+  [[nodiscard]] virtual TodaysWorklist GetWorklist() = 0;
+};
+
+}  // namespace plumb::web
