@@ -114,6 +114,9 @@ export class Person {
   async click(kind, name) {
     await this.until(`a press of ${name}`, async () => {
       const element = await this.find(kind, name);
+      // The driver itself leaves it below the window.
+      await this.run((one) => one.scrollIntoView({ block: 'center', behavior: 'instant' }),
+        { [kElement]: element }).catch(() => {});
       return this.call('POST', `/element/${element}/click`).then(() => true, (error) => {
         if (/stale|intercepted|interactable/.test(error.message)) return false;
         throw error;

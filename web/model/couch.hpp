@@ -3,7 +3,6 @@
 // counts them. Everything that shows a correction or a live motion asks CouchAxisOf().
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -91,7 +90,9 @@ struct CouchRow {
 
 /// In an unknown room the numbers run along other axes, which no profile of a couch is about.
 [[nodiscard]] inline bool RunsAlongCouch(const ResultSummary& result) {
-  return std::ranges::all_of(result.axes, &Message::empty);
+  for (std::size_t i = 0; i < result.axes.size(); ++i)
+    if (!result.axes.at(i).empty() && result.axes.at(i) != AxisName(i)) return false;
+  return true;
 }
 
 /// The six numbers of a result for people; none without an answer.

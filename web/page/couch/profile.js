@@ -33,8 +33,8 @@ function profileForm(couch) {
       done(S.saved);
     }, h('div', { class: 'row' }, h('button', { class: 'primary' }, text.sign)),
     field(text.name, name), field(text.numAxes, axes), field(text.unit, unit),
-    h('fieldset', {}, h('legend', {}, text.reverses), hint(text.reversesHint),
-      reverses.map(({ element }) => element)),
+    h('fieldset', { class: 'reverses' }, h('legend', {}, text.reverses),
+      hint(text.reversesHint), reverses.map(({ element }) => element)),
     hides.element));
 }
 
