@@ -198,7 +198,7 @@ async () => {
   equal(await card(anna, 'Vertical').locator('.word').innerText(), 'down', 'the body');
   equal(await anna.locator('.number').count(), 3, 'rotations are in tolerance: left out');
   await anna.getByText('Apply the 3 numbers below that the couch can move').waitFor();
-  await anna.getByText('It cannot correct: Pitch; Roll; Yaw.').waitFor();
+  await anna.getByText('It cannot correct: Pitch, Roll, Yaw.').waitFor();
   await anna.getByText('Couch readings: what to set').click();
   await anna.getByLabel('Vertical (cm)').fill('12.4');
   await anna.getByText('Vertical: set to 13.2 cm').waitFor();
