@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/acceptance/number_judgement.hpp"
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/utf8.hpp"

@@ -64,12 +64,12 @@ function siteTable(site, which) {
 function courseTable(courses, which) {
   const text = S.statistics;
   const axes = courses[0].numbers.map(axisName);
-  const heads = [S.patients.code, S.result.reference, text.fractionsHead, text.scansHead,
-    text.overridesHead, ...axes];
+  const heads = [S.patients.code, text.fractionsHead, text.scansHead, text.overridesHead, ...axes];
   return table(heads,
     courses.map((course) => row(
-      h('a', { href: `#/patient/${course.patient_id}` }, course.code), versionOf(course),
-      course.fractions, course.scans, course.overrides,
+      // Below the code, not in a column of its own: ten columns are as many as fit at 1280 px.
+      h('td', {}, h('a', { href: `#/patient/${course.patient_id}` }, course.code), h('br'),
+        h('small', {}, versionOf(course))), course.fractions, course.scans, course.overrides,
       ...course.numbers.map((number) => cell(meanWords(number[which], number.unit))))),
     text.ofCourses);
 }
