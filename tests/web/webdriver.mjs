@@ -91,11 +91,11 @@ export class Person {
     if (!response.ok) throw new Error(`${method} ${path}: ${value.error}: ${value.message}`);
     return value;
   }
-  async until(what, holds) {
+  async until(what, holds, patience_ms = kPatience_ms) {
     for (const begun = Date.now(); ;) {
       const found = await holds();
       if (found) return found;
-      if (Date.now() - begun > kPatience_ms) throw new Error(`expected: ${what}`);
+      if (Date.now() - begun > patience_ms) throw new Error(`expected: ${what}`);
       await after(kLook_ms);
     }
   }

@@ -37,13 +37,16 @@ async function logIn(page, name) {
 async function sweep(page, shows, verdict) {
   h.tell(shows);
   await page.goto(`${h.url}#/scan`);
-  await page.until('a button that starts', () => page.run(() => {
+  const begins = () => page.run(() => {
     const button = document.querySelector('button.giant');
-    return Boolean(button) && !button.disabled
-      && ['Start sweep', 'Scan again'].includes(button.textContent);
-  }));
-  await page.click('button', await page.run(() =>
-    document.querySelector('button.giant').textContent));
+    const words = button && !button.disabled ? button.textContent : '';
+    return ['Start sweep', 'Scan again'].includes(words) ? words : '';
+  });
+  await page.until('a sweep', async () => {
+    await page.click('button', await page.until('a button that starts', begins));
+    // A press is lost where the screen is drawn anew just then.
+    return page.until('its beginning', async () => !await begins(), 5000).catch(() => false);
+  });
   await page.until(verdict, () => page.run(
     (word) => document.querySelector('.verdict .word')?.textContent.includes(word), verdict));
 }
