@@ -272,6 +272,7 @@ void Appliance::ReadStored(Status& status) {
   if (status.session && status.session->id != session_.id()) status.session.reset();
   status.waiting = store_->references.Waiting();
   status.last_check = store_->checks.Last();
+  status.couch = store_->couch.Get();
   if (session_.IsOpen())
     status.scans_today = store_->scans.CountSince(session_.patient_id(), StartOfDay());
   if (last_result_) status.last_result = store_->scans.Find(last_result_->id);

@@ -231,6 +231,9 @@ ALTER TABLE sessions ADD COLUMN chosen_at_version INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE patients ADD COLUMN immobilisation TEXT NOT NULL DEFAULT '';
 ALTER TABLE patients ADD COLUMN alert TEXT NOT NULL DEFAULT '';
 ALTER TABLE patients ADD COLUMN photo TEXT NOT NULL DEFAULT '';
+-- The posture that plans of a site begin with, and what is said to whoever sweeps.
+ALTER TABLE templates ADD COLUMN posture TEXT NOT NULL DEFAULT '';
+ALTER TABLE templates ADD COLUMN hint TEXT NOT NULL DEFAULT '';
 -- Backups that were made, when their bytes were last compared with the digest (verified_at: and were
 -- the same), and the scans of which each one holds every file as it was stored.
 CREATE TABLE backups (

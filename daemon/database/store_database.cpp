@@ -17,8 +17,9 @@ StoreDatabase::StoreDatabase(std::unique_ptr<Database> write, const std::filesys
 namespace {
 
 /// Prefixes of the actions after which the log of writes is emptied.
-constexpr std::array<std::string_view, 8> kDeciding = {
-    "reference.", "user.", "display.", "room.", "check.", "settings.", "template.", "scan."};
+constexpr std::array<std::string_view, 9> kDeciding = {"reference.", "user.",     "display.",
+                                                       "room.",      "couch.",    "check.",
+                                                       "settings.",  "template.", "scan."};
 
 }  // namespace
 

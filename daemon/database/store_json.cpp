@@ -12,6 +12,7 @@
 #include "algo/acceptance/gates.hpp"
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "daemon/database/stored_values.hpp"
 #include "daemon/result/axis_names.hpp"
 #include "daemon/result/stored_result.hpp"
 #include "web/model/limits.hpp"
@@ -77,6 +78,11 @@ class Stored {
       Fail(say::store::ValueNoAcceptLive(key));
     return value->get<std::string>();
   }
+  [[nodiscard]] std::string Text(const char* key) const {
+    const StoredJson* value = Find(key);
+    if (value == nullptr || !value->is_string()) Fail(say::store::ValueNoText(key));
+    return value->get<std::string>();
+  }
   /// A point of finite numbers.
   template <std::size_t kSize>
   [[nodiscard]] std::array<double, kSize> Point(const char* key, const StoredJson& json) const {
@@ -100,6 +106,10 @@ class Stored {
   StoredJson json_;
   Message (*unreadable_)(Message why);
 };
+
+std::string ReversesKey(std::size_t number) {
+  return std::string("reverses_") + kNumberAxes.at(number).name;
+}
 
 }  // namespace
 
@@ -170,6 +180,37 @@ Settings ParseSettings(const std::string& text) {
   if (stored.Find("accept_live") != nullptr) s.accept_live = stored.AcceptLive("accept_live");
   number("breath_window_mm", s.breath_window_mm, kBreathWindow_mm);
   return s;
+}
+
+std::string CouchJson(const CouchProfile& couch) {
+  StoredJson json = {{"version", couch.version},
+                     {"name", couch.name},
+                     {"num_axes", couch.num_axes},
+                     {"is_in_cm", couch.is_in_cm},
+                     {"hides_rest", couch.hides_rest},
+                     {"signed_by", couch.signed_by},
+                     {"signed_at", ToStored(couch.signed_at)}};
+  for (std::size_t i = 0; i < kNumberAxes.size(); ++i) json[ReversesKey(i)] = couch.reverses.at(i);
+  return json.dump();
+}
+
+CouchProfile ParseCouch(const std::string& text) {
+  const Stored stored(text, say::store::StoredCouchUnreadable);
+  constexpr double kMaxNumber = 9e15;  // exact as a floating-point number
+  CouchProfile couch;
+  couch.version = static_cast<int>(stored.Number("version", {1, 1e9}));
+  couch.name = stored.Text("name");
+  couch.num_axes = static_cast<int>(stored.Number("num_axes", {3, 6}));
+  if (!IsCouchAxes(couch.num_axes))
+    stored.Fail(say::store::ValueOutOfRange("num_axes", couch.num_axes, 3, 6));
+  couch.is_in_cm = stored.Flag("is_in_cm");
+  couch.hides_rest = stored.Flag("hides_rest");
+  couch.signed_by = stored.Text("signed_by");
+  couch.signed_at =
+      FromStored(static_cast<std::int64_t>(stored.Number("signed_at", {-kMaxNumber, kMaxNumber})));
+  for (std::size_t i = 0; i < kNumberAxes.size(); ++i)
+    couch.reverses.at(i) = stored.Flag(ReversesKey(i).c_str());
+  return couch;
 }
 
 ResultSummary SummaryOf(const std::string& result_json) {

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "web/model/couch.hpp"
 #include "web/model/reference.hpp"
 #include "web/model/scan.hpp"
 #include "web/model/settings.hpp"
@@ -24,6 +25,10 @@ namespace plumb {
 /// may.
 /// @throws DataError stating what is wrong.
 [[nodiscard]] Settings ParseSettings(const std::string& text);
+
+[[nodiscard]] std::string CouchJson(const CouchProfile& couch);
+/// All must be present and valid. @throws DataError stating what is wrong.
+[[nodiscard]] CouchProfile ParseCouch(const std::string& text);
 
 /// The list entry of a result.json. @throws DataError as ParseResult()
 [[nodiscard]] ResultSummary SummaryOf(const std::string& result_json);

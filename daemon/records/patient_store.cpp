@@ -312,7 +312,8 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
       "ifnull((SELECT "
       "language FROM preferences WHERE user = opened_by), ''), kept.source, newest.source, "
       "other.id, "
-      "other.version, other.source, newest.version > chosen_at_version FROM open "
+      "other.version, other.source, newest.version > chosen_at_version, ifnull((SELECT hint FROM "
+      "templates WHERE templates.site = patients.site), '') FROM open "
       "JOIN patients ON patients.id = "
       "open.patient_id LEFT JOIN refs AS kept ON kept.id = ifnull(reference_id, newest_id) LEFT "
       "JOIN refs AS newest ON newest.id = newest_id LEFT JOIN refs AS other ON other.id = (SELECT "
@@ -335,6 +336,7 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
               .source = ParseStored<ReferenceSource>("source", row.Text(source))};
         };
         session.language = row.Text(13);
+        session.sweep_hint = row.Text(20);
         if (!row.IsNull(8)) session.reference = version(8, 14);
         if (session.reference && row.Text(10) != session.reference->id && row.Integer(19) != 0)
           session.newer_reference = version(10, 15);

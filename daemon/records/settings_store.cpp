@@ -1,15 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/settings_store.hpp"
 
+#include <utility>
+
+#include "daemon/database/clock_doubt.hpp"
 #include "daemon/database/store_json.hpp"
 #include "daemon/database/store_refusal.hpp"
-#include "daemon/records/clock_doubt.hpp"
 #include "words/store.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr const char* kStoredSettings = "SELECT value FROM settings WHERE name = 'settings'";
+
+constexpr const char* kTemplateColumns =
+    "SELECT site, width_mm, height_mm, shift_mm, rotation_deg, changed_by, posture, hint FROM "
+    "templates ";
+
+PlanTemplate ReadTemplate(const Statement& row) {
+  return {.site = row.Text(0),
+          .width_mm = row.Real(1),
+          .height_mm = row.Real(2),
+          .tolerance = {.shift_mm = row.Real(3), .rotation_deg = row.Real(4)},
+          .changed_by = row.Text(5),
+          .posture = row.Text(6),
+          .hint = row.Text(7)};
+}
+
+Message ValuesForLog(const PlanTemplate& one) {
+  Message values = say::store::LogTemplateValues(
+      one.width_mm, one.height_mm, one.tolerance.shift_mm, one.tolerance.rotation_deg);
+  if (one.posture.empty() && one.hint.empty()) return values;
+  return say::store::LogTemplateWords(std::move(values), one.posture, one.hint);
+}
 
 }  // namespace
 
@@ -34,16 +57,8 @@ void SettingsStore::Change(const Actor& actor, const Settings& settings) {
 }
 
 std::vector<PlanTemplate> TemplateStore::List() {
-  return database_.ForRows()->All(
-      "SELECT site, width_mm, height_mm, shift_mm, rotation_deg, changed_by FROM templates ORDER "
-      "BY site LIMIT 100",
-      [](const Statement& row) {
-        return PlanTemplate{.site = row.Text(0),
-                            .width_mm = row.Real(1),
-                            .height_mm = row.Real(2),
-                            .tolerance = {.shift_mm = row.Real(3), .rotation_deg = row.Real(4)},
-                            .changed_by = row.Text(5)};
-      });
+  return database_.ForRows()->All(std::string(kTemplateColumns) + "ORDER BY site LIMIT 100",
+                                  ReadTemplate);
 }
 
 void TemplateStore::Set(const Actor& actor, const PlanTemplate& wanted) {
@@ -52,20 +67,17 @@ void TemplateStore::Set(const Actor& actor, const PlanTemplate& wanted) {
   if (change->FirstInteger("SELECT count(*) FROM templates WHERE site <> ?", wanted.site) >=
       kMaxTemplates)
     throw StoreRefusal(ChangeResult::kConflict, say::store::TemplatesFull());
-  Message values = say::store::LogTemplateValues(
-      wanted.width_mm, wanted.height_mm, wanted.tolerance.shift_mm, wanted.tolerance.rotation_deg);
+  Message values = ValuesForLog(wanted);
   const std::optional<Message> before = change->First(
-      "SELECT width_mm, height_mm, shift_mm, rotation_deg FROM templates WHERE site = ?",
-      [](const Statement& row) {
-        return say::store::LogTemplateValues(row.Real(0), row.Real(1), row.Real(2), row.Real(3));
-      },
-      wanted.site);
+      std::string(kTemplateColumns) + "WHERE site = ?",
+      [](const Statement& row) { return ValuesForLog(ReadTemplate(row)); }, wanted.site);
   change->Run(
-      "INSERT INTO templates (site, width_mm, height_mm, shift_mm, rotation_deg, changed_by) "
-      "VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT (site) DO UPDATE SET site = ?1, width_mm = "
-      "?2, height_mm = ?3, shift_mm = ?4, rotation_deg = ?5, changed_by = ?6",
+      "INSERT INTO templates (site, width_mm, height_mm, shift_mm, rotation_deg, changed_by, "
+      "posture, hint) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (site) DO UPDATE SET "
+      "site = ?1, width_mm = ?2, height_mm = ?3, shift_mm = ?4, rotation_deg = ?5, changed_by = "
+      "?6, posture = ?7, hint = ?8",
       wanted.site, wanted.width_mm, wanted.height_mm, wanted.tolerance.shift_mm,
-      wanted.tolerance.rotation_deg, actor.user);
+      wanted.tolerance.rotation_deg, actor.user, wanted.posture, wanted.hint);
   change.Log(actor, "template.set", "",
              before ? say::store::LogTemplateChanged(wanted.site, std::move(values), *before)
                     : say::store::LogTemplate(wanted.site, std::move(values)));

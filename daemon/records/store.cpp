@@ -11,11 +11,11 @@
 #include <cerrno>
 #include <cstring>
 
+#include "daemon/database/clock_doubt.hpp"
 #include "daemon/database/database_mark.hpp"
 #include "daemon/database/page_seals.hpp"
 #include "daemon/database/retry_while_busy.hpp"
 #include "daemon/database/schema.hpp"
-#include "daemon/records/clock_doubt.hpp"
 #include "daemon/state_folder/old_copies.hpp"
 #include "daemon/state_folder/restore_note.hpp"
 #include "daemon/state_folder/scan_numbers.hpp"

@@ -12,6 +12,7 @@
 #include <sys/types.h>
 
 #include "daemon/database/audit_store.hpp"
+#include "daemon/database/couch_store.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/records/account_store.hpp"
 #include "daemon/records/check_store.hpp"
@@ -120,6 +121,7 @@ class Store {
   TreatmentStore treatments{database_};
   CheckStore checks{database_};
   RoomStore room{database_};
+  CouchStore couch{database_};
   ScanStore scans{database_, folders};
   FileIntegrity integrity;
   ReferenceStore references{database_, integrity};

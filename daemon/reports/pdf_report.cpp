@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/acceptance/number_judgement.hpp"
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/utf8.hpp"
@@ -237,7 +238,7 @@ std::string ValueAndU95(double value, std::optional<double> u95, int most,
 }
 
 /// The number with its interval on a line of twice the tolerance, which is shaded.
-void ToleranceBar(Pages& pages, double x, double at, double width, const ShownRow& number) {
+void ToleranceBar(Pages& pages, double x, double at, double width, const CouchRow& number) {
   if (!(number.tolerance > 0)) return;
   const double middle = x + width / 2, scale = width / (4 * number.tolerance);
   const auto place = [&](double value) { return std::clamp(middle + value * scale, x, x + width); };
@@ -247,24 +248,23 @@ void ToleranceBar(Pages& pages, double x, double at, double width, const ShownRo
   const double u95 = number.u95.value_or(0.0);
   pages.Line(place(*number.value - u95), at, place(*number.value + u95), at, kBlack, 1.6);
   pages.Dot(place(*number.value), at, 2.2,
-            number.judgement == NumberJudgement::kWithin ? kGood : kMove);
+            number.judged.judgement == NumberJudgement::kWithin ? kGood : kMove);
 }
 
-void NumberLine(Pages& pages, const ShownRow& number, Verdict verdict, const Catalogue& language) {
+void NumberLine(Pages& pages, const CouchRow& number, const Catalogue& language) {
   const double line = pages.y + 15;
   constexpr double kNameSize = 9.5, kNameWidth = 82;
   pages.y = line - 1.3 * kNameSize;  // the first line of the name is on this line
-  pages.Paragraph(kMargin, kNameWidth, Text(number.name, language), kNameSize, kBlack, true);
+  pages.Paragraph(kMargin, kNameWidth, Text(number.judged.name, language), kNameSize, kBlack, true);
   const double name_end = pages.y;
   if (!number.value) {
     pages.Text(kMargin + 85, line, Word(say::result::kNotKnown, language), 9.5, kGrey);
     return;
   }
-  const bool is_shift = IsShift(number.number);
-  const std::string unit = is_shift ? " mm" : "\u00b0";
+  const std::string unit = UnitBehind(number.axis);
   pages.Text(kMargin + 85, line,
-             ValueAndU95(*number.value, number.u95, is_shift ? 1 : 2, language) + unit, 9.5, kBlack,
-             true);
+             ValueAndU95(*number.value, number.u95, number.axis.digits, language) + unit, 9.5,
+             kBlack, true);
   pages.Text(
       kMargin + 180, line,
       Text(say::result::ReportTolerance(PlainNumber(number.tolerance, language.decimal), unit),
@@ -275,12 +275,12 @@ void NumberLine(Pages& pages, const ShownRow& number, Verdict verdict, const Cat
   constexpr double kJudgementAt = 265, kJudgementSize = 8.5;
   pages.y = line - 1.3 * kJudgementSize;  // the first line of the judgement is on this line
   pages.Paragraph(kMargin + kJudgementAt, kWordsAt - kJudgementAt - 4,
-                  Text(JudgementWord(number.judgement), language), kJudgementSize,
-                  number.judgement == NumberJudgement::kWithin ? kGood : kMove, true);
+                  Text(JudgementWord(number.judged.judgement), language), kJudgementSize,
+                  number.judged.judgement == NumberJudgement::kWithin ? kGood : kMove, true);
   const double judgement_end = pages.y;
   pages.y = line - 1.3 * kWordsSize;  // the first line of the words is on this line
-  pages.Paragraph(kMargin + kWordsAt, pages.inner() - kWordsAt,
-                  Text(WayOf(number, verdict), language), kWordsSize);
+  pages.Paragraph(kMargin + kWordsAt, pages.inner() - kWordsAt, Text(number.way, language),
+                  kWordsSize);
   pages.y = std::max({pages.y, line + 5, name_end, judgement_end});
 }
 
@@ -447,8 +447,9 @@ void Draw(Pages& pages, const ScanReport& report) {
   for (const std::string& caution : report.cautions)
     pages.Paragraph(kMargin, pages.inner(), "! " + caution, 9, kMove, true);
   if (!report.numbers.empty()) pages.y += 2;
-  for (const ShownRow& number : report.numbers)
-    NumberLine(pages, number, report.result_verdict, *report.language);
+  for (const CouchRow& number : report.numbers)
+    if (!number.is_hidden) NumberLine(pages, number, *report.language);
+  for (const std::string& note : report.couch) pages.Paragraph(kMargin, pages.inner(), note, 8);
   if (!report.body.empty()) {
     Heading(pages, Word(say::result::kPosture, *report.language));
     for (const std::string& words : report.body)
@@ -461,8 +462,8 @@ void Draw(Pages& pages, const ScanReport& report) {
   if (pages.y + kSignature > pages.bottom()) pages.Next();
   SignatureLine(pages, *report.language);
   std::array<double, 2> limits{};
-  for (const ShownRow& number : report.numbers)
-    limits.at(IsShift(number.number) ? 0 : 1) = number.tolerance;
+  for (const CouchRow& number : report.numbers)
+    limits.at(IsShift(number.judged.number) ? 0 : 1) = number.judged.tolerance;
   const double trends = report.trend.size() < 2 ? 0.0 : 2 * kTrendRow + kSignature;
   const bool fits = pages.y + trends + kSignature < pages.bottom();
   if (fits) Trends(pages, report.trend, limits, *report.language);

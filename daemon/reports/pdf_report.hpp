@@ -10,8 +10,8 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "algo/acceptance/shown_row.hpp"
 #include "algo/base/message.hpp"
+#include "web/model/couch.hpp"
 
 namespace plumb {
 
@@ -35,8 +35,8 @@ struct ScanReport {
   const Catalogue* language = &EnglishCatalogue();  ///< Of the fixed texts; never null.
   std::string title, verdict, why;
   ReportFacts identity;  ///< Patient, time with zone, versions, planner, approver and accepter.
-  std::vector<ShownRow> numbers;
-  Verdict result_verdict = Verdict::kNoAnswer;  ///< Decides what to do about each number.
+  std::vector<CouchRow> numbers;
+  std::vector<std::string> couch = {};  ///< How the couch counts them, and what it cannot do.
   std::vector<std::string> cautions;
   ReportFacts quality;
   std::vector<std::string> body;  ///< Differences by part of the body.

@@ -280,13 +280,19 @@ std::string SpreadText(const NumberSpreads& spreads, const Catalogue& language) 
 }
 
 /// Over the fractions, where there are several.
-void AddStatistics(ReportFacts& facts, const std::vector<Scan>& scans, const Catalogue& language) {
-  const CourseStatistics course = StatisticsOf(scans);
-  if (course.fractions < 2) return;
-  facts.emplace_back(Word(say::result::kReportFirstScans, language),
-                     SpreadText(course.first, language));
-  facts.emplace_back(Word(say::result::kReportLastScans, language),
-                     SpreadText(course.last, language));
+void AddStatistics(ReportFacts& facts, const ReportSources& stored, const std::vector<Scan>& scans,
+                   const Catalogue& language) {
+  for (const auto& [reference_id, course] : PartsOf(scans)) {
+    if (course.fractions < 2) continue;
+    const std::optional<Reference> reference = stored.references.Find(reference_id);
+    const auto told = [&](const NumberSpreads& spreads) {
+      const std::string text = SpreadText(spreads, language);
+      return reference ? Text(say::result::ReportSpreadOf(text, reference->version), language)
+                       : text;
+    };
+    facts.emplace_back(Word(say::result::kReportFirstScans, language), told(course.first));
+    facts.emplace_back(Word(say::result::kReportLastScans, language), told(course.last));
+  }
 }
 
 }  // namespace
@@ -297,20 +303,23 @@ ScanReport DescribeScan(const ReportSources& stored, const Scan& scan, const Cat
   const ScanFiles files = FilesOf(scan);
   const web::ScanQuality quality = QualityOf(scan, files, stored.warm_up_min);
   ReportPictures drawn = PicturesOf(stored, scan, reference, files.result, language);
-  ScanReport report{.language = &language,
-                    .title = Word(say::result::kReportScanTitle, language),
-                    .verdict = VerdictOf(scan, language),
-                    .why = WhyOf(scan, language),
-                    .identity = IdentityOf(scan, patient, reference, language),
-                    .numbers = scan.result ? ShownRows(*scan.result) : std::vector<ShownRow>(),
-                    .result_verdict = scan.result ? scan.result->verdict : Verdict::kNoAnswer,
-                    .cautions = CautionsOf(quality, language),
-                    .quality = FactsOf(quality.rows, language),
-                    .body = {},
-                    .pictures = std::move(drawn.pictures),
-                    .pictures_note = std::move(drawn.note),
-                    .footer = Footer(language)};
+  ScanReport report{
+      .language = &language,
+      .title = Word(say::result::kReportScanTitle, language),
+      .verdict = VerdictOf(scan, language),
+      .why = WhyOf(scan, language),
+      .identity = IdentityOf(scan, patient, reference, language),
+      .numbers = scan.result ? CouchRows(*scan.result, stored.couch) : std::vector<CouchRow>(),
+      .cautions = CautionsOf(quality, language),
+      .quality = FactsOf(quality.rows, language),
+      .body = {},
+      .pictures = std::move(drawn.pictures),
+      .pictures_note = std::move(drawn.note),
+      .footer = Footer(language)};
   if (report.numbers.empty()) return report;
+  if (RunsAlongCouch(*scan.result))
+    for (const Message& note : CouchNotes(stored.couch))
+      report.couch.push_back(Text(note, language));
   if (!scan.patient_id.empty()) report.trend = TrendUntil(stored, scan, language);
   for (const Message& part : scan.result->body_after) report.body.push_back(Text(part, language));
   if (report.body.empty()) report.body.emplace_back(Word(say::result::kAsReference, language));
@@ -334,7 +343,7 @@ CourseReport DescribeCourse(const ReportSources& stored, const Patient& patient,
     report.tolerance = {tolerance.shift_mm, tolerance.rotation_deg};
   }
   std::vector<Scan> scans = stored.scans.List(patient.id, kMaxScans);
-  AddStatistics(report.identity, scans, language);
+  AddStatistics(report.identity, stored, scans, language);
   bool is_any_overdue = false, is_any_failed = false;
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != ScanOutcome::kDone) continue;

@@ -12,6 +12,7 @@
 #include "daemon/records/scan_store.hpp"
 #include "daemon/reports/pdf_report.hpp"
 #include "daemon/reports/report_pictures.hpp"
+#include "web/model/couch.hpp"
 #include "web/service/scan_service.hpp"
 
 namespace plumb {
@@ -23,6 +24,7 @@ struct ReportSources {
   ScanStore& scans;
   double warm_up_min;       ///< Time that a sensor must have been on to be warm.
   RoomFinder room_in = {};  ///< As the room is known now: for pictures of plans.
+  CouchProfile couch = {};
 };
 
 /// One page: identity, plan and approval, verdict, the six numbers with uncertainty and tolerance,

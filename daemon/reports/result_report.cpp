@@ -30,19 +30,20 @@ ResultWords WordsOfVerdict(Verdict verdict) {
 }
 
 /// None without an answer, which must not be acted on.
-std::vector<ShownRow> RowsOf(const StoredResult& result) {
-  std::vector<ShownRow> rows;
+std::vector<CouchRow> RowsOf(const StoredResult& result) {
+  std::vector<CouchRow> rows;
   if (!result.correction || result.verdict == Verdict::kNoAnswer) return rows;
   const StoredCorrection& correction = *result.correction;
   const std::array<Message, 6> names = AxisNames(result.body);
   for (std::size_t i = 0; i < names.size(); ++i)
-    rows.push_back({.name = names[i].empty() ? AxisName(i) : names[i],
-                    .number = i,
-                    .value = correction.value[i],
-                    .u95 = correction.u95[i],
-                    .tolerance = result.limits.ToleranceOf(i),
-                    .judgement = correction.judgements[i],
-                    .words = correction.words[i]});
+    rows.push_back(OnCouch({.name = names[i].empty() ? AxisName(i) : names[i],
+                            .number = i,
+                            .value = correction.value[i],
+                            .u95 = correction.u95[i],
+                            .tolerance = result.limits.ToleranceOf(i),
+                            .judgement = correction.judgements[i],
+                            .words = correction.words[i]},
+                           result.verdict, {}));
   return rows;
 }
 
@@ -83,7 +84,6 @@ ScanReport DescribeResult(const StoredResult& result, const std::string& patient
                                                     : Text(result.reasons.front(), language),
                     .identity = {{word(say::result::kReportPatient), patient}},
                     .numbers = RowsOf(result),
-                    .result_verdict = result.verdict,
                     .cautions = {},
                     .quality = QualityFacts(result, language),
                     .body = {},

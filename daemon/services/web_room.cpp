@@ -77,6 +77,11 @@ class WebRoomCalibration final : public web::RoomCalibrationService {
         });
   }
 
+  void SignCouch(const Actor& actor, const CouchProfile& couch, Done done) override {
+    store_.Write(&Store::couch, std::move(done),
+                 [=](CouchStore& stored) { return stored.Sign(actor, couch); });
+  }
+
   std::optional<std::string> RoomBoardPdf(Message& why_not) override {
     try {
       return room_.BoardPdf();

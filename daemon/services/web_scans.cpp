@@ -140,8 +140,12 @@ class WebScans final : public web::ScanService {
   };
 
   ReportSources SourcesIn(Store& store) const {
-    return {store.patients, store.references, store.scans, references_.warm_up_min(),
-            [this](const MarkerMap& scene) { return room_.In(scene); }};
+    return {store.patients,
+            store.references,
+            store.scans,
+            references_.warm_up_min(),
+            [this](const MarkerMap& scene) { return room_.In(scene); },
+            store.couch.Get()};
   }
 
   /// @throws DataError if there is none, or it cannot be read.

@@ -2,6 +2,7 @@
 #include "tests/support/fake_appliance.hpp"
 #include "words/check.hpp"
 #include "words/scan.hpp"
+#include "words/store.hpp"
 
 #include <fmt/format.h>
 #include <strings.h>
@@ -319,6 +320,18 @@ void FakeAppliance::SeeBoard(const CheckRecord& check) {
                                 "touching it",
                                 room.scans.size(), room.num_wanted))
                           : Message();
+}
+
+void FakeAppliance::SignCouch(const Actor& actor, const CouchProfile& couch, Done done) {
+  if (couch.version != status.couch.version)
+    return Finish(done, Refused(ChangeResult::kConflict, say::store::CouchChanged()));
+  status.couch = couch;
+  ++status.couch.version;
+  status.couch.signed_by = actor.user;
+  status.couch.signed_at = WallClock::now();
+  Notify(EventKind::kStatus);
+  const std::string version = std::to_string(status.couch.version);
+  Did(actor, "couch.set", version, done, version);
 }
 
 void FakeAppliance::SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) {

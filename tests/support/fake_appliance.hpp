@@ -242,6 +242,7 @@ class FakeAppliance : public web::BackgroundWork,
                         Done done) override;
   web::RoomCalibrationStatus GetRoomCalibration() override { return room; }
   void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) override;
+  void SignCouch(const Actor& actor, const CouchProfile& couch, Done done) override;
   std::optional<std::string> RoomBoardPdf(Message& why_not) override;
   SensorProfiles GetSensorProfiles() override { return profiles; }
   std::optional<std::string> SensorProfileFile(int version) override;

@@ -175,6 +175,9 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
                                     .opened_by = actor.user,
                                     .opened_at = WallClock::now()};
   status.session->language = preferences_[actor.user].language;
+  for (const PlanTemplate& one : Templates())
+    if (strcasecmp(one.site.c_str(), patient->site.c_str()) == 0)
+      status.session->sweep_hint = one.hint;
   if (const auto approved = FindReference(patient->approved_reference_id);
       approved && purpose == ScanPurpose::kFraction)
     status.session->reference = VersionOf(*approved);

@@ -80,6 +80,7 @@ export class Harness {
     h.folder = folder;
     h.failures = [];
     h.password = kPassword;  // of every account, once its person has logged in
+    h.firstPassword = kFirstPassword;
     h.fresh = new Set();  // accounts whose first password stands
     h.log = [];
     h.contexts = [];
@@ -111,6 +112,11 @@ export class Harness {
     const args = ['--no-sandbox', '--disable-dev-shm-usage', '--use-gl=angle',
       '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-gpu-compositing',
       '--disable-gpu-rasterization'];
+    // WebKitGTK is driven by webdriver.mjs, one process for each person.
+    if (/WebKitWebDriver$/.test(chromium)) {
+      h.browser = { contexts: () => [], close: async () => {} };
+      return h;
+    }
     const { chromium: chrome, firefox } = load('playwright-core');
     // A Firefox as it is sold, by WebDriver BiDi.
     h.isFirefox = /firefox/.test(chromium);

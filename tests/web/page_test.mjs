@@ -145,11 +145,16 @@ await h.step('a physicist plans, a second one approves', async () => {
   // The site's template: made of what is here, used again after it was cleared.
   await bob.getByText('There is no template for this site yet.').waitFor();
   await bob.getByLabel('Shifts (mm)').fill('4');
-  await bob.getByRole('button', { name: 'Save this size and tolerance as the template' }).click();
+  await bob.getByLabel('Hint for the sweep').fill('begin at the feet, end above the chin');
+  await bob.getByRole('button',
+    { name: 'Save this size, tolerance and posture as the template' }).click();
   await bob.getByText(
     /^Region \d+(\.\d+)? × \d+(\.\d+)? cm \(x × y\) about the isocentre, ±4 mm, ±1°/).waitFor();
   const size = (await h.api(bob, 'templates')).body.templates[0];
   equal(size.site, 'thorax', 'of the site of the patient');
+  equal([size.posture, size.hint].join(': '), 'HFS: begin at the feet, end above the chin',
+    'posture and hint');
+  await bob.getByText('Hint: begin at the feet').waitFor();
   await bob.getByRole('button', { name: 'Clear the region' }).click();
   await bob.getByLabel('Shifts (mm)').fill('3');
   await bob.getByRole('button', { name: 'Use the template' }).click();

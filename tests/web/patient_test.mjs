@@ -97,7 +97,9 @@ await h.step('mean and deviation over the fractions', async () => {
     await ok(anna, 'treatment/close', 'POST', { session_id: '' });
     await h.acknowledge(anna, bob);
   }
-  const course = await ok(anna, `patients/${patient}/statistics`);
+  const { courses: [course, ...others] } = await ok(anna, `patients/${patient}/statistics`);
+  equal(others.length, 0, 'one reference, one course');
+  equal(course.reference_version, 1, 'its version');
   equal(course.fractions, 2, 'fractions');
   equal(course.scans, 4, 'scans');
   await anna.goto(`${h.url}#/patient/${patient}`);

@@ -171,6 +171,54 @@ await h.step('couch readings: the sum is done, only for a move, only where the r
   h.tell('room known');
 });
 
+await h.step('a couch that counts in cm, downward, and only shifts: numbers, readings, words and '
+  + 'what it cannot do, on page, room display and page without script; the verdict stays',
+async () => {
+  const card = (page, name) =>
+    page.locator('.number', { has: page.getByRole('heading', { name, exact: true }) });
+  h.tell('moved z 8 HFS');
+  await scan();
+  equal(await card(anna, 'Vertical').locator('.value').innerText(), '−8.0 mm', 'before');
+  await bob.goto(`${h.url}#/check`);
+  await bob.getByText('No profile: a couch of six axes').waitFor();
+  await bob.getByText('Change the profile…').click();
+  await bob.getByLabel('Name of the couch').fill('Couch 2');
+  await bob.getByLabel('What it can apply').selectOption('3');
+  await bob.getByLabel('Unit of shifts').selectOption('cm');
+  await bob.getByLabel('Vertical shrinks upward').check();
+  await bob.getByLabel('Leave out what it cannot apply').check();
+  await h.look(bob, 'couch-profile', { axe: true });
+  const ofCouch = bob.locator('section',
+    { has: bob.getByRole('heading', { name: 'Couch', exact: true }) });
+  await ofCouch.getByLabel('Your password').fill(h.password);
+  await bob.getByRole('button', { name: 'Sign the profile' }).click();
+  await bob.getByText('Version 1, signed by bob').waitFor();
+  // The same result, at once: the page of it is open.
+  await card(anna, 'Vertical').locator('.value', { hasText: '+0.80 cm' }).waitFor();
+  equal(await card(anna, 'Vertical').locator('.word').innerText(), 'down', 'the body');
+  equal(await anna.locator('.number').count(), 3, 'rotations are in tolerance: left out');
+  await anna.getByText('Apply the 3 numbers below that the couch can move').waitFor();
+  await anna.getByText('It cannot correct: Pitch, Roll, Yaw.').waitFor();
+  await anna.getByText('Couch readings: what to set').click();
+  await anna.getByLabel('Vertical (cm)').fill('12.4');
+  await anna.getByText('Vertical: set to 13.2 cm').waitFor();
+  await h.look(anna, 'result-couch-profile');
+  const plain = await anna.context().request.get(`${h.url.replace(/#.*/, '')}result`);
+  const page = await plain.text();
+  check(page.includes('+0.80 cm') && page.includes('Couch 2') && page.includes('MOVE'),
+    'the page without script');
+  h.tell('moved yaw 4 HFS');
+  await scan();
+  await card(anna, 'Yaw').locator('.word', { hasText: 'not by the couch: move the patient' })
+    .waitFor();
+  equal(await card(anna, 'Yaw').locator('.arrow').count(), 0, 'no arrow for the couch');
+  await anna.locator('.verdict.move').waitFor();
+  const six = { version: 1, name: 'Couch 2', num_axes: 6, is_in_cm: false, hides_rest: false,
+    ...Object.fromEntries(['vertical', 'longitudinal', 'lateral', 'pitch', 'roll', 'yaw'].map(
+      (name) => [`reverses_${name}`, false])) };
+  equal((await h.api(bob, 'couch', 'POST', { ...six, password: h.password })).status, 201, 'back');
+});
+
 await h.step('a result of an earlier session of the same patient is not valid in the next one, '
   + 'where nothing has been scanned yet', async () => {
   h.tell('moved z 8 HFS');

@@ -14,6 +14,7 @@
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
 #include "web/model/account.hpp"
+#include "web/model/couch.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/numbers.hpp"
 #include "web/model/patient.hpp"
@@ -109,16 +110,15 @@ std::string LoginForm(const Catalogue& language, const std::string& trouble) {
 }
 
 /// A row of the table.
-std::string NumberCells(const ShownRow& row, Verdict verdict, const Catalogue& language) {
-  const std::string name = EscapeHtml(Text(row.name, language));
+std::string NumberCells(const CouchRow& row, const Catalogue& language) {
+  const std::string name = EscapeHtml(Text(row.judged.name, language));
   if (!row.value)
     return fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td></td><td></td><td></td><td></td></tr>", name,
         Word(say::result::kNotKnown, language));
-  const bool is_shift = IsShift(row.number);
   const char decimal = language.decimal;
-  const ShownNumber shown = Shown(*row.value, row.u95.value_or(NAN), is_shift ? 1 : 2, decimal);
-  const std::string unit = is_shift ? " mm" : "\u00b0";
+  const ShownNumber shown = Shown(*row.value, row.u95.value_or(NAN), row.axis.digits, decimal);
+  const std::string unit = UnitBehind(row.axis);
   // A narrow window has no heads above the numbers: what a bare "±" means stands beside it.
   return fmt::format(
       "<tr><th scope=\"row\">{}</th><td>{}{}</td><td data-label=\"{}\">{}</td>"
@@ -126,7 +126,7 @@ std::string NumberCells(const ShownRow& row, Verdict verdict, const Catalogue& l
       name, shown.value, unit, Word(say::result::kPageHeadU95, language),
       shown.u95.empty() ? Word(say::result::kNotKnown, language) : "\u00b1" + shown.u95 + unit,
       Word(say::result::kPageHeadTolerance, language), PlainNumber(row.tolerance, decimal), unit,
-      Text(JudgementWord(row.judgement), language), Said(WayOf(row, verdict), language));
+      Text(JudgementWord(row.judged.judgement), language), Said(row.way, language));
 }
 
 /// @param review  The page is for reading or printing, or the result can no longer be acted on.
@@ -141,17 +141,22 @@ std::string TableTitle(Verdict verdict, bool review, const Catalogue& language) 
   return word(say::result::kPageMeasured, say::result::kPageMeasuredThen);
 }
 
-std::string NumbersTable(const ResultSummary& result, bool review, const Catalogue& language) {
-  std::string rows, heads;
-  for (const ShownRow& row : ShownRows(result)) rows += NumberCells(row, result.verdict, language);
+std::string NumbersTable(const ResultSummary& result, const CouchProfile& couch, bool review,
+                         const Catalogue& language) {
+  std::string rows, heads, notes;
+  for (const CouchRow& row : CouchRows(result, couch))
+    if (!row.is_hidden) rows += NumberCells(row, language);
   if (rows.empty()) return "";
+  const auto beside = RunsAlongCouch(result) ? CouchNotes(couch) : std::vector<Message>();
+  for (const Message& note : beside)
+    notes += fmt::format("<p class=\"couch-notes\">{}</p>", Said(note, language));
   for (const MessageId head : {say::result::kPageHeadAxis, say::result::kPageHeadValue,
                                say::result::kPageHeadU95, say::result::kPageHeadTolerance,
                                say::result::kPageHeadAssessment, say::result::kPageHeadDirection})
     heads += fmt::format("<th scope=\"col\">{}</th>", Word(head, language));
   return fmt::format(
-      "<table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>{}</tbody></table>",
-      TableTitle(result.verdict, review, language), heads, rows);
+      "<table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>{}</tbody></table>{}",
+      TableTitle(result.verdict, review, language), heads, rows, notes);
 }
 
 std::string BodyList(const ResultSummary& result, const Catalogue& language) {
@@ -321,8 +326,8 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
   for (const auto* list : {&quality.cautions, &quality.remarks})
     for (const Message& caution : *list)
       body += fmt::format("<p class=\"caution\">{}</p>", Said(caution, language));
-  return body + NumbersTable(*scan.result, review, language) + BodyList(*scan.result, language) +
-         Pictures(scan, language) + "</section>";
+  return body + NumbersTable(*scan.result, wanted.status.couch, review, language) +
+         BodyList(*scan.result, language) + Pictures(scan, language) + "</section>";
 }
 
 /// The scan that is named, else the newest completed one; a later failed one is mentioned.

@@ -85,6 +85,13 @@ void Accounts::AddSignedActs(Routes& routes) {
                 room_.SignRoomCalibration(actor, digest, std::move(done));
               };
             });
+  // The couch as the person has read it, with the version that this replaces.
+  AddSigned(routes, "POST", "/api/v1/couch", Permission::kCalibrate,
+            [this](const Request&, Fields& fields) -> SignedAct {
+              return [this, couch = ReadCouch(fields)](const Actor& actor, Done done) {
+                room_.SignCouch(actor, couch, std::move(done));
+              };
+            });
   AddSignedUnitActs(routes);
 }
 

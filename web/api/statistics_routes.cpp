@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -21,18 +22,29 @@ constexpr int kMaxScansOfCourse = 1000;
 constexpr std::size_t kMaxCourses = 500;
 constexpr auto kMostTime = std::chrono::seconds(5);
 
+/// Of a patient against one reference.
 struct Course {
   Patient patient;
+  int version = 0;  ///< Of the reference; 0: there is none.
   CourseStatistics statistics;
 };
+
+std::vector<Course> CoursesOf(const Patient& patient, const Services& services) {
+  std::vector<Course> courses;
+  for (CoursePart& part : PartsOf(services.scans.Scans(patient.id, kMaxScansOfCourse))) {
+    const auto reference = services.references.FindReference(part.reference_id);
+    courses.push_back({patient, reference ? reference->version : 0, std::move(part.statistics)});
+  }
+  return courses;
+}
 /// The courses with an answer, newest first, and how many were not read for want of time.
 struct Courses {
   std::vector<Course> all;
   std::size_t left_out = 0;
 };
 
-Courses ReadCourses(PatientService& patients, ScanService& scans) {
-  std::vector<Patient> listed = patients.Patients();
+Courses ReadCourses(const Services& services) {
+  std::vector<Patient> listed = services.patients.Patients();
   std::erase_if(listed, [](const Patient& patient) { return patient.num_scans == 0; });
   std::ranges::stable_sort(listed, std::ranges::greater(), &Patient::created_at);
   const auto begun = std::chrono::steady_clock::now();
@@ -42,8 +54,7 @@ Courses ReadCourses(PatientService& patients, ScanService& scans) {
       courses.left_out = listed.size() - i;
       break;
     }
-    CourseStatistics statistics = StatisticsOf(scans.Scans(listed[i].id, kMaxScansOfCourse));
-    if (statistics.fractions > 0) courses.all.push_back({listed[i], std::move(statistics)});
+    std::ranges::move(CoursesOf(listed[i], services), std::back_inserter(courses.all));
   }
   return courses;
 }
@@ -66,11 +77,18 @@ std::map<std::string, std::pair<std::string, std::vector<CourseStatistics>>> ByS
   return sites;
 }
 
-Json CourseJson(const Patient& patient, const CourseStatistics& course) {
-  Json json = {
-      {"patient_id", patient.id},      {"code", patient.code},      {"site", patient.site},
-      {"fractions", course.fractions}, {"scans", course.scans},     {"accepted", course.accepted},
-      {"overrides", course.overrides}, {"minutes", course.minutes}, {"numbers", Json::array()}};
+Json CourseJson(const Course& of) {
+  const auto& [patient, version, course] = of;
+  Json json = {{"patient_id", patient.id},
+               {"code", patient.code},
+               {"site", patient.site},
+               {"reference_version", version > 0 ? Json(version) : Json(nullptr)},
+               {"fractions", course.fractions},
+               {"scans", course.scans},
+               {"accepted", course.accepted},
+               {"overrides", course.overrides},
+               {"minutes", course.minutes},
+               {"numbers", Json::array()}};
   for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
     Json number = {{"name", kNumberAxes[i].name}, {"unit", kNumberAxes[i].symbol()}};
     for (const auto& [name, which] : kWhich) {
@@ -103,8 +121,7 @@ Json SiteJson(const std::string& site, const std::vector<CourseStatistics>& cour
 Json StatisticsJson(const Courses& courses) {
   Json json = {
       {"courses", Json::array()}, {"sites", Json::array()}, {"left_out", courses.left_out}};
-  for (const auto& [patient, statistics] : courses.all)
-    json["courses"].push_back(CourseJson(patient, statistics));
+  for (const Course& course : courses.all) json["courses"].push_back(CourseJson(course));
   for (const auto& [key, site] : BySite(courses.all))
     json["sites"].push_back(SiteJson(site.first, site.second));
   return json;
@@ -112,16 +129,17 @@ Json StatisticsJson(const Courses& courses) {
 
 /// A line for each course, then one for each site: there the deviation is the systematic error.
 std::string StatisticsCsv(const Courses& courses) {
-  std::string text = "kind,site,patient,courses,fractions,scans,accepted,overrides,minutes";
+  std::string text =
+      "kind,site,patient,reference,courses,fractions,scans,accepted,overrides,minutes";
   for (const auto& [name, which] : kWhich)
     for (const NumberAxis& axis : kNumberAxes)
       for (const char* what : {"mean", "deviation", "random"})
         text += fmt::format(",{}_{}_{}", name, what, axis.key);
   text += "\r\n";
-  for (const auto& [patient, course] : courses.all) {
-    text += fmt::format("course,{},{},1,{},{},{},{},{}", CsvCell(patient.site),
-                        CsvCell(patient.code), course.fractions, course.scans, course.accepted,
-                        course.overrides, CsvNumber(course.minutes));
+  for (const auto& [patient, version, course] : courses.all) {
+    text += fmt::format("course,{},{},{},1,{},{},{},{},{}", CsvCell(patient.site),
+                        CsvCell(patient.code), version, course.fractions, course.scans,
+                        course.accepted, course.overrides, CsvNumber(course.minutes));
     for (const auto& [name, which] : kWhich)
       for (const NumberSpread& spread : course.*which)
         text += fmt::format(",{},{},",
@@ -130,7 +148,7 @@ std::string StatisticsCsv(const Courses& courses) {
     text += "\r\n";
   }
   for (const auto& [key, site] : BySite(courses.all)) {
-    text += fmt::format("site,{},,{},,,,,", CsvCell(site.first), site.second.size());
+    text += fmt::format("site,{},,,{},,,,,", CsvCell(site.first), site.second.size());
     for (const auto& [name, which] : kWhich) {
       for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
         const GroupSpread spread = GroupSpreadOf(site.second, which, i);
@@ -147,28 +165,28 @@ std::string StatisticsCsv(const Courses& courses) {
 }  // namespace
 
 void AddStatisticsRoutes(Routes& routes, const Services& services) {
-  PatientService& patients = services.patients;
-  ScanService& scans = services.scans;
   routes
       .ReadInBackground("/api/v1/patients/{id}/statistics", Permission::kView,
-                        [&patients, &scans](const Request& request) {
-                          const auto patient = patients.FindPatient(request.arguments[0]);
+                        [services](const Request& request) {
+                          const auto patient = services.patients.FindPatient(request.arguments[0]);
                           if (!patient) return ErrorResponse(404, say::store::NoPatient());
-                          return JsonResponse(CourseJson(
-                              *patient, StatisticsOf(scans.Scans(patient->id, kMaxScansOfCourse))));
+                          Json courses = Json::array();
+                          for (const Course& course : CoursesOf(*patient, services))
+                            courses.push_back(CourseJson(course));
+                          return JsonResponse({{"courses", courses}});
                         })
       .Discloses("view.patient");
   routes
       .ReadInBackground("/api/v1/statistics", Permission::kView,
-                        [&patients, &scans](const Request&) {
-                          return JsonResponse(StatisticsJson(ReadCourses(patients, scans)));
+                        [services](const Request&) {
+                          return JsonResponse(StatisticsJson(ReadCourses(services)));
                         })
       .Discloses("view.statistics");
   routes
       .ReadInBackground("/api/v1/statistics.csv", Permission::kView,
-                        [&patients, &scans](const Request&) {
+                        [services](const Request&) {
                           return Download("text/csv; charset=utf-8",
-                                          StatisticsCsv(ReadCourses(patients, scans)),
+                                          StatisticsCsv(ReadCourses(services)),
                                           "plumb_statistics.csv");
                         })
       .Discloses("", "download.statistics");

@@ -9,6 +9,7 @@
 #include "algo/base/polygon.hpp"
 #include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"
+#include "web/model/couch.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/patient.hpp"
 #include "web/model/reference.hpp"
@@ -154,8 +155,23 @@ PlanTemplate ParseTemplate(const std::string& body) {
   wanted.width_mm = fields.Number("width_mm", kMin_mm, kMax_mm);
   wanted.height_mm = fields.Number("height_mm", kMin_mm, kMax_mm);
   wanted.tolerance = ToleranceIn(fields);
+  if (fields.Has("posture")) wanted.posture = PostureIn(fields);
+  if (fields.Has("hint")) wanted.hint = fields.Text("hint", 0, kMaxReason);
   fields.Finish();
   return wanted;
+}
+
+CouchProfile ReadCouch(Fields& fields) {
+  CouchProfile couch;
+  couch.version = fields.Integer("version", 0, 999'999'999);
+  couch.name = fields.Text("name", 1, kMaxName);
+  couch.num_axes = fields.Integer("num_axes", 3, 6);
+  if (!IsCouchAxes(couch.num_axes)) throw DataError(say::web::FieldCouchAxes());
+  couch.is_in_cm = fields.Flag("is_in_cm");
+  couch.hides_rest = fields.Flag("hides_rest");
+  for (std::size_t i = 0; i < kNumberAxes.size(); ++i)
+    couch.reverses.at(i) = fields.Flag((std::string("reverses_") + kNumberAxes.at(i).name).c_str());
+  return couch;
 }
 
 ScanPurpose ParsePurpose(const std::string& name) {

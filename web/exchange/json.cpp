@@ -8,6 +8,7 @@
 #include <array>
 
 #include "algo/base/message_json.hpp"
+#include "words/result.hpp"
 #include "words/text.hpp"
 
 namespace plumb::web {
@@ -157,6 +158,7 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
         {"words", WordsJson(scan.result->words)},
         {"axes", AxesJson(*scan.result)},
         {"numbers", RowsJson(*scan.result)},
+        {"along_couch", RunsAlongCouch(*scan.result)},
         {"body", BodyJson(*scan.result)}};
     PutMessages(json["result"], "reason", scan.result->reasons);
   }
@@ -246,7 +248,30 @@ Json SessionJson(const TreatmentSession& session) {
           {"reference", VersionJson(session.reference)},
           {"newer_reference", VersionJson(session.newer_reference)},
           {"other_reference", VersionJson(session.other_reference)},
-          {"language", session.language.empty() ? Json(nullptr) : Json(session.language)}};
+          {"language", TextOrNull(session.language)},
+          {"sweep_hint", TextOrNull(session.sweep_hint)}};
+}
+
+Json CouchJson(const CouchProfile& couch) {
+  Json json = {{"version", couch.version},
+               {"name", couch.name},
+               {"num_axes", couch.num_axes},
+               {"is_in_cm", couch.is_in_cm},
+               {"hides_rest", couch.hides_rest},
+               {"signed_by", TextOrNull(couch.signed_by)},
+               {"signed_at", couch.version > 0 ? Json(couch.signed_at) : Json(nullptr)},
+               {"axes", Json::object()}};
+  for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
+    const CouchAxis axis = CouchAxisOf(couch, i);
+    json["axes"][kNumberAxes.at(i).name] = {{"factor", axis.factor},
+                                            {"unit", axis.unit},
+                                            {"digits", axis.digits},
+                                            {"moves", axis.moves}};
+  }
+  PutMessages(json, "note", CouchNotes(couch));
+  PutMessage(json, "apply", CouchApply(couch));
+  PutMessage(json, "cannot", say::result::CouchCannot());
+  return json;
 }
 
 Json WaitingJson(const std::vector<WaitingReference>& waiting) {
@@ -285,6 +310,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
       {"scans_today", status.scans_today},
       {"session", status.session ? SessionJson(*status.session) : Json(nullptr)},
       {"room", status.room},
+      {"couch", CouchJson(status.couch)},
       {"waiting", WaitingJson(status.waiting)},
       {"scan", status.scan ? LiveScanJson(*status.scan) : Json(nullptr)},
       {"last_check", status.last_check ? CheckJson(*status.last_check, now) : Json(nullptr)},
@@ -319,6 +345,8 @@ void to_json(Json& json, const PlanTemplate& wanted) {
           {"width_mm", wanted.width_mm},
           {"height_mm", wanted.height_mm},
           {"tolerance", wanted.tolerance},
+          {"posture", TextOrNull(wanted.posture)},
+          {"hint", wanted.hint},
           {"changed_by", wanted.changed_by}};
 }
 

@@ -119,6 +119,8 @@ inline constexpr int kMaxRevision = 1'000'000'000;
 /// Any of the settings, but at least one.
 [[nodiscard]] SettingsChange ParseSettingsChange(const std::string& body);
 [[nodiscard]] PlanTemplate ParseTemplate(const std::string& body);
+/// With `version`, the one that it replaces.
+[[nodiscard]] CouchProfile ReadCouch(Fields& fields);
 [[nodiscard]] ScanPurpose ParsePurpose(const std::string& name);
 
 }  // namespace plumb::web

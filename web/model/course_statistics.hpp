@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "web/model/numbers.hpp"
@@ -91,6 +92,28 @@ struct CourseStatistics {
   std::ranges::transform(last, course.last.begin(), SpreadOf);
   course.minutes = MedianOf(std::move(minutes));
   return course;
+}
+
+/// What is compared with another reference is another course.
+struct CoursePart {
+  std::string reference_id;  ///< Empty: of scans from before references were kept.
+  CourseStatistics statistics;
+};
+
+/// Those with an answer, the one with the newest scan first.
+[[nodiscard]] inline std::vector<CoursePart> PartsOf(const std::vector<Scan>& scans) {
+  std::map<std::string, std::vector<Scan>> of_reference;
+  for (const Scan& scan : scans) of_reference[scan.reference_id].push_back(scan);
+  std::vector<std::pair<std::string, CoursePart>> found;  // with the newest scan
+  for (const auto& [reference, compared] : of_reference) {
+    CoursePart part{.reference_id = reference, .statistics = StatisticsOf(compared)};
+    if (part.statistics.fractions > 0)
+      found.emplace_back(std::ranges::max(compared, {}, &Scan::id).id, std::move(part));
+  }
+  std::ranges::sort(found, std::ranges::greater(), [](const auto& one) { return one.first; });
+  std::vector<CoursePart> parts;
+  for (auto& [newest, part] : found) parts.push_back(std::move(part));
+  return parts;
 }
 
 /// Of one number over the courses of a group.

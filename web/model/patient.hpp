@@ -77,7 +77,8 @@ struct TreatmentSession {
   /// The newest approved one of the other source: the planning CT where a captured surface is
   /// compared with, or the other way round. A person may choose it for this session.
   std::optional<ReferenceVersion> other_reference = {};
-  std::string language = {};  ///< The choice of the person who opened it; empty: none.
+  std::string language = {};    ///< The choice of the person who opened it; empty: none.
+  std::string sweep_hint = {};  ///< Of the template of the patient's site; empty: none.
 };
 
 /// Defaults for plans of one site. Letter case of site names is ignored.
@@ -87,6 +88,8 @@ struct PlanTemplate {
   double height_mm = 400.0;  ///< Along y.
   Tolerance tolerance;
   std::string changed_by;
+  std::string posture = {};  ///< Empty: as the plan has it.
+  std::string hint = {};     ///< To whoever sweeps, shown before the sweep; empty: none.
 };
 
 }  // namespace plumb

@@ -11,6 +11,7 @@
 #include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "web/model/check.hpp"
+#include "web/model/couch.hpp"
 #include "web/model/forming_answer.hpp"
 #include "web/model/patient.hpp"
 #include "web/model/reference.hpp"
@@ -133,6 +134,7 @@ struct Status {
   ScanPurpose next_purpose = ScanPurpose::kFraction;
   int scans_today = 0;                      ///< Scans of the open patient, rescans included.
   std::optional<TreatmentSession> session;  ///< The open session.
+  CouchProfile couch;
   RoomOnMap room;  ///< In the reference marker's frame as it lay when the room was calibrated.
   /// References that wait for a plan or an approval; at most 20.
   std::vector<WaitingReference> waiting;

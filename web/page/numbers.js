@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The six numbers: value, words, arrow, uncertainty, tolerance bar. The appliance has judged them.
+import {
+  couchAxis, couchCannot, couchNotes, isLeftOut,
+} from './couch/axes.js';
 import { h, svg } from './dom.js';
 import { kTolerance } from './limits.js';
 import { S, said } from './words.js';
@@ -22,6 +25,8 @@ export const kTones = {
 
 const printsAsZero = (value, digits) => Number(Math.abs(value).toFixed(digits)) === 0;
 const number = (value, digits) => Math.abs(value).toFixed(digits).replace('.', S.decimal);
+/// A limit as it was set, whatever the unit.
+const plain = (value) => `${Math.round(1000 * value) / 1000}`.replace('.', S.decimal);
 export const signed = (value, digits = 1) =>
   `${printsAsZero(value, digits) ? '' : value < 0 ? '−' : '+'}${number(value, digits)}`;
 
@@ -75,7 +80,7 @@ export function toleranceBar(value, u95, tolerance, isKnown = true) {
   const x = (v) => 100 + 96 * Math.max(-1, Math.min(1, v / span));
   const beyond = Math.abs(value) > span;
   const tick = (v) => svg('text', { x: x(v), y: 36, class: 'bar-tick' },
-    `${v < 0 ? '−' : '+'}${number(v, Number.isInteger(v) ? 0 : 1)}`);
+    `${v < 0 ? '−' : '+'}${plain(Math.abs(v))}`);
   return svg('svg', { viewBox: '0 0 200 38', class: 'tolerance-bar', 'aria-hidden': 'true' },
     svg('rect', { x: 2, y: 9, width: 196, height: 8, rx: 4, class: 'track' }),
     svg('rect', {
@@ -95,33 +100,37 @@ export function toleranceBar(value, u95, tolerance, isKnown = true) {
 /// @param valid  Whether the result can be acted on; otherwise the card has no instruction.
 /// @param pictured  Whether an arrow shows the way: only for what is to be applied, and, but for up
 /// and down, only in a room whose axes are known.
-function card(axis, row, { name, weak, commands, pictured, valid }) {
+function card(axis, row, { name, weak, commands, pictured, valid, alongCouch }) {
   const text = S.result;
-  const { value, tolerance: limit, judgement } = row;
-  if (value === null) {
+  const { judgement } = row;
+  if (row.value === null) {
     return h('li', { class: 'number refused' }, h('h3', {}, name),
       h('p', { class: 'value' }, S.none), h('p', { class: 'word' }, text.refused));
   }
-  const half = row.u95 ?? NaN;  // not known
-  const most = mostDigits(axis);
-  const digits = digitsOf(half, most);
+  const couch = couchAxis(axis, alongCouch);
+  const value = row.value * couch.factor;
+  const limit = row.tolerance * Math.abs(couch.factor);
+  const half = (row.u95 ?? NaN) * Math.abs(couch.factor);  // NaN: not known
+  const digits = digitsOf(half, couch.digits);
   const directed = commands && !row.still;
-  const word = !commands && !valid ? text.atThisScan : said(row, 'way') ?? S.none;
+  const cannot = directed && valid && !couch.moves;
+  const word = cannot ? couchCannot()
+    : !commands && !valid ? text.atThisScan : said(row, 'way') ?? S.none;
   // Those within tolerance are moved with the others: no green says "leave it".
   const neutral = commands && judgement === 'in_tolerance' ? ' neutral' : '';
   return h('li', { class: `number ${kTones[judgement]}${neutral}${commands ? '' : ' told'}` },
-    h('h3', {}, name), directed && pictured && drawing(axis.name, value),
+    h('h3', {}, name), directed && pictured && !cannot && drawing(axis.name, row.value),
     h('p', { class: 'value' }, signed(value, digits),
-      h('span', { class: axis.shift ? 'unit' : 'unit degrees' }, axis.shift ? ' mm' : '°')),
+      h('span', { class: axis.shift ? 'unit' : 'unit degrees' },
+        axis.shift ? ` ${couch.unit}` : '°')),
     h('p', { class: 'word' }, word),
     toleranceBar(value, half, limit),
     h('p', { class: 'fine' },
       h('span', { class: 'half' }, Number.isNaN(half) ? text.uncertaintyUnknown
         : [h('span', { class: 'visually-hidden' }, `${text.uncertaintyLong} `),
-          `±${withUnit(shownUncertainty(half, digits, most), axis.unit)}`]),
+          `±${withUnit(shownUncertainty(half, digits, couch.digits), couch.unit)}`]),
       h('span', { class: 'judged' }, `${kMarks[judgement]} ${said(row, 'judged')}`),
-      h('span', { class: 'limit' }, text.tolerance(
-        withUnit(number(limit, Number.isInteger(limit) ? 0 : 1), axis.unit)))),
+      h('span', { class: 'limit' }, text.tolerance(withUnit(plain(limit), couch.unit)))),
     weak && h('p', { class: 'caution' }, text.notSeen));
 }
 
@@ -142,8 +151,11 @@ export function sixNumbers(result, details, valid = true) {
   const weak = new Set((details?.motion?.weak_directions ?? []).map(({ name }) => name));
   const roomKnown = details?.body?.room_known !== false;
   const commands = result.verdict === 'move';
-  return h('ol', { class: 'numbers' }, kAxes.map((axis, i) => card(axis, result.numbers[i], {
-    name: said(result.axes, axis.name), weak: weak.has(axis.name), commands, valid,
-    pictured: valid && (roomKnown || axis.name === 'vertical'),
-  })));
+  const alongCouch = Boolean(result.along_couch);
+  const cards = kAxes.map((axis, i) => !isLeftOut(axis, result.numbers[i], alongCouch)
+    && card(axis, result.numbers[i], {
+      name: said(result.axes, axis.name), weak: weak.has(axis.name), commands, valid, alongCouch,
+      pictured: valid && (roomKnown || axis.name === 'vertical'),
+    }));
+  return [h('ol', { class: 'numbers' }, cards), couchNotes(alongCouch)];
 }

@@ -11,6 +11,7 @@
 #include "web/model/account.hpp"
 #include "web/model/change.hpp"
 #include "web/model/check.hpp"
+#include "web/model/couch.hpp"
 #include "web/model/sensor_profile.hpp"
 #include "web/model/wall_clock.hpp"
 
@@ -73,7 +74,7 @@ struct RoomCalibrationStatus {
   std::string digest;    ///< Digest of the calibration that would be signed.
 };
 
-/// The rules of services.hpp hold.
+/// Of the room and its couch. The rules of services.hpp hold.
 class RoomCalibrationService {
  public:
   virtual ~RoomCalibrationService() = default;
@@ -82,6 +83,9 @@ class RoomCalibrationService {
   /// @param digest  Digest of the calibration that was read and is signed; kConflict if another one
   ///         would be stored, or if it may not be signed. Returns the version.
   virtual void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) = 0;
+  /// The couch from now on. @param couch  With the version that was read; kConflict if another one
+  ///         is in force by now. Returns the new version.
+  virtual void SignCouch(const Actor& actor, const CouchProfile& couch, Done done) = 0;
   /// The board as a PDF at true size (background). Nothing if the room's markers are too large for
   /// one; `why_not` then says so.
   [[nodiscard]] virtual std::optional<std::string> RoomBoardPdf(Message& why_not) = 0;

@@ -6,9 +6,9 @@
 #include "daemon/archive/backup_register.hpp"
 #include "daemon/archive/factory_reset.hpp"
 #include "daemon/archive/store_backup.hpp"
+#include "daemon/database/clock_doubt.hpp"
 #include "daemon/database/examination.hpp"
 #include "daemon/database/schema.hpp"
-#include "daemon/records/clock_doubt.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/unit/records/store_fixture.hpp"
 

@@ -53,6 +53,20 @@ class StoreSessionsTest : public ::testing::Test {
   testing::TempFolder folder_;
 };
 
+TEST_F(StoreSessionsTest, TheHintOfTheSitesTemplateIsSaid) {
+  Store store(folder_ / "state");
+  store.templates.Set(kAnna, {.site = "Thorax",
+                              .tolerance = {},
+                              .changed_by = {},
+                              .posture = "HFS",
+                              .hint = "begin at the feet"});
+  store.treatments.Open(kAnna, store.patients.Add(kAnna, "P-1", "THORAX"), ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->sweep_hint, "begin at the feet");
+  store.treatments.Close(kAnna, "");
+  store.treatments.Open(kAnna, store.patients.Add(kAnna, "P-2", "pelvis"), ScanPurpose::kFraction);
+  EXPECT_EQ(store.treatments.Opened()->sweep_hint, "");
+}
+
 TEST_F(StoreSessionsTest, OneIsOpenAtATime) {
   Store store(folder_ / "state");
   const std::string a = store.patients.Add(kAnna, "P-1", ""),

@@ -429,6 +429,15 @@ TEST_F(StoreTest, ATemplateIsOfOneSiteWhateverItsCaseAndIsLogged) {
   EXPECT_EQ(store->audit.Find({0, 1}).at(0).detail.English(),
             "thorax: region 320 x 410 mm, tolerance 4 mm and 1.5 degrees; before: region 300 x 400 "
             "mm, tolerance 5 mm and 2 degrees");
+  EXPECT_EQ(stored.posture, "");
+  PlanTemplate more = stored;
+  more.posture = "FFS";
+  more.hint = "from the feet";
+  store->templates.Set(kAnna, more);
+  EXPECT_EQ(store->templates.List().at(0).posture, "FFS");
+  EXPECT_EQ(store->templates.List().at(0).hint, "from the feet");
+  EXPECT_THAT(store->audit.Find({0, 1}).at(0).detail.English(),
+              HasSubstr("1.5 degrees, posture FFS, hint \u201cfrom the feet\u201d; before:"));
   EXPECT_EQ(RefusalOf([&] { store->templates.Remove(kAnna, "pelvis"); }), ChangeResult::kNotFound);
   store->templates.Remove(kAnna, "THORAX");
   EXPECT_THAT(store->templates.List(), SizeIs(0));

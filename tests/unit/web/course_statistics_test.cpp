@@ -66,6 +66,21 @@ TEST(CourseStatisticsTest, ASingleFractionHasNoDeviationAndAClockThatWasSetNoTim
   EXPECT_FALSE(course.minutes);
 }
 
+TEST(CourseStatisticsTest, ResultsAgainstDifferentReferencesAreDifferentCourses) {
+  std::vector<Scan> scans = Course();
+  scans[0].reference_id = scans[1].reference_id = "8";  // of the second fraction
+  for (std::size_t i = 2; i < scans.size(); ++i) scans[i].reference_id = "7";
+  const std::vector<CoursePart> parts = PartsOf(scans);
+  ASSERT_EQ(parts.size(), 2U);
+  EXPECT_EQ(parts[0].reference_id, "8") << "the one with the newest scan first";
+  EXPECT_EQ(parts[0].statistics.fractions, 1);
+  EXPECT_DOUBLE_EQ(parts[0].statistics.first[0].mean, -3);
+  EXPECT_EQ(parts[1].reference_id, "7");
+  EXPECT_EQ(parts[1].statistics.scans, 2) << "no answer and no reference scan count";
+  EXPECT_DOUBLE_EQ(parts[1].statistics.first[0].mean, 5);
+  EXPECT_TRUE(PartsOf({}).empty());
+}
+
 TEST(CourseStatisticsTest, AGroupHasASystematicAndARandomError) {
   const auto course = [](double mean, std::optional<double> deviation) {
     CourseStatistics one;
@@ -116,13 +131,14 @@ TEST_F(StatisticsRouteTest, CoursesAndSitesAreListedAndExported) {
   EXPECT_EQ(vertical["first"]["systematic"], 0.0);
   EXPECT_NEAR(vertical["first"]["random"].get<double>(), std::sqrt(32.0), 1e-12);
   EXPECT_TRUE(all["sites"][1]["numbers"][1]["last"]["mean"].is_null()) << "not known, never 0";
-  const auto one = client.Get("/api/v1/patients/P-1/statistics").json();
-  EXPECT_EQ(one["overrides"], 1);
-  EXPECT_EQ(one["numbers"][0]["last"]["mean"], 0.75);
+  const auto courses = client.Get("/api/v1/patients/P-1/statistics").json()["courses"];
+  ASSERT_EQ(courses.size(), 1U);
+  EXPECT_EQ(courses[0]["overrides"], 1);
+  EXPECT_EQ(courses[0]["numbers"][0]["last"]["mean"], 0.75);
   EXPECT_EQ(client.Get("/api/v1/patients/P-9/statistics").status, 404);
   const std::string csv = client.Get("/api/v1/statistics.csv").body;
-  EXPECT_NE(csv.find("\r\ncourse,Thorax,P-1,1,2,4,2,1,5.5000,1.0000,5.6569,,"), csv.npos) << csv;
-  EXPECT_NE(csv.find("\r\nsite,Thorax,,2,,,,,,1.0000,0.0000,5.6569,"), csv.npos) << csv;
+  EXPECT_NE(csv.find("\r\ncourse,Thorax,P-1,0,1,2,4,2,1,5.5000,1.0000,5.6569,,"), csv.npos) << csv;
+  EXPECT_NE(csv.find("\r\nsite,Thorax,,,2,,,,,,1.0000,0.0000,5.6569,"), csv.npos) << csv;
   EXPECT_NE(csv.find(",'=cmd,"), csv.npos) << "what a person typed is no formula";
 }
 

@@ -97,6 +97,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"GET /api/v1/room-calibration", "TPE"},
     {"GET /api/v1/room-calibration/board.pdf", "TPE"},
     {"POST /api/v1/room-calibration/sign", "PE"},
+    {"POST /api/v1/couch", "PE"},
     {"GET /api/v1/sensor-profile", "TPE"},
     {"GET /api/v1/sensor-profile/{version}/file", "TPE"},
     {"POST /api/v1/sensor-profile/reset", "E"},

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The daily check of the room's markers: today's, its numbers over time, and the baseline.
 import { currentSession, get, live, may, post } from '../api.js';
+import { couchCard } from '../couch/profile.js';
 import {
   action, card, clear, done, field, fixed, h, hint, localDay, localTime, redraw, row, rowHead,
   signedTime, svg, table,
@@ -9,6 +10,7 @@ import { kReason } from '../limits.js';
 import { signed } from '../numbers.js';
 import { controlLimits } from '../drawings/control_limits.js';
 import { markOf } from '../drawings/trend.js';
+import { markerHelp } from '../help/drawings.js';
 import { signedForm } from '../signed_form.js';
 import { S, said, saidEach } from '../words.js';
 import { sentence } from './common.js';
@@ -153,6 +155,8 @@ function earlier(checks) {
 export async function showCheck(place) {
   const text = S.check;
   const room = roomCard();
+  const couch = couchCard();
+  const help = markerHelp();
   const baselinePlace = h('section', { class: 'card', hidden: true });
   let offered = null;  // the check whose form is there: what was typed in it stays
   let asked = 0;
@@ -178,12 +182,12 @@ export async function showCheck(place) {
       : text.noBaseline;
     redraw(place, h('h1', { class: 'visually-hidden' }, text.title), verdict(checks[0], overdue),
       h('section', { class: 'card split' },
-        h('div', {}, h('p', {}, text.how), hint(`${text.baseline}: ${of}`)),
+        h('div', {}, h('p', {}, text.how), hint(`${text.baseline}: ${of}`), help),
         may('scan') && action(text.start, async () => {
           await post('checks/open');
           location.hash = '#/scan';
         }, { class: 'primary' })),
-      last && newest(last), baselinePlace, room.place, trends(checks),
+      last && newest(last), baselinePlace, room.place, couch.place, trends(checks),
       checks.length > 1 && earlier(checks.slice(1)));
   };
   await load();
@@ -193,5 +197,6 @@ export async function showCheck(place) {
   return () => {
     end();
     room.end();
+    couch.end();
   };
 }

@@ -4,11 +4,12 @@
 import {
   currentSession, get, getOrNull, live, may, post, since_s,
 } from '../api.js';
+import { couchAxis } from '../couch/axes.js';
 import {
   action, card, clear, done, enable, field, h, hint, redraw, saveFrom, say, signedTime, svg,
 } from '../dom.js';
 import { kReason } from '../limits.js';
-import { kAxes, mostDigits, signed, toleranceBar, withUnit } from '../numbers.js';
+import { kAxes, signed, toleranceBar, withUnit } from '../numbers.js';
 import { signedForm } from '../signed_form.js';
 import { S, said, saidEach } from '../words.js';
 import { follow, sentence } from './common.js';
@@ -43,16 +44,22 @@ export function presentOf(monitor, received_s) {
 }
 
 function number(axis, numbers, tolerance) {
-  const value = numbers?.[axis.key] ?? null;
-  const u95 = numbers?.[axis.key.replace(/_(mm|deg)$/, '_u95_$1')] ?? null;
-  const digits = mostDigits(axis);
-  const tone = value === null ? 'unknown' : Math.abs(value) > tolerance ? 'outside' : '';
+  const couch = couchAxis(axis, live.status?.room?.known);
+  const counted = (key, factor) => {
+    const found = numbers?.[key] ?? null;
+    return found === null ? null : found * factor;
+  };
+  const value = counted(axis.key, couch.factor);
+  const u95 = counted(axis.key.replace(/_(mm|deg)$/, '_u95_$1'), Math.abs(couch.factor));
+  const { digits, unit } = couch;
+  const limit = tolerance * Math.abs(couch.factor);
+  const tone = value === null ? 'unknown' : Math.abs(value) > limit ? 'outside' : '';
   return h('div', { class: `live-number ${tone}` },
     h('span', { class: 'axis' }, S.result.axes[axis.name]),
-    h('strong', {}, value === null ? '–' : withUnit(signed(value, digits), axis.unit)),
+    h('strong', {}, value === null ? '–' : withUnit(signed(value, digits), unit)),
     h('span', { class: 'fine' }, u95 === null ? ''
-      : `± ${withUnit(u95.toFixed(digits).replace('.', S.decimal), axis.unit)}`),
-    toleranceBar(value ?? 0, value === null ? NaN : u95, tolerance, value !== null));
+      : `± ${withUnit(u95.toFixed(digits).replace('.', S.decimal), unit)}`),
+    toleranceBar(value ?? 0, value === null ? NaN : u95, limit, value !== null));
 }
 
 /// @param monitor  States the tolerances.

@@ -384,9 +384,10 @@ export async function showPatient(place, id) {
     redraw(references, referenceTable(found.references));
     redraw(scans, scanTable(history.scans));
     // Nothing waits for them.
-    getOrNull(`patients/${id}/statistics`).then((course) => {
+    getOrNull(`patients/${id}/statistics`).then((statistics) => {
       const inUse = found.references.find((one) => one.id === patient.approved_reference_id);
-      redraw(spread, courseStatistics(course, history.scans, toleranceOf(inUse)) ?? []);
+      redraw(spread,
+        courseStatistics(statistics?.courses, history.scans, toleranceOf(inUse)) ?? []);
     });
     const sessions = JSON.stringify(history.scans.map((scan) => [scan.session_id, scan.fraction]));
     if (numbered !== sessions) {  // or a half-typed reason would be lost

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One result, from its verdict down to the pictures.
 import { fileUrl, get, getOrNull, live, now } from '../api.js';
+import { couchVersion } from '../couch/axes.js';
+import { couchReadings } from '../couch/readings.js';
 import { card, clear, h, hint, keepFocus, warn } from '../dom.js';
 import { errorMap } from '../drawings/error_map.js';
 import { compassOf, mapFrame, marksNote, viewOf } from '../drawings/map_frame.js';
@@ -11,7 +13,6 @@ import { S, said, saidEach } from '../words.js';
 import { actions } from './accept.js';
 import { capturedAgainst, capturedCard } from './captured.js';
 import { findings, follow, isAdvice, partsOf, sentence } from './common.js';
-import { couchReadings } from './couch.js';
 import { meshView } from './mesh_view.js';
 import { recordsOf } from './monitoring_record.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
@@ -135,8 +136,9 @@ function build(data, reload, id) {
   };
   /// Draws the answer again once it can no longer be acted on.
   parts.judge = (why) => {
-    if (parts.isValid === !why) return;
+    if (parts.isValid === !why && parts.couch === couchVersion()) return;
     parts.isValid = !why;
+    parts.couch = couchVersion();
     clear(parts.fresh, answer(data, !why));
     clear(parts.words, bodyWords(data, !why));
   };

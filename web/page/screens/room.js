@@ -3,6 +3,7 @@
 import {
   currentSession, get, live, loadSession, may, now, setLoggedOffHandler, since_s,
 } from '../api.js';
+import { couchVersion } from '../couch/axes.js';
 import { clear, h, hint, say } from '../dom.js';
 import { legend } from '../drawings/error_map.js';
 import { isLanguage, keepLanguage, languageOf } from '../language.js';
@@ -159,7 +160,9 @@ function resting(status) {
       h('p', { class: 'room-hint' }, faultWords(status))];
   }
   const closed = saysNoSession(status);
+  const siteHint = status.next_purpose !== 'daily_check' && status.session?.sweep_hint;
   return [word(closed ? text.noSession : text.ready, closed ? 'bad' : 'good'),
+    siteHint && h('p', { class: 'room-hint site-hint' }, siteHint),
     h('p', { class: 'room-hint' }, closed ? text.openOne
       : status.press === 'monitoring' ? S.stateHints.at_rest : text.press)];
 }
@@ -210,9 +213,11 @@ function result() {
     const strip = h('div', { class: 'room-strip' });
     const six = isAdvice(scan) && h('section', {});
     let isValid = null;
+    let couch = null;
     judge = (why) => {
-      if (isValid === !why) return;
+      if (isValid === !why && couch === couchVersion()) return;
       isValid = !why;
+      couch = couchVersion();
       clear(strip, scan.result ? verdictStrip(data, isValid) : withoutResult(scan));
       strip.querySelector('details')?.remove();  // a display has nothing to open it with
       if (six) {

@@ -5,6 +5,7 @@ import { get, live, may, post } from '../api.js';
 import {
   action, clear, done, fixed, h, hint, localTime, row, rowHead, signedTime, table,
 } from '../dom.js';
+import { boardHelp } from '../help/drawings.js';
 import { signedForm } from '../signed_form.js';
 import { S, said } from '../words.js';
 import { sentence } from './common.js';
@@ -77,7 +78,7 @@ export function roomCard() {
     shown = JSON.stringify(room);
     const { scans, versions } = room;
     clear(place, h('h2', {}, text.title), state(room), may('calibrate') && [
-      steps(),
+      steps(), boardHelp(),
       action(text.start, async () => {
         await post('checks/open');
         location.hash = '#/scan/board';

@@ -5,6 +5,7 @@ import {
 } from '../api.js';
 import { action, card, clear, done, enable, h, hint, say } from '../dom.js';
 import { liveSurface } from '../drawings/live_surface.js';
+import { sweepHelp } from '../help/drawings.js';
 import { isAcknowledged, sessionLine, sessionName } from '../treatment.js';
 import { S, said } from '../words.js';
 import {
@@ -131,6 +132,7 @@ export async function showScan(place, what) {
   const who = h('p', { class: 'lead who-line' });
   const headline = h('p', { class: 'headline' });
   const guidance = h('p', { class: 'guidance' });
+  const siteHint = h('p', { class: 'lead site-hint' });
   const known = lastKnownNote('old-note');
   const caution = h('p', { class: 'caution' });
   const toResult = h('a', { class: 'button', href: '#/result', hidden: true }, text.toResult);
@@ -140,15 +142,16 @@ export async function showScan(place, what) {
   const seen = h('div', { class: 'seen-so-far' });
   const showSurface = surfaceIn(seen);
   const soFar = h('div', {});
+  const help = sweepHelp();
   const control = buttons();
   const drawSession = sessionLine(who, { mayClose: may('scan') });
   const shown = {};
 
   clear(place, h('h1', { class: 'visually-hidden' }, text.title),
     h('div', { class: 'scan-grid' },
-      h('section', { class: 'card sweep' }, who, known.element, headline, guidance, caution,
-        toResult, h('div', { class: 'bar' }, bar, barText), control.element, soFar),
-      card(S.status.preview, camera.element, seen, facts)));
+      h('section', { class: 'card sweep' }, who, known.element, headline, guidance, siteHint,
+        caution, toResult, h('div', { class: 'bar' }, bar, barText), control.element, soFar),
+      card(S.status.preview, camera.element, seen, facts, help)));
 
   const drawWho = (status) => {
     const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
@@ -204,8 +207,11 @@ export async function showScan(place, what) {
     toResult.hidden = state !== 'result' || !status.last_result;
     control.draw(status);
     showSurface(status.state === 'scanning');
+    help.hidden = ['scanning', 'working'].includes(status.state);
     drawProgress(status);
     if (status.fault) guidance.textContent = faultWords(status);
+    const isOurs = status.session && status.next_purpose !== 'daily_check';
+    siteHint.textContent = isOurs && state !== 'working' ? status.session.sweep_hint ?? '' : '';
     const refused = status.next_purpose === 'reference' && status.state === 'ready';
     caution.textContent = refused ? sentence(said(status, 'reference_block') ?? '') : '';
     drawWho(status);

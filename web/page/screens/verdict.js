@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The head of a result: whose it is, how old, the verdict, and whether it can be acted on.
 import { live, may, since_s } from '../api.js';
+import { couchApply } from '../couch/axes.js';
 import { clear, h, localTime } from '../dom.js';
 import { kResult } from '../limits.js';
 import { S, said, saidEach } from '../words.js';
@@ -108,7 +109,8 @@ export function verdictStrip({ scan, quality, patient }, valid = true) {
   const reasons = saidEach(result, 'reasons');
   // The first reason decides; a wall of text is not read.
   const [first, ...others] = result.verdict === 'no_answer' ? reasons
-    : [(valid ? text.why : text.whyThen)[result.verdict] ?? reasons[0]];
+    : [valid && result.verdict === 'move' && result.along_couch ? couchApply()
+      : (valid ? text.why : text.whyThen)[result.verdict] ?? reasons[0]];
   return h('section', { class: `verdict ${result.verdict}` },
     h('p', { class: 'word' },
       h('span', { class: 'icon', 'aria-hidden': 'true' }, verdictIcon(result.verdict)),

@@ -29,15 +29,25 @@ function factsOf(course) {
     .filter(Boolean).join(' · ');
 }
 
-/// Of one patient, with the trend over the fractions: nothing before two of them have an answer.
-export function courseStatistics(course, scans, tolerance) {
+const versionOf = ({ reference_version: version }) => (
+  version === null ? S.none : S.result.version(version));
+
+/// Of one patient against one reference; nothing before two fractions have an answer.
+function ofReference(course) {
   const text = S.statistics;
-  if (!course || course.fractions < 2) return null;
-  return card(text.title, hint(factsOf(course)),
+  if (course.fractions < 2) return null;
+  return [h('h3', {}, `${S.result.reference}: ${versionOf(course)}`), hint(factsOf(course)),
     table([text.number, text.first, text.last], course.numbers.map((number) => row(
       axisName(number), cell(meanWords(number.first, number.unit)),
-      cell(meanWords(number.last, number.unit)))), text.title), hint(text.courseHint),
-    trend(scans, tolerance, true));
+      cell(meanWords(number.last, number.unit)))), text.title)];
+}
+
+/// Of one patient, with the trend over the fractions.
+export function courseStatistics(courses, scans, tolerance) {
+  const text = S.statistics;
+  const tables = (courses ?? []).map(ofReference).filter(Boolean);
+  if (!tables.length) return null;
+  return card(text.title, tables, hint(text.courseHint), trend(scans, tolerance, true));
 }
 
 function siteTable(site, which) {
@@ -54,10 +64,12 @@ function siteTable(site, which) {
 function courseTable(courses, which) {
   const text = S.statistics;
   const axes = courses[0].numbers.map(axisName);
-  return table([S.patients.code, text.fractionsHead, text.scansHead, text.overridesHead, ...axes],
+  const heads = [S.patients.code, text.fractionsHead, text.scansHead, text.overridesHead, ...axes];
+  return table(heads,
     courses.map((course) => row(
-      h('a', { href: `#/patient/${course.patient_id}` }, course.code), course.fractions,
-      course.scans, course.overrides,
+      // Below the code, not in a column of its own: ten columns are as many as fit at 1280 px.
+      h('td', {}, h('a', { href: `#/patient/${course.patient_id}` }, course.code), h('br'),
+        h('small', {}, versionOf(course))), course.fractions, course.scans, course.overrides,
       ...course.numbers.map((number) => cell(meanWords(number[which], number.unit))))),
     text.ofCourses);
 }

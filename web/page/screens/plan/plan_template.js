@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Templates, with which plans of one site begin: size of the region and tolerances.
 import { get, post, put } from '../../api.js';
-import { action, clear, done, h, hint } from '../../dom.js';
+import {
+  action, clear, done, field, h, hint,
+} from '../../dom.js';
+import { kReason } from '../../limits.js';
 import { S } from '../../words.js';
 
 const boundsOf = (region) => {
@@ -19,6 +22,9 @@ export async function templateOf(patient, grid, model, inputs, drawing, changed)
   const load = async () => {
     const { templates } = await get('templates', true);
     const found = templates.find((one) => one.site.toLowerCase() === site.toLowerCase());
+    const advice = h('input', {
+      autocomplete: 'off', maxlength: kReason.maxlength, value: found?.hint ?? '',
+    });
     const use = found && action(text.templateUse, async () => {
       const [x, y] = model.isocentre ?? (model.region.length > 2
         ? boundsOf(model.region).map(([low, high]) => (low + high) / 2)
@@ -29,6 +35,11 @@ export async function templateOf(patient, grid, model, inputs, drawing, changed)
         .map((point) => point.map(round)));
       inputs.shift.value = found.tolerance.shift_mm;
       inputs.rotation.value = found.tolerance.rotation_deg;
+      // A planning CT says its posture itself.
+      if (found.posture && !inputs.posture.disabled) {
+        inputs.posture.value = found.posture;
+        inputs.posture.dispatchEvent(new Event('change', { bubbles: true }));
+      }
       changed();
     }, {});
     const keep = action(text.templateKeep, async () => {
@@ -39,6 +50,7 @@ export async function templateOf(patient, grid, model, inputs, drawing, changed)
         site, width_mm: width, height_mm: height,
         shift_tolerance_mm: Number(inputs.shift.value),
         rotation_tolerance_deg: Number(inputs.rotation.value),
+        posture: inputs.posture.value, hint: advice.value.replace(/\s+/g, ' ').trim(),
       });
       done(S.saved);
       await load();
@@ -49,7 +61,10 @@ export async function templateOf(patient, grid, model, inputs, drawing, changed)
     }, {});
     const says = found ? text.templateIs(found.width_mm / 10, found.height_mm / 10,
       found.tolerance.shift_mm, found.tolerance.rotation_deg) : text.templateNone;
-    clear(element, hint(says), h('div', { class: 'row' }, use, keep, drop));
+    const more = found && (found.posture || found.hint) && hint(text.templateSays(
+      text.postures[found.posture] ?? S.none, found.hint || S.none));
+    clear(element, hint(says), more, field(text.templateHint, advice, text.templateHintHint),
+      h('div', { class: 'row' }, use, keep, drop));
   };
   await load();
   return h('fieldset', {}, h('legend', {}, text.template(site)), element);

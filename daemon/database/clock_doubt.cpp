@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/records/clock_doubt.hpp"
+#include "daemon/database/clock_doubt.hpp"
 
 #include <cstdint>
 #include <optional>
