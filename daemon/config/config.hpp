@@ -30,7 +30,7 @@ struct ApplianceConfig {
   std::string sensor_driver;         ///< Driver of the sensors; empty: the first of the build.
   std::filesystem::path sensor_socket =
       "/run/plumb/sensor.sock";          ///< Where the driver "stream" listens.
-  std::filesystem::path sensor_library;  ///< Of the driver "realsense"; empty: the newest found.
+  std::filesystem::path sensor_library;  ///< A maker's; empty: the newest found.
   double sensor_exposure_us = 0.0;       ///< Of colour during a scan; 0: automatic.
   /// Scans start from what earlier scans learned about this sensor unit.
   bool sensor_profiles = true;

@@ -30,7 +30,7 @@ struct SensorSettings {
   std::filesystem::path calibration_folder = "/var/lib/plumb/calibration";
   /// Where the driver "stream" listens.
   std::filesystem::path stream_socket = "/run/plumb/sensor.sock";
-  /// Of the driver "realsense": file or name of its library; empty: the newest installed one.
+  /// File or name of a maker's library; empty: the newest installed one.
   std::filesystem::path library = {};
   /// Exposure of colour images during a scan; 0: automatic.
   double exposure_us = 0.0;

@@ -47,8 +47,9 @@ void ExamineUsb(std::vector<SensorFinding>& findings) {
                    : say::sensor::UsbSensorWithSpeed(sensor.model, id, sensor.bus, sensor.address,
                                                      sensor.speed);
       }();
-      if (IsRealSense(sensor.vendor)) {
-        findings.push_back({State::kNote, say::sensor::Usb(), found, say::sensor::UseRealsense()});
+      if (const UsbDriver other = DriverOf(sensor.vendor, sensor.product); !other.name.empty()) {
+        findings.push_back({State::kNote, say::sensor::Usb(), found,
+                            say::sensor::UseDriver(other.library, other.name, other.guide)});
       } else if (const std::string sdk = SdkOf(sensor.vendor, sensor.product); !sdk.empty()) {
         findings.push_back({State::kNote, say::sensor::Usb(), found, say::stream::Deliver(sdk)});
       } else if (NeedsForeignDriver(sensor.vendor)) {

@@ -3,39 +3,22 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
-#include <span>
 #include <utility>
 
-#include <Eigen/Geometry>
-#include <opencv2/imgproc.hpp>
+#include <Eigen/Core>
 
-#include "drivers/live/sensor_calibration.hpp"
-#include "drivers/replay/camera_file.hpp"
-#include "words/realsense.hpp"
 #include "words/recording.hpp"
+#include "words/sdk.hpp"
 
 namespace plumb::realsense {
 namespace {
 
-constexpr int kRate_hz = 30;
-// Automatic exposure settles within half a second.
-constexpr int kPairsToSettle = 15;
-constexpr int kMostColumns = 960;
 constexpr float kLaser_mw = 150.0F;
 
-struct Size {
-  int width, height;
-};
 // 848x480 is the native mode of the D400's stereo, in which its noise is lowest for the work.
-constexpr std::array kDepthSizes = {Size{848, 480}, Size{640, 480}, Size{1024, 768}};
-// Colour of more than 960 columns is halved.
-constexpr std::array kColorSizes = {Size{848, 480}, Size{960, 540}, Size{1280, 720},
-                                    Size{640, 480}};
-
-cv::Size HalvedAbove(int width, int height) {
-  return width > kMostColumns ? cv::Size(width / 2, height / 2) : cv::Size(width, height);
-}
+const std::array kDepthSizes = {cv::Size(848, 480), cv::Size(640, 480), cv::Size(1024, 768)};
+const std::array kColorSizes = {cv::Size(848, 480), cv::Size(960, 540), cv::Size(1280, 720),
+                                cv::Size(640, 480)};
 
 }  // namespace
 
@@ -53,7 +36,7 @@ RealSenseStreams::~RealSenseStreams() {
 }
 
 void RealSenseStreams::FindModes() {
-  const Message what = say::realsense::NoStreams(serial_);
+  const Message what = say::sdk::NoStreams(RealSenseTitle().name, serial_);
   const Owned<SensorList> list(library_->Call(what, library_->query_sensors, device_.get()),
                                library_->delete_sensor_list);
   const int num_sensors = library_->Call(what, library_->get_sensors_count, list.get());
@@ -72,16 +55,18 @@ void RealSenseStreams::FindModes() {
       Consider(sensor, library_->Call(what, library_->get_stream_profile, modes, k));
   }
   if (depth_.profile == nullptr)
-    throw DeviceError(say::realsense::NoMode(serial_, say::recording::Depth(), kRate_hz));
+    throw DeviceError(
+        say::sdk::NoMode(serial_, say::recording::Depth(), kSdkRate_hz, RealSenseTitle().guide));
   if (color_.profile == nullptr)
-    throw DeviceError(say::realsense::NoMode(serial_, say::recording::Colour(), kRate_hz));
+    throw DeviceError(
+        say::sdk::NoMode(serial_, say::recording::Colour(), kSdkRate_hz, RealSenseTitle().guide));
 }
 
 void RealSenseStreams::Consider(Sensor* sensor, const Profile* profile) {
   int stream = 0, format = 0, index = 0, id = 0, rate_hz = 0;
   if (!library_->Try(library_->get_stream_profile_data, profile, &stream, &format, &index, &id,
                      &rate_hz) ||
-      rate_hz != kRate_hz)
+      rate_hz != kSdkRate_hz)
     return;
   const bool is_depth = stream == kStreamDepth && format == kFormatZ16;
   const bool is_color = stream == kStreamColor && format == kFormatRgb8;
@@ -89,13 +74,10 @@ void RealSenseStreams::Consider(Sensor* sensor, const Profile* profile) {
   if ((!is_depth && !is_color) ||
       !library_->Try(library_->get_video_stream_resolution, profile, &found.width, &found.height))
     return;
-  const std::span<const Size> sizes =
-      is_depth ? std::span<const Size>(kDepthSizes) : std::span<const Size>(kColorSizes);
-  const auto known = std::ranges::find_if(sizes, [&](const Size& size) {
-    return size.width == found.width && size.height == found.height;
-  });
-  if (known == sizes.end()) return;
-  found.rank = static_cast<std::size_t>(known - sizes.begin());
+  const auto rank = is_depth ? SdkRank(kDepthSizes, found.width, found.height)
+                             : SdkRank(kColorSizes, found.width, found.height);
+  if (!rank) return;
+  found.rank = *rank;
   ChosenMode& best = is_depth ? depth_ : color_;
   if (best.profile == nullptr || found.rank < best.rank) best = found;
 }
@@ -132,21 +114,25 @@ void RealSenseStreams::SetExposure(double exposure_us) const {
   SetOption(color_.sensor, kOptionExposure, static_cast<float>(exposure_us / unit_us));
 }
 
-cv::Size RealSenseStreams::color_size() const { return HalvedAbove(color_.width, color_.height); }
-
 /// The library projects with its "inverse" and "modified" models as OpenCV does, but for the order
 /// of the last two terms.
-nlohmann::json RealSenseStreams::Lens(const RsIntrinsics& camera, const Message& image) const {
+SdkLens RealSenseStreams::Lens(const RsIntrinsics& camera, const Message& image) const {
   constexpr std::array kPlain = {kDistortionNone, kDistortionModified, kDistortionInverse,
                                  kDistortionBrownConrady};
   const bool is_zero = std::ranges::all_of(camera.coefficients, [](float c) { return c == 0; });
   if (!is_zero && std::ranges::find(kPlain, camera.model) == kPlain.end())
-    throw DeviceError(say::realsense::LensModel(image, serial_, camera.model));
-  return camera.coefficients;
+    throw DeviceError(say::sdk::LensModel(image, serial_, camera.model, RealSenseTitle().name));
+  return {.width = camera.width,
+          .height = camera.height,
+          .fx = camera.fx,
+          .fy = camera.fy,
+          .cx = camera.ppx,
+          .cy = camera.ppy,
+          .distortion = {camera.coefficients.begin(), camera.coefficients.end()}};
 }
 
-nlohmann::json RealSenseStreams::CameraKeys() const {
-  const Message what = say::realsense::NoCalibration(serial_);
+SdkFactory RealSenseStreams::Factory() const {
+  const Message what = say::sdk::NoCalibration(serial_);
   RsIntrinsics color, depth;
   RsExtrinsics pose;
   library_->Call(what, library_->get_video_stream_intrinsics, color_.profile, &color);
@@ -156,37 +142,17 @@ nlohmann::json RealSenseStreams::CameraKeys() const {
     return camera.width == mode.width && camera.height == mode.height;
   };
   if (!is_of(color, color_) || !is_of(depth, depth_)) throw DeviceError(what);
-  const double unit_m =
-      static_cast<double>(library_->Call(what, library_->get_depth_scale, depth_.sensor));
-  if (!(unit_m > 0)) throw DeviceError(what);
-  const auto matrix = [](const RsIntrinsics& c) {
-    return std::array<double, 9>{c.fx, 0, c.ppx, 0, c.fy, c.ppy, 0, 0, 1};
-  };
-  const Eigen::Matrix3d turn =
-      Eigen::Map<const Eigen::Matrix3f>(pose.rotation.data()).cast<double>();
-  Pose T_color_depth = Pose::Identity();  // Single precision is not rigid enough.
-  T_color_depth.linear() = Eigen::Quaterniond(turn).normalized().toRotationMatrix();
-  T_color_depth.translation() =
-      Eigen::Map<const Eigen::Vector3f>(pose.translation.data()).cast<double>();
-  nlohmann::json rows = nlohmann::json::array();
-  for (int r = 0; r < 4; ++r)
-    for (int c = 0; c < 4; ++c) rows.push_back(T_color_depth.matrix()(r, c));
-  return {{"image_width", color.width},
-          {"image_height", color.height},
-          {"camera_matrix", matrix(color)},
-          {"distortion_coefficients", Lens(color, say::recording::Colour())},
-          {"depth_scale", 1.0 / unit_m},
-          {"depth_registered", 0},
-          {"depth_image_width", depth.width},
-          {"depth_image_height", depth.height},
-          {"depth_camera_matrix", matrix(depth)},
-          {"depth_distortion_coefficients", Lens(depth, say::recording::Depth())},
-          {"T_color_depth", rows}};
+  return {.color = Lens(color, say::recording::Colour()),
+          .depth = Lens(depth, say::recording::Depth()),
+          .T_color_depth = RigidPose(Eigen::Map<const Eigen::Matrix3f>(pose.rotation.data()),
+                                     Eigen::Map<const Eigen::Vector3f>(pose.translation.data())),
+          .depth_unit_m =
+              static_cast<double>(library_->Call(what, library_->get_depth_scale, depth_.sensor))};
 }
 
 void RealSenseStreams::Start(std::shared_ptr<FrameBox> box) {
   box_ = std::move(box);
-  const Message what = say::realsense::NoStart(serial_);
+  const Message what = say::sdk::NoStart(serial_);
   std::array<const Profile*, 2> both = {depth_.profile, color_.profile};
   const bool is_one = depth_.sensor == color_.sensor;  // The D405.
   const auto open = [&](Sensor* sensor, const Profile** first, int count) {
@@ -224,7 +190,7 @@ StatedTime RealSenseStreams::TimeOf(const RsFrame* frame) const {
 }
 
 void RealSenseStreams::Accept(const RsFrame* frame) {
-  const Message what = say::realsense::BadImage(serial_);
+  const Message what = say::sdk::BadImage(serial_);
   const Profile* profile = library_->Call(what, library_->get_frame_stream_profile, frame);
   int stream = 0, format = 0, index = 0, id = 0, rate_hz = 0;
   library_->Call(what, library_->get_stream_profile_data, profile, &stream, &format, &index, &id,
@@ -235,81 +201,29 @@ void RealSenseStreams::Accept(const RsFrame* frame) {
   const ChosenMode& mode = is_color ? color_ : depth_;
   box_->CountGaps(
       kind, static_cast<std::int64_t>(library_->Call(what, library_->get_frame_number, frame)));
-  const int width = library_->Call(what, library_->get_frame_width, frame);
-  const int height = library_->Call(what, library_->get_frame_height, frame);
-  const int stride = library_->Call(what, library_->get_frame_stride_in_bytes, frame);
-  const void* data = library_->Call(what, library_->get_frame_data, frame);
-  if (width != mode.width || height != mode.height || stride < width * (is_color ? 3 : 2) ||
-      format != (is_color ? kFormatRgb8 : kFormatZ16) || data == nullptr) {
-    box_->Fail(say::realsense::WrongSize(
-        serial_, is_color ? say::recording::Colour() : say::recording::Depth(), width, height,
-        mode.width, mode.height));
-    return;
-  }
+  const SdkImage image{.kind = kind,
+                       .width = library_->Call(what, library_->get_frame_width, frame),
+                       .height = library_->Call(what, library_->get_frame_height, frame),
+                       .row_bytes = static_cast<std::size_t>(std::max(
+                           0, library_->Call(what, library_->get_frame_stride_in_bytes, frame))),
+                       .has_format = format == (is_color ? kFormatRgb8 : kFormatZ16),
+                       .data = library_->Call(what, library_->get_frame_data, frame)};
+  if (!IsWanted(*box_, serial_, image, mode.width, mode.height)) return;
   const std::optional<std::int64_t> stamp = stamps_.StampOf(kind, TimeOf(frame));
   if (!stamp) return box_->CountDiscarded();
-  // The library takes its buffer back.
-  const cv::Mat view(height, width, is_color ? CV_8UC3 : CV_16UC1, const_cast<void*>(data),
-                     static_cast<std::size_t>(stride));
-  cv::Mat image;
-  if (is_color && color_size() != view.size())
-    cv::resize(view, image, color_size(), 0, 0, cv::INTER_AREA);
-  else
-    image = view.clone();
-  box_->Add(kind, *stamp, std::move(image));
+  box_->Add(kind, *stamp, CopyOf(image));
 }
 
-namespace {
-
-/// The factory's calibration, in the form of camera.yaml and as strictly checked.
-CameraFile FactoryCamera(const RealSenseStreams& streams, const std::string& serial) try {
-  return ParseCameraFile(streams.CameraKeys().dump(), "librealsense2");
-} catch (const DataError& error) {
-  throw DeviceError(say::realsense::CalibrationDamaged(serial, error.message()));
-}
-
-StreamInfo InfoFor(const SensorSettings& settings, const RealSenseUnit& unit,
-                   const CameraFile& factory, cv::Size size) {
-  const DepthSensor sensor = ClassOfLine(unit.line);
-  StreamInfo info;
-  std::error_code error;
-  if (std::filesystem::exists(CalibrationFile(settings.calibration_folder, unit.serial), error)) {
-    info =
-        LiveStreamInfo(settings, unit.serial, size.width, size.height, 0.0, ClassOf(sensor).noise);
-    if (info.usable_depth == UsableDepth()) info.usable_depth = ClassOf(sensor).range;
-  } else {
-    info.room_markers = settings.room_markers;
-    TakeOver(factory, info);
-    info.intrinsics = Resized(factory.color, size.width, size.height);
-    info.depth_noise = ClassOf(sensor).noise;
-    info.usable_depth = ClassOf(sensor).range;
-  }
-  info.depth_sensor = sensor;
-  if (const auto advice = FirmwareAdvice(unit)) info.warnings.push_back(*advice);
-  return info;
-}
-
-}  // namespace
-
-RealSenseSensor::RealSenseSensor(std::unique_ptr<RealSenseStreams> streams,
-                                 const RealSenseUnit& unit, const SensorSettings& settings,
-                                 SensorDescription description, std::shared_ptr<FrameBox> box,
-                                 std::shared_ptr<const void> watched)
-    : BoxedSensor(std::move(description), box),
-      exposure_us_(settings.exposure_us),
-      streams_(std::move(streams)),
-      watched_(std::move(watched)) {
-  const CameraFile factory = FactoryCamera(*streams_, unit.serial);
-  SetInfo(InfoFor(settings, unit, factory, streams_->color_size()));
-  SetDepth(factory.depth_scale.value(),
-           DepthRegistration(factory.depth_camera.value().intrinsics, info().intrinsics,
-                             factory.depth_camera->T_color_depth));
-  box->Begin(kPairsToSettle);
-  streams_->Start(std::move(box));
+RealSenseSensor::RealSenseSensor(std::unique_ptr<RealSenseStreams> streams, SdkOpening opening,
+                                 const SensorSettings& settings)
+    : SdkSensor(opening, settings, RealSenseTitle(), streams->Factory()),
+      streams_(std::move(streams)) {
+  opening.box->Begin(kSdkPairsToSettle);
+  streams_->Start(std::move(opening.box));
 }
 
 void RealSenseSensor::LockExposure(bool locked) {
-  if (exposure_us_ > 0) streams_->SetExposure(locked ? exposure_us_ : 0.0);
+  if (exposure_us() > 0) streams_->SetExposure(locked ? exposure_us() : 0.0);
 }
 
 }  // namespace plumb::realsense

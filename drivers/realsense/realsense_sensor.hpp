@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// One open camera of librealsense2, created by RealSenseProvider.
+// One open camera of librealsense2, created by the driver.
 #pragma once
 
 #include <memory>
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
-#include "drivers/live/boxed_sensor.hpp"
-#include "drivers/live/sensor_driver.hpp"
 #include "drivers/realsense/realsense_library.hpp"
 #include "drivers/realsense/realsense_stamps.hpp"
-#include "drivers/realsense/realsense_unit.hpp"
+#include "drivers/sdk/sdk_sensor.hpp"
 
 namespace plumb::realsense {
 
@@ -36,15 +32,12 @@ class RealSenseStreams {
   RealSenseStreams(const RealSenseStreams&) = delete;
   RealSenseStreams& operator=(const RealSenseStreams&) = delete;
 
-  /// The factory's calibration for both modes, with the keys of camera.yaml. @throws DeviceError
-  [[nodiscard]] nlohmann::json CameraKeys() const;
+  /// The factory's calibration for both modes. @throws DeviceError
+  [[nodiscard]] SdkFactory Factory() const;
   /// From now on images go into the box. @throws DeviceError
   void Start(std::shared_ptr<FrameBox> box);
   /// Exposure of colour; 0: automatic.
   void SetExposure(double exposure_us) const;
-
-  /// Colour images are delivered with this size: at most 960 columns.
-  [[nodiscard]] cv::Size color_size() const;
 
  private:
   void FindModes();
@@ -53,7 +46,7 @@ class RealSenseStreams {
   void SetOption(const Sensor* sensor, int option, float value) const;
   void Accept(const RsFrame* frame);
   [[nodiscard]] StatedTime TimeOf(const RsFrame* frame) const;
-  [[nodiscard]] nlohmann::json Lens(const RsIntrinsics& camera, const Message& image) const;
+  [[nodiscard]] SdkLens Lens(const RsIntrinsics& camera, const Message& image) const;
 
   const std::shared_ptr<const RealSenseLibrary> library_;
   const std::string serial_;
@@ -66,21 +59,16 @@ class RealSenseStreams {
   RealSenseStamps stamps_;
 };
 
-class RealSenseSensor : public BoxedSensor {
+class RealSenseSensor : public SdkSensor {
  public:
   /// Starts the streams.
-  /// @param box  Receives its unplugging and failures from the provider.
-  /// @param watched  Released before the device is closed: the end of the provider's watch on it.
-  RealSenseSensor(std::unique_ptr<RealSenseStreams> streams, const RealSenseUnit& unit,
-                  const SensorSettings& settings, SensorDescription description,
-                  std::shared_ptr<FrameBox> box, std::shared_ptr<const void> watched);
+  RealSenseSensor(std::unique_ptr<RealSenseStreams> streams, SdkOpening opening,
+                  const SensorSettings& settings);
 
   void LockExposure(bool locked) override;
 
  private:
-  const double exposure_us_;
   std::unique_ptr<RealSenseStreams> streams_;
-  std::shared_ptr<const void> watched_;
 };
 
 }  // namespace plumb::realsense

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "drivers/live/frame_pairing.hpp"
+#include "drivers/sdk/counter_clock.hpp"
 
 namespace plumb::realsense {
 
@@ -32,26 +33,15 @@ class RealSenseStamps {
     if (!mine) mine = stated.sensor_us.has_value();
     if (!has_sensor_time_[0] || !has_sensor_time_[1]) return std::nullopt;
     if (*has_sensor_time_[0] && *has_sensor_time_[1])
-      return stated.sensor_us ? std::optional(Unwrapped(*stated.sensor_us)) : std::nullopt;
+      return stated.sensor_us ? std::optional(counter_.Continue(*stated.sensor_us)) : std::nullopt;
     if (!std::isfinite(stated.frame_ms) || std::abs(stated.frame_ms) > 1e15) return std::nullopt;
     return std::llround(1e3 * stated.frame_ms) - stated.exposure_us.value_or(0) / 2;
   }
 
  private:
-  /// The camera counts microseconds in 32 bits, for 71 minutes. Begins above 0, so that an image of
-  /// the other stream from just before is not negative.
-  std::int64_t Unwrapped(std::int64_t stated_us) {
-    constexpr std::int64_t kTurn = std::int64_t{1} << 32;
-    if (!last_us_) last_us_ = kTurn + stated_us % kTurn;
-    const auto step = static_cast<std::int32_t>(static_cast<std::uint32_t>(stated_us) -
-                                                static_cast<std::uint32_t>(*last_us_));
-    last_us_ = *last_us_ + step;
-    return *last_us_;
-  }
-
   std::mutex mutex_;
   std::array<std::optional<bool>, 2> has_sensor_time_;  ///< Of colour and depth.
-  std::optional<std::int64_t> last_us_;
+  CounterClock counter_;  ///< The camera counts microseconds in 32 bits, for 71 minutes.
 };
 
 }  // namespace plumb::realsense

@@ -20,6 +20,13 @@ constexpr double kMaxReach_px =
     8.0;  // of one sample; a colour image has at most a few times the resolution of its depth image
 constexpr int kSaturatedUnits = 65535;
 
+/// std::ceil() of what an int holds, without the call that it is on processors of 64 bits at large:
+/// four for each pixel.
+int Ceil(double value) {
+  const int towards_zero = static_cast<int>(value);
+  return towards_zero + (towards_zero < value ? 1 : 0);
+}
+
 }  // namespace
 
 cv::Mat DepthInMetres(const cv::Mat& units, double units_per_metre) {
@@ -69,6 +76,7 @@ cv::Mat DepthRegistration::Register(const cv::Mat& depth_m) const {
       CV_32FC1);  // squared distance of a pixel from the centre of its sample, set together with it
   const double magnification_x = 0.5 * kOverlap * color_.fx / depth_.fx;
   const double magnification_y = 0.5 * kOverlap * color_.fy / depth_.fy;
+  const bool has_lens = HasLens(color_);
   const Eigen::Vector3d* ray = ray_in_color_.data();
   for (int row = 0; row < depth_.height; ++row) {
     const auto* depth_row = depth_m.ptr<float>(row);
@@ -79,18 +87,24 @@ cv::Mat DepthRegistration::Register(const cv::Mat& depth_m) const {
       if (!(p_color.z() > kMinColorDepth_m)) continue;
       const Eigen::Array2d view = p_color.head<2>().array() / p_color.z();
       if ((view < min_view_).any() || (view > max_view_).any()) continue;
-      const Eigen::Vector2d centre = Project(color_, p_color);
+      // As Project() does it, bit for bit, without dividing again.
+      const Eigen::Vector2d seen =
+          has_lens ? DistortNormalised(color_, view.matrix()) : Eigen::Vector2d(view.matrix());
+      const Eigen::Vector2d centre(color_.fx * seen.x() + color_.cx,
+                                   color_.fy * seen.y() + color_.cy);
       const double reach_x = std::min(magnification_x * z_depth / p_color.z(), kMaxReach_px);
       const double reach_y = std::min(magnification_y * z_depth / p_color.z(), kMaxReach_px);
-      const int x_begin = std::max(0, static_cast<int>(std::ceil(centre.x() - reach_x)));
-      const int x_end = std::min(color_.width, static_cast<int>(std::ceil(centre.x() + reach_x)));
-      const int y_begin = std::max(0, static_cast<int>(std::ceil(centre.y() - reach_y)));
-      const int y_end = std::min(color_.height, static_cast<int>(std::ceil(centre.y() + reach_y)));
+      const int x_begin = std::max(0, Ceil(centre.x() - reach_x));
+      const int x_end = std::min(color_.width, Ceil(centre.x() + reach_x));
+      const int y_begin = std::max(0, Ceil(centre.y() - reach_y));
+      const int y_end = std::min(color_.height, Ceil(centre.y() + reach_y));
       const auto z = static_cast<float>(p_color.z());
       for (int y = y_begin; y < y_end; ++y) {
+        auto* z_row = registered.ptr<float>(y);
+        auto* offset_row = offset.ptr<float>(y);
         for (int x = x_begin; x < x_end; ++x) {
-          float& z_there = registered.at<float>(y, x);
-          float& offset_there = offset.at<float>(y, x);
+          float& z_there = z_row[x];
+          float& offset_there = offset_row[x];
           const auto offset_px2 =
               static_cast<float>((centre - Eigen::Vector2d(x, y)).squaredNorm());
           const bool same_surface = std::abs(z - z_there) <= kSameSurface * z;

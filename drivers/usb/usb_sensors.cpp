@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::uint16_t kPrimeSense = 0x1d27;
 constexpr std::uint16_t kOrbbec = 0x2bc5;
+constexpr std::uint16_t kOrbbecUvc = 0x0600;  ///< The first product that its SDK 2 uses.
 constexpr std::uint16_t kMicrosoft = 0x045e;
 constexpr std::uint16_t kIntel = 0x8086;
 
@@ -94,8 +95,9 @@ UsbSensor Describe(libusb_device* device, const libusb_device_descriptor& descri
   if (speed == LIBUSB_SPEED_LOW || speed == LIBUSB_SPEED_FULL) {
     sensor.problems.push_back(say::sensor::UsbSlow(sensor.speed));
   }
+  const std::string driver = DriverOf(sensor.vendor, sensor.product).name;
   const bool needs_usb3 =
-      IsRealSense(sensor.vendor) || !SdkOf(sensor.vendor, sensor.product).empty();
+      driver == "realsense" || driver == "orbbec" || !SdkOf(sensor.vendor, sensor.product).empty();
   if (needs_usb3 && speed == LIBUSB_SPEED_HIGH)
     sensor.problems.push_back(say::stream::Usb2(sensor.speed));
   if (!needs_usb3 && BehindUsb3(device)) {
@@ -121,7 +123,14 @@ std::string SdkOf(std::uint16_t vendor, std::uint16_t product) {
   return {};
 }
 
-bool IsRealSense(std::uint16_t vendor) { return vendor == kIntel; }
+UsbDriver DriverOf(std::uint16_t vendor, std::uint16_t product) {
+  if (vendor == kIntel) return {"realsense", "librealsense2", "docs/realsense.md"};
+  if (vendor == kMicrosoft && (product == 0x02ae || product == 0x02bf))
+    return {"freenect", "libfreenect0.5", "docs/freenect.md"};
+  // Older ones speak OpenNI's protocol.
+  if (vendor == kOrbbec && product >= kOrbbecUvc) return {"orbbec", "OrbbecSDK", "docs/orbbec.md"};
+  return {};
+}
 
 bool NeedsForeignDriver(std::uint16_t vendor) { return vendor != kPrimeSense; }
 

@@ -30,8 +30,13 @@ struct UsbSensor {
 /// The maker's library by which a program delivers the frames of such a sensor to the driver
 /// "stream"; empty for sensors that have a driver.
 [[nodiscard]] std::string SdkOf(std::uint16_t vendor, std::uint16_t product);
-/// Of the driver "realsense".
-[[nodiscard]] bool IsRealSense(std::uint16_t vendor);
+/// The driver that uses such a sensor through its maker's library.
+struct UsbDriver {
+  std::string name;     ///< For `driver` in the [sensor] table; empty: OpenNI2, or none.
+  std::string library;  ///< What has to be installed.
+  std::string guide;    ///< Where the manual says how.
+};
+[[nodiscard]] UsbDriver DriverOf(std::uint16_t vendor, std::uint16_t product);
 /// Debian's OpenNI2 has no driver for sensors of this vendor: it comes from their maker.
 [[nodiscard]] bool NeedsForeignDriver(std::uint16_t vendor);
 

@@ -350,9 +350,10 @@ TEST(RealSenseLibraryTest, TheNewestFileIsTaken) {
         "librealsense2.so.2.56.5", "librealsense2.so.3.1", "librealsense2.so.2.x",
         "librealsense2-gl.so.2.200"})
     WriteWholeFile(folder / name, std::string("x"));
-  EXPECT_EQ(RealSenseLibrary::FindIn({"/nowhere", folder.path()}),
+  const std::string& prefix = RealSenseTitle().prefix;
+  EXPECT_EQ(SdkLibrary::FindIn(prefix, {"/nowhere", folder.path()}),
             folder / "librealsense2.so.2.100.1");
-  EXPECT_EQ(RealSenseLibrary::FindIn({"/nowhere"}), "");
+  EXPECT_EQ(SdkLibrary::FindIn(prefix, {"/nowhere"}), "");
 }
 
 TEST_F(RealSenseTest, OtherLibrariesAreRefusedWithWhatIsExpected) {

@@ -129,7 +129,11 @@ TEST(UsbModelTest, NamesTheFamily) {
 
 TEST(UsbSensorModelTest, CamerasWithoutAnOpenNi2DriverAreNamedWithTheirMakersLibrary) {
   EXPECT_EQ(UsbSensorModel(0x8086, 0x0b07), "RealSense D435");
-  EXPECT_TRUE(IsRealSense(0x8086));
+  EXPECT_EQ(DriverOf(0x8086, 0x0b07).name, "realsense");
+  EXPECT_EQ(DriverOf(0x045e, 0x02ae).name, "freenect");
+  EXPECT_EQ(DriverOf(0x2bc5, 0x066b).name, "orbbec") << "Femto Bolt";
+  EXPECT_EQ(DriverOf(0x2bc5, 0x0401).name, "") << "an Astra, by its maker's driver for OpenNI2";
+  EXPECT_EQ(DriverOf(0x1d27, 0x0601).name, "");
   EXPECT_EQ(SdkOf(0x8086, 0x0b07), "") << "there is a driver for it";
   EXPECT_EQ(SdkOf(0x045e, 0x097c), "libk4a");
   EXPECT_EQ(UsbSensorModel(0x8086, 0x1234), std::nullopt) << "Intel makes other devices, too";
