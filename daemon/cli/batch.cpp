@@ -2,10 +2,7 @@
 #include "daemon/cli/batch.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <ctime>
-#include <mutex>
 #include <new>
 #include <utility>
 
@@ -29,8 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Between two looks at items that another process is doing, which takes seconds to minutes.
-constexpr std::chrono::milliseconds kLookAgain{200};
 constexpr int kMaxThreads = 1024;
 
 /// Of this process, all threads together.
@@ -67,7 +62,7 @@ class Batch {
       if (!Do(i)) of_others.push_back(i);
     while (!of_others.empty()) {
       std::erase_if(of_others, [&](std::size_t i) { return Do(i); });
-      if (!of_others.empty()) WaitForOthers();
+      if (!of_others.empty()) WaitForOthers(context_.stop);
     }
     RemoveUnfinished(folder_);
     WriteTableOnce();
@@ -85,7 +80,9 @@ class Batch {
       outcome.answer.exit_code = code;
     };
     try {
-      const fs::path output = folder_ / WorkName(work_.method, items_[i], context_.stop);
+      const fs::path output =
+          folder_ /
+          (work_.name ? work_.name(items_[i]) : WorkName(work_.method, items_[i], context_.stop));
       if (!work_.is_finished(output)) {
         const OutputLock lock(folder_, output.filename().string());
         if (!lock.IsHeld()) return false;
@@ -155,15 +152,6 @@ class Batch {
     return static_cast<int>(std::find(kRising.begin(), kRising.end(), code) - kRising.begin());
   }
 
-  /// Returns at once on a stop request.
-  void WaitForOthers() {
-    std::mutex mutex;
-    std::condition_variable_any stopped;
-    std::unique_lock lock(mutex);
-    stopped.wait_for(lock, context_.stop, kLookAgain, [] { return false; });
-    CheckStop(context_.stop);
-  }
-
   /// Two processes with one list write the same table, one after the other.
   void WriteTableOnce() {
     std::vector<TableColumn> columns = work_.inputs;
@@ -181,7 +169,7 @@ class Batch {
         WriteTable(columns, rows_, folder_ / work_.table);
         return;
       }
-      WaitForOthers();
+      WaitForOthers(context_.stop);
     }
   }
 

@@ -34,6 +34,8 @@ struct BatchWork {
   std::vector<TableColumn> inputs;   ///< One for each path of an item.
   std::vector<TableColumn> columns;  ///< What the table says of the output.
   std::string table;                 ///< Name of the table's file.
+  /// If set, the name of an item's output, where not all of the files of its inputs decide it.
+  std::function<std::string(const BatchInputs&)> name = {};
   std::function<bool(const std::filesystem::path& output)> is_finished;
   /// @param name  Of the item, for its progress.
   std::function<void(const BatchInputs&, const std::filesystem::path& output,

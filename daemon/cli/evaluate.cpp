@@ -1,34 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
 #include <utility>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
+#include "algo/base/errors.hpp"
 #include "algo/planning/planned_scene.hpp"
+#include "daemon/cli/batch.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/cli/shared_outputs.hpp"
 #include "daemon/cli/watch_recording.hpp"
+#include "daemon/cli/work_digest.hpp"
 #include "daemon/evaluation/evaluation.hpp"
 #include "daemon/evaluation/live_accuracy.hpp"
 #include "daemon/evaluation/report.hpp"
+#include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 #include "daemon/reports/text_report.hpp"
 #include "daemon/result/result_folder.hpp"
 #include "drivers/dicom/planning_files.hpp"
 #include "drivers/files/file_io.hpp"
+#include "words/cli.hpp"
+#include "words/output.hpp"
 
 namespace plumb {
 namespace {
 
 struct EvaluateArguments {
-  std::filesystem::path suite;
+  std::filesystem::path suite, list;
   std::optional<std::filesystem::path> out;
   MethodOptions method;
+  ThreadLimit threads;
   bool reuse = false;
   bool results = false;
   bool json = false;
@@ -113,33 +125,32 @@ LiveEvaluation EvaluateLive(const Suite& suite, const EvaluateOptions& evaluate,
   return live;
 }
 
-int Run(const EvaluateArguments& options, const CommandContext& context) {
+/// A suite with planning CTs brings its room.
+Config ConfigFor(const EvaluateArguments& options, const std::filesystem::path& suite) {
   MethodOptions method = options.method;
-  // A suite with planning CTs brings its room.
-  if (const auto room = options.suite / "room.toml";
-      !method.config_file && std::filesystem::exists(room))
+  if (const auto room = suite / "room.toml"; !method.config_file && std::filesystem::exists(room))
     method.config_file = room;
-  const Config config = method.Read();
-  const Suite suite = OpenSuite(options.suite);
-  const Preset preset = config.reconstruct.preset;
-  const std::filesystem::path out =
-      options.out.value_or(options.suite / fmt::format("results-{}", Name(preset)));
-  EnsureFolder(out);
-  Progress progress(context.language);
+  return method.Read();
+}
+
+/// Makes or finds the scene of a part of a sweep.
+using SceneMaker = std::function<Scene(const std::string& name, double part)>;
+
+struct Figures {
+  std::string json, table;
+};
+
+/// Writes the figures of one suite into a folder.
+/// @param item  Of a list, for its progress.
+Figures EvaluateInto(const std::filesystem::path& out, const Suite& suite, const Config& config,
+                     const SceneMaker& get, const EvaluateArguments& options,
+                     const std::string& item, Progress& progress, const CommandContext& context) {
   EvaluateOptions evaluate{.compare = config.compare};
-  evaluate.compare.preset = preset;
+  evaluate.compare.preset = config.reconstruct.preset;
   evaluate.compare.now_s = SteadySeconds;
-  const auto get = [&](const std::string& name, const std::filesystem::path& scenes, double part) {
-    const std::filesystem::path folder = scenes / name;
-    if (options.reuse && IsSceneFolder(folder)) return ReadScene(folder);
-    return Reconstruct(suite, name, config, part, folder, context, progress);
-  };
-  evaluate.get_scene = [&](const std::string& name) { return get(name, out / "scenes", 1.0); };
-  if (options.part) {
-    evaluate.get_current = [&](const std::string& name) {
-      return get(name, out / fmt::format("scenes-part-{:g}", *options.part), *options.part);
-    };
-  }
+  evaluate.get_scene = [&](const std::string& name) { return get(name, 1.0); };
+  if (options.part)
+    evaluate.get_current = [&](const std::string& name) { return get(name, *options.part); };
   if (options.results) {
     evaluate.store = [&](const std::string& reference, const std::string& current,
                          const Scene& reference_scene, const Comparison& comparison) {
@@ -153,24 +164,183 @@ int Run(const EvaluateArguments& options, const CommandContext& context) {
     };
   }
   const Evaluation evaluation =
-      EvaluateSuite(suite, evaluate, context.stop,
-                    [&](const Message& step, double fraction) { progress.Update(step, fraction); });
+      EvaluateSuite(suite, evaluate, context.stop, [&](const Message& step, double fraction) {
+        progress.Update(item.empty() ? step : say::cli::StepOf(item, step), fraction);
+      });
   const LiveEvaluation live = EvaluateLive(suite, evaluate, config, out, context, progress);
   progress.Clear();
-  const std::string json = EvaluationJson(evaluation);
-  std::string table = EvaluationTable(evaluation);
-  if (!live.empty()) {
-    table += "\n" + LiveTable(live);
-    WriteFileAtomically(out / "live.json", [&](const std::filesystem::path& file) {
-      WriteWholeFile(file, LiveJson(live));
-    });
-  }
-  WriteFileAtomically(out / "evaluation.json",
-                      [&](const std::filesystem::path& file) { WriteWholeFile(file, json); });
-  WriteFileAtomically(out / "evaluation.txt",
-                      [&](const std::filesystem::path& file) { WriteWholeFile(file, table); });
-  PrintOut(options.json ? json : table);
+  Figures figures{.json = EvaluationJson(evaluation), .table = EvaluationTable(evaluation)};
+  if (!live.empty()) figures.table += "\n" + LiveTable(live);
+  const auto write = [&](const char* name, const std::string& text) {
+    WriteFileAtomically(out / name,
+                        [&](const std::filesystem::path& file) { WriteWholeFile(file, text); });
+  };
+  if (!live.empty()) write("live.json", LiveJson(live));
+  write("evaluation.txt", figures.table);
+  write("evaluation.json", figures.json);
+  return figures;
+}
+
+int RunOne(const EvaluateArguments& options, const CommandContext& context) {
+  const Config config = ConfigFor(options, options.suite);
+  const Suite suite = OpenSuite(options.suite);
+  const std::filesystem::path out = options.out.value_or(
+      options.suite / fmt::format("results-{}", Name(config.reconstruct.preset)));
+  EnsureFolder(out);
+  Progress progress(context.language);
+  const auto get = [&](const std::string& name, double part) {
+    const std::filesystem::path folder =
+        out / (part < 1.0 ? fmt::format("scenes-part-{:g}", part) : std::string("scenes")) / name;
+    if (options.reuse && IsSceneFolder(folder)) return ReadScene(folder);
+    return Reconstruct(suite, name, config, part, folder, context, progress);
+  };
+  const Figures figures = EvaluateInto(out, suite, config, get, options, "", progress, context);
+  PrintOut(options.json ? figures.json : figures.table);
   return kDone;
+}
+
+OutputKind EvaluationOutput() {
+  return {say::output::Evaluation(),
+          "evaluation.json",
+          {"evaluation.json", "evaluation.txt", "live.json", "monitoring"}};
+}
+
+/// What decides about the scenes of a suite, as for `plumb reconstruct --list`, so that its scenes
+/// are used.
+std::string MethodOfScenes(const EvaluateArguments& options, const Config& config, double part,
+                           const CommandContext& context) {
+  constexpr auto kSections = std::to_array<std::string_view>({"markers", "reconstruct"});
+  std::string text = MethodText("reconstruct", config, kSections);
+  if (const auto& profile = options.method.profile_file)
+    text += OptionText("profile", ContentDigest(*profile, context.stop));
+  if (part < 1.0) text += OptionText("part", fmt::to_string(part));
+  return text;
+}
+
+/// Everything that decides about the figures of a suite: its description, recordings and truths.
+/// What else lies in its folder, such as results of an earlier evaluation, does not.
+std::string NameOfEvaluation(const std::filesystem::path& folder, const EvaluateArguments& options,
+                             const CommandContext& context) {
+  constexpr auto kSections =
+      std::to_array<std::string_view>({"markers", "reconstruct", "compare", "iec"});
+  const Config config = ConfigFor(options, folder);
+  const Suite suite = OpenSuite(folder);
+  std::string text = MethodText("evaluate", config, kSections) +
+                     MethodOfScenes(options, config, options.part.value_or(1.0), context);
+  const auto add = [&](const std::filesystem::path& path) {
+    text += OptionText("content", ContentDigest(path, context.stop));
+  };
+  for (const auto& file : {config.region_file, config.markers_scene})
+    text += OptionText("file", file ? ContentDigest(*file, context.stop) : "");
+  if (const auto file = folder / "suite.json"; std::filesystem::exists(file)) add(file);
+  for (const auto* paths : {&suite.recordings, &suite.truths}) {
+    for (const auto& [name, path] : *paths) {
+      text += OptionText("scene", name);
+      add(path);
+    }
+  }
+  return WorkName(text, {}, context.stop);
+}
+
+/// Finds a scene in the folder that all suites of a list share, or makes it. It is always read, so
+/// that a run that was killed gives the same bits as one that was not.
+Scene SharedScene(const std::filesystem::path& scenes, const Suite& suite, const std::string& name,
+                  const Config& config, double part, const EvaluateArguments& options,
+                  Progress& progress, const CommandContext& context) {
+  const std::filesystem::path recording = suite.recordings.at(name);
+  const std::filesystem::path folder =
+      scenes /
+      WorkName(MethodOfScenes(options, config, part, context), {&recording, 1}, context.stop);
+  while (!IsSceneFolder(folder)) {
+    const OutputLock lock(scenes, folder.filename().string());
+    if (lock.IsHeld() && !IsSceneFolder(folder))
+      (void)Reconstruct(suite, name, config, part, folder, context, progress);
+    else if (!lock.IsHeld())
+      WaitForOthers(context.stop);
+  }
+  return ReadScene(folder);
+}
+
+BatchAnswer AnswerOfEvaluation(const std::filesystem::path& output) {
+  constexpr std::size_t kMostBytes = std::size_t{64} << 20;
+  const std::filesystem::path file = output / "evaluation.json";
+  try {
+    const auto json = ParseBoundedJson(ReadTextFile(file, kMostBytes));
+    const auto& total = json.at("total");
+    const auto& intervals = total.at("intervals_95").at("all");
+    TableRow cells = {json.at("suite").get<std::string>()};
+    for (const char* key : {"pairs", "no_answer", "without_motion"})
+      cells.push_back(fmt::to_string(total.at(key).get<std::size_t>()));
+    for (const char* kind : {"translation_mm", "rotation_deg"}) {
+      const auto& summary = total.at(kind);
+      const bool is_known = summary.at("count").get<std::size_t>() > 0;
+      for (const char* key : {"median", "p95", "max"})
+        cells.push_back(is_known ? fmt::to_string(summary.at(key).get<double>()) : std::string());
+    }
+    for (const char* key : {"count", "inside"})
+      cells.push_back(fmt::to_string(intervals.at(key).get<std::size_t>()));
+    cells.push_back(
+        fmt::to_string(total.at("verdicts").at("false_in_tolerance").get<std::size_t>()));
+    return {.verdict = "evaluated", .cells = std::move(cells)};
+  } catch (const nlohmann::json::exception&) {
+    throw DataError(say::cli::EvaluationDamaged(file.string()));
+  }
+}
+
+std::vector<TableColumn> FigureColumns() {
+  std::vector<TableColumn> columns = {
+      {"suite", "string", "Name of the suite"},
+      {"pairs", "integer", "Pairs that were compared"},
+      {"no_answer", "integer", "Pairs without an answer"},
+      {"without_motion", "integer", "Pairs for which no motion was computed"}};
+  for (const char* kind : {"translation_mm", "rotation_deg"}) {
+    for (const char* key : {"median", "p95", "max"})
+      columns.push_back({fmt::format("{}_{}", key, kind), "double",
+                         "Error of the body's motion; empty: no motion was computed"});
+  }
+  columns.push_back({"intervals", "integer", "Numbers with an interval of 95 %"});
+  columns.push_back({"intervals_that_hold", "integer", "Of these, with the truth inside"});
+  columns.push_back({"false_in_tolerance", "integer", "Out of tolerance, but called in"});
+  return columns;
+}
+
+int RunList(const EvaluateArguments& options, const CommandContext& context) {
+  const std::filesystem::path out = *options.out, scenes = out / "scenes";
+  EnsureFolder(scenes);
+  RemoveUnfinished(scenes);
+  Progress progress(context.language);
+  const auto make = [&](const BatchInputs& item, const std::filesystem::path& output,
+                        const std::string& name) {
+    const Config config = ConfigFor(options, item.front());
+    const Suite suite = OpenSuite(item.front());
+    AtomicFolder folder(output, EvaluationOutput());
+    const auto get = [&](const std::string& scene, double part) {
+      return SharedScene(scenes, suite, scene, config, part, options, progress, context);
+    };
+    (void)EvaluateInto(folder.path(), suite, config, get, options, name, progress, context);
+    folder.Commit();
+  };
+  const BatchWork work{
+      .method = {},  // In the name.
+      .inputs = {{"input", "string", "The suite, as the list has it"}},
+      .columns = FigureColumns(),
+      .table = "evaluations.csv",
+      .name =
+          [&](const BatchInputs& item) { return NameOfEvaluation(item.front(), options, context); },
+      .is_finished =
+          [](const std::filesystem::path& output) {
+            return std::filesystem::exists(output / "evaluation.json");
+          },
+      .make = make,
+      .read = AnswerOfEvaluation};
+  return RunBatch(options.list, out, work, context);
+}
+
+int Run(const EvaluateArguments& options, const CommandContext& context) {
+  if (options.list.empty() == options.suite.empty() || (options.suite.empty() && !options.out))
+    throw InvalidRequest(say::cli::ListOrPaths());
+  return options.threads.Run(
+      [&] { return options.list.empty() ? RunOne(options, context) : RunList(options, context); });
 }
 
 }  // namespace
@@ -179,23 +349,30 @@ Command AddEvaluate(CLI::App& app) {
   auto options = std::make_shared<EvaluateArguments>();
   app.add_option("suite", options->suite,
                  "Suite folder: recordings/, truth/ and usually suite.json")
-      ->required()
       ->type_name("SUITE_DIR");
+  CLI::Option* const list =
+      app.add_option("--list", options->list,
+                     "Evaluate many suites: a file with one folder a line; needs --out")
+          ->type_name("FILE");
   app.add_option("--out", options->out,
                  "Folder for scenes and figures; default SUITE_DIR/results-PRESET")
       ->type_name("DIR");
+  options->threads.AddTo(app);
   options->method.AddTo(app);
   options->method.AddSensorTo(app);
   app.add_flag("--reuse", options->reuse,
                "Use the scenes of an earlier run in the folder instead of reconstructing "
-               "them again");
+               "them again")
+      ->excludes(list);
   app.add_option("--part", options->part,
                  "Use only this part of each current sweep, from its beginning: the accuracy of "
                  "the numbers that form while one sweeps")
       ->check(CLI::Range(0.05, 1.0))
       ->type_name("FRACTION");
-  app.add_flag("--results", options->results, "Write the result folder of every pair too");
-  app.add_flag("--json", options->json, "Print the figures as JSON on the standard output");
+  app.add_flag("--results", options->results, "Write the result folder of every pair too")
+      ->excludes(list);
+  app.add_flag("--json", options->json, "Print the figures as JSON on the standard output")
+      ->excludes(list);
   return [options](const CommandContext& context) { return Run(*options, context); };
 }
 

@@ -5,8 +5,12 @@
 #include <sys/file.h>
 
 #include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <vector>
 
+#include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "drivers/files/file_io.hpp"
@@ -15,6 +19,9 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Between two looks at items that another process is doing, which takes seconds to minutes.
+constexpr std::chrono::milliseconds kLookAgain{200};
 
 fs::path LockFile(const fs::path& folder, const std::string& name) {
   EnsureFolder(folder / ".locks");
@@ -42,6 +49,14 @@ OutputLock::OutputLock(const fs::path& folder, const std::string& name)
   if (result != 0 && errno != EWOULDBLOCK)
     throw IoError(DescribeWriteError(LockFile(folder, name), errno));
   is_held_ = result == 0;
+}
+
+void WaitForOthers(const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any stopped;
+  std::unique_lock lock(mutex);
+  stopped.wait_for(lock, stop, kLookAgain, [] { return false; });
+  CheckStop(stop);
 }
 
 void RemoveUnfinished(const fs::path& folder) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <stop_token>
 #include <string>
 
 #include "drivers/files/descriptor.hpp"
@@ -23,6 +24,9 @@ class OutputLock {
   Descriptor file_;
   bool is_held_ = false;
 };
+
+/// Pauses between two looks at what another process is doing. @throws Interrupted at once
+void WaitForOthers(const std::stop_token& stop);
 
 /// Removes the unfinished outputs of processes that were killed: hidden folders that no process has
 /// locked. @throws IoError

@@ -40,8 +40,9 @@ std::string ReadWhole(const fs::path& file) {
 }
 
 json ReadJson(const fs::path& file) {
+  const std::string text = ReadWhole(file);
   try {
-    return ParseBoundedJson(ReadWhole(file));
+    return ParseBoundedJson(text);
   } catch (const DataError& error) {
     Fail(file, MessageOf(error));
   }

@@ -3,6 +3,10 @@
 //
 //   plumb_bench_peers SUITE [SCENE...]     the first scene if none is named
 //   plumb_bench_peers RECORDING TRUTH
+//   plumb_bench_peers --scene METHOD RECORDING SCENE
+//
+// The last one writes the scene that a peer makes of a recording, for the open benchmark: METHOD is
+// open3d or pcl, and no truth is read. See PeerScene().
 //
 // Prints a Markdown table for each scene. All rows start from the poses that Plumb's tracker gave
 // the keyframes, and use their depth images corrected by the stated calibration only. Differences
@@ -22,6 +26,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -37,8 +42,10 @@
 #include "algo/reconstruction/trajectory.hpp"
 #include "algo/registration/joint_registration.hpp"
 #include "algo/surface/height_maps.hpp"
+#include "algo/surface/surface_cloud.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "daemon/evaluation/evaluation.hpp"
+#include "daemon/files/scene_folder.hpp"
 #include "tests/bench/measured_run.hpp"
 #include "tests/bench/peers.hpp"
 
@@ -117,8 +124,7 @@ HeightMap HeightsAt(std::vector<Keyframe> keyframes, const std::vector<Pose>& T_
     views.back().color_rgb.release();
     views.back().T_world_camera = T_marker_scene * T_scene_camera[k];
   }
-  RobustHeightMapOptions options;
-  return RobustHeightMap(views, options);
+  return RobustHeightMap(PrepareViews(views, {}));
 }
 
 Row RowOfPoses(const std::string& name, const std::optional<Cost>& cost,
@@ -137,10 +143,10 @@ Row RunBest(const Recorded& recorded, const std::vector<Keyframe>& keyframes) {
   Reconstructor reconstructor(recorded.info, {});
   for (const Frame& frame : recorded.frames) (void)reconstructor.AddFrame(frame);
   Cost before, after;
-  Scene scene = reconstructor.Finish({}, [&](double, std::string_view stage) {
+  Scene scene = reconstructor.Finish({}, [&](double, const Message& stage) {
     const Cost now{.cpu_s = CpuSeconds(), .wall_s = SteadySeconds()};
-    if (stage == "markers") before = now;
-    if (stage == "surface") after = now;
+    if (stage.id() == "progress.markers") before = now;
+    if (stage.id() == "progress.surface") after = now;
   });
   Row row{.name = "Plumb: `RegisterJointly()`, preset `best`",
           .cost = Cost{.cpu_s = after.cpu_s - before.cpu_s, .wall_s = after.wall_s - before.wall_s},
@@ -183,6 +189,17 @@ std::vector<PeerMethod> Peers() {
   return methods;
 }
 
+/// The method with a short name; nothing if it is not built in.
+std::optional<PeerMethod> PeerNamed(const std::string& name) {
+#ifdef PLUMB_BENCH_OPEN3D
+  if (name == "open3d") return Open3dMethod();
+#endif
+#ifdef PLUMB_BENCH_PCL
+  if (name == "pcl") return PclMethod();
+#endif
+  return std::nullopt;
+}
+
 std::vector<PeerView> ViewsForPeers(const std::vector<Keyframe>& keyframes) {
   RayTables tables;
   std::vector<PeerView> views;
@@ -192,6 +209,61 @@ std::vector<PeerView> ViewsForPeers(const std::vector<Keyframe>& keyframes) {
     views.push_back({BackProject(view, *tables.For(view.intrinsics)), view.T_world_camera});
   }
   return views;
+}
+
+/// The published chain with a peer's registration in the place of Algorithm 1, and with as many
+/// keyframes as the tracker gives: markers are averaged over the keyframes, and the reference
+/// marker gives the frame. The surface is Plumb's, as in every row of this program.
+Scene PeerScene(const Recorded& recorded, const PeerMethod& method) {
+  std::vector<Keyframe> keyframes = TrackedKeyframes(recorded);
+  const std::vector<Pose> T_peer_camera = method.solve(ViewsForPeers(keyframes));
+  std::vector<Pose> T_peer_world;
+  for (std::size_t k = 0; k < keyframes.size(); ++k)
+    T_peer_world.push_back(T_peer_camera.at(k) * keyframes[k].view.T_world_camera.inverse());
+  Scene scene;
+  scene.preset = Preset::kPaper;
+  scene.room_markers = recorded.info.room_markers;
+  scene.depth_sensor = recorded.info.depth_sensor;
+  scene.frames_total = static_cast<std::int64_t>(recorded.frames.size());
+  scene.frames_tracked = scene.frames_total;
+  scene.markers = AverageMarkers(keyframes, T_peer_world);
+  const std::optional<Pose> T_marker_peer = ReferenceFrame(
+      scene.markers, scene.room_markers.reference.value_or(-1), scene.room_markers.length_m);
+  if (!T_marker_peer)
+    throw DataError("no keyframe measured the reference marker in depth at all its corners");
+  scene.frame = SceneFrame::kReferenceMarker;
+  for (auto& [id, marker] : scene.markers)
+    for (Eigen::Vector3d& corner : marker.corners) corner = *T_marker_peer * corner;
+  std::vector<DepthView> views;
+  for (std::size_t k = 0; k < keyframes.size(); ++k) {
+    views.push_back(std::move(keyframes[k].view));
+    views.back().color_rgb.release();
+    views.back().T_world_camera = *T_marker_peer * T_peer_camera[k];
+    scene.keyframes.push_back({keyframes[k].depth_time_s, views.back().T_world_camera});
+  }
+  scene.trajectory = scene.keyframes;
+  const std::vector<ViewSurface> surfaces =
+      PrepareViews(views, {.min_depth_m = static_cast<float>(recorded.info.usable_depth.nearest_m),
+                           .max_depth_m = static_cast<float>(recorded.info.usable_depth.farthest_m),
+                           .depth_noise = recorded.info.depth_noise});
+  scene.cloud = MergeSurface(surfaces, {.with_colors = false});
+  scene.height_map = RobustHeightMap(surfaces);
+  return scene;
+}
+
+/// @return the exit code.
+int WritePeerScene(const std::vector<std::string>& arguments) {
+  const std::optional<PeerMethod> method =
+      arguments.size() == 3 ? PeerNamed(arguments[0]) : std::nullopt;
+  if (!method) {
+    fmt::print(stderr,
+               "plumb_bench_peers: call plumb_bench_peers --scene METHOD RECORDING SCENE, where "
+               "METHOD is open3d or pcl, as this program was built with\n");
+    return 2;
+  }
+  WriteScene(PeerScene(Load(arguments[1]), *method), arguments[2]);
+  fmt::print("{}: {}\n", method->name, method->parameters);
+  return 0;
 }
 
 void PrintRow(const Row& row, const SceneTruth& truth) {
@@ -303,6 +375,14 @@ std::vector<SceneFolders> ScenesOf(const std::vector<std::string>& arguments) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == "--scene") {
+    try {
+      return plumb::WritePeerScene({argv + 2, argv + argc});
+    } catch (const std::exception& error) {
+      fmt::print(stderr, "plumb_bench_peers: {}\n", error.what());
+      return 1;
+    }
+  }
   std::vector<plumb::SceneFolders> scenes;
   try {
     scenes = plumb::ScenesOf({argv + 1, argv + argc});

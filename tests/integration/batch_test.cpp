@@ -208,6 +208,52 @@ TEST_F(BatchTest, PairsBecomeOneTable) {
   EXPECT_EQ(typed, names);
 }
 
+/// Suites of one list: killed, they go on with the scenes that are there; equal ones are done once.
+TEST_F(BatchTest, SuitesOfAListAreEvaluatedOnce) {
+  const fs::path suite = folder_ / "suite", same = Copy(suite, "same suite"),
+                 broken = Copy(suite, "broken suite");
+  fs::remove(broken / "truth" / "reference" / "motion.json");
+  // What an earlier evaluation left there is not part of the suite.
+  WriteText(same / "results-best", "figures");
+  const std::vector<std::string> command = {"evaluate", "--list", List({suite, same, broken}),
+                                            "--out", folder_};
+  {
+    Process run(PlumbCommand(command));
+    ASSERT_TRUE(run.WaitForStderr("comparing")) << run.err();
+    run.Signal(SIGKILL);
+    EXPECT_EQ(run.Wait(), -SIGKILL);
+  }
+  const auto before = Finished();
+  ASSERT_FALSE(before.empty());
+  const RunResult again = Plumb(command);
+  EXPECT_EQ(again.exit_code, 3) << again.err;
+  const std::vector<Json> lines = Lines(again.out);
+  ASSERT_THAT(lines, SizeIs(3));
+  EXPECT_EQ(lines[0]["verdict"], "evaluated");
+  EXPECT_EQ(lines[0]["reused"], false);
+  EXPECT_EQ(lines[1]["reused"], true);
+  EXPECT_EQ(lines[1]["output"], lines[0]["output"]);
+  EXPECT_EQ(lines[2]["exit_code"], 3);
+  EXPECT_THAT(lines[2]["error"].get<std::string>(), HasSubstr("motion.json"));
+  const auto after = Finished();
+  for (const auto& [file, identity] : before) EXPECT_EQ(after.at(file), identity) << file;
+  EXPECT_THAT(Unfinished(), IsEmpty());
+  for (const auto& entry : fs::directory_iterator(folder_))
+    EXPECT_THAT(entry.path().filename().string(), testing::Not(HasSubstr(".plumb-")));
+  // The scenes are those of a list of recordings with the same options.
+  const RunResult scenes = Plumb(Reconstruct(List({recordings_[0], recordings_[1]})));
+  ASSERT_THAT(Lines(scenes.out), SizeIs(2)) << scenes.err;
+  for (const Json& line : Lines(scenes.out)) EXPECT_EQ(line["reused"], true);
+  // The same figures as of the suite alone, but for times.
+  const RunResult alone = Plumb({"evaluate", suite, "--out", folder_ / "alone", "--json"});
+  ASSERT_EQ(alone.exit_code, 0) << alone.err;
+  const fs::path output = lines[0]["output"].get<std::string>();
+  const Json shared = Json::parse(ReadText(output / "evaluation.json"));
+  EXPECT_EQ(shared["total"]["pairs"], Json::parse(alone.out)["total"]["pairs"]);
+  EXPECT_THAT(ReadText(folder_ / "evaluations.csv"),
+              testing::StartsWith("input,output,exit_code,verdict,error,suite,pairs,no_answer,"));
+}
+
 TEST_F(BatchTest, WrongListsAreRefusedBeforeAnyWork) {
   for (const auto& [text, says] : {std::pair("a b c\n", "line 1"), std::pair("# none\n", "nothing"),
                                    std::pair("x 'y\n", "line 1")}) {
@@ -219,6 +265,8 @@ TEST_F(BatchTest, WrongListsAreRefusedBeforeAnyWork) {
   }
   EXPECT_EQ(Plumb({"reconstruct", "--out", folder_ / "results"}).exit_code, 2);
   EXPECT_EQ(Plumb({"compare", recordings_[0], "--out", folder_ / "results"}).exit_code, 2);
+  EXPECT_EQ(Plumb({"evaluate"}).exit_code, 2);
+  EXPECT_EQ(Plumb({"evaluate", "--list", folder_ / "list"}).exit_code, 2);
   EXPECT_FALSE(fs::exists(folder_ / "results"));
 }
 
