@@ -79,8 +79,8 @@ struct UncertaintyInput {
 
 /// The largest of the causes, as a person may mend it.
 /// @param of_turns  Of the rotations, otherwise of the shifts at the centroid.
-[[nodiscard]] Message LargestCause(const MotionUncertainty& uncertainty,
-                                   const Alignment& alignment, bool of_turns);
+[[nodiscard]] Message LargestCause(const MotionUncertainty& uncertainty, const Alignment& alignment,
+                                   bool of_turns);
 
 /// Moves a covariance (left perturbation) to another reference point.
 [[nodiscard]] Matrix6d CovarianceAbout(const Matrix6d& covariance, const Eigen::Vector3d& from_m,

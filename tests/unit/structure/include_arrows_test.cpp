@@ -100,6 +100,7 @@ const Arrows kAllowed = {
      {"algo/base", "web/model", "web/service", "web/security", "web/http", "web/exchange",
       "web/page"}},
     {"web/api/planning", {"algo/base", "web/model", "web/http", "web/exchange", "web/api"}},
+    {"web/api/watching", {"algo/base", "web/model", "web/security", "web/exchange", "web/api"}},
 
     {"daemon/loop", {}},
     {"daemon/config",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "web/api/metrics.hpp"
+#include "web/api/watching/metrics.hpp"
 
 #include <fstream>
 #include <map>
