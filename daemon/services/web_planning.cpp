@@ -41,7 +41,7 @@ std::string TodayAsDicom() {
 
 PlannedPatients PatientsByHash(Store& store) {
   PlannedPatients patients;
-  store.database().ForLists()->All(
+  (void)store.database().ForLists()->All(
       "SELECT DISTINCT patient_hash, patients.id, code FROM refs JOIN patients ON patients.id = "
       "patient_id WHERE patient_hash <> '' AND archived = 0 ORDER BY refs.id DESC LIMIT 20000",
       [&](const Statement& row) {

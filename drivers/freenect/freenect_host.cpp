@@ -5,7 +5,6 @@
 #include <chrono>
 
 #include "algo/base/errors.hpp"
-#include "drivers/freenect/freenect_sensor.hpp"
 #include "words/sdk.hpp"
 
 namespace plumb::freenect {
@@ -21,8 +20,8 @@ thread_local const FreenectLibrary* running = nullptr;
 
 }  // namespace
 
-FreenectHost::FreenectHost(const SensorSettings& settings)
-    : SdkHost("freenect"), settings_(settings), library_(settings.library) {
+FreenectHost::FreenectHost(const SensorSettings& settings, OpenSensor open)
+    : SdkHost("freenect"), settings_(settings), open_(std::move(open)), library_(settings.library) {
   if (library_.init(&context_, nullptr) < 0 || context_ == nullptr)
     throw DeviceError(say::sdk::NoContext(library_.file()));
   library_.set_log_level(context_, kLogFatal);
@@ -126,8 +125,7 @@ std::vector<SdkAttached> FreenectHost::Attached() {
 
 std::unique_ptr<LiveSensor> FreenectHost::Open(const std::shared_ptr<SdkHost>& self,
                                                SdkOpening opening) {
-  return std::make_unique<FreenectSensor>(std::static_pointer_cast<FreenectHost>(self),
-                                          std::move(opening), settings_);
+  return open_(std::static_pointer_cast<FreenectHost>(self), std::move(opening), settings_);
 }
 
 }  // namespace plumb::freenect

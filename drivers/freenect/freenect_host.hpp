@@ -22,8 +22,11 @@ namespace plumb::freenect {
 
 class FreenectHost : public SdkHost {
  public:
+  /// Makes a sensor of one of the host's Kinects.
+  using OpenSensor = std::function<std::unique_ptr<LiveSensor>(
+      std::shared_ptr<FreenectHost> host, SdkOpening opening, const SensorSettings& settings)>;
   /// @throws DeviceError if the library cannot be used.
-  explicit FreenectHost(const SensorSettings& settings);
+  FreenectHost(const SensorSettings& settings, OpenSensor open);
   ~FreenectHost() override;
 
   [[nodiscard]] const SdkLibrary& library() const override { return library_; }
@@ -63,6 +66,7 @@ class FreenectHost : public SdkHost {
   [[nodiscard]] std::vector<std::string> Serials() const;
 
   const SensorSettings settings_;
+  const OpenSensor open_;
   const FreenectLibrary library_;
   Context* context_ = nullptr;
   int num_open_ = 0;

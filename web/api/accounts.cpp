@@ -138,8 +138,6 @@ void Accounts::AddRoutes(Routes& routes) {
   AddQuickLogInRoutes(routes);
   AddSecondFactorRoutes(routes);
   AddSessionRoutes(routes);
-  routes.Read("/api/v1/displays/presence", Permission::kRoom,
-              [this](const Request& request) { return DescribePresence(request); });
   AddSignedActs(routes);
   const auto add = [&](const char* method, const char* pattern, Permission permission,
                        BodyKind body, auto handler) {

@@ -75,6 +75,8 @@ void Accounts::RemoveSecondFactor(const Request& request, const Respond& respond
 }
 
 void Accounts::AddSessionRoutes(Routes& routes) {
+  routes.Read("/api/v1/displays/presence", Permission::kRoom,
+              [this](const Request& request) { return DescribePresence(request); });
   routes.Read("/api/v1/session/list", Permission::kView,
               [this](const Request& request) { return ListSessions(request); });
   routes.Add("DELETE", "/api/v1/session/list/{id}", Permission::kView, BodyKind::kNone,

@@ -78,6 +78,11 @@ void Accounts::AddSignedActs(Routes& routes) {
                 patients_.WipePatient(actor, id, std::move(done));
               };
             });
+  AddSignedRoomActs(routes);
+  AddSignedUnitActs(routes);
+}
+
+void Accounts::AddSignedRoomActs(Routes& routes) {
   // Signs the room's calibration that the person was shown, identified by its digest.
   AddSigned(routes, "POST", "/api/v1/room-calibration/sign", Permission::kCalibrate,
             [this](const Request&, Fields& fields) -> SignedAct {
@@ -92,7 +97,6 @@ void Accounts::AddSignedActs(Routes& routes) {
                 room_.SignCouch(actor, couch, std::move(done));
               };
             });
-  AddSignedUnitActs(routes);
 }
 
 void Accounts::AddSignedUnitActs(Routes& routes) {

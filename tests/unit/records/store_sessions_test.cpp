@@ -62,7 +62,7 @@ TEST_F(StoreSessionsTest, TheHintOfTheSitesTemplateIsSaid) {
                               .hint = "begin at the feet"});
   store.treatments.Open(kAnna, store.patients.Add(kAnna, "P-1", "THORAX"), ScanPurpose::kFraction);
   EXPECT_EQ(store.treatments.Opened()->sweep_hint, "begin at the feet");
-  store.treatments.Close(kAnna, "");
+  store.treatments.CloseAll(kAnna);
   store.treatments.Open(kAnna, store.patients.Add(kAnna, "P-2", "pelvis"), ScanPurpose::kFraction);
   EXPECT_EQ(store.treatments.Opened()->sweep_hint, "");
 }

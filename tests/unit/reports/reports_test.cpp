@@ -255,7 +255,7 @@ TEST_F(ReportsTest, WithoutAKnownRoomTheNumbersAreNamedAfterThePatientAndNotTheC
     const Scan scan = *store_.scans.Find(AddScan(Approved(), text, DailyCheck::kPassed, {}, text));
     const ScanReport report = DescribeScan(sources_, scan, language);
     std::vector<std::string> names;
-    for (const ShownRow& row : report.numbers) names.push_back(Text(row.name, language));
+    for (const CouchRow& row : report.numbers) names.push_back(Text(row.judged.name, language));
     EXPECT_THAT(report.cautions, ::testing::Contains(HasSubstr(names.at(2))));
     return names;
   };
