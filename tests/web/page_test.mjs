@@ -1040,7 +1040,7 @@ await h.step('without script the last result is shown, without WebGL the picture
   const plain = await h.person('plain', { width: 1280, height: 900 }, { javaScriptEnabled: false });
   await plain.goto(`${h.url}result`);
   await plain.getByLabel('Name').fill('anna');
-  await plain.getByLabel('Password').fill(h.password);
+  await plain.getByLabel('Password', { exact: true }).fill(h.password);
   await plain.getByRole('button', { name: 'Log in' }).click();
   await plain.getByText('NO ANSWER').waitFor();
   check((await plain.getByRole('complementary').innerText()).includes('Not a medical device'),
