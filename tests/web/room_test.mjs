@@ -545,6 +545,7 @@ await h.step('a version that is approved meanwhile is a question, and changes no
 await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   // Where nothing is done with who is open, the screen stays usable beside it. A reload is no
   // acknowledgement.
+  await anna.locator('.who-line').waitFor();
   await anna.goto(`${h.url}#/status`);
   const second = await addPatient('P-0050');
   await ok(bob, `patients/${second}/open`, 'POST',
