@@ -25,7 +25,8 @@ struct Switch {
 
 struct SimulateArguments {
   SimulateOptions simulate;
-  std::string format = "tum", noise = "nominal", size = "640x480", sensor = "structured_light";
+  std::string format = "tum", noise = "nominal", size = "640x480", sensor = "structured_light",
+              lens = "plain";
   std::vector<Switch> switches;
 };
 
@@ -69,7 +70,9 @@ int Run(const SimulateArguments& options, const CommandContext& context) {
   simulate.noise = Named<simulated::NoiseLevel>(options.noise).value_or(simulate.noise);
   simulate.sensor = Named<DepthSensor>(options.sensor).value_or(simulate.sensor);
   simulate.format = options.format == "oni" ? RecordingFormat::kOni : RecordingFormat::kTum;
+  simulate.lens = Named<simulated::LensKind>(options.lens).value_or(simulate.lens);
   if (options.size == "320x240") simulate.width = 320, simulate.height = 240;
+  if (options.size == "848x480") simulate.width = 848;
   simulated::FaultSet faults = FaultsOf(simulate);
   for (const auto& [fault, on] : options.switches) faults.Set(fault, on);
   simulate.faults = faults;
@@ -132,9 +135,9 @@ void AddImageOptions(CLI::App& app, const std::shared_ptr<SimulateArguments>& op
       ->capture_default_str()
       ->type_name("HZ");
   app.add_option("--size", options->size, "Size of the images")
-      ->check(CLI::IsMember({"640x480", "320x240"}))
+      ->check(CLI::IsMember({"640x480", "320x240", "848x480"}))
       ->capture_default_str()
-      ->type_name("640x480|320x240");
+      ->type_name("640x480|320x240|848x480");
 }
 
 }  // namespace
@@ -167,6 +170,11 @@ Command AddSimulate(CLI::App& app) {
           std::vector<std::string>(kNamesOf<DepthSensor>.begin(), kNamesOf<DepthSensor>.end())))
       ->capture_default_str()
       ->type_name("structured_light|active_stereo|time_of_flight|lidar");
+  app.add_option("--lens", options->lens,
+                 "Lens of the colour camera: OpenCV's plain or rational model, or a fisheye")
+      ->check(CLI::IsMember({"plain", "rational", "fisheye"}))
+      ->capture_default_str()
+      ->type_name("plain|rational|fisheye");
   app.add_option_function<std::vector<std::string>>(
          "--fault",
          [options](const std::vector<std::string>& texts) {

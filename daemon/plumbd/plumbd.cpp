@@ -71,11 +71,13 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const PlumbdOptions& options, co
   const SensorDriver& driver =
       registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
   const SensorSettings settings = SensorSettingsOf(config);
-  const bool is_small = options.sim_size == "320x240";
+  const bool is_small = options.sim_size == "320x240", is_wide = options.sim_size == "848x480";
   SimulatedSweeps sweeps{.suite = options.simulated.empty() ? "demo" : options.simulated,
                          .seed = options.sim_seed,
                          .frames = options.sim_frames,
-                         .width = is_small ? 320 : 640,
+                         .width = is_small  ? 320
+                                  : is_wide ? 848
+                                            : 640,
                          .height = is_small ? 240 : 480,
                          .max_scenes = static_cast<std::size_t>(options.sim_scenes),
                          .at_rest = options.sim_rest,

@@ -109,7 +109,7 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
       ->check(CLI::Range(2, 20000))
       ->group("Virtual sensor");
   app.add_option("--sim-size", options.sim_size, "Size of its images")
-      ->check(CLI::IsMember({"640x480", "320x240"}))
+      ->check(CLI::IsMember({"640x480", "320x240", "848x480"}))
       ->group("Virtual sensor");
   app.add_option("--sim-seed", options.sim_seed, "Seed of its scenes and noise")
       ->group("Virtual sensor");

@@ -130,8 +130,9 @@ class Renderer {
 
 SimulateOptions ScenesOf(const VirtualSensorOptions& options) {
   const bool known_size = (options.width == 640 && options.height == 480) ||
+                          (options.width == 848 && options.height == 480) ||
                           (options.width == 320 && options.height == 240);
-  if (!known_size) throw std::invalid_argument("the virtual sensor is 640x480 or 320x240");
+  if (!known_size) throw std::invalid_argument("the virtual sensor is 640x480, 848x480 or 320x240");
   SimulateOptions simulate;
   simulate.suite = options.suite;
   simulate.seed = options.seed;

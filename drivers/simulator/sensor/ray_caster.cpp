@@ -3,20 +3,52 @@
 
 #include <tbb/parallel_for.h>
 
+#include <array>
+#include <cmath>
+
 namespace plumb::simulated {
+
+namespace {
+
+/// The angle whose distorted radius this is, by Newton's method.
+double AngleOf(const std::array<double, 4>& k, double radius) {
+  double theta = radius;
+  for (int i = 0; i < 20; ++i) {
+    const double t2 = theta * theta;
+    const double value =
+        theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3])))) - radius;
+    const double slope =
+        1.0 + t2 * (3.0 * k[0] + t2 * (5.0 * k[1] + t2 * (7.0 * k[2] + t2 * 9.0 * k[3])));
+    theta -= value / slope;
+  }
+  return theta;
+}
+
+/// Through the lens without its rest.
+Eigen::Vector2d UndistortMain(const Intrinsics& camera, const LensRest& rest,
+                              const Eigen::Vector2d& pixel) {
+  if (!rest.equidistant) return plumb::Undistort(camera, pixel);
+  const Eigen::Vector2d distorted((pixel.x() - camera.cx) / camera.fx,
+                                  (pixel.y() - camera.cy) / camera.fy);
+  const double radius = distorted.norm();
+  if (radius < 1e-9) return distorted;
+  return std::tan(AngleOf(*rest.equidistant, radius)) / radius * distorted;
+}
+
+}  // namespace
 
 Eigen::Vector2d Undistort(const Intrinsics& camera, const LensRest& rest,
                           const Eigen::Vector2d& pixel) {
-  Eigen::Vector2d ideal = plumb::Undistort(camera, pixel);
-  if (rest == LensRest{}) return ideal;
+  Eigen::Vector2d ideal = UndistortMain(camera, rest, pixel);
+  if (rest.prism == std::array<double, 4>{} && rest.k4 == 0.0) return ideal;
   // The rest is a fraction of a pixel, over which the correction hardly changes.
   for (int i = 0; i < 4; ++i) {
     const double r2 = ideal.squaredNorm();
     const Eigen::Vector2d prism(r2 * (rest.prism[0] + rest.prism[1] * r2),
                                 r2 * (rest.prism[2] + rest.prism[3] * r2));
     const Eigen::Vector2d added = prism + rest.k4 * r2 * r2 * r2 * r2 * ideal;
-    ideal = plumb::Undistort(camera,
-                             pixel - Eigen::Vector2d(camera.fx * added.x(), camera.fy * added.y()));
+    ideal = UndistortMain(camera, rest,
+                          pixel - Eigen::Vector2d(camera.fx * added.x(), camera.fy * added.y()));
   }
   return ideal;
 }

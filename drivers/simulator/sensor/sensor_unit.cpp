@@ -230,10 +230,14 @@ SensorUnit MakeSensorUnit(NoiseLevel level, std::uint64_t seed, int width, int h
 
   BecomeClass(unit, sensor, size);
 
-  const double pixels = width / 640.0;
+  // Pixels are square: wider images see more to the sides.
+  const double pixels = height / 480.0;
   for (Intrinsics* camera :
-       {&unit.color_true, &unit.color_written, &unit.depth_true, &unit.depth_assumed})
-    *camera = Resized(*camera, width, height);
+       {&unit.color_true, &unit.color_written, &unit.depth_true, &unit.depth_assumed}) {
+    *camera = Resized(*camera, height * 4 / 3, height);
+    camera->cx += 0.5 * (width - camera->width);
+    camera->width = width;
+  }
   unit.correlation_px *= pixels;
   unit.lateral_noise *= pixels;
   unit.lens_blur_px *= std::max(0.6, pixels);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/names.hpp"
@@ -32,6 +33,9 @@ struct DepthBend {
 struct LensRest {
   std::array<double, 4> prism{};
   double k4 = 0.0;
+  /// In place of OpenCV's terms: the coefficients of an equidistant lens, of which the unit's
+  /// Intrinsics have only what comes near.
+  std::optional<std::array<double, 4>> equidistant = std::nullopt;
   bool operator==(const LensRest&) const = default;
 };
 

@@ -13,6 +13,7 @@
 #include "algo/types/frame.hpp"
 #include "drivers/simulator/sensor/sensor_unit.hpp"
 #include "drivers/simulator/suites/planning_ct.hpp"
+#include "drivers/simulator/suites/unit_lens.hpp"
 
 namespace plumb {
 
@@ -37,6 +38,7 @@ struct SimulateOptions {
   simulated::NoiseLevel noise = simulated::NoiseLevel::kNominal;
   std::optional<simulated::FaultSet> faults = std::nullopt;  ///< Not set: see FaultsOf().
   DepthSensor sensor = DepthSensor::kStructuredLight;        ///< Class of the depth camera.
+  simulated::LensKind lens = simulated::LensKind::kPlain;    ///< Of the colour camera.
   double ct_spacing_m = 3 * kMillimetre;                     ///< Of the slices of the suite `ct`.
   /// Standard deviation of how far its contours lie outside the skin, which no file states.
   double ct_skin_m = 0.0;

@@ -227,6 +227,7 @@ SuitePlan PlanSuite(const SimulateOptions& options) {
   plan.name = options.suite;
   plan.unit = MakeSensorUnit(options.noise, options.unit.value_or(options.seed), options.width,
                              options.height, FaultsOf(options), options.sensor);
+  GiveLens(plan.unit, options.lens);
   const bool patient = options.suite == "patient";
   if (options.suite == "demo") {
     PlanDemo(plan, options);

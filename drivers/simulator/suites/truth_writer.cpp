@@ -305,21 +305,23 @@ void WriteUnit(const std::filesystem::path& file, const SensorUnit& unit) {
                    {"stamp_jitter_s", unit.stamp_jitter_s}};
   const json tone{
       {"kind", Name(unit.tone.kind)}, {"gamma", unit.tone.gamma}, {"contrast", unit.tone.contrast}};
-  const json written{
-      {"unit", unit.seed},
-      {"faults", unit.faults.Names()},
-      {"color", ToJson(unit.color_true)},
-      {"color_written", ToJson(unit.color_written)},
-      {"infrared", ToJson(unit.depth_true)},
-      {"infrared_assumed", ToJson(unit.depth_assumed)},
-      {"T_color_depth", ToJson(unit.T_color_depth_true)},
-      {"T_color_depth_assumed", ToJson(unit.T_color_depth_assumed)},
-      {"lens_rest", {{"prism", unit.color_lens_rest.prism}, {"k4", unit.color_lens_rest.k4}}},
-      {"depth", depth},
-      {"warm_up", warm_up},
-      {"speckle", unit.speckle},
-      {"times", times},
-      {"tone_curve", tone}};
+  json lens_rest{{"prism", unit.color_lens_rest.prism}, {"k4", unit.color_lens_rest.k4}};
+  if (unit.color_lens_rest.equidistant)
+    lens_rest["equidistant"] = *unit.color_lens_rest.equidistant;
+  const json written{{"unit", unit.seed},
+                     {"faults", unit.faults.Names()},
+                     {"color", ToJson(unit.color_true)},
+                     {"color_written", ToJson(unit.color_written)},
+                     {"infrared", ToJson(unit.depth_true)},
+                     {"infrared_assumed", ToJson(unit.depth_assumed)},
+                     {"T_color_depth", ToJson(unit.T_color_depth_true)},
+                     {"T_color_depth_assumed", ToJson(unit.T_color_depth_assumed)},
+                     {"lens_rest", lens_rest},
+                     {"depth", depth},
+                     {"warm_up", warm_up},
+                     {"speckle", unit.speckle},
+                     {"times", times},
+                     {"tone_curve", tone}};
   WriteWholeFile(file, written.dump(1));
 }
 
