@@ -10,7 +10,7 @@ build=$1
 check "a source: its folder's" '^plumb_test_acceptance $' \
   "$(of algo/acceptance/gates.cpp)"
 check "a header: those of the folders that include it, too" \
-  'plumb_test_markers .*plumb_test_replay .*plumb_test_sensor_model ' "$(of algo/types/marker.hpp)"
+  'plumb_test_markers .*plumb_test_replay .*plumb_test_simulator ' "$(of algo/types/marker.hpp)"
 check "a folder of tests stands for the folders below" '^plumb_test_web $' "$(of web/api/scan_routes.cpp)"
 check "a folder without tests: those that include its headers" 'plumb_test_tracking ' \
   "$(of algo/map/dense_view.cpp)"
