@@ -85,6 +85,7 @@ inline void MakeSchema9(const std::filesystem::path& database) {
           "approved_digest; ALTER TABLE refs DROP COLUMN source; ALTER TABLE refs DROP COLUMN "
           "patient_hash; ALTER TABLE sessions DROP COLUMN reference_id; ALTER TABLE sessions DROP "
           "COLUMN chosen_at_version; ALTER TABLE patients DROP COLUMN immobilisation; ALTER TABLE "
+          "templates DROP COLUMN posture; ALTER TABLE templates DROP COLUMN hint; ALTER TABLE "
           "patients DROP COLUMN alert; ALTER TABLE patients DROP COLUMN photo; DROP TABLE "
           "backup_scans; DROP TABLE backups; DROP TABLE removals; DROP "
           "TABLE bin; DROP TABLE second_factors; DROP TABLE pins; PRAGMA user_version = 9");
