@@ -243,7 +243,7 @@ class SlowPasswordTest : public LockoutTest {
  protected:
   void SetUp() override {
     Start([](web::HttpServerOptions& options) {
-      options.password_operations = 6;
+      options.password_operations = 12;
       options.password_memory_bytes = 32 << 20;
     });
     SetUpAccounts();
