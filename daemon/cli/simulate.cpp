@@ -140,6 +140,24 @@ void AddImageOptions(CLI::App& app, const std::shared_ptr<SimulateArguments>& op
       ->type_name("640x480|320x240|848x480");
 }
 
+void AddUnitOptions(CLI::App& app, const std::shared_ptr<SimulateArguments>& options) {
+  app.add_option(
+         "--unit", options->simulate.unit,
+         "The sensor unit. Default: that of the seed; the demo's default unit has only mild "
+         "faults, as the virtual sensor has")
+      ->type_name("N");
+  app.add_option("--sensor", options->sensor, "Class of the depth camera")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(kNamesOf<DepthSensor>.begin(), kNamesOf<DepthSensor>.end())))
+      ->capture_default_str()
+      ->type_name("structured_light|active_stereo|time_of_flight|lidar");
+  app.add_option("--lens", options->lens,
+                 "Lens of the colour camera: OpenCV's plain or rational model, or a fisheye")
+      ->check(CLI::IsMember({"plain", "rational", "fisheye"}))
+      ->capture_default_str()
+      ->type_name("plain|rational|fisheye");
+}
+
 }  // namespace
 
 Command AddSimulate(CLI::App& app) {
@@ -160,21 +178,7 @@ Command AddSimulate(CLI::App& app) {
   app.add_option("--seed", simulate.seed, "Seed of room, body, placements and sweep")
       ->capture_default_str()
       ->type_name("N");
-  app.add_option(
-         "--unit", simulate.unit,
-         "The sensor unit. Default: that of the seed; the demo's default unit has only mild "
-         "faults, as the virtual sensor has")
-      ->type_name("N");
-  app.add_option("--sensor", options->sensor, "Class of the depth camera")
-      ->check(CLI::IsMember(
-          std::vector<std::string>(kNamesOf<DepthSensor>.begin(), kNamesOf<DepthSensor>.end())))
-      ->capture_default_str()
-      ->type_name("structured_light|active_stereo|time_of_flight|lidar");
-  app.add_option("--lens", options->lens,
-                 "Lens of the colour camera: OpenCV's plain or rational model, or a fisheye")
-      ->check(CLI::IsMember({"plain", "rational", "fisheye"}))
-      ->capture_default_str()
-      ->type_name("plain|rational|fisheye");
+  AddUnitOptions(app, options);
   app.add_option_function<std::vector<std::string>>(
          "--fault",
          [options](const std::vector<std::string>& texts) {

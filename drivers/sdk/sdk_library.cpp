@@ -23,7 +23,7 @@ std::vector<fs::path> SdkLibrary::Folders() {
 
 fs::path SdkLibrary::FindIn(const std::string& prefix, const std::vector<fs::path>& folders) {
   fs::path newest;
-  VersionNumbers newest_version;
+  VersionNumbers newest_version{};
   for (const fs::path& folder : folders) {
     std::error_code error;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
