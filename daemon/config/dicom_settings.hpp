@@ -26,7 +26,7 @@ struct DicomSettings {
   std::filesystem::path tls_certificate, tls_key, tls_trusted;  ///< All or none.
   std::filesystem::path spool = "/var/lib/plumb-dicom";
   double quota_mb = 2000.0, keep_days = 14.0;
-  std::string worklist;          ///< Who is asked for it: "AETITLE@HOST:PORT"; empty: nobody.
+  std::string worklist;          ///< Server to query, "AETITLE@HOST:PORT"; empty: none.
   std::string worklist_station;  ///< AE title of the station whose steps count; empty: all.
 };
 

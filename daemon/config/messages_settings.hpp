@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// [messages] of the configuration: whom the unit tells what needs a person, and how.
+// Section [messages] of the configuration: who is notified of what needs attention, and how.
 #pragma once
 
 #include <filesystem>
@@ -12,8 +12,8 @@
 
 namespace plumb {
 
-/// Each way that names somebody is used; without one, nobody is told. Secrets are read from their
-/// files whenever they are needed.
+/// Messages go out over every channel that is configured; with none, there are no messages. Secrets
+/// are read from their files whenever they are needed.
 struct MessagesSettings {
   std::string language = "en";
   std::vector<std::string> mail_to;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a unit tells people who are not looking at it, and when it tells them again.
+// The events that a unit sends messages about, and when it repeats them.
 #pragma once
 
 #include <chrono>
@@ -48,9 +48,9 @@ struct OccasionRules {
                                                 double up_s, WallClock::time_point now,
                                                 const std::tm& local);
 
-/// Says which occasions are told now: each event once, and as long as it lasts once a day. New
-/// events of a kind wait for an hour after the last one of that kind, so that what comes and goes
-/// fills nobody's mailbox.
+/// Decides which messages are due: one when an event begins, and one a day for as long as it lasts.
+/// A new event of the same kind waits until an hour after the last message of that kind, so that a
+/// condition that comes and goes does not flood the mailbox.
 class OccasionMemory {
  public:
   using Time = std::chrono::steady_clock::time_point;
