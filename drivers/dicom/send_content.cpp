@@ -8,6 +8,7 @@
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
+#include "drivers/dicom/call_wire.hpp"
 #include "words/dicom.hpp"
 
 namespace plumb {
@@ -40,28 +41,17 @@ std::optional<DicomPeer> ParseDicomPeer(std::string_view text) {
 }
 
 std::string SendRequestText(const DicomSendRequest& request) {
-  const nlohmann::ordered_json json = {{"called", request.peer.ae_title},
-                                       {"host", request.peer.host},
-                                       {"port", request.peer.port},
-                                       {"calling", request.own_ae_title},
-                                       {"certificate", request.tls.certificate},
-                                       {"key", request.tls.key},
-                                       {"trusted", request.tls.trusted},
-                                       {"files", request.files}};
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  nlohmann::ordered_json json = CallToJson(request);
+  json["files"] = request.files;
+  return LineOf(json);
 }
 
 DicomSendRequest ParseSendRequest(std::string_view text) {
   try {
     const auto json = ParseBoundedJson<nlohmann::ordered_json>(text);
-    const auto word = [&](const char* key) { return json.at(key).get<std::string>(); };
-    return {
-        .peer = {.ae_title = word("called"),
-                 .host = word("host"),
-                 .port = json.at("port").get<std::uint16_t>()},
-        .own_ae_title = word("calling"),
-        .tls = {.certificate = word("certificate"), .key = word("key"), .trusted = word("trusted")},
-        .files = json.at("files").get<std::vector<std::string>>()};
+    auto request = CallFromJson<DicomSendRequest>(json);
+    request.files = json.at("files").get<std::vector<std::string>>();
+    return request;
   } catch (const nlohmann::json::exception&) {
     throw DataError(say::dicom::ReaderVersion());
   }
