@@ -71,7 +71,7 @@ int Run(const ImportDicomArguments& options, const CommandContext& context) {
   progress.Update(say::cli::Writing(), 0.9);
   WriteScene(scene, options.out, context.stop);
   progress.Clear();
-  PrintOut(options.json ? SceneJson(scene) : TextOf(scene, options, context));
+  PrintOut(options.json ? SceneText(options.out) : TextOf(scene, options, context));
   return kDone;
 }
 

@@ -190,9 +190,9 @@ std::string Lines(const ordered_json& facts, const CommandContext& context) {
 int Run(const InfoArguments& options, const CommandContext& context) {
   ordered_json facts;
   if (IsSceneFolder(options.path)) {
+    (void)ReadScene(options.path, {.cloud = false, .height_map = false, .mesh = false});
     facts = {{"kind", "scene"}};
-    facts.update(ordered_json::parse(
-        SceneJson(ReadScene(options.path, {.cloud = false, .height_map = false, .mesh = false}))));
+    facts.update(ordered_json::parse(SceneText(options.path)));
   } else if (IsResultFolder(options.path)) {
     facts = {{"kind", "result"}};
     facts.update(ordered_json::parse(ResultText(ReadResult(options.path))));

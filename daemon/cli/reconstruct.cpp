@@ -94,7 +94,7 @@ int RunOne(const ReconstructArguments& options, const CommandContext& context) {
   Progress progress(context.language);
   const Scene scene =
       Reconstructed(options.recording, options, config, options.out, "", progress, context);
-  PrintOut(options.json ? SceneJson(scene) : Summary(scene, options.out, context));
+  PrintOut(options.json ? SceneText(options.out) : Summary(scene, options.out, context));
   return kDone;
 }
 

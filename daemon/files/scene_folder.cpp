@@ -12,6 +12,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/sensitivity_json.hpp"
+#include "daemon/files/sha256.hpp"
 #include "daemon/files/trajectory_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
@@ -48,6 +49,16 @@ HeightMap ReadHeightMap(const fs::path& file, const GridShape& grid) {
                 in, static_cast<std::size_t>(grid.width) * sizeof(float));
   }
   return map;
+}
+
+/// Refuses a file that is not the one with which the scene was written: it would be read as if it
+/// belonged to it, and the numbers would be wrong without a word.
+void CheckSum(const fs::path& file, const std::optional<SceneSums>& sums) {
+  if (!sums) return;
+  const auto stated = sums->find(file.filename());
+  if (stated == sums->end()) throw DataError(say::scene_file::NotOfScene(file.string()));
+  if (SumOfFile(file).sha256 != stated->second)
+    throw DataError(say::scene_file::NotAsWritten(file.string()));
 }
 
 /// JSON cannot represent NaN, and an invalid pose must not be used for a patient: better no scene.
@@ -94,14 +105,20 @@ void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_toke
   if (!scene.mesh.vertices.empty()) WriteMeshPly(output.path() / "mesh.ply", scene.mesh);
   if (scene.sensitivity)
     WriteWholeFile(output.path() / "sensitivity.json", SensitivityJson(*scene.sensitivity));
-  WriteWholeFile(output.path() / "scene.json", SceneJson(scene));
+  SceneSums sums;
+  for (const fs::directory_entry& file : fs::directory_iterator(output.path()))
+    sums[file.path().filename()] = SumOfFile(file, stop).sha256;
+  WriteWholeFile(output.path() / "scene.json", SceneJson(scene, sums));
   CheckStop(stop);
   output.Commit();
 }
 
+std::string SceneText(const fs::path& folder) {
+  return ReadTextFile(folder / "scene.json", kMaxSceneBytes);
+}
+
 StoredScene ReadStoredScene(const fs::path& folder) {
-  const fs::path json = folder / "scene.json";
-  return ParseSceneJson(ReadTextFile(json, kMaxSceneBytes), json.string());
+  return ParseSceneJson(SceneText(folder), (folder / "scene.json").string());
 }
 
 Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
@@ -112,24 +129,37 @@ Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
   }
   StoredScene stored = ReadStoredScene(folder);
   Scene scene = std::move(stored.scene);
-  scene.keyframes = ReadTrajectory(folder / "trajectory.txt");
+  // A file's own fault is said before that it is another file than the scene's.
+  const auto read = [&](const char* name, const auto& reader) {
+    auto part = reader(folder / name);
+    CheckSum(folder / name, stored.sums);
+    return part;
+  };
+  const auto has = [&](const char* name) {
+    std::error_code no_error;
+    if (fs::exists(folder / name, no_error)) return true;
+    if (stored.sums && stored.sums->contains(name))
+      throw DataError(say::scene_file::PartMissing((folder / name).string()));
+    return false;
+  };
+  scene.keyframes = read("trajectory.txt", ReadTrajectory);
   if (scene.keyframes.size() != stored.shape.num_keyframes) {
     throw DataError(say::scene_file::PosesDiffer(
         (folder / "trajectory.txt").string(), static_cast<std::int64_t>(scene.keyframes.size()),
         static_cast<std::int64_t>(stored.shape.num_keyframes)));
   }
-  scene.trajectory = ReadTrajectory(folder / "trajectory_all.txt");
+  scene.trajectory = read("trajectory_all.txt", ReadTrajectory);
   // Scenes of before had none, and those without a calibration have none.
-  const fs::path sensitivity = folder / "sensitivity.json";
-  std::error_code no_error;
-  if (fs::exists(sensitivity, no_error))
-    scene.sensitivity =
-        ParseSensitivityJson(ReadTextFile(sensitivity, kMaxSceneBytes), sensitivity.string());
-  if (parts.cloud) scene.cloud = ReadCloudPly(folder / "cloud.ply");
+  if (has("sensitivity.json"))
+    scene.sensitivity = read("sensitivity.json", [](const fs::path& file) {
+      return ParseSensitivityJson(ReadTextFile(file, kMaxSceneBytes), file.string());
+    });
+  if (parts.cloud) scene.cloud = read("cloud.ply", ReadCloudPly);
   if (parts.height_map && stored.shape.grid)
-    scene.height_map = ReadHeightMap(folder / "heightmap.tiff", *stored.shape.grid);
-  const fs::path mesh = folder / "mesh.ply";
-  if (parts.mesh && fs::exists(mesh)) scene.mesh = ReadMeshPly(mesh);
+    scene.height_map = read("heightmap.tiff", [&](const fs::path& file) {
+      return ReadHeightMap(file, *stored.shape.grid);
+    });
+  if (parts.mesh && has("mesh.ply")) scene.mesh = read("mesh.ply", ReadMeshPly);
   return scene;
 }
 

@@ -33,8 +33,12 @@ struct SceneParts {
 
 /// Reads a scene and checks all of its contents.
 /// @throws DataError naming the file, what was found and what is expected: another format, missing
-///         or truncated files, numbers that are not finite, inconsistent sizes.
+///         or truncated files, numbers that are not finite, inconsistent sizes, a file that is not
+///         the one with which the scene was written.
 [[nodiscard]] Scene ReadScene(const std::filesystem::path& folder, const SceneParts& parts = {});
+
+/// scene.json as it is. @throws IoError
+[[nodiscard]] std::string SceneText(const std::filesystem::path& folder);
 
 /// The small values of a scene; nothing else is read. @throws DataError as ReadScene(); IoError
 [[nodiscard]] StoredScene ReadStoredScene(const std::filesystem::path& folder);

@@ -76,7 +76,7 @@ struct FrameCounts {
 };
 
 /// What other programs may leave out is read by OrAsIs().
-void SceneFields(auto& scene, auto& shape, auto& source, const auto& visit) {
+void SceneFields(auto& scene, auto& shape, auto& source, auto& sums, const auto& visit) {
   constexpr Bounds kCalibration{-1e12, 1e12}, kSigma{0, 1e12};
   visit("preset", scene.preset);
   visit.IfSet("source", source);
@@ -104,19 +104,20 @@ void SceneFields(auto& scene, auto& shape, auto& source, const auto& visit) {
   visit.SentencesOrNone("warnings", "warning_messages", scene.warnings);
   visit.SentencesOrNone("refusals", "refusal_messages", scene.refusals);
   visit.OrAsIs("scale_doubt", scene.scale_doubt, Bounds{0, 1e3});
+  visit.IfSet("sha256", sums);
 }
 
 }  // namespace
 }  // namespace stored
 
-std::string SceneJson(const Scene& scene) {
+std::string SceneJson(const Scene& scene, const std::optional<SceneSums>& sums) {
   stored::Json json = {{"format", stored::kSceneFormat}};
   const SceneShape shape{
       .num_keyframes = scene.keyframes.size(),
       .grid = scene.height_map ? std::optional(scene.height_map->grid) : std::nullopt};
   const std::optional<SceneSource> source =
       scene.planning ? std::optional(SceneSource::kDicom) : std::nullopt;
-  stored::SceneFields(scene, shape, source, stored::FieldWriter(json));
+  stored::SceneFields(scene, shape, source, sums, stored::FieldWriter(json));
   // Warnings can quote file names in any encoding; invalid UTF-8 is replaced.
   return json.dump(1, ' ', false, stored::Json::error_handler_t::replace) + "\n";
 }
@@ -137,7 +138,7 @@ StoredScene ParseSceneJson(std::string_view text, const std::string& name) {
     throw DataError(say::scene_file::NewerFormat(name, format, stored::kSceneFormat));
   StoredScene read;
   std::optional<SceneSource> source;
-  stored::SceneFields(read.scene, read.shape, source, reader);
+  stored::SceneFields(read.scene, read.shape, source, read.sums, reader);
   const bool is_planned = source == SceneSource::kDicom;
   if (is_planned != read.scene.planning.has_value() ||
       is_planned != (read.scene.frame == SceneFrame::kIec))

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,9 +13,12 @@
 
 namespace plumb {
 
-/// The text of scene.json, which `reconstruct --json` also prints. Numbers are read back bit for
-/// bit; the keys have a fixed order.
-[[nodiscard]] std::string SceneJson(const Scene& scene);
+/// SHA-256 in hexadecimal of each other file of the scene's folder, by name.
+using SceneSums = std::map<std::string, std::string>;
+
+/// The text of scene.json. Numbers are read back bit for bit; the keys have a fixed order.
+[[nodiscard]] std::string SceneJson(const Scene& scene,
+                                    const std::optional<SceneSums>& sums = std::nullopt);
 
 /// What scene.json states of the large parts of its scene.
 struct SceneShape {
@@ -26,6 +30,7 @@ struct SceneShape {
 struct StoredScene {
   Scene scene;
   SceneShape shape;
+  std::optional<SceneSums> sums = {};  ///< Scenes of before state none.
 };
 
 /// Reads and checks scene.json of format 1.

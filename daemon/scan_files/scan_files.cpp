@@ -11,8 +11,6 @@
 #include <cstring>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <sodium.h>
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
@@ -23,10 +21,6 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-
-Descriptor OpenForReading(const fs::path& path) {
-  return Descriptor(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
-}
 
 [[noreturn]] void FailToRead(const fs::path& path, int error) {
   throw IoError(say::file::CannotRead(path.string(), std::strerror(error)));
@@ -63,28 +57,6 @@ Message Difference(const Message& what, const FileLook& look, const FileDigest& 
 
 }  // namespace
 
-Sha256::Sha256() { crypto_hash_sha256_init(&state_); }
-
-void Sha256::Add(const void* bytes, std::size_t count) {
-  crypto_hash_sha256_update(&state_, static_cast<const unsigned char*>(bytes), count);
-}
-
-std::string Sha256::Hex() {
-  std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
-  crypto_hash_sha256_final(&state_, hash.data());
-  return HexOf(hash);
-}
-
-std::string HexOf(std::span<const unsigned char> bytes) {
-  return fmt::format("{:02x}", fmt::join(bytes, ""));
-}
-
-std::string Sha256Of(std::string_view text) {
-  Sha256 hash;
-  hash.Add(text.data(), text.size());
-  return hash.Hex();
-}
-
 FileLook LookAt(const fs::path& path) {
   FileLook look;
   const Descriptor file = OpenForReading(path);
@@ -103,25 +75,8 @@ FileLook LookAt(const fs::path& path) {
 
 FileDigest DigestOfFile(const fs::path& folder, const std::string& path,
                         const std::stop_token& stop) {
-  const fs::path full = folder / path;
-  const Descriptor file = OpenForReading(full);
-  struct stat status {};
-  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailToRead(full, errno);
-  if (!S_ISREG(status.st_mode)) FailToRead(full, S_ISDIR(status.st_mode) ? EISDIR : EINVAL);
-  Sha256 hash;
-  FileDigest digest{.path = path};
-  std::vector<char> buffer(std::size_t{256} << 10);
-  for (;;) {
-    CheckStop(stop);
-    const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) FailToRead(full, errno);
-    if (count == 0) break;
-    hash.Add(buffer.data(), static_cast<std::size_t>(count));
-    digest.bytes += static_cast<std::uint64_t>(count);
-  }
-  digest.sha256 = hash.Hex();
-  return digest;
+  FileSum sum = SumOfFile(folder / path, stop);
+  return {.path = path, .bytes = sum.bytes, .sha256 = std::move(sum.sha256)};
 }
 
 std::vector<FileDigest> DigestsOfScan(const fs::path& folder, const std::stop_token& stop) {

@@ -12,26 +12,10 @@
 #include <string_view>
 #include <vector>
 
-#include <sodium/crypto_hash_sha256.h>
-
 #include "algo/base/message.hpp"
+#include "daemon/files/sha256.hpp"
 
 namespace plumb {
-
-/// SHA-256 of the added data, in hexadecimal.
-class Sha256 {
- public:
-  Sha256();
-  void Add(const void* bytes, std::size_t count);
-  [[nodiscard]] std::string Hex();  ///< Call it once.
-
- private:
-  crypto_hash_sha256_state state_{};
-};
-
-/// Two digits for each byte.
-[[nodiscard]] std::string HexOf(std::span<const unsigned char> bytes);
-[[nodiscard]] std::string Sha256Of(std::string_view text);
 
 /// Result of examining a path.
 struct FileLook {

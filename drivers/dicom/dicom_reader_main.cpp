@@ -29,7 +29,7 @@ namespace {
 constexpr ReaderLimits kDicomLimits{.memory_bytes = std::uint64_t{512} << 20, .cpu_s = 10};
 
 std::vector<std::uint8_t> BytesOf(const std::string& file) {
-  const Descriptor opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  const Descriptor opened = OpenForReading(file);
   struct stat status {};
   if (opened.get() < 0 || ::fstat(opened.get(), &status) != 0 || !S_ISREG(status.st_mode))
     throw DataError(say::dicom::CannotRead());

@@ -47,7 +47,7 @@ std::string SaidName(const fs::path& file, const fs::path& name) {
 bool IsDicomFile(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return false;
-  const Descriptor opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  const Descriptor opened = OpenForReading(file);
   std::array<char, 132> first{};
   return opened.get() >= 0 &&
          ReadAllAt(opened.get(), 0, std::as_writable_bytes(std::span(first))) ==

@@ -2,11 +2,13 @@
 // Descriptors of open files.
 #pragma once
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <utility>
 
@@ -27,6 +29,11 @@ class Descriptor {
  private:
   int fd_;
 };
+
+/// Opens whatever is there without waiting for it, as a pipe without a writer would make it.
+[[nodiscard]] inline Descriptor OpenForReading(const std::filesystem::path& path) {
+  return Descriptor(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
+}
 
 /// Reads from a place in the file, in as many calls as it takes. @return the number of bytes, which
 /// is lower at the end of the file; -1 with errno set after an error.

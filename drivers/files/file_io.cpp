@@ -30,7 +30,7 @@ std::string ErrorText(int error_number) { return std::generic_category().message
 template <typename Container>
 Container ReadInto(const std::filesystem::path& path, std::size_t max_bytes) {
   // O_NONBLOCK: opening a FIFO must not wait for a writer; regular files ignore it.
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  const Descriptor file = OpenForReading(path);
   if (file.get() < 0) {
     const int error = errno;
     if (error == ENOENT || error == ENOTDIR) throw DataError(say::file::Missing(path.string()));

@@ -88,7 +88,7 @@ void SendHello(const RecordedFacts& facts, std::size_t num_pairs) {
 }
 
 int Main(const std::string& file, double max_gap_s) try {
-  const Descriptor opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  const Descriptor opened = OpenForReading(file);
   if (opened.get() < 0) throw DataError(say::foreign::Unreadable());
   const std::unique_ptr<RecordedFile> recording = OpenRecordedFile(BytesOf(opened));
   const RecordedFacts& facts = recording->facts();

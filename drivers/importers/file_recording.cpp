@@ -210,7 +210,7 @@ std::unique_ptr<ImportedRecording> OpenFileRecording(const fs::path& file,
 bool IsFileRecording(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return false;
-  const Descriptor opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  const Descriptor opened = OpenForReading(file);
   std::array<std::uint8_t, kFirstBytes> first{};
   if (opened.get() < 0) return false;
   const ssize_t got = ReadAllAt(opened.get(), 0, std::as_writable_bytes(std::span(first)));

@@ -81,6 +81,16 @@ fs::path SmallLiveScene() {
   return target;
 }
 
+const fs::path& SmallCtSuite() {
+  static const fs::path suite = [] {
+    const fs::path target = fs::path(PLUMB_INTEGRATION_DATA) / "ct-suite";
+    MakeOnce(target, {"simulate", "--suite", "ct", "--frames", "50", "--rate", "5", "--size",
+                      "320x240", "--seed", "5", "--unit", "5", "--out", target});
+    return target;
+  }();
+  return suite;
+}
+
 const std::vector<std::string>& SmallNames() {
   static const auto names = nlohmann::json::parse(ReadText(SmallSuite() / "suite.json"))
                                 .at("scenes")

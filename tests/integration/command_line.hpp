@@ -32,6 +32,9 @@ namespace fs = std::filesystem;
 /// The scene of the body that it is over.
 [[nodiscard]] fs::path SmallLiveScene();
 
+/// A small suite of planning CTs in four positions and ten placements, each pair of them.
+[[nodiscard]] const fs::path& SmallCtSuite();
+
 /// Names of the suite's scenes in order: the reference first.
 [[nodiscard]] const std::vector<std::string>& SmallNames();
 

@@ -222,6 +222,8 @@ TEST_F(OrthancTest, APlanComesFromOrthancAndTheReportGoesBack) {
   Start();
   if (!StartOrthanc())
     PLUMB_SKIP("Orthanc is not installed: apt install orthanc, or name it in PLUMB_ORTHANC");
+  structures_ = SmallCtSuite() / "recordings" / "ct_HFS" / "structures.dcm";
+  plan_ = structures_.parent_path() / "plan.dcm";
   std::vector<std::string> pushed;
   for (const fs::path& file : {structures_, plan_}) {
     const auto stored = web_.Ask("POST", "/instances", ReadText(file)).json();
@@ -233,12 +235,23 @@ TEST_F(OrthancTest, APlanComesFromOrthancAndTheReportGoesBack) {
   ASSERT_EQ(push.value("InstancesCount", 0), 2) << push;
   ASSERT_EQ(Received().size(), 2U) << dicomd_->err();
 
-  const fs::path current = SmallScene(SmallNames().back());
+  const fs::path current = folder_ / "current";
+  ASSERT_EQ(Plumb({"reconstruct", SmallCtSuite() / "recordings" / "placement_1", "--out", current})
+                .exit_code,
+            0);
   const RunResult imported =
       Plumb({"import-dicom", ReceivedOf("1.2.840.10008.5.1.4.1.1.481.3"),
              ReceivedOf("1.2.840.10008.5.1.4.1.1.481.5"), "--out", folder_ / "planned"});
   ASSERT_EQ(imported.exit_code, 0) << imported.err;
-  (void)Plumb({"compare", folder_ / "planned", current, "--out", folder_ / "result"});
+  const RunResult compared =
+      Plumb({"compare", folder_ / "planned", current, "--config", SmallCtSuite() / "room.toml",
+             "--out", folder_ / "result", "--json"});
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  const auto correction = nlohmann::json::parse(compared.out).at("correction");
+  for (const char* number : {"vertical_mm", "longitudinal_mm", "lateral_mm"})
+    EXPECT_LT(std::abs(correction.at(number).get<double>()), 8) << number;
+  for (const char* number : {"pitch_deg", "roll_deg", "yaw_deg"})
+    EXPECT_LT(std::abs(correction.at(number).get<double>()), 2) << number;
   const RunResult exported =
       Plumb({"export-dicom", folder_ / "result", "--reference", folder_ / "planned", "--current",
              current, "--out", folder_ / "exported", "--patient-id", "SIM-1"});

@@ -393,6 +393,24 @@ TEST_F(ScenesTest, InfoKnowsEveryKindOfFolder) {
     EXPECT_THAT(text.out, HasSubstr(kind));
     EXPECT_EQ(json::parse(machine.out).at("kind"), kind);
   }
+  // A scene's facts are those of its file.
+  const RunResult scene = Plumb({"info", SmallScene(Reference()), "--json"});
+  json facts = json::parse(scene.out);
+  EXPECT_TRUE(facts.at("heightmap").is_object());
+  facts.erase("kind");
+  EXPECT_EQ(facts, json::parse(ReadText(SmallScene(Reference()) / "scene.json")));
+}
+
+TEST_F(ScenesTest, AFileOfAnotherSceneGivesNoNumbers) {
+  const fs::path mixed = folder_ / "mixed";
+  fs::copy(SmallScene(Reference()), mixed);
+  fs::copy_file(SmallScene("moved") / "sensitivity.json", mixed / "sensitivity.json",
+                fs::copy_options::overwrite_existing);
+  const RunResult result =
+      Plumb({"compare", mixed, SmallScene("moved"), "--out", folder_ / "result"});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("sensitivity.json is not as it was written with the scene"));
+  EXPECT_FALSE(fs::exists(folder_ / "result"));
 }
 
 TEST_F(ScenesTest, EvaluateMeasuresAgainstTheTruth) {

@@ -61,6 +61,45 @@ class SceneFolderTest : public ::testing::Test {
   fs::path scene_ = folder_ / "scene";
 };
 
+Scene SceneWithSensitivity() {
+  Scene scene = SmallScene();
+  scene.sensitivity = testing::SmallSensitivity();
+  return scene;
+}
+
+TEST_F(SceneFolderTest, RefusesAFileOfAnotherScene) {
+  Scene other = SceneWithSensitivity();
+  other.sensitivity->covariance *= 0.25;  // Would narrow the intervals without a word.
+  other.height_map->z[0] += 0.001F;
+  other.cloud.points[0].x() += 0.001F;
+  other.mesh.vertices[0].x() += 0.001F;
+  for (StampedPose& pose : other.keyframes) pose.T_world_camera.translation().x() += 0.001;
+  for (StampedPose& pose : other.trajectory) pose.T_world_camera.translation().x() += 0.001;
+  WriteScene(other, folder_ / "other");
+  for (const char* name : {"sensitivity.json", "heightmap.tiff", "cloud.ply", "mesh.ply",
+                           "trajectory.txt", "trajectory_all.txt"}) {
+    WriteScene(SceneWithSensitivity(), scene_);
+    EXPECT_NO_THROW((void)ReadScene(scene_, {.mesh = true})) << name;
+    fs::copy_file(folder_ / "other" / name, scene_ / name, fs::copy_options::overwrite_existing);
+    EXPECT_THAT(Refusal(), AllOf(HasSubstr(name), HasSubstr("SHA-256"))) << name;
+  }
+}
+
+TEST_F(SceneFolderTest, RefusesWithoutAFileThatItStatesOrWithOneThatItDoesNot) {
+  WriteScene(SceneWithSensitivity(), scene_);
+  fs::rename(scene_ / "sensitivity.json", folder_ / "sensitivity.json");
+  EXPECT_THAT(Refusal(), HasSubstr("sensitivity.json is missing, scene.json states it"));
+  WriteScene(SmallScene(), scene_);
+  EXPECT_NO_THROW((void)ReadScene(scene_));
+  fs::rename(folder_ / "sensitivity.json", scene_ / "sensitivity.json");
+  EXPECT_THAT(Refusal(), HasSubstr("not one of the files that scene.json states"));
+}
+
+TEST_F(SceneFolderTest, ReadsASceneOfBeforeWhichStatesNoSums) {
+  WriteWholeFile(scene_ / "scene.json", SceneJson(SmallScene()));
+  EXPECT_NO_THROW((void)ReadScene(scene_, {.mesh = true}));
+}
+
 TEST_F(SceneFolderTest, GivesBackAPlanningCt) {
   Scene scene = SmallScene();
   scene.frame = SceneFrame::kIec;

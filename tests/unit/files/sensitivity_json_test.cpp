@@ -5,29 +5,15 @@
 
 #include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/unit/files/small_output.hpp"
 
 namespace plumb {
 namespace {
 
 using testing::MessageOf;
 
-SensorSensitivity Sample() {
-  SensorSensitivity s;
-  s.stated = {640, 480, 525.5, 524.25, 319.5, 239.5, {0.1, -0.2, 0.001, 0.002, 0.05}};
-  s.stated_for_this_unit = true;
-  s.serial = "1804060024";
-  s.estimate = Eigen::Vector3d(0.001, -1.25, 3.0 / 7.0);
-  s.covariance = Eigen::Matrix3d::Zero();
-  s.covariance << 4, 1, 0.5, 1, 9, 0.25, 0.5, 0.25, 1.0 / 3.0;
-  SensorSensitivity::Derivative d(3, 3);
-  d << 1, 2, 3, 4, 5, 6, 7, 8, 9;
-  s.surface.push_back({Eigen::Vector3f(0.25F, 0.5F, -0.125F), 75.0F, d});
-  s.markers[7] = 0.5F * d;
-  return s;
-}
-
 TEST(SensitivityJsonTest, ComesBackAsItWas) {
-  const SensorSensitivity s = Sample();
+  const SensorSensitivity s = testing::SmallSensitivity();
   const SensorSensitivity read = ParseSensitivityJson(SensitivityJson(s), "sensitivity.json");
   EXPECT_EQ(read.stated, s.stated);
   EXPECT_TRUE(read.stated_for_this_unit);
@@ -43,7 +29,7 @@ TEST(SensitivityJsonTest, ComesBackAsItWas) {
 }
 
 TEST(SensitivityJsonTest, WrongFilesAreRefusedByName) {
-  const std::string good = SensitivityJson(Sample());
+  const std::string good = SensitivityJson(testing::SmallSensitivity());
   const auto refused = [](std::string text, const std::string& from, const std::string& to) {
     const auto at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;

@@ -20,6 +20,22 @@ inline StampedPose PoseAt(double time_s) {
   return pose;
 }
 
+/// A sensitivity of three terms, with one patch and one marker.
+inline SensorSensitivity SmallSensitivity() {
+  SensorSensitivity s;
+  s.stated = {640, 480, 525.5, 524.25, 319.5, 239.5, {0.1, -0.2, 0.001, 0.002, 0.05}};
+  s.stated_for_this_unit = true;
+  s.serial = "1804060024";
+  s.estimate = Eigen::Vector3d(0.001, -1.25, 3.0 / 7.0);
+  s.covariance = Eigen::Matrix3d::Zero();
+  s.covariance << 4, 1, 0.5, 1, 9, 0.25, 0.5, 0.25, 1.0 / 3.0;
+  SensorSensitivity::Derivative d(3, 3);
+  d << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  s.surface.push_back({Eigen::Vector3f(0.25F, 0.5F, -0.125F), 75.0F, d});
+  s.markers[7] = 0.5F * d;
+  return s;
+}
+
 inline Scene SmallScene() {
   Scene scene;
   scene.preset = Preset::kPaper;
