@@ -60,6 +60,12 @@ inline constexpr std::array<const char*, 6> kNumberNames = {"vertical", "longitu
   return IsShift(number) ? "mm" : "deg";
 }
 
+/// Whether the markers of two scans lie so differently that a distorted scan is as likely a cause
+/// of a misfit as another body. Scans of one room by good units fit to 0.3 to 1.9 mm (RMS, 288
+/// pairs of four classes); halves of a real sweep with a wrong calibration fit to 3.5 mm.
+/// @param rms_m  NaN: not known, and nothing disagrees.
+[[nodiscard]] bool MarkersDisagree(double rms_m);
+
 /// The name of one of the six numbers, for people.
 [[nodiscard]] Message NumberWord(std::size_t number);
 
@@ -109,6 +115,8 @@ struct Evidence {
   double largest_hole_m = kNotMeasured;
   Message hole_place;  ///< The part of the body that it lies on, such as "left shoulder".
   double residual_p95_m = kNotMeasured;
+  /// RMS misfit of the two marker maps after the alignment.
+  double markers_rms_m = kNotMeasured;
   double reference_lost_s = kNotMeasured;
   double current_lost_s = kNotMeasured;
   /// Rise of chest and belly; 0 also where it is not known, as in scans of older versions.
@@ -119,6 +127,10 @@ struct Evidence {
   std::array<std::optional<MeasuredNumber>, 6> numbers;
   /// What makes shifts and rotations uncertain most of all; said where one is too uncertain.
   Message shift_doubt, turn_doubt;
+  /// How well the scans know their own markers: mean SceneMarker::sigma_m. The scan that knows them
+  /// much worse is named where a number is too uncertain.
+  double reference_markers_sigma_m = kNotMeasured;
+  double current_markers_sigma_m = kNotMeasured;
 
   static constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 };

@@ -74,6 +74,18 @@ void CheckOptions(const CompareOptions& options) {
       throw std::invalid_argument("comparison: the IEC transform is not finite");
 }
 
+// NaN where the scene states none: markers of other programs have the default.
+double MeanMarkerSigma(const Scene& scene) {
+  double sum_m = 0.0;
+  int count = 0;
+  for (const auto& [id, marker] : scene.markers) {
+    if (marker.sigma_m == SceneMarker().sigma_m) continue;
+    sum_m += marker.sigma_m;
+    ++count;
+  }
+  return count > 0 ? sum_m / count : Evidence::kNotMeasured;
+}
+
 void CheckScenesMatch(const Scene& reference, const Scene& current) {
   if (reference.room_markers.dictionary != current.room_markers.dictionary) {
     throw DataError(say::comparison::OtherDictionary(reference.room_markers.dictionary,
@@ -101,6 +113,8 @@ class Comparer {
     if (reference.breathing) evidence_.reference_breathing_m = reference.breathing->amplitude_m;
     if (current.breathing) evidence_.current_breathing_m = current.breathing->amplitude_m;
     evidence_.region_is_drawn = !options.region_polygon_m.empty();
+    evidence_.reference_markers_sigma_m = MeanMarkerSigma(reference);
+    evidence_.current_markers_sigma_m = MeanMarkerSigma(current);
     TakeFindings(reference, say::acceptance::ScanReference());
     TakeFindings(current, say::acceptance::ScanCurrent());
     CheckSensors();
@@ -339,7 +353,12 @@ class Comparer {
       };
     }
     const std::optional<SurfaceMotion> surface = EstimateBodyMotion(input);
-    if (!surface) return Refuse(say::comparison::NoMotion());
+    if (!surface) {
+      const double rms_m = result_.alignment->rms_m;
+      return Refuse(MarkersDisagree(rms_m)
+                        ? say::comparison::NoMotionOrDistorted(rms_m / kMillimetre)
+                        : say::comparison::NoMotion());
+    }
 
     BodyMotion motion;
     motion.T = surface->T;
@@ -357,6 +376,7 @@ class Comparer {
          .breathing_m = std::hypot(evidence_.reference_breathing_m, evidence_.current_breathing_m),
          .planned = planned_});
     motion.covariance = motion.uncertainty.Total();
+    evidence_.markers_rms_m = result_.alignment->rms_m;
     evidence_.shift_doubt = LargestCause(motion.uncertainty, *result_.alignment, false);
     evidence_.turn_doubt = LargestCause(motion.uncertainty, *result_.alignment, true);
     result_.motion = motion;

@@ -150,12 +150,18 @@ void JudgeForeignMarkers(const Symptoms& symptoms, std::vector<Finding>& finding
         {FindingLevel::kRefusal, say::diagnosis::OtherDictionary(foreign.dictionary)});
 }
 
-void JudgeCalibration(const CalibrationFit& fit, std::vector<Finding>& findings) {
+void JudgeCalibration(const Symptoms& symptoms, std::vector<Finding>& findings) {
+  const CalibrationFit& fit = symptoms.calibration;
   if (fit.num_terms == 0) return;
   const double chi2_per_term = fit.chi2 / fit.num_terms;
   if (!(chi2_per_term > kChi2ToReport)) return;
   const FindingLevel level =
       chi2_per_term > kChi2ToRefuse ? FindingLevel::kRefusal : FindingLevel::kWarning;
+  // Of assumed cameras, single terms mean nothing.
+  if (symptoms.cameras_assumed) {
+    findings.push_back({level, say::diagnosis::CamerasUnstated(chi2_per_term)});
+    return;
+  }
   findings.push_back({level, say::diagnosis::Calibration(chi2_per_term, fit.worst_term,
                                                          fit.worst_value, fit.worst_sigma)});
 }
@@ -179,7 +185,7 @@ std::vector<Finding> Diagnose(const Symptoms& symptoms) {
   // Depth of another moment disagrees with the markers because of its time.
   const bool wrong_numbers = !clocks_differ && JudgeMarkerDepths(symptoms, findings);
   if (!wrong_numbers) JudgeRange(symptoms, findings);
-  if (!clocks_differ && !wrong_numbers) JudgeCalibration(symptoms.calibration, findings);
+  if (!clocks_differ && !wrong_numbers) JudgeCalibration(symptoms, findings);
   std::ranges::stable_sort(findings,
                            [](const Finding& a, const Finding& b) { return a.level > b.level; });
   return findings;

@@ -30,6 +30,7 @@ struct Symptoms {
   std::vector<MarkerDepth> marker_depths;  ///< By id.
   double marker_length_m = 0.0;            ///< As stated.
   bool depth_unit_assumed = false;         ///< Nothing states the unit of the depth images.
+  bool cameras_assumed = false;            ///< Nothing states the intrinsics.
   std::optional<StreamOffset> stream_offset;
   std::int64_t num_frames = 0;
   std::int64_t num_repeated_depth = 0;  ///< Depth images with every pixel of the one before.

@@ -44,8 +44,8 @@ inline constexpr auto kNamesOf<BlindReason> =
 
 /// The accepted result of the scan that is monitored, against its reference.
 struct AcceptedMotion {
-  Pose T_reference_current = Pose::Identity();
-  Pose T_motion = Pose::Identity();                      ///< Of the body, in the reference frame.
+  Pose T_reference_current = Pose::Identity();           ///< To the frame of the motion.
+  Pose T_motion = Pose::Identity();                      ///< Of the body, in that frame.
   Matrix6d covariance = Matrix6d::Zero();                ///< As BodyMotion::covariance.
   Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();  ///< Of the reference's region.
 };

@@ -18,7 +18,10 @@ MonitorOptions MonitorOptionsOf(const CompareOptions& compare, const Scene* refe
         comparison.reasons.empty() ? Message() : comparison.reasons.front()));
     return options;
   }
-  options.accepted = {.T_reference_current = comparison.alignment->T_reference_current,
+  // The motion against a planning CT is stated in the current scan's frame.
+  options.accepted = {.T_reference_current = reference->planning
+                                                 ? Pose::Identity()
+                                                 : comparison.alignment->T_reference_current,
                       .T_motion = comparison.motion->T,
                       .covariance = comparison.motion->covariance,
                       .centroid_m = comparison.motion->centroid_m};

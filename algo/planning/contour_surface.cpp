@@ -29,6 +29,25 @@ double Highest(const FlatContour& contour) {
   return high;
 }
 
+// Whether two contours enclose the same, wherever they begin and whichever way they run.
+bool IsSame(const FlatContour& a, const FlatContour& b) {
+  if (a.size() != b.size() || a.empty()) return false;
+  const auto near = [](const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
+    return (p - q).cwiseAbs().maxCoeff() < kSamePlace_m;
+  };
+  const std::size_t n = a.size();
+  for (std::size_t start = 0; start < n; ++start) {
+    if (!near(a[0], b[start])) continue;
+    bool forwards = true, backwards = true;
+    for (std::size_t i = 1; i < n && (forwards || backwards); ++i) {
+      forwards = forwards && near(a[i], b[(start + i) % n]);
+      backwards = backwards && near(a[i], b[(start + n - i) % n]);
+    }
+    if (forwards || backwards) return true;
+  }
+  return false;
+}
+
 std::vector<ContourSlice> Joined(std::vector<ContourSlice> slices) {
   std::stable_sort(slices.begin(), slices.end(),
                    [](const auto& a, const auto& b) { return a.y_m < b.y_m; });
@@ -53,6 +72,13 @@ void DropCrumbs(std::vector<ContourSlice>& slices, const ContourSurfaceOptions& 
     });
     std::stable_sort(slice.contours.begin(), slice.contours.end(),
                      [](const auto& a, const auto& b) { return AreaOf(a) > AreaOf(b); });
+    // The same contour twice would be a hole in itself.
+    for (auto one = slice.contours.begin(); one != slice.contours.end(); ++one) {
+      const auto same = [&](const FlatContour& other) { return IsSame(*one, other); };
+      const auto rest = std::remove_if(std::next(one), slice.contours.end(), same);
+      result.repeated += static_cast<std::size_t>(slice.contours.end() - rest);
+      slice.contours.erase(rest, slice.contours.end());
+    }
   }
   std::erase_if(slices, [](const ContourSlice& slice) { return slice.contours.empty(); });
   if (slices.size() < 3)

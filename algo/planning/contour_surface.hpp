@@ -37,6 +37,7 @@ struct ContourSurface {
   double spacing_m = 0.0;       ///< The usual one of the slices.
   std::size_t parts_apart = 0;  ///< Contours beside the largest of their slice that were kept.
   std::size_t crumbs = 0;       ///< Contours that are too small.
+  std::size_t repeated = 0;     ///< Contours that the same slice has once more.
   std::size_t couch_parts = 0;  ///< Parts apart that do not rise above the height of the couch.
   std::size_t holes = 0;        ///< Contours inside another one.
   std::size_t gaps = 0;         ///< Places where slices are missing; nothing is interpolated there.
@@ -44,7 +45,7 @@ struct ContourSurface {
 };
 
 /// Each column of each slice takes its topmost crossing by the even-odd rule, so that holes and
-/// keyholes need no care, and rows between neighbouring slices are interpolated. Empty remain: the
+/// keyholes need no care (a contour that a slice has twice counts once), and rows between neighbouring slices are interpolated. Empty remain: the
 /// first and the last slice, which are the ends of the scan; rows in a gap; steps; what is not
 /// higher than the couch; and the field of view's edges.
 /// @param slices  In any order. Those at one place (to 0.01 mm) are joined.

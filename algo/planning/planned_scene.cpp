@@ -59,6 +59,8 @@ void Warn(const ContourSurface& surface, std::vector<Message>& warnings) {
     warnings.push_back(say::planning::PartsApart(count(surface.parts_apart)));
   if (surface.couch_parts > 0)
     warnings.push_back(say::planning::CouchParts(count(surface.couch_parts)));
+  if (surface.repeated > 0)
+    warnings.push_back(say::planning::ContoursRepeated(count(surface.repeated)));
   if (surface.cut_at_side) warnings.push_back(say::planning::CutAtSide());
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/appliance/room_in_use.hpp"
 
+#include <chrono>
+#include <cmath>
 #include <ctime>
 #include <utility>
 
@@ -43,6 +45,13 @@ web::RoomCalibrationVersion ForPage(const SignedRoom& room) {
 
 }  // namespace
 
+Message WhyTooOld(WallClock::time_point signed_at, WallClock::time_point now, double most_days) {
+  using Days = std::chrono::duration<double, std::ratio<86400>>;
+  const double age_days = Days(now - signed_at).count();
+  if (most_days <= 0 || age_days <= most_days) return {};
+  return say::room::TooOld(std::floor(age_days), most_days);
+}
+
 WallClock::time_point StartOfDay() {
   const std::time_t now = std::time(nullptr);
   std::tm local{};
@@ -77,8 +86,13 @@ void RoomInUse::Refresh() {
 
 std::optional<RoomAxes> RoomInUse::OfJob() const {
   if (room_.calibration)
-    return RoomAxes{room_.calibration->version, room_.calibration->fit.markers_iec, room_.due,
-                    room_.calibration->fit.shift_m, room_.calibration->fit.turn_rad};
+    return RoomAxes{room_.calibration->version,
+                    room_.calibration->fit.markers_iec,
+                    room_.due,
+                    room_.calibration->fit.shift_m,
+                    room_.calibration->fit.turn_rad,
+                    WhyTooOld(room_.calibration->signed_at, WallClock::now(),
+                              config_.appliance.room_max_age_days)};
   if (!room_.due.empty()) return RoomAxes{0, {}, room_.due};
   return std::nullopt;
 }
@@ -115,6 +129,12 @@ void RoomInUse::Report(Status& status) const {
     status.warnings.push_back(say::room::ConfigurationIgnored());
   const std::optional<Pose> room = T_iec_reference();
   const Eigen::Matrix3d R_iec_reference = room.value_or(Pose::Identity()).linear();
+  if (room_.due.empty() && room_.calibration) {
+    if (const Message old = WhyTooOld(room_.calibration->signed_at, WallClock::now(),
+                                      config_.appliance.room_max_age_days);
+        !old.empty())
+      status.warnings.push_back(say::room::TooOldForPlans(old));
+  }
   status.room = {.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)},
                  .right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)},
                  .is_known = room.has_value()};

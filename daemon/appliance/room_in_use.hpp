@@ -67,6 +67,12 @@ class RoomInUse {
   Room room_;
 };
 
+/// Why a calibration is too old to join a scan with what shares no marker with it: a planning CT, a
+/// scan of another room. Empty if it is not.
+/// @param most_days  0: it never is.
+[[nodiscard]] Message WhyTooOld(WallClock::time_point signed_at, WallClock::time_point now,
+                                double most_days);
+
 /// Midnight, local time.
 [[nodiscard]] WallClock::time_point StartOfDay();
 

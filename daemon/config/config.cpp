@@ -226,6 +226,8 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
                say::config::ExpectedRange(say::config::Gigabytes(), 1, 100000),
                [](double v) { return v >= 1 && v <= 100000; });
   section.TakeNumber("warm_up_min", appliance.warm_up_min, 0, 120, say::config::Minutes());
+  section.TakeNumber("room_max_age_days", appliance.room_max_age_days, 0, 3650,
+                     say::config::Days());
   section.TakeNumber("session_idle_min", appliance.session_idle_min, 1, 600,
                      say::config::Minutes());
   section.RejectUnknownKeys();

@@ -40,6 +40,8 @@ struct ApplianceConfig {
   std::optional<double> auto_stop_s, scan_limit_s;
   std::optional<bool> keep_recordings;
   double warm_up_min = 15.0;  ///< Time that the sensor must have been on before a reference scan.
+  /// Age of a room's calibration beyond which it joins no planning CT and no other room; 0: none.
+  double room_max_age_days = 400.0;
   double session_idle_min = 30.0;       ///< Time without a scan after which a session is closed.
   std::filesystem::path backup_folder;  ///< Folder of scheduled backups; empty: none are made.
   double backup_hours = 24.0;
@@ -147,7 +149,8 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///                    u95_mm, u95_deg, markers (folder of a scene of the same room)
 ///     [storage]      backup_folder, backup_hours, backup_recipients, backup_key_file
 ///     [appliance]    state, control, calibration, sensor_serial, sensor_profiles, quota_gb,
-///                    auto_stop_s, scan_limit_s, keep_recordings, warm_up_min, session_idle_min
+///                    auto_stop_s, scan_limit_s, keep_recordings, warm_up_min, session_idle_min,
+///                    room_max_age_days
 ///     [sensor]       driver, socket
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low

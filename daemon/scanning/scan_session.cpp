@@ -63,6 +63,11 @@ std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Sc
     return used;
   }
   if (reference.planning) {
+    if (!room->too_old.empty()) {
+      used.why_not_used = room->too_old;
+      compare.why_no_room = say::room::NotForPlan(room->too_old);
+      return used;
+    }
     // What the calibration's scans differ by, beside what the configuration states of the lasers.
     compare.T_iec_reference = Pose::Identity();
     compare.room_markers = room->markers_iec;
@@ -90,7 +95,9 @@ std::optional<ResultRoom> TakeOtherRoom(const ImportedRoom& elsewhere,
     theirs.markers = fit.markers_iec;
   }
   compare.T_iec_reference.reset();
-  compare.why_no_room = here ? here->why_not : say::room::ElsewhereNeedsCalibration();
+  compare.why_no_room = !here                   ? say::room::ElsewhereNeedsCalibration()
+                        : here->why_not.empty() ? here->too_old
+                                                : here->why_not;
   if (!compare.why_no_room.empty()) return std::nullopt;
   compare.T_iec_reference = Pose::Identity();
   compare.room_markers = here->markers_iec;

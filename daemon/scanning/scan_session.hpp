@@ -44,6 +44,8 @@ struct RoomAxes {
   Message why_not;  ///< Why it is not used at present; empty if it is.
   /// Largest differences between two of its scans: its uncertainty for a planning CT.
   double shift_m = 0.0, turn_rad = 0.0;
+  /// Why it is too old to join what shares no marker with the scan; empty if it is not.
+  Message too_old = {};
 };
 
 /// Purpose and input of a scan.

@@ -360,7 +360,7 @@ class WebReferences final : public web::ReferenceService {
     const auto contradicts = std::make_shared<bool>(false);
     const auto work = [=, this] {
       try {
-        if (is_sweep && reference) *contradicts = ContradictsItsPosture(*reference);
+        if (reference) *contradicts = ContradictsItsPosture(*reference);
       } catch (const std::exception& error) {  // Approve() compares every file, and says it
         Log(LogLevel::kError,
             fmt::format("cannot read the scene of reference {}: {}", id, error.what()));
@@ -385,7 +385,8 @@ class WebReferences final : public web::ReferenceService {
     const auto posture = Named<PatientPosture>(reference.plan.posture);
     if (!posture || !scan || scan->folder.empty()) return false;
     const Scene scene = ReadScene(scan->folder / "scene");
-    const std::optional<Pose> room = room_.AxesIn(scene.markers);
+    const std::optional<Pose> room =
+        scene.planning ? std::optional(Pose::Identity()) : room_.AxesIn(scene.markers);
     return room && ContradictsPosture(scene, *room, *posture);
   }
 

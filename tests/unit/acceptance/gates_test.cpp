@@ -191,6 +191,39 @@ TEST(AcceptanceTest, WhatMakesANumberTooUncertainIsSaidOnceAndOnlyThen) {
               ElementsAre(HasSubstr("roll"), HasSubstr("by 4.0 mm")));
 }
 
+TEST(AcceptanceTest, TheScanThatKnowsItsMarkersMuchWorseIsNamedWhereANumberIsTooUncertain) {
+  const auto reasons = [](double reference_m, double current_m, double u95) {
+    Evidence evidence = GoodEvidence();
+    evidence.reference_markers_sigma_m = reference_m;
+    evidence.current_markers_sigma_m = current_m;
+    evidence.numbers[0]->u95 = u95;
+    return EnglishTexts(Decide(evidence, {}).reasons);
+  };
+  EXPECT_THAT(
+      reasons(0.0004, 0.00061, 3.1),
+      ElementsAre(HasSubstr("vertical"), HasSubstr("the current scan is the poorer one: it "
+                                                   "knows its markers to 0.61 mm, the other "
+                                                   "scan to 0.40 mm")));
+  EXPECT_THAT(reasons(0.0012, 0.0004, 3.1),
+              ElementsAre(HasSubstr("vertical"), HasSubstr("the reference scan is the poorer")));
+  EXPECT_THAT(reasons(0.0004, 0.00059, 3.1), ElementsAre(HasSubstr("vertical")));
+  EXPECT_THAT(reasons(kNan, 0.0005, 3.1), ElementsAre(HasSubstr("vertical")));
+  EXPECT_THAT(reasons(0.0004, 0.0012, 0.5), ElementsAre(HasSubstr("every value")));
+}
+
+TEST(AcceptanceTest, ABodyThatDoesNotFitIsNotBlamedWhereTheMarkersDisagreeToo) {
+  const auto reason = [](double rms_m) {
+    Evidence evidence = GoodEvidence();
+    evidence.residual_p95_m = 0.02;
+    evidence.markers_rms_m = rms_m;
+    return Decide(evidence, {}).reasons.at(0).English();
+  };
+  EXPECT_THAT(reason(0.0026),
+              ::testing::AllOf(HasSubstr("either it is another body"), HasSubstr("2.6 mm")));
+  EXPECT_THAT(reason(0.0024), ::testing::Not(HasSubstr("either")));
+  EXPECT_THAT(reason(kNan), ::testing::Not(HasSubstr("either")));
+}
+
 TEST(AcceptanceTest, AnUncertaintyIsWrittenWithoutAnExponent) {
   const auto reason = [](std::size_t i, double u95) {
     Evidence wide = GoodEvidence();

@@ -116,6 +116,21 @@ TEST(TakeOtherRoomTest, WithoutACalibrationOnEitherSideThereIsNoAnswer) {
       TakeOtherRoom({.unit = "a", .version = 1, .room = SignedRoom{}}, std::nullopt, compare));
   EXPECT_EQ(compare.why_no_room, say::room::ElsewhereNeedsCalibration());
   EXPECT_FALSE(compare.T_iec_reference);
+  RoomAxes old = here;
+  old.too_old = Message::Verbatim("401 days");
+  EXPECT_NE(reason({.unit = "a", .version = 1, .room = SignedRoom{}}, old).find("401 days"),
+            std::string::npos);
+}
+
+TEST(RoomAgeTest, ACalibrationIsTooOldAfterItsDaysAndNeverWhereNoneAreStated) {
+  const WallClock::time_point signed_at{};
+  const auto after = [&](int hours) {
+    return WhyTooOld(signed_at, signed_at + std::chrono::hours(hours), 400).English();
+  };
+  EXPECT_EQ(after(400 * 24), "");
+  EXPECT_THAT(after(400 * 24 + 1), HasSubstr("400 days old"));
+  EXPECT_EQ(after(-24), "");
+  EXPECT_TRUE(WhyTooOld(signed_at, signed_at + std::chrono::hours(24 * 5000), 0).empty());
 }
 
 TEST(TakeRoomTest, APlanningCtIsMetByTheRoomsMarkersWithTheSpreadOfTheCalibration) {
@@ -133,6 +148,13 @@ TEST(TakeRoomTest, APlanningCtIsMetByTheRoomsMarkersWithTheSpreadOfTheCalibratio
   EXPECT_FALSE(compare.isocentre_m) << "the origin of its frame";
   EXPECT_TRUE(compare.room_markers.contains(5));
   EXPECT_NEAR(compare.iec_u95_m.value_or(0), 0.005, 1e-12);
+
+  RoomAxes old = room;
+  old.too_old = Message::Verbatim("401 days");
+  CompareOptions with_old;
+  EXPECT_THAT(TakeRoom(old, planned, with_old)->why_not_used.English(), HasSubstr("401 days"));
+  EXPECT_FALSE(with_old.T_iec_reference);
+  EXPECT_THAT(with_old.why_no_room.English(), HasSubstr("401 days"));
 
   room.why_not = Message::Verbatim("marker 5 moved");
   (void)TakeRoom(room, planned, compare);

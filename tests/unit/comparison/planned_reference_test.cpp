@@ -10,6 +10,7 @@
 #include "algo/base/units.hpp"
 #include "algo/comparison/comparison.hpp"
 #include "algo/comparison/deviation.hpp"
+#include "algo/monitoring/monitor.hpp"
 #include "tests/support/synthetic_scene.hpp"
 #include "words/comparison.hpp"
 
@@ -108,6 +109,33 @@ TEST(PlannedReferenceTest, TheMotionIsThatOfTheBodyInTheMarkersFrame) {
   ASSERT_TRUE(comparison.deviation && comparison.distance);
   EXPECT_EQ(comparison.deviation->grid, PlannedScene().height_map->grid);
   EXPECT_EQ(comparison.distance->grid, PlannedScene().height_map->grid);
+}
+
+TEST(PlannedReferenceTest, MonitoringGoesOnFromTheBodyWhereTheScanSawIt) {
+  const Scene current = Current(SmallMotion());
+  const Eigen::Vector3d body(0.6, 0.45, 0.1);
+  std::vector<Message> warnings;
+  const MonitorOptions options = MonitorOptionsOf(InRoom(), &PlannedScene(), current, warnings);
+  ASSERT_TRUE(options.accepted) << testing::PrintToString(EnglishTexts(warnings));
+  // The live motion is that of the scan's own frame, and is composed with this one.
+  const Eigen::Vector3d in_scan =
+      options.accepted->T_reference_current.inverse() * (options.accepted->T_motion * body);
+  EXPECT_LT((in_scan - SmallMotion() * body).norm(), 0.5 * kMillimetre);
+  EXPECT_LT(RotationAngle(options.accepted->T_reference_current), 1e-12);
+}
+
+// The plan states feet first for a patient who lies head first, or the like: the CT is turned about
+// the isocentre.
+TEST(PlannedReferenceTest, APlanOfAnotherPostureIsFoundByTheSurface) {
+  for (const Eigen::Vector3d axis : {Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY()}) {
+    Scene turned = PlannedScene();
+    const Pose T(Eigen::AngleAxisd(kPi, axis));
+    turned.cloud = TransformedCloud(T, turned.cloud);
+    turned.height_map = ResampledHeightMap(*turned.height_map, T, turned.height_map->grid);
+    const Comparison comparison = Compare(turned, Current(SmallMotion()), InRoom());
+    EXPECT_EQ(comparison.verdict, Verdict::kNoAnswer);
+    for (const Message& reason : comparison.reasons) std::cerr << reason.English() << "\n";
+  }
 }
 
 TEST(PlannedReferenceTest, WithoutARoomThereIsNoAnswer) {

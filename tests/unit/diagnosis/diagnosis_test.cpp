@@ -166,6 +166,13 @@ TEST(DiagnosisTest, NamesTheCauseOfEachFaultAndNothingElse) {
       {"chi-square above 2", [](Symptoms& s) { s.calibration.chi2 = 105; }, {"calibration"}},
       {"chi-square 4", [](Symptoms& s) { s.calibration.chi2 = 208; }, {"calibration"}},
       {"chi-square above 4", [](Symptoms& s) { s.calibration.chi2 = 209; }, {"calibration!"}},
+      {"chi-square above 4 with assumed cameras",
+       [](Symptoms& s) {
+         s.calibration.chi2 = 209;
+         s.cameras_assumed = true;
+       },
+       {"cameras_unstated!"}},
+      {"assumed cameras that fit", [](Symptoms& s) { s.cameras_assumed = true; }, {}},
       {"wrong units, which the calibration cannot take up",
        [](Symptoms& s) {
          ScaleAll(s, 5.0);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -87,6 +88,25 @@ TEST(ContourSurfaceTest, TheFirstContourOfASliceIsNotTheBody) {
   EXPECT_EQ(surface.crumbs, 101U);
   EXPECT_TRUE(std::isnan(HeightAt(surface, -0.30, 0.15))) << "50 mm2 are a crumb";
   EXPECT_NEAR(HeightAt(surface, 0, 0.15), 0.3, 1e-4);
+}
+
+TEST(ContourSurfaceTest, AContourThatASliceHasTwiceIsNoHoleInItself) {
+  const ContourSurface once = SurfaceFromAbove(Cylinder());
+  std::vector<ContourSlice> slices = Cylinder();
+  for (std::size_t i = 0; i < slices.size(); ++i) {
+    // The same points, begun elsewhere and, in every second slice, the other way round.
+    FlatContour again = slices[i].contours.front();
+    std::rotate(again.begin(), again.begin() + 7, again.end());
+    if (i % 2 == 0) std::reverse(again.begin(), again.end());
+    slices[i].contours.push_back(std::move(again));
+  }
+  const ContourSurface twice = SurfaceFromAbove(std::move(slices));
+  EXPECT_EQ(twice.repeated, 101U);
+  EXPECT_EQ(once.repeated, 0U);
+  EXPECT_EQ(twice.holes, 0U);
+  EXPECT_EQ(twice.parts_apart, 0U);
+  EXPECT_NEAR(HeightAt(twice, 0, 0.15), 0.3, 1e-4);
+  EXPECT_NEAR(HeightAt(twice, 0.1, 0.15), HeightAt(once, 0.1, 0.15), 1e-6);
 }
 
 TEST(ContourSurfaceTest, ArmsApartAreKeptAndPartsOfTheCouchAreNot) {
