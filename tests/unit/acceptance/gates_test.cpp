@@ -214,7 +214,7 @@ TEST(AcceptanceTest, TheScanThatKnowsItsMarkersMuchWorseIsNamedWhereANumberIsToo
 TEST(AcceptanceTest, ABodyThatDoesNotFitIsNotBlamedWhereTheMarkersDisagreeToo) {
   const auto reason = [](double rms_m) {
     Evidence evidence = GoodEvidence();
-    evidence.residual_p95_m = 0.02;
+    evidence.residual_p95_m = 0.03;
     evidence.markers_rms_m = rms_m;
     return Decide(evidence, {}).reasons.at(0).English();
   };

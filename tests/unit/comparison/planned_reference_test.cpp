@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "algo/base/units.hpp"
 #include "algo/comparison/comparison.hpp"
@@ -127,9 +128,10 @@ TEST(PlannedReferenceTest, MonitoringGoesOnFromTheBodyWhereTheScanSawIt) {
 // The plan states feet first for a patient who lies head first, or the like: the CT is turned about
 // the isocentre.
 TEST(PlannedReferenceTest, APlanOfAnotherPostureIsFoundByTheSurface) {
-  for (const Eigen::Vector3d axis : {Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY()}) {
+  for (const Eigen::Vector3d& axis :
+       {Eigen::Vector3d(Eigen::Vector3d::UnitZ()), Eigen::Vector3d(Eigen::Vector3d::UnitY())}) {
     Scene turned = PlannedScene();
-    const Pose T(Eigen::AngleAxisd(kPi, axis));
+    const Pose T(Eigen::AngleAxisd(std::numbers::pi, axis));
     turned.cloud = TransformedCloud(T, turned.cloud);
     turned.height_map = ResampledHeightMap(*turned.height_map, T, turned.height_map->grid);
     const Comparison comparison = Compare(turned, Current(SmallMotion()), InRoom());
