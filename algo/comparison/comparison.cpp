@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <mutex>
+#include <numbers>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -353,6 +354,8 @@ class Comparer {
       };
     }
     const std::optional<SurfaceMotion> surface = EstimateBodyMotion(input);
+    if (reference_.planning && FitsOtherEnd(input, surface ? surface->inlier_fraction : 0.0))
+      return Refuse(say::comparison::PlanOtherEnd(std::string(Name(posture_))));
     if (!surface) {
       const double rms_m = result_.alignment->rms_m;
       return Refuse(MarkersDisagree(rms_m)
@@ -382,6 +385,17 @@ class Comparer {
     result_.motion = motion;
     Lap("motion", since_s);
     return true;
+  }
+
+  // Whether the contour fits the body after half a turn about the vertical, and not without: head
+  // and feet are exchanged, in the plan or on the couch.
+  bool FitsOtherEnd(BodyMotionInput input, double fraction) const {
+    constexpr double kFits = 0.8;  // Right pairs: 0.87 to 0.90 (20 of four positions, 320x240).
+    if (fraction >= kFits) return false;
+    const Pose turn(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ()));
+    for (Pose& start : input.starts) start = start * turn;
+    const std::optional<SurfaceMotion> turned = EstimateBodyMotion(input);
+    return turned && turned->inlier_fraction >= kFits;
   }
 
   [[nodiscard]] std::vector<DepthSensor> Classes() const {
