@@ -53,6 +53,8 @@ await h.step('the numbers follow, since zero and against the reference apart', a
   keepSaying('monitoring out none 4.2');
   await tech.getByText('▲ OUT: HOLD').waitFor();
   equal(await first(tech, '.live-six.judged'), '+5.2 mm', 'the number has followed');
+  await tech.locator('.live-why', { hasText: 'The couch was moved.' }).waitFor();
+  await tech.getByText('Image to number: 42 ms').waitFor();
   await h.look(tech, 'monitor-phone-out', { axe: false });
 });
 
@@ -114,6 +116,9 @@ await h.step('a level is taught, and the screen for the patient coaches', async 
   keepSaying('monitoring in none 0.5');
   await tech.getByRole('button', { name: 'Teach this level' }).click();
   await tech.getByText(/^Level [\d.]+ mm, window 3.5 mm/).waitFor();
+  // The window lies about the trace's height.
+  await tech.locator('.breathing rect.gate.in').waitFor({ state: 'attached' });
+  await h.look(tech, 'monitor-phone-gate', { axe: false });
   fallSilent();
   const level = (await h.api(tech, 'monitor')).body.breath_hold.level_mm;
   await room.goto(`${h.url}breath`);

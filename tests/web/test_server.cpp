@@ -463,6 +463,8 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.monitor.against_reference = service.monitor.since_zero;
     if (knows) service.monitor.against_reference->value[0] += 1.0;
     service.monitor.age_s = 0.03;
+    service.monitor.latency_ms = 42;
+    service.monitor.couch_moved = service.monitor.advice == "out";
     service.monitor.has_breathing = knows;
     service.monitor.breathing_mm =
         knows ? std::optional(3.0 +

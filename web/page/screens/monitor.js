@@ -85,13 +85,16 @@ function trace() {
         clear(element, h('figcaption', {}, text.breathing), hint(text.noBreathing));
         return;
       }
-      const highest = Math.max(kLeastTrace_mm, ...points.map(([, mm]) => mm ?? 0));
+      const hold = monitor.breath_hold;
+      const top_mm = hold ? hold.level_mm + hold.window_mm / 2 : 0;
+      const highest = Math.max(kLeastTrace_mm, top_mm, ...points.map(([, mm]) => mm ?? 0));
+      const row = (mm) => 90 - 80 * (mm / highest);
       let path = '';
       let drawing = false;
       for (const [time, mm] of points) {
         if (mm !== null) {
           path += `${drawing ? 'L' : 'M'}${(1000 * (1 - (at - time) / kTrace_s)).toFixed(1)} `
-            + `${(90 - 80 * (mm / highest)).toFixed(1)}`;
+            + `${row(mm).toFixed(1)}`;
         }
         drawing = mm !== null;
       }
@@ -99,6 +102,13 @@ function trace() {
       clear(element, h('figcaption', {}, text.breathing, ' ',
         h('strong', {}, last === null ? '–' : text.height(last))),
       svg('svg', { viewBox: '0 0 1000 100', preserveAspectRatio: 'none', 'aria-hidden': 'true' },
+        hold && svg('rect', {
+          x: 0,
+          width: 1000,
+          y: row(top_mm),
+          height: Math.max(1, (80 * hold.window_mm) / highest),
+          class: `gate ${hold.advice}`,
+        }),
         svg('line', { x1: 0, x2: 1000, y1: 90, y2: 90, class: 'zero' }),
         svg('path', { d: path, class: 'trace' })));
     },
@@ -140,7 +150,7 @@ export function monitorView() {
     }
     const text = S.monitor;
     const key = JSON.stringify([S.languageName, monitor?.advice, monitor?.state, monitor?.reason,
-      monitor?.is_old, monitor?.since_zero, monitor?.against_reference, monitor?.ended]);
+      monitor?.is_old, monitor?.couch_moved, monitor?.since_zero, monitor?.against_reference, monitor?.ended]);
     if (key === drawn) return;
     drawn = key;
     element.classList.toggle('is-old', Boolean(monitor?.active && monitor.is_old));
@@ -157,7 +167,8 @@ export function monitorView() {
     if (isStarting) tell('info', word, '');
     else {
       tell(advice, `${kMarks[advice]} ${word}`,
-        [text.states[state], why].filter(Boolean).join(' · '));
+        [text.states[state], why, monitor.couch_moved && text.couchMoved]
+          .filter(Boolean).join(' · '));
     }
     const judgesReference = monitor.judges === 'against_reference';
     clear(numbers,
@@ -258,10 +269,11 @@ export async function showMonitor(place) {
     class: 'quiet', type: 'button',
     onclick: () => saveFrom('/api/v1/monitor/record.csv', 'plumb_monitoring.csv'),
   }, text.record);
+  const latency = hint('');
   clear(place, h('h1', {}, text.title),
     h('section', { class: 'card' }, view.element, warnings, hint(text.motion)),
     may('scan') && h('div', { class: 'controls' }, start, stop), hint(text.hint),
-    accept.element, hold.element, record);
+    accept.element, hold.element, h('div', { class: 'row' }, record, latency));
   const draw = () => {
     const { status } = live;
     if (!status || !currentSession()) return;
@@ -272,6 +284,8 @@ export async function showMonitor(place) {
     enable(stop, live.connected);
     record.hidden = !live.monitor?.has_record;
     drawWarnings();
+    const ms = live.monitor?.active ? live.monitor.latency_p95_ms ?? null : null;
+    latency.textContent = ms === null ? '' : text.latency(ms);
     const now = presentOf(live.monitor, live.monitor ? since_s(live.monitorAt) : 0);
     accept.draw(now);
     hold.draw(now);
