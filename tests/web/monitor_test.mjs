@@ -117,7 +117,7 @@ await h.step('a level is taught, and the screen for the patient coaches', async 
   await tech.getByRole('button', { name: 'Teach this level' }).click();
   await tech.getByText(/^Level [\d.]+ mm, window 3.5 mm/).waitFor();
   // The window lies about the trace's height.
-  await tech.locator('.breathing rect.gate.in').waitFor({ state: 'attached' });
+  await tech.locator('.breathing rect.gate').waitFor({ state: 'attached' });
   await h.look(tech, 'monitor-phone-gate', { axe: false });
   fallSilent();
   const level = (await h.api(tech, 'monitor')).body.breath_hold.level_mm;
