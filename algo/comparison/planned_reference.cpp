@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Cholesky>
 
@@ -65,6 +66,7 @@ void PlaceByReferenceMarker(const Scene& scan, const CalibratedRoom& room, int m
     result.failure = say::comparison::FewMarkersForRoom(min_markers, result.markers.good);
     return;
   }
+  alignment.rms_m = std::numeric_limits<double>::quiet_NaN();
   alignment.T_reference_current = *room.T_iec_reference;
   alignment.centre_m = room.T_iec_reference->translation();
   double sigma_m = kMostCornerSigma_m;

@@ -35,7 +35,7 @@ struct Alignment {
   /// determines the scale. Applied about `centre_m` after T_reference_current, which is the rigid
   /// fit.
   Eigen::Matrix3d stretch = Eigen::Matrix3d::Identity();
-  double rms_m = 0.0;                      ///< Over the corners used, after the rigid fit.
+  double rms_m = 0.0;  ///< Over the corners used, after the rigid fit; NaN without a fit.
   std::vector<int> markers_used;           ///< Ids, ascending.
   std::map<int, double> markers_rejected;  ///< Residual against the other markers by id, metres.
   /// Rotation vector, translation; left perturbation about `centre_m`.

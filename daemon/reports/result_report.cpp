@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "algo/base/units.hpp"
+#include "daemon/reports/text_report.hpp"
 #include "daemon/result/axis_names.hpp"
 #include "words/result.hpp"
 #include "words/text_report.hpp"
@@ -53,10 +54,7 @@ ReportFacts QualityFacts(const StoredResult& result, const Catalogue& language) 
     facts.emplace_back(Text(name, language), Text(value, language));
   };
   if (const auto& alignment = result.alignment) {
-    const auto& used = alignment->markers_used;
-    add(say::text_report::Markers(),
-        say::text_report::Matched(static_cast<std::int64_t>(used.size()),
-                                  {used.begin(), used.end()}, alignment->rms_m / kMillimetre));
+    add(say::text_report::Markers(), MarkersThatPlace(*alignment));
   }
   if (const auto& region = result.region)
     add(say::text_report::Region(),

@@ -119,10 +119,7 @@ void Report::Trust(const StoredResult& result) {
         say::text_report::PlanningCt(planned->roi, planned->plan_label, planned->plan_date,
                                      planned->posture));
   if (const auto& alignment = result.alignment) {
-    const auto& used = alignment->markers_used;
-    Row(say::text_report::Markers(),
-        say::text_report::Matched(static_cast<std::int64_t>(used.size()),
-                                  {used.begin(), used.end()}, alignment->rms_m / kMillimetre));
+    Row(say::text_report::Markers(), MarkersThatPlace(*alignment));
     for (const auto& [id, residual_m] : alignment->markers_rejected)
       Row({}, say::text_report::MarkerMoved(id, residual_m / kMillimetre));
   } else {
@@ -144,6 +141,15 @@ void Report::Trust(const StoredResult& result) {
 }
 
 }  // namespace
+
+Message MarkersThatPlace(const StoredAlignment& alignment) {
+  const std::vector<int>& used = alignment.markers_used;
+  const auto count = static_cast<std::int64_t>(used.size());
+  if (std::isnan(alignment.rms_m))
+    return say::text_report::PlacedByOne(count, {used.begin(), used.end()});
+  return say::text_report::Matched(count, {used.begin(), used.end()},
+                                   alignment.rms_m / kMillimetre);
+}
 
 std::string ComparisonText(const StoredResult& result, const Catalogue& language) {
   Report report(language);

@@ -17,4 +17,7 @@ namespace plumb {
 /// One line for a picture, in English: the verdict and the residual if nothing else is known.
 [[nodiscard]] std::string PictureSubtitle(const Comparison& comparison);
 
+/// Which markers place the scan, and how well they fit where they were fitted.
+[[nodiscard]] Message MarkersThatPlace(const StoredAlignment& alignment);
+
 }  // namespace plumb

@@ -30,7 +30,7 @@ using StoredNumbers = std::array<std::optional<double>, 6>;
 struct StoredAlignment {
   Eigen::Matrix4d T_reference_current = Eigen::Matrix4d::Identity();
   Eigen::Matrix3d stretch = Eigen::Matrix3d::Identity();
-  double rms_m = 0.0;
+  double rms_m = 0.0;  ///< NaN (null in the file): no markers were fitted to each other.
   std::vector<int> markers_used;
   std::vector<std::pair<std::string, double>> markers_rejected;  ///< Residual (m) by id.
   Matrix6d covariance = Matrix6d::Zero();

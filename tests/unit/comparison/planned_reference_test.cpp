@@ -97,6 +97,7 @@ TEST(PlannedReferenceTest, TheMotionIsThatOfTheBodyInTheMarkersFrame) {
   const Eigen::Vector3d body(0.6, 0.45, 0.1);
   EXPECT_LT((comparison.motion->T * body - SmallMotion() * body).norm(), 0.3 * kMillimetre);
   EXPECT_LT(RotationAngle(comparison.motion->T * SmallMotion().inverse()), 0.05 * kDegree);
+  EXPECT_TRUE(std::isnan(comparison.alignment->rms_m)) << "no marker was fitted to another";
   // The correction at the isocentre, which is the origin of IEC axes.
   const Eigen::Vector3d isocentre(0.62, 0.43, 0.1);
   EXPECT_LT((comparison.correction->isocentre_m - isocentre).norm(), 1e-9);
