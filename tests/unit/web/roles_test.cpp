@@ -72,6 +72,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"GET /api/v1/statistics.csv", "TPE"},
     {"POST /api/v1/treatment/close", "TPE"},
     {"POST /api/v1/treatment/resume", "TPE"},
+    {"POST /api/v1/treatment/wristband", "TPE"},
     {"POST /api/v1/treatment/reference", "TPE"},
     {"POST /api/v1/treatment/fraction", "TP"},
     {"POST /api/v1/references", "P"},
