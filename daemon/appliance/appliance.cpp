@@ -142,6 +142,20 @@ Appliance::Answer Appliance::WhyNotScan() const {
   return WhyNoSpace();
 }
 
+bool Appliance::WantsWristband() const {
+  return session_.LacksWristband(Clock::now()) && store_->settings.Get().scan_wristband;
+}
+
+/// Settings that cannot be read might ask for the wristband.
+Appliance::Answer Appliance::WhyNotSweep() const {
+  if (Message why = WhyNotScan(); !why.empty()) return why;
+  try {
+    return WantsWristband() ? say::scan::WristbandFirst() : Message();
+  } catch (const std::exception& error) {
+    return MessageOf(error);
+  }
+}
+
 Appliance::Answer Appliance::Handle(ScanEvent event, const Actor* actor) {
   const ScanState before = state_;
   ScanTransition transition = Next(state_, event);
@@ -153,7 +167,8 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const Actor* actor) {
   const bool monitors = std::find(transition.actions.begin(), transition.actions.end(),
                                   ScanAction::kStartMonitor) != transition.actions.end();
   if (starts || monitors) {
-    answer = starts ? WhyNotScan() : WhyNotMonitor();
+    answer = starts ? WhyNotSweep() : WhyNotMonitor();
+    if (starts && answer.empty()) session_.UseUpWristband();
     if (!answer.empty())
       transition = {.state = before, .actions = {ScanAction::kRefuse}, .refusal = {}};
   }

@@ -105,6 +105,8 @@ class Appliance : private StorageUser {
   void NoteDropped(const ScanUpdate& update);
   void Act(ScanAction action);
   Answer WhyNotScan() const;
+  [[nodiscard]] bool WantsWristband() const;
+  Answer WhyNotSweep() const;
   void StartScan();
   Answer WhyNotMonitor() const;
   void StartMonitor();

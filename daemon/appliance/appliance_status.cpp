@@ -273,6 +273,7 @@ void Appliance::ReadStored(Status& status) {
   status.waiting = store_->references.Waiting();
   status.last_check = store_->checks.Last();
   status.couch = store_->couch.Get();
+  status.wants_wristband = WantsWristband();
   if (session_.IsOpen())
     status.scans_today = store_->scans.CountSince(session_.patient_id(), StartOfDay());
   if (last_result_) status.last_result = store_->scans.Find(last_result_->id);

@@ -19,6 +19,7 @@ void CurrentSession::Open(const std::string& id, const std::string& patient_id, 
   check_.reset();
   purpose_ = purpose;
   reason_ = reason;
+  confirmed_.reset();
   ArmTimer();
 }
 
@@ -26,6 +27,7 @@ void CurrentSession::Forget() {
   id_.clear();
   patient_id_.clear();
   reason_.clear();
+  confirmed_.reset();
   purpose_ = ScanPurpose::kFraction;
   timer_.Disarm();
 }
@@ -37,6 +39,15 @@ void CurrentSession::ArmTimer() {
 
 bool CurrentSession::IsPatients() const {
   return opening_ || (IsOpen() && opened_by_.user != kSelf.user);
+}
+
+bool CurrentSession::LacksWristband(std::chrono::steady_clock::time_point now) const {
+  const bool is_of_patient = IsOpen() && opened_by_.user != kSelf.user && !check_;
+  return is_of_patient && !(confirmed_ && now - *confirmed_ < kWristbandHolds);
+}
+
+void CurrentSession::UseUpWristband() {
+  if (!check_) confirmed_.reset();
 }
 
 Message CurrentSession::WhyNotChange() const {

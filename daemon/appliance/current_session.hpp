@@ -3,6 +3,7 @@
 // daily check.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
@@ -15,6 +16,9 @@
 #include "web/model/scan.hpp"
 
 namespace plumb {
+
+/// Nobody lies on the couch for longer before the first sweep; somebody else might by then.
+inline constexpr std::chrono::minutes kWristbandHolds{10};
 
 /// Used on the loop's thread.
 class CurrentSession {
@@ -55,6 +59,15 @@ class CurrentSession {
     return blocking_reason_ ? blocking_reason_() : Message();
   }
 
+  /// The wristband of the open session's patient has been scanned: for one sweep, that begins
+  /// within kWristbandHolds. Whoever opens a session, this one included, has confirmed nothing yet.
+  void ConfirmWristband(std::chrono::steady_clock::time_point now) { confirmed_ = now; }
+  /// Whether that has to come first, where the settings ask for it before each sweep. Not for a
+  /// daily check, nor for scans without a patient.
+  [[nodiscard]] bool LacksWristband(std::chrono::steady_clock::time_point now) const;
+  /// Ends what was confirmed, if the next sweep is one of the session.
+  void UseUpWristband();
+
   /// The next scan is the daily check of the room's markers; scans after it belong to the open
   /// patient again.
   void SetCheck(std::optional<Actor> actor) { check_ = std::move(actor); }
@@ -70,6 +83,7 @@ class CurrentSession {
   ScanPurpose purpose_ = ScanPurpose::kFraction;
   bool opening_ = false, wiping_ = false;
   std::optional<Actor> check_;
+  std::optional<std::chrono::steady_clock::time_point> confirmed_;
   std::function<Message()> blocking_reason_;
   EventLoop::Source timer_;
 };

@@ -32,8 +32,8 @@ constexpr const char* kWipe = "wipe";
 constexpr const char* kOfFileSystem = "lost+found";  // root's, on the root of a disk
 constexpr const char* kOfProvisionedDisplay = "provisioned-display";
 /// Items beside the database that are neither records nor belong to the sensor.
-constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", kOfProvisionedDisplay,
-                                          "updates"};
+constexpr std::array kOfPageAndUpdates = {"page-key.pem", "page-authority.pem", "device.key",
+                                          kOfProvisionedDisplay, "updates"};
 
 struct Request {
   FactoryReset kind = FactoryReset::kKeepRecords;

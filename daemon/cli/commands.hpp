@@ -66,6 +66,7 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddUpdate(CLI::App& app);
 [[nodiscard]] Command AddBackup(CLI::App& app);
 [[nodiscard]] Command AddRestore(CLI::App& app);
+[[nodiscard]] Command AddAuthority(CLI::App& app);
 [[nodiscard]] Command AddVerifyLog(CLI::App& app);
 [[nodiscard]] Command AddExportPatient(CLI::App& app);
 [[nodiscard]] Command AddImportPatient(CLI::App& app);

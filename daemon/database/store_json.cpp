@@ -175,6 +175,7 @@ Settings ParseSettings(const std::string& text) {
   number("auto_stop_s", s.auto_stop_s, kAutoStop_s);
   number("scan_limit_s", s.scan_limit_s, kScanLimit_s);
   if (stored.Find("keep_recordings") != nullptr) s.keep_recordings = stored.Flag("keep_recordings");
+  if (stored.Find("scan_wristband") != nullptr) s.scan_wristband = stored.Flag("scan_wristband");
   whole("retention_days", s.retention_days, kRetention_days);
   whole("idle_logout_min", s.idle_logout_min, kIdleLogout_min);
   if (stored.Find("accept_live") != nullptr) s.accept_live = stored.AcceptLive("accept_live");

@@ -2,6 +2,7 @@
 // The page's services for patients and references.
 #include "daemon/services/web_services.hpp"
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -37,8 +38,12 @@ Message WhyNotOpen(bool is_running, const Patient& patient, ScanPurpose purpose)
 class WebPatients final : public web::PatientService {
  public:
   WebPatients(Appliance& appliance, CurrentSession& session, const ReferenceGate& references,
-              StoreAccess& store)
-      : appliance_(appliance), session_(session), references_(references), store_(store) {}
+              Notices& notices, StoreAccess& store)
+      : appliance_(appliance),
+        session_(session),
+        references_(references),
+        notices_(notices),
+        store_(store) {}
 
   std::vector<Patient> Patients() override {
     return store_.Read(&Store::patients, [](PatientStore& patients) { return patients.List(); });
@@ -142,6 +147,19 @@ class WebPatients final : public web::PatientService {
                  });
   }
 
+  void ConfirmWristband(const Actor& actor, const std::string& session_id, const std::string& code,
+                        Done done) override {
+    if (session_.id() != session_id) return done(AnswerOf(say::scan::SessionClosed()));
+    const std::optional<Patient> patient = FindPatient(session_.patient_id());
+    if (!patient) return done(Refused(ChangeResult::kNotFound, say::store::NoPatient()));
+    if (PlainPatientCode(code) != PlainPatientCode(patient->code))
+      return done(AnswerOf(say::scan::OtherWristband(patient->code)));
+    session_.ConfirmWristband(std::chrono::steady_clock::now());
+    notices_.TellPage(web::EventKind::kStatus);
+    store_.Write(&Store::audit, std::move(done),
+                 [=](AuditStore& audit) { audit.Log(actor, "session.wristband", session_id, {}); });
+  }
+
   void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
                        const std::string& reason, Done done) override {
     store_.Write(&Store::treatments, std::move(done), [=](TreatmentStore& treatments) {
@@ -179,6 +197,7 @@ class WebPatients final : public web::PatientService {
   Appliance& appliance_;
   CurrentSession& session_;
   const ReferenceGate& references_;
+  Notices& notices_;
   StoreAccess& store_;
 };
 
@@ -449,8 +468,8 @@ class WebReferences final : public web::ReferenceService {
 
 std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance, CurrentSession& session,
                                                      const ReferenceGate& references,
-                                                     StoreAccess& store) {
-  return std::make_unique<WebPatients>(appliance, session, references, store);
+                                                     Notices& notices, StoreAccess& store) {
+  return std::make_unique<WebPatients>(appliance, session, references, notices, store);
 }
 
 std::unique_ptr<web::ReferenceService> MakeWebReferences(const ReferenceGate& references,

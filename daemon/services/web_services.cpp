@@ -40,7 +40,8 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
     : store_(shared.loop, shared.storage, shared.store_thread, shared.notices),
       audit_(MakeWebAuditLog(store_)),
       button_(MakeWebAppliance(appliance, shared.sensors, shared.notices)),
-      patients_(MakeWebPatients(appliance, shared.session, shared.references, store_)),
+      patients_(
+          MakeWebPatients(appliance, shared.session, shared.references, shared.notices, store_)),
       references_(
           MakeWebReferences(shared.references, shared.session, shared.room, store_, background_)),
       planning_(MakeWebPlanning(shared.loop, shared.given.config_file, *references_, store_)),

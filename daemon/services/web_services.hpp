@@ -35,6 +35,7 @@ namespace plumb {
 [[nodiscard]] std::unique_ptr<web::PatientService> MakeWebPatients(Appliance& appliance,
                                                                    CurrentSession& session,
                                                                    const ReferenceGate& references,
+                                                                   Notices& notices,
                                                                    StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::PlanningService> MakeWebPlanning(
     EventLoop& loop, std::optional<std::filesystem::path> config_file,

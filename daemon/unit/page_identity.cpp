@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <functional>
 #include <stdexcept>
@@ -29,6 +30,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxPemBytes = 64 << 10;
 // certificate and key together, so that they always match
 constexpr const char* kKeyFile = "page-key.pem";
+constexpr const char* kAuthorityFile = "page-authority.pem";
 constexpr const char* kDeviceFile = "device.key";
 
 void Sync(const fs::path& path, int flags) {
@@ -59,11 +61,26 @@ web::TlsIdentity GivenTls(const WebConfig& web) {
                                  ReadTextFile(web.tls_key, kMaxPemBytes), name);
 }
 
+/// By the authority of this unit, which is made if there is none, or if the one that there is could
+/// not sign what is needed now: because the unit has another name, or because its clock was wrong.
+web::TlsIdentity Issued(const fs::path& state, const std::vector<std::string>& names,
+                        std::chrono::system_clock::time_point now) {
+  const fs::path file = state / kAuthorityFile;
+  const auto make = [&] { return web::MakeAuthority(names, now); };
+  std::string authority = ReadOrMakeSecret(file, make);
+  if (!web::CanIssue(authority, names, now)) {
+    authority = make();
+    WriteSecret(file, authority);
+  }
+  return web::IssueTlsIdentity(authority, names, now);
+}
+
 web::TlsIdentity OwnTls(const Config& config, std::vector<Message>& warnings) {
   const fs::path file = config.appliance.state / kKeyFile;
   try {
     const std::string pem = ReadOrMakeSecret(file, [&] {
-      const web::TlsIdentity made = web::MakeTlsIdentity(config.web.host_names);
+      const web::TlsIdentity made =
+          Issued(config.appliance.state, config.web.host_names, std::chrono::system_clock::now());
       return made.certificate_pem + made.key_pem;
     });
     return web::CheckedTlsIdentity(pem, pem, say::web::FileNamed(file.string()));
@@ -166,6 +183,8 @@ PageNotes IdentifyPage(const Config& config, web::HttpServerOptions& options) {
     options.keep_certificate = [state = config.appliance.state](const auto& identity) {
       KeepPageIdentity(state, identity);
     };
+    options.make_certificate = [state = config.appliance.state, names = config.web.host_names](
+                                   const auto now) { return Issued(state, names, now); };
   }
   if (transport == PageTransport::kPlainOnNetwork)
     notes.warnings.push_back(say::upkeep::PageWithoutTls());

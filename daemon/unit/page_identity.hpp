@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The secrets by which browsers recognise the appliance and the appliance recognises browsers:
-// certificate and key of TLS, key of the device cookies. Created at the first start and kept in the
-// state folder.
+// certificate and key of TLS and of the authority that signs it, key of the device cookies. Created
+// at the first start and kept in the state folder.
 #pragma once
 
 #include <filesystem>

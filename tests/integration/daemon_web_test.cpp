@@ -249,6 +249,14 @@ TEST_F(DaemonWebTest, OffLoopbackItIsServedByTlsWithACertificateOfItsOwnThatStay
   }
   EXPECT_EQ(fs::status(folder_ / "state" / "page-key.pem").permissions(), fs::perms(0600));
   EXPECT_EQ(fs::status(folder_ / "state" / "device.key").permissions(), fs::perms(0600));
+  EXPECT_EQ(fs::status(folder_ / "state" / "page-authority.pem").permissions(), fs::perms(0600));
+  const RunResult printed = plumb::Run({PLUMB_BINARY, "authority", "--state", folder_ / "state"});
+  EXPECT_EQ(printed.exit_code, 0) << printed.err;
+  EXPECT_THAT(printed.out, HasSubstr("-----END CERTIFICATE-----"));
+  EXPECT_EQ(printed.out.find("PRIVATE"), std::string::npos);
+  const RunResult none = plumb::Run({PLUMB_BINARY, "authority", "--state", folder_.path()});
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_THAT(none.err, HasSubstr("holds no authority"));
 }
 
 TEST_F(DaemonWebTest, AProvisionedDisplaySeesChangesNothingAndStaysRemoved) {

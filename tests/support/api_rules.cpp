@@ -308,7 +308,7 @@ TEST_F(ApiRules, SettingsAreKeptAsTheyWereWrittenAndBounded) {
                        {"auto_stop_s", 7.0},        {"scan_limit_s", 33.0},
                        {"keep_recordings", true},   {"retention_days", 730},
                        {"idle_logout_min", 11},     {"accept_live", "signature"},
-                       {"breath_window_mm", 5.0}};
+                       {"breath_window_mm", 5.0},   {"scan_wristband", true}};
   ASSERT_NE(engineer.Get("/api/v1/settings").json(), wanted);
   for (const char* role : {"technician", "physicist"})
     EXPECT_EQ(LoggedIn(role).Put("/api/v1/settings", wanted).status, 403) << role;
@@ -344,6 +344,7 @@ TEST_F(ApiRules, ASettingThatIsNotSentStaysAsItIsStored) {
                                                                 {"auto_stop_s", 7.0},
                                                                 {"scan_limit_s", 33.0},
                                                                 {"keep_recordings", true},
+                                                                {"scan_wristband", true},
                                                                 {"retention_days", 730},
                                                                 {"idle_logout_min", 11},
                                                                 {"accept_live", "signature"},

@@ -25,6 +25,7 @@ FakeAppliance::FakeAppliance() {
 
 Status FakeAppliance::GetStatus() {
   Status told = status;
+  told.wants_wristband = WantsWristband();
   if (told.last_result && told.last_result->finished_at && !told.last_result->age_s)
     told.last_result->age_s =
         std::chrono::duration<double>(WallClock::now() - *told.last_result->finished_at).count();
@@ -48,6 +49,23 @@ void FakeAppliance::Did(const Actor& actor, const std::string& action, const std
   Log(actor, action, subject, {});
   Notify(EventKind::kData);
   Finish(done, DoneWith(id));
+}
+
+bool FakeAppliance::WantsWristband() const {
+  return settings.scan_wristband && status.session && !is_check_ &&
+         wristband_of_ != status.session->id;
+}
+
+void FakeAppliance::ConfirmWristband(const Actor& actor, const std::string& session_id,
+                                     const std::string& code, Done done) {
+  if (!status.session || status.session->id != session_id)
+    return Finish(done, Refused(ChangeResult::kConflict, say::scan::SessionClosed()));
+  if (PlainPatientCode(code) != PlainPatientCode(status.session->patient_code))
+    return Finish(done, Refused(ChangeResult::kConflict,
+                                say::scan::OtherWristband(status.session->patient_code)));
+  wristband_of_ = session_id;
+  Notify(EventKind::kStatus);
+  Did(actor, "session.wristband", session_id, done);
 }
 
 void FakeAppliance::StartSweep(const Actor& actor, Done done) {
@@ -158,6 +176,9 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
         done, Refused(ChangeResult::kConflict,
                       "in this state a press is ignored; it requires ready, scanning or result"));
   }
+  if (WantsWristband())
+    return Finish(done, Refused(ChangeResult::kConflict, say::scan::WristbandFirst()));
+  if (!is_check_) wristband_of_.clear();
   Scan scan;
   scan.id = fmt::format("s{:04}", next_id_++);
   scan.patient_id = status.patient_id;

@@ -166,6 +166,8 @@ class FakeAppliance : public web::BackgroundWork,
                    const std::string& reason, const std::string& replaces, Done done) override;
   void ResumeSession(const Actor& actor, const std::string& session_id, const std::string& replaces,
                      Done done) override;
+  void ConfirmWristband(const Actor& actor, const std::string& session_id, const std::string& code,
+                        Done done) override;
   void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
                        const std::string& reason, Done done) override;
   void UseReference(const Actor& actor, const std::string& session_id,
@@ -310,12 +312,14 @@ class FakeAppliance : public web::BackgroundWork,
   [[nodiscard]] bool IsOld(const Scan& scan) const;
   void EndCheck();
   void CloseCheck();
+  [[nodiscard]] bool WantsWristband() const;
   [[nodiscard]] Patient* PatientOf(const std::string& id);
 
   std::function<void(web::EventKind)> listener_;
   std::optional<std::chrono::steady_clock::time_point> phase_begun_;
   std::size_t num_finished_ = 0;
-  bool is_check_ = false;  ///< The next or running scan is a check.
+  bool is_check_ = false;     ///< The next or running scan is a check.
+  std::string wristband_of_;  ///< The session for whose next sweep it has been scanned.
   std::string checker_, patient_before_check_;
   int next_id_ = 1;
   std::map<std::string, Preferences> preferences_;

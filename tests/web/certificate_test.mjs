@@ -3,6 +3,7 @@
 // SERVER OUT_FOLDER CHROMIUM
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
+import { get as getByTls } from 'node:https';
 import { connect } from 'node:tls';
 import { Harness } from './harness.mjs';
 
@@ -22,6 +23,17 @@ const shown = () => new Promise((found, failed) => {
   socket.on('error', failed);
 });
 
+/// What anybody is sent from that path, who trusts only these authorities, or everybody.
+const fetched = (path, ca) => new Promise((found, failed) => {
+  getByTls({ host: 'localhost', family: 4, port: new URL(h.url).port, path, agent: false,
+    ...(ca ? { ca } : { rejectUnauthorized: false }) }, (response) => {
+    let body = '';
+    response.on('data', (part) => { body += part; });
+    response.on('end', () => found({ status: response.statusCode, body,
+      type: response.headers['content-type'] }));
+  }).on('error', failed);
+});
+
 function madeCertificate(name) {
   const files = { chain: h.file(`${name}.pem`), key: h.file(`${name}.key`) };
   execFileSync('openssl', ['req', '-x509', '-newkey', 'ec', '-pkeyopt',
@@ -29,6 +41,8 @@ function madeCertificate(name) {
     files.key, '-out', files.chain], { stdio: 'ignore' });
   return files;
 }
+
+const madeCertificateText = () => readFileSync(madeCertificate('another').chain, 'utf8');
 
 async function replace(password) {
   await card.getByLabel('Your password').fill(password);
@@ -51,13 +65,35 @@ await h.step('a wrong password changes nothing', async () => {
   equal(await shown(), first, 'the certificate');
 });
 
+let authority = '';
+await h.step('without a log-in, the certificate of the unit’s own authority, and how to install it',
+  async () => {
+  const { status, body, type } = await fetched('/authority.crt');
+  equal(status, 200, 'for anybody');
+  equal(type, 'application/x-x509-ca-cert', 'as what devices install');
+  authority = body;
+  check(!/PRIVATE/.test(authority), 'no key');
+  equal((await fetched('/health', authority)).status, 200, 'who trusts it trusts the page');
+  check(/self.signed|unable to (get|verify)/i.test(await fetched('/health', madeCertificateText())
+    .then(() => '', (error) => error.message)), 'who trusts another one does not');
+  const how = card.locator('details.authority');
+  await how.getByText('This unit’s own authority').click();
+  equal(await how.locator('li').count(), 4, 'four kinds of devices');
+  await how.getByText(`open ${h.url}authority.crt in Safari`).waitFor();
+  equal(await how.getByRole('link', { name: 'Certificate of the authority' }).getAttribute('href'),
+    `${h.url}authority.crt`, 'the link');
+  await h.look(engineer, 'authority');
+});
+
 let second = '';
-await h.step('a new self-signed one is used for new connections at once', async () => {
+await h.step('a new one of the unit’s own is used for new connections at once', async () => {
   await replace(h.password);
   await card.getByText(first).waitFor({ state: 'detached' });
-  second = await card.locator('code').textContent();
+  second = await card.locator('code').first().textContent();
   check(second !== first, 'another fingerprint');
   equal(await shown(), second, 'what a new connection is shown');
+  equal((await fetched('/health', authority)).status, 200, 'no question to those who trust the unit');
+  equal((await fetched('/authority.crt', authority)).body, authority, 'the same authority');
 });
 
 await h.step('a key that does not belong to the certificate is refused with the reason',
@@ -80,10 +116,12 @@ await h.step('a certificate of one’s own, sent with the line ends of another s
   await card.getByLabel('Private key').setInputFiles(file('room.key', own.key));
   await replace(h.password);
   await card.getByText(/Issued to: .*plumb-room-2/).waitFor();
-  const third = await card.locator('code').textContent();
+  const third = await card.locator('code').first().textContent();
   equal(await shown(), third, 'what a new connection is shown');
   check(third !== second, 'another fingerprint');
   await h.look(engineer, 'certificate-replaced', { axe: false });
+  equal(await card.locator('details.authority').count(), 0, 'no authority of the unit signs it');
+  equal((await fetched('/authority.crt')).status, 404, 'nothing to install');
   await engineer.goto(`${h.url}#/audit`);
   for (const fingerprint of [first, second, third]) {
     await engineer.getByText(new RegExp(fingerprint)).first().waitFor();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A whole day on the real appliance with its virtual sensor, as people work through it: the room's
 // calibration, the daily check, a reference, its plan, the approval by a second person, three
-// fractions with moves and accepts, and the report.
+// fractions with moves and accepts by two technicians on one tablet, a power cut in the middle of a
+// sweep, a lost network, and the report. Nothing is accepted that its person had not been shown.
 // day_test.mjs NODE_MODULES PLUMBD PLUMB OUT_FOLDER CHROMIUM
 import { execFile } from 'node:child_process';
 import { writeFileSync } from 'node:fs';
@@ -28,6 +29,8 @@ async function scene(number) {
     await run(plumb, ['--control', socket, 'sim', 'next-scene']);
   }
 }
+/// At half the speed: what is tested is not how many images a loaded machine loses.
+const slowDown = () => run(plumb, ['--control', socket, 'sim', 'speed', '0.5']);
 const button = () => run(plumb, ['--control', socket, 'press']);
 
 const engineer = await h.person('engineer');
@@ -56,11 +59,53 @@ async function scanByButton() {
     (status) => status.state === 'result' && status.last_result?.id !== before);
 }
 
-await h.step('first start, three accounts, and the screen in the room', async () => {
+/// Every acceptance: the scan, who signs, and what the page showed to them at that moment.
+const signed = [];
+async function accept(person, press) {
+  const cards = await anna.locator('.number .value').allInnerTexts();
+  equal(cards.length, 6, 'six numbers in view of whoever accepts');
+  const link = await anna.locator('a[href^="/result?scan="]').first().getAttribute('href');
+  signed.push({
+    id: new URLSearchParams(link.split('?')[1]).get('scan'), person,
+    verdict: (await anna.locator('.verdict').getAttribute('class')).split(' ').at(-1),
+    values: cards.map((text) => text.replace('−', '-').replace(/[^-+.\d]/g, '')),
+  });
+  await press();
+}
+const acceptInTolerance = (person) => accept(person, async () => {
+  await anna.getByRole('button', { name: 'Accept', exact: true }).click();
+  await anna.getByText(new RegExp(`Accepted by ${person}`)).waitFor();
+});
+
+const kPins = { anna: '4711', dora: '2580' };
+async function setPin(name) {
+  await anna.goto(`${h.url}#/users`);
+  const own = anna.locator('section.card',
+    { has: anna.getByRole('heading', { name: 'My PIN or badge' }) });
+  await own.getByLabel('New PIN').fill(kPins[name]);
+  await own.getByLabel('The same again').fill(kPins[name]);
+  await own.getByLabel('Your password').first().fill(h.password);
+  await own.getByRole('button', { name: 'Set PIN or badge' }).click();
+  await own.getByText('Set.', { exact: true }).waitFor();
+}
+/// At the same tablet, on the screen that is open.
+async function changeTo(name) {
+  await anna.getByRole('button', { name: 'Change person' }).click();
+  const box = anna.locator('dialog');
+  await box.getByRole('button', { name }).click();
+  for (const digit of kPins[name]) {
+    await box.getByRole('button', { name: digit, exact: true }).click();
+  }
+  await box.getByRole('button', { name: 'Log in' }).click();
+  await anna.getByText(`${name}, with a PIN`).waitFor();
+}
+
+await h.step('first start, four accounts, and the screen in the room', async () => {
+  await slowDown();
   await h.firstStart(engineer);
   await engineer.locator('.headline', { hasText: 'Ready' }).waitFor(kSlow);
   await engineer.goto(`${h.url}#/users`);
-  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'],
+  for (const [name, role] of [['anna', 'technician'], ['dora', 'technician'], ['bob', 'physicist'],
     ['clara', 'physicist']]) {
     await h.addAccount(engineer, name, role);
   }
@@ -76,9 +121,14 @@ await h.step('first start, three accounts, and the screen in the room', async ()
   await engineer.getByLabel('Stop a sweep after').fill('3');
   await engineer.getByRole('button', { name: 'Save', exact: true }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  // Two technicians share the tablet.
+  await h.logIn(anna, 'dora');
+  await setPin('dora');
+  await anna.getByRole('button', { name: 'Log out' }).click();
   for (const [page, name] of [[anna, 'anna'], [bob, 'bob'], [clara, 'clara']]) {
     await h.logIn(page, name);
   }
+  await setPin('anna');
   // The demo opens a patient of its own; this day has another one.
   const { session } = await state();
   if (session) {
@@ -176,7 +226,7 @@ async function closeSession() {
 }
 const verdict = (page, kind) => page.locator(`.verdict.${kind}`).waitFor(kSlow);
 
-await h.step('fraction 1: one tap to six numbers, the couch is moved, the next scan is accepted',
+await h.step('fraction 1: one tap to six numbers, the couch is moved, the other technician accepts',
   async () => {
   await openSession(1);
   await scene(kMoved);
@@ -192,42 +242,154 @@ await h.step('fraction 1: one tap to six numbers, the couch is moved, the next s
   equal(await room.locator('.number').count(), 6, 'six numbers in the room');
   await h.look(anna, 'fraction-1-move');
   await h.look(room, 'room-move', { fullPage: false });
+  await changeTo('dora');
   await scene(kReference);  // as if the couch had been moved
   await scanByButton();
   await verdict(anna, 'in_tolerance');
   await verdict(room, 'in_tolerance');
-  await anna.getByRole('button', { name: 'Accept', exact: true }).click();
-  await anna.getByText(/Accepted by anna/).waitFor();
+  await acceptInTolerance('dora');
   await closeSession();
 });
 
-await h.step('fraction 2: accepted outside tolerance, with a reason and the password', async () => {
+await h.step('fraction 2: a power cut in the middle of a sweep leaves nothing to accept', async () => {
   await openSession(2);
   await scene(kMoved);
+  await scanOn(anna);
+  const { scan: cut } = await state();
+  await h.cutPower();
+  // Whoever stands there sees that nothing is known; no number of before comes in its place.
+  for (const page of [anna, room]) await page.getByText(/no connection/i).first().waitFor(kSlow);
+  equal(await anna.getByRole('button', { name: /^Accept/ }).count(), 0, 'nothing to accept');
+  equal(await anna.locator('.number .arrow').count(), 0, 'no arrow to follow');
+  await h.powerOn();
+  shown = 0;  // the simulated device starts with its first scene again
+  await slowDown();
+  // Nobody is logged in any more, and a PIN counts only once the password has been given again.
+  await anna.getByLabel('Password').waitFor(kSlow);
+  await h.logIn(bob, 'bob');
+  await h.logIn(engineer, 'engineer');
+  await until('the unit is ready', ({ state: now }) => now === 'ready');
+  await h.logIn(clara, 'clara');
+  await h.logIn(anna, 'anna');
+  await anna.getByRole('button', { name: 'Log out' }).click();
+  await h.logIn(anna, 'dora');
+  // The demo has opened its own patient.
+  await h.acknowledge(anna, bob, clara);
+  await anna.goto(`${h.url}#/result/${cut.id}`);
+  await anna.locator('.verdict.none').waitFor();
+  await h.look(anna, 'after-power-cut', { axe: false });
+  equal(await anna.locator('.number').count(), 0, 'no numbers of a sweep that was cut off');
+  for (const way of ['accept', 'accept-outside']) {
+    const { status } = await h.api(anna, `scans/${cut.id}/${way}`, 'POST',
+      way === 'accept' ? undefined : { reason: 'the power was gone', password: h.password });
+    equal(status, 409, `${way} of a sweep that was cut off`);
+  }
+});
+
+await h.step('the session is resumed, and accepted outside tolerance with a password', async () => {
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByRole('link', { name: 'PX-0100', exact: true }).click();
+  await anna.getByRole('button', { name: /^Resume fraction 2/ }).click();
+  await anna.getByRole('button', { name: /^Close demo.*, open PX-0100/ }).click();
+  await anna.locator('.who-line', { hasText: 'Fraction 2' }).waitFor();
+  await scene(kMoved);
+  // The control socket refuses as the button does, in the language of whoever types.
+  equal((await h.api(engineer, 'settings', 'PUT', { scan_wristband: true })).status, 200, 'asked');
+  const refusal = await run(plumb, ['--language', 'de', '--control', socket, 'press'])
+    .then(() => 'none', ({ stderr }) => stderr);
+  check(/lesen Sie zuerst das Armband des Patienten/.test(refusal), `the refusal: ${refusal}`);
+  await anna.getByLabel('Wristband of PX-0100').fill('px0100');
+  await anna.locator('.wristband').getByRole('button', { name: 'Confirm' }).click();
+  await anna.getByText('PX-0100 confirmed for the next sweep').waitFor();
   await scanByButton();
+  equal((await h.api(engineer, 'settings', 'PUT', { scan_wristband: false })).status, 200, 'not');
   await anna.goto(`${h.url}#/result`);
   await verdict(anna, 'move');
-  await anna.getByText('Accept outside tolerance…').click();
-  await anna.getByLabel('Reason', { exact: true }).fill('the couch is at its end stop');
-  await anna.getByLabel('Your password').fill(h.password);
-  await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
-  await anna.getByText(/Accepted outside tolerance by anna, .*: the couch is at its end stop/)
-    .waitFor();
+  await verdict(room, 'move');
+  await accept('dora', async () => {
+    await anna.getByText('Accept outside tolerance…').click();
+    await anna.getByLabel('Reason', { exact: true }).fill('the couch is at its end stop');
+    await anna.getByLabel('Your password').fill(h.password);
+    await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
+    await anna.getByText(/Accepted outside tolerance by dora, .*: the couch is at its end stop/)
+      .waitFor();
+  });
   await closeSession();
 });
 
 await h.step('fraction 3: one press of the button, and the sweep ends by itself', async () => {
+  await changeTo('anna');
   await openSession(3);
   await scene(kReference);
   await button();
   await verdict(anna, 'in_tolerance');
   await verdict(room, 'in_tolerance');
   equal(await anna.locator('.number').count(), 6, 'six numbers');
-  await anna.getByRole('button', { name: 'Accept', exact: true }).click();
-  await anna.getByText(/Accepted by anna/).waitFor();
+});
+
+await h.step('the network is lost for 7 s: nothing can be accepted until what is shown holds',
+  async () => {
+  const begun = Date.now();
+  const offers = anna.getByRole('button', { name: /^Accept/ });
+  h.server.kill('SIGSTOP');
+  try {
+    for (const page of [anna, room]) {
+      await page.locator('.old-note', { hasText: 'NO CONNECTION' }).waitFor({ timeout: 15000 });
+      equal(await page.locator('.number .arrow').count(), 0, 'no arrow to follow');
+    }
+    // To the end of the 7 s.
+    do equal(await offers.count(), 0, 'nothing to accept'); while (Date.now() - begun < 7000);
+  } finally {
+    h.server.kill('SIGCONT');
+  }
+  await anna.locator('.old-note', { hasText: 'NO CONNECTION' }).waitFor({ state: 'detached' });
+  await offers.waitFor();
+});
+
+await h.step('a tablet without network accepts neither a result that has been replaced nor the new',
+  async () => {
+  const { last_result: before } = await state();
+  await anna.context().setOffline(true);
+  const offer = anna.getByRole('button', { name: 'Accept', exact: true });
+  await offer.click();
+  await anna.getByRole('alert').getByText('The appliance is not responding').waitFor(kSlow);
+  await scanByButton();
+  const { last_result: newest } = await state();
+  check(newest.id !== before.id, 'another result');
+  equal((await h.api(bob, `scans/${before.id}`)).body.accepted_by, null, 'the tap changed nothing');
+  equal((await h.api(bob, `scans/${before.id}/accept`, 'POST')).status, 409,
+    'the one before is no longer accepted by anybody');
+  await anna.context().setOffline(false);
+  // The tablet comes to the newest by itself, shows it, and only then offers it.
+  await anna.locator(`a[href^="/result?scan=${newest.id}&"]`).first()
+    .waitFor({ state: 'attached', ...kSlow });
+  await verdict(anna, 'in_tolerance');
+  await acceptInTolerance('anna');
   await anna.locator('.trend').first().waitFor();
   await h.look(anna, 'fraction-3');
   await closeSession();
+});
+
+await h.step('exactly what was accepted had been shown, number by number, to whoever signed',
+  async () => {
+  const { scans } = (await h.api(clara, 'scans?limit=50')).body;
+  const accepted = scans.filter(({ accepted_by: who }) => who).reverse();
+  equal(JSON.stringify(accepted.map(({ id, accepted_by: who }) => [id, who])),
+    JSON.stringify(signed.map(({ id, person }) => [id, person])), 'scans and people');
+  for (const [i, { result }] of accepted.entries()) {
+    equal(result.verdict, signed[i].verdict, `verdict of ${accepted[i].id}`);
+    for (const [k, { name, value }] of result.numbers.entries()) {
+      const text = signed[i].values[k];
+      const digits = (text.split('.')[1] ?? '').length;
+      check(Math.abs(Number(text) - value) <= 0.5 * 10 ** -digits + 1e-6,
+        `${name} of ${accepted[i].id}: ${value} was shown as ${text}`);
+    }
+  }
+  const { entries } = (await h.api(clara, 'audit?limit=200')).body;
+  equal(entries.filter(({ action }) => /^scan\.accept/.test(action)).length, signed.length,
+    'acceptances in the log');
+  console.log(`    ${signed.length} acceptances: ${signed.map(({ person, verdict: word, values }) =>
+    `${person} ${word} (${values.join(' ')})`).join('; ')}`);
 });
 
 await h.step('on a slow line: 1.5 MB at most before the map is there, 10 s at 1 Mbit/s',
@@ -267,11 +429,12 @@ await h.step('the history, the reports and the log tell the day in the words tha
   async () => {
   await clara.goto(`${h.url}#/patients`);
   await clara.getByRole('link', { name: 'PX-0100', exact: true }).click();
-  await clara.getByRole('region', { name: 'Scans' }).locator('tbody tr').nth(4).waitFor();
+  await clara.getByRole('region', { name: 'Scans' }).locator('tbody tr').nth(6).waitFor();
   const rows =
     await clara.getByRole('region', { name: 'Scans' }).locator('tbody tr').allInnerTexts();
-  equal(rows.length, 5, 'a reference and four scans');
-  equal(rows.filter((row) => row.includes('anna')).length, 3, 'three were accepted');
+  equal(rows.length, 7, 'a reference and six scans, one of them cut off');
+  equal(rows.filter((row) => row.includes('dora')).length, 2, 'two were accepted by dora');
+  equal(rows.filter((row) => row.includes('anna')).length, 1, 'and one by anna');
   await h.look(clara, 'patient');
   const { scans } = (await h.api(clara, `patients/${clara.url().split('/').at(-1)}/scans`)).body;
   const fetched = (path) => clara.evaluate(async (where) => {
@@ -279,7 +442,7 @@ await h.step('the history, the reports and the log tell the day in the words tha
     return { status: response.status, bytes: [...new Uint8Array(await response.arrayBuffer())] };
   }, path);
   for (const [name, path] of [['report', `scans/${scans[0].id}/report.pdf`],
-    ['report-outside', `scans/${scans[1].id}/report.pdf`],
+    ['report-outside', `scans/${scans[2].id}/report.pdf`],
     ['report-es', `scans/${scans[0].id}/report.pdf?language=es`],
     ['course', `patients/${scans[0].patient_id}/report.pdf`],
     ['course-es', `patients/${scans[0].patient_id}/report.pdf?language=es`]]) {

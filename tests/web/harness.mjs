@@ -87,26 +87,10 @@ export class Harness {
     h.check = (holds, what) => { if (!holds) throw new Error(`expected: ${what}`); };
     h.equal = (found, expected, what) => h.check(found === expected,
       `${what}: ${JSON.stringify(expected)}, found ${JSON.stringify(found)}`);
-    const [program, ...rest] = command.map((part) => part.replace('FOLDER', join(folder, 'data')));
-    h.server = spawn(program, rest, { stdio: ['pipe', 'pipe', 'pipe'] });
+    h.command = command.map((part) => part.replace('FOLDER', join(folder, 'data')));
     // Whatever goes wrong here, nothing stays behind.
     process.on('exit', () => h.server.kill('SIGKILL'));
-    h.server.on('exit', (code, signal) => {
-      if (!h.finished) {
-        console.error(`the server ended: ${code ?? signal}\n${h.log.join('\n')}`);
-        process.exit(1);
-      }
-    });
-    await new Promise((ready) => {
-      for (const input of [h.server.stdout, h.server.stderr]) {
-        createInterface({ input }).on('line', (line) => {
-          h.log.push(line);
-          h.url ??= /https?:\/\/127\.0\.0\.1:\d+\//.exec(line)?.[0];
-          h.setupCode ??= /setup code: (\S+)/.exec(line)?.[1];
-          if (h.url && h.setupCode) ready();
-        });
-      }
-    });
+    await h.launch(h.command, () => h.url && h.setupCode);
     // WebGL by SwiftShader, but not the page itself: painting it by an emulated graphics card took
     // fifteen times as long (3 pictures of 1920x1080 on a loaded machine: 87 s, so 6 s).
     const args = ['--no-sandbox', '--disable-dev-shm-usage', '--use-gl=angle',
@@ -124,6 +108,43 @@ export class Harness {
       ? firefox.launch({ channel: 'moz-firefox', executablePath: chromium })
       : chrome.launch({ executablePath: chromium, args }));
     return h;
+  }
+
+  /// Until it has said what isReady() waits for.
+  async launch([program, ...rest], isReady) {
+    const server = spawn(program, rest, { stdio: ['pipe', 'pipe', 'pipe'] });
+    this.server = server;
+    server.on('exit', (code, signal) => {
+      if (!this.finished && server === this.server) {
+        console.error(`the server ended: ${code ?? signal}\n${this.log.join('\n')}`);
+        process.exit(1);
+      }
+    });
+    await new Promise((ready) => {
+      for (const input of [server.stdout, server.stderr]) {
+        createInterface({ input }).on('line', (line) => {
+          this.log.push(line);
+          this.url ??= /https?:\/\/127\.0\.0\.1:\d+\//.exec(line)?.[0];
+          this.setupCode ??= /setup code: (\S+)/.exec(line)?.[1];
+          if (isReady(line)) ready();
+        });
+      }
+    });
+  }
+
+  /// As a power cut does; nothing runs until powerOn().
+  async cutPower() {
+    const { server } = this;
+    this.server = { kill() {}, stdin: { write() {}, end() {} } };
+    const gone = new Promise((ready) => { server.on('exit', ready); });
+    server.kill('SIGKILL');
+    await gone;
+  }
+  /// The same program at the same address.
+  powerOn() {
+    const { host } = new URL(this.url);
+    return this.launch(this.command.map((part) => part.replace('127.0.0.1:0', host)),
+      (line) => line.includes(this.url));
   }
 
   file(name) { return join(this.folder, name); }
@@ -175,6 +196,10 @@ export class Harness {
 
   async logIn(page, name) {
     await page.goto(this.url);
+    // Where somebody has a PIN.
+    const byPassword = page.getByRole('button', { name: 'Log in with name and password' });
+    await page.getByLabel('Name').or(byPassword).first().waitFor();
+    if (await byPassword.count()) await byPassword.click();
     await page.getByLabel('Name').fill(name);
     const first = this.fresh.delete(name);
     await page.getByLabel('Password').fill(first ? kFirstPassword : kPassword);

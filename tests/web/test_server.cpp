@@ -629,7 +629,10 @@ int Serve(const fs::path& root, bool tls) {
   options.upload_folder = root / "updates";
   options.max_upload_bytes = 64 << 20;
   if (tls) {
-    options.tls = web::MakeTlsIdentity({});
+    options.make_certificate = [authority = web::MakeAuthority({})](const auto now) {
+      return web::IssueTlsIdentity(authority, {}, now);
+    };
+    options.tls = options.make_certificate(std::chrono::system_clock::now());
     options.keep_certificate = [](const web::TlsIdentity&) {};
   }
   web::HttpServer server(service.services(), options);

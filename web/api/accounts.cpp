@@ -180,6 +180,8 @@ void Accounts::AddRoutes(Routes& routes) {
       &Accounts::ChangeOwnPassword);
   add("PUT", "/api/v1/session/preferences", Permission::kLogin, BodyKind::kJson,
       &Accounts::SetPreferences);
+  routes.Read("/authority.crt", Permission::kNone,
+              [this](const Request&) { return SendAuthority(); });
   routes.Read("/api/v1/certificate", Permission::kSettings,
               [this](const Request&) { return DescribeCertificate(); });
   add("PUT", "/api/v1/certificate", Permission::kSettings, BodyKind::kJson,

@@ -145,6 +145,9 @@ class Accounts : public SessionLookup {
   void AddSignedUnitActs(Routes& routes);
   /// The certificate of the page.
   [[nodiscard]] Response DescribeCertificate() const;
+  /// Of the unit's own authority, if that has signed it.
+  [[nodiscard]] std::optional<AuthorityCertificate> OwnAuthority() const;
+  [[nodiscard]] Response SendAuthority() const;
   /// Replaces it by an uploaded one or a new self-signed one; requires the user's own password.
   void ReplaceCertificate(const Request& request, const Respond& respond);
   void MakeNewCertificate(const Request& request, const Respond& respond);

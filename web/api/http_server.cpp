@@ -33,6 +33,10 @@ constexpr std::chrono::milliseconds kCutEvery{1000};
 HttpServerOptions Completed(HttpServerOptions options) {
   if (!options.now) options.now = [] { return SteadyClock::now(); };
   if (!options.wall_now) options.wall_now = [] { return std::chrono::system_clock::now(); };
+  if (!options.make_certificate)
+    options.make_certificate = [names = options.host_names](const auto now) {
+      return MakeTlsIdentity(names, now);
+    };
   if (!options.is_clock_trusted) options.is_clock_trusted = [] { return true; };
   return options;
 }

@@ -38,7 +38,20 @@ Response Accounts::DescribeCertificate() const {
     json["subject"] = facts.subject;
     json["valid_until"] = TimeText(facts.valid_until);
   }
+  const auto authority = OwnAuthority();
+  json["authority"] = authority ? Json(authority->fingerprint) : Json(nullptr);
   return JsonResponse(json);
+}
+
+std::optional<AuthorityCertificate> Accounts::OwnAuthority() const {
+  return certificate_ ? OwnAuthorityOf(certificate_->certificate_pem) : std::nullopt;
+}
+
+/// For tablets that do not trust this unit yet, so without a log-in; it is no secret.
+Response Accounts::SendAuthority() const {
+  const auto authority = OwnAuthority();
+  if (!authority) return ErrorResponse(404, say::web::NoAuthority());
+  return BodyResponse("application/x-x509-ca-cert", authority->pem);
 }
 
 void Accounts::ReplaceCertificate(const Request& request, const Respond& respond) {
@@ -75,7 +88,7 @@ void Accounts::MakeNewCertificate(const Request& request, const Respond& respond
   VerifyOwn(request, std::move(proof), say::web::WrongPassword(), respond,
             [this, actor = request.actor(), respond](const User&) {
               try {
-                const TlsIdentity identity = MakeTlsIdentity(options_.host_names);
+                const TlsIdentity identity = options_.make_certificate(options_.wall_now());
                 options_.keep_certificate(identity);
                 trial_.reset();
                 ServeCertificate(actor, identity, "certificate.new");
@@ -135,7 +148,7 @@ void Accounts::CareForCertificate() {
     if (!IsDueForRenewal(certificate_->certificate_pem,
                          is_trusted ? std::optional(wall) : std::nullopt, names))
       return;
-    const TlsIdentity identity = MakeTlsIdentity(options_.host_names, wall);
+    const TlsIdentity identity = options_.make_certificate(wall);
     options_.keep_certificate(identity);
     ServeCertificate(kSelf, identity, "certificate.renew");
   } catch (const std::runtime_error& error) {

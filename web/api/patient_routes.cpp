@@ -118,6 +118,14 @@ void AddSessionRoutes(Routes& routes, PatientService& patients) {
                    done(change);
                  });
                });
+  routes.Write("POST", "/api/v1/treatment/wristband", Permission::kScan, BodyKind::kJson,
+               [&patients](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::string session = fields.Text("session_id", 1, 64),
+                                   code = fields.Text("code", 1, 64);
+                 fields.Finish();
+                 patients.ConfirmWristband(request.actor(), session, code, done);
+               });
   routes.Write("POST", "/api/v1/treatment/reference", Permission::kScan, BodyKind::kJson,
                [&patients](const Request& request, const Done& done) {
                  Fields fields(request.body);

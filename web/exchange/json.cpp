@@ -305,6 +305,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
         {"writable", status.storage.writable}}},
       {"light", status.light},
       {"press", status.press_monitors ? "monitoring" : "sweep"},
+      {"wants_wristband", status.wants_wristband},
       {"patient_id", TextOrNull(status.patient_id)},
       {"next_purpose", Name(status.next_purpose)},
       {"scans_today", status.scans_today},

@@ -26,6 +26,8 @@ struct HttpServerOptions {
   /// connected with it. Throws IoError, after which the previous one stays. Empty: the certificate
   /// cannot be replaced on the page.
   std::function<void(const TlsIdentity&)> keep_certificate;
+  /// Makes one of the unit's own, such as by its authority; throws. Empty: a self-signed one.
+  std::function<TlsIdentity(std::chrono::system_clock::time_point)> make_certificate;
   /// Called with every identity that replaces another. May be empty.
   std::function<void(const TlsIdentity&)> on_certificate;
   /// Called when strangers begin to guess passwords faster than permitted, and again when none has

@@ -6,12 +6,21 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "web/model/reference.hpp"
 #include "web/model/scan.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
+
+/// Codes are the same without regard to case, spaces and hyphens, as scanners send them.
+[[nodiscard]] inline std::string PlainPatientCode(std::string_view code) {
+  std::string plain;
+  for (const char c : code)
+    if (c != '-' && c != ' ') plain += c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+  return plain;
+}
 
 /// For how long a closed session can go on.
 inline constexpr int kResumable_h = 12;

@@ -130,6 +130,8 @@ struct Status {
   std::string light;  ///< Name of the shown pattern: "ready", "too_fast".
   /// The sensor is at rest: the next press starts monitoring instead of a sweep.
   bool press_monitors = false;
+  /// No sweep of the open session begins before the wristband of its patient has been scanned.
+  bool wants_wristband = false;
   std::string patient_id;  ///< Patient of the next scan; empty if there is none.
   ScanPurpose next_purpose = ScanPurpose::kFraction;
   int scans_today = 0;                      ///< Scans of the open patient, rescans included.

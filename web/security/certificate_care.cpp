@@ -118,15 +118,16 @@ bool IsDueForRenewal(const std::string& pem,
                      const std::vector<std::string>& names) {
   const std::vector<Certificate> chain = ChainOf(pem);
   const gnutls_x509_crt_t own = chain.front().get();
-  if (chain.size() != 1 || gnutls_x509_crt_check_issuer(own, own) == 0 ||
-      SubjectOf(chain.front()) != fmt::format("CN={}", kOwnSubject))
-    return false;
+  const bool is_self_signed = chain.size() == 1 && gnutls_x509_crt_check_issuer(own, own) != 0 &&
+                              SubjectOf(chain.front()) == fmt::format("CN={}", kOwnSubject);
+  if (!is_self_signed && !OwnAuthorityOf(pem)) return false;
+  const std::chrono::seconds most = is_self_signed ? kOwnValidity : kIssuedValidity;
   const std::time_t begin = gnutls_x509_crt_get_activation_time(own),
                     end = gnutls_x509_crt_get_expiration_time(own);
   if (now) {
     const std::time_t time = std::chrono::system_clock::to_time_t(*now);
     if (time < begin || end - time <= std::chrono::seconds(2 * kWarnBeforeEnd).count() ||
-        end - begin > std::chrono::seconds(kOwnValidity).count())
+        end - begin > most.count())
       return true;
   }
   return std::any_of(names.begin(), names.end(), [&](const std::string& name) {

@@ -35,8 +35,8 @@ struct CertificateFacts {
 
 /// Whether this machine made the certificate for itself and must now replace it, because it expires
 /// within twice kWarnBeforeEnd, begins in the future (the clock was wrong), is valid for longer
-/// than kOwnValidity (as those of 0.2.0) or lacks one of `names`. A certificate that a person set
-/// is never due.
+/// than its kind may be (as those of 0.2.0) or lacks one of `names`. A certificate that a person
+/// set is never due.
 /// @param now  Nothing: the clock cannot be trusted, so that dates do not count. A certificate that
 ///        a wrong clock makes is one that no browser accepts once the clock is right.
 /// @throws DataError as CertificateWarnings().

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,8 +31,9 @@ inline constexpr const char* kTlsPriorities =
 /// Subject of the certificates that this machine makes for itself.
 inline constexpr std::string_view kOwnSubject = "Plumb scan appliance";
 
-/// The validity of such a certificate: Safari refuses one of more than 825 days.
-inline constexpr std::chrono::hours kOwnValidity{820 * 24};
+/// The validity of such a certificate: Safari refuses one of more than 825 days, and browsers one
+/// of more than 398 days that an authority signed.
+inline constexpr std::chrono::hours kOwnValidity{820 * 24}, kIssuedValidity{397 * 24};
 
 /// An elliptic key and a self-signed certificate for localhost, this machine's names and addresses
 /// (without link-local ones), and `names`. It is valid from a day before `now` for
@@ -40,6 +42,37 @@ inline constexpr std::chrono::hours kOwnValidity{820 * 24};
 [[nodiscard]] TlsIdentity MakeTlsIdentity(
     const std::vector<std::string>& names,
     std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
+
+/// What the subject of a unit's own authority begins with; the rest tells units apart.
+inline constexpr std::string_view kAuthoritySubject = "Plumb authority ";
+
+/// An authority of this unit's own, certificate and key as one PEM text: people install the
+/// certificate once, and the unit renews those of its page without another question. It signs no
+/// authorities and, as to names, only for localhost, this machine's and `names`, so that a tablet
+/// that trusts it trusts it for no other site; addresses change, and are not limited.
+/// @throws IoError if the library refuses.
+[[nodiscard]] std::string MakeAuthority(
+    const std::vector<std::string>& names,
+    std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
+
+/// Whether browsers that trust this authority accept what it issues now for these names, for as
+/// long as that is valid.
+/// @throws DataError if the text holds no authority.
+[[nodiscard]] bool CanIssue(const std::string& authority, const std::vector<std::string>& names,
+                            std::chrono::system_clock::time_point now);
+
+/// As MakeTlsIdentity(), signed by the authority, whose certificate follows; for kIssuedValidity.
+/// @throws DataError if the text holds no authority; IoError if the library refuses.
+[[nodiscard]] TlsIdentity IssueTlsIdentity(const std::string& authority,
+                                           const std::vector<std::string>& names,
+                                           std::chrono::system_clock::time_point now);
+
+struct AuthorityCertificate {
+  std::string pem, fingerprint;
+};
+/// The certificate of the unit's own authority, if it has signed the first of this chain, which is
+/// one of the unit's own.
+[[nodiscard]] std::optional<AuthorityCertificate> OwnAuthorityOf(const std::string& chain_pem);
 
 /// Checks PEM texts from files: a certificate, a key, and that they belong together. One text may
 /// hold both.

@@ -54,6 +54,10 @@ class PatientService {
   /// @param replaces  As in OpenPatient(), also for another session of the same patient.
   virtual void ResumeSession(const Actor& actor, const std::string& session_id,
                              const std::string& replaces, Done done) = 0;
+  /// The wristband of the patient on the couch carries this code: the next sweep of that session
+  /// may begin. kConflict where it is another patient's, or another session is open.
+  virtual void ConfirmWristband(const Actor& actor, const std::string& session_id,
+                                const std::string& code, Done done) = 0;
   /// Corrects the number of a session for fractions, open or closed.
   virtual void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,
                                const std::string& reason, Done done) = 0;

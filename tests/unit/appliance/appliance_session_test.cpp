@@ -332,6 +332,87 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
   });
 }
 
+TEST_F(ApplianceTest, WhereTheSettingsAskForItNoSweepBeginsBeforeTheWristbandWasScanned) {
+  parts_.demo_patient.clear();
+  const Actor tess = {.user = "tess", .address = {}};
+  Play([&] {
+    MakeReady();
+    std::string session;
+    Change answer;
+    std::promise<void> confirmed;
+    const auto confirm = [&](const std::string& of, const std::string& code) {
+      services_->services().patients.ConfirmWristband(
+          tess, of, code, [&](const Change& change) { answer = change; });
+      return answer.reason.English();
+    };
+    On([&] {
+      Store& store = *shared_->store.get();
+      Settings settings;
+      settings.scan_wristband = true;
+      store.settings.Change(tess, settings);
+      const Approved approved = AddApproved(store, tess);
+      (void)store.patients.Add(tess, "P-2", "");
+      OpenForFraction(*appliance_, shared_->store, approved.patient, tess);
+      session = appliance_->WebStatus().session.value().id;
+      EXPECT_TRUE(appliance_->WebStatus().wants_wristband);
+      // The button, the page and the control socket (whose press is the button's).
+      const std::string first = say::scan::WristbandFirst().English();
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), first);
+      EXPECT_EQ(appliance_->StartSweep(tess).English(), first);
+      EXPECT_EQ(appliance_->state().phase, ApplianceState::kReady);
+      // Another patient's, one that nobody has, and another session change nothing.
+      for (const char* code : {"P-2", "P-9", ""})
+        EXPECT_EQ(confirm(session, code), say::scan::OtherWristband("P-1").English()) << code;
+      EXPECT_EQ(confirm("99", "P-1"), say::scan::SessionClosed().English());
+      EXPECT_EQ(appliance_->StartSweep(tess).English(), first);
+      // A daily check is of nobody.
+      EXPECT_EQ(appliance_->PrepareCheck(/*opens=*/true, tess).English(), "");
+      EXPECT_FALSE(appliance_->WebStatus().wants_wristband);
+      EXPECT_EQ(appliance_->PrepareCheck(/*opens=*/false, tess).English(), "");
+      services_->services().patients.ConfirmWristband(
+          tess, session, "p 1", [&](const Change&) { confirmed.set_value(); });
+      EXPECT_FALSE(appliance_->WebStatus().wants_wristband);
+    });
+    confirmed.get_future().get();
+    On([&] {
+      EXPECT_EQ(shared_->store->audit.Find({0, 1}).at(0).action, "session.wristband");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "");
+      EXPECT_EQ(appliance_->state().phase, ApplianceState::kScanning);
+      EXPECT_TRUE(appliance_->WebStatus().wants_wristband) << "for the next one";
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), "") << "its end";
+    });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    On([&] {
+      (void)appliance_->Press(ButtonPress::kShort, kTester);  // acknowledges what became of it
+      EXPECT_EQ(appliance_->StartSweep(tess).English(), say::scan::WristbandFirst().English());
+      shared_->store->settings.Change(tess, Settings{});
+      EXPECT_FALSE(appliance_->WebStatus().wants_wristband) << "nobody asks for it any more";
+      EXPECT_EQ(appliance_->StartSweep(tess).English(), "");
+    });
+  });
+}
+
+TEST_F(ApplianceTest, AWristbandCountsForTenMinutesAndForTheSessionInWhichItWasScanned) {
+  using std::chrono::minutes, std::chrono::seconds;
+  CurrentSession session(loop_, parts_.config, [] {});
+  const auto scanned = std::chrono::steady_clock::time_point(minutes(5));
+  EXPECT_FALSE(session.LacksWristband(scanned)) << "a scan of nobody";
+  session.Open("1", "1", ScanPurpose::kFraction, "", {.user = "tess", .address = {}});
+  EXPECT_TRUE(session.LacksWristband(scanned));
+  session.ConfirmWristband(scanned);
+  EXPECT_FALSE(session.LacksWristband(scanned + kWristbandHolds - seconds(1)));
+  EXPECT_TRUE(session.LacksWristband(scanned + kWristbandHolds));
+  session.SetCheck(Actor{.user = "tess", .address = {}});
+  session.UseUpWristband();
+  session.SetCheck(std::nullopt);
+  EXPECT_FALSE(session.LacksWristband(scanned)) << "a check uses nothing up";
+  session.UseUpWristband();
+  EXPECT_TRUE(session.LacksWristband(scanned));
+  session.ConfirmWristband(scanned);
+  session.Open("2", "1", ScanPurpose::kFraction, "", {.user = "tess", .address = {}});
+  EXPECT_TRUE(session.LacksWristband(scanned)) << "another session";
+}
+
 TEST_F(ApplianceTest, ASessionWithoutScansClosesByItself) {
   parts_.demo_patient.clear();
   parts_.config.appliance.session_idle_min = 0.3 / 60;

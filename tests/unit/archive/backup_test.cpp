@@ -253,6 +253,7 @@ TEST_F(BackupTest, WhatARestoreReplacesIsMovedAsideAndWhole) {
   (void)BackUpStopped(state(), backup());
   const auto saved = FilesOf(state());
   WriteWholeFile(state() / "page-key.pem", std::string_view("key"));
+  WriteWholeFile(state() / "page-authority.pem", std::string_view("authority"));
   // Beside a database that does not know its key, it would pair a removed display again.
   WriteWholeFile(state() / "provisioned-display", std::string_view("hash name"));
   {
@@ -265,9 +266,10 @@ TEST_F(BackupTest, WhatARestoreReplacesIsMovedAsideAndWhole) {
   EXPECT_EQ(report.scans, 4U);
   EXPECT_EQ(report.replaced, state() / "before-restore-1");
   auto aside = FilesBelow(report.replaced);
-  EXPECT_EQ(aside.size() + 1, before.size());
+  EXPECT_EQ(aside.size() + 2, before.size());
   aside["page-key.pem"] = "key";
-  EXPECT_EQ(aside, before) << "all but the key, which stays";
+  aside["page-authority.pem"] = "authority";
+  EXPECT_EQ(aside, before) << "all but the keys, which stay";
   EXPECT_TRUE(fs::exists(state() / "page-key.pem"));
   EXPECT_FALSE(fs::exists(state() / "provisioned-display"));
   EXPECT_FALSE(fs::exists(state() / ".recovery"));
@@ -278,10 +280,10 @@ TEST_F(BackupTest, WhatARestoreReplacesIsMovedAsideAndWhole) {
     EXPECT_EQ(store.recovery().lost_scans + store.recovery().foreign_folders, 0);
   }
   EXPECT_EQ(RestoreOver(backup(), state()).replaced, state() / "before-restore-2");
-  EXPECT_EQ(FilesBelow(report.replaced).size() + 1, before.size()) << "the first is as it was";
+  EXPECT_EQ(FilesBelow(report.replaced).size() + 2, before.size()) << "the first is as it was";
   auto now = FilesOf(state());
   std::erase_if(now, [](const auto& entry) {
-    return entry.first.starts_with("before-restore") || entry.first == "page-key.pem";
+    return entry.first.starts_with("before-restore") || entry.first.starts_with("page-");
   });
   EXPECT_EQ(now, saved);
 }

@@ -44,8 +44,9 @@ class FactoryResetTest : public testing::StoreTest {
     store->settings.Change(kAnna, settings);
     const std::string patient = store->patients.Add(kAnna, "P-1", "thorax");
     scan_ = Scan(*store, patient);
-    for (const char* name : {"page-key.pem", "device.key", "provisioned-display",
-                             "updates/v2.raucb", "profiles/S1.json", "calibration/S1.yaml"})
+    for (const char* name :
+         {"page-key.pem", "page-authority.pem", "device.key", "provisioned-display",
+          "updates/v2.raucb", "profiles/S1.json", "calibration/S1.yaml"})
       Put(name);
     return patient;
   }
@@ -71,8 +72,8 @@ TEST_F(FactoryResetTest, KeepingTheRecordsRemovesPeopleSettingsAndKeys) {
   EXPECT_EQ(store->audit.Find({0, 1, "system."}).at(0).user, kAnna.user);
   EXPECT_GT(store->audit.Find({0, 100, ""}).size(), 4U) << "the log goes on";
   EXPECT_FALSE(store->audit.FirstBroken());
-  for (const char* gone :
-       {"page-key.pem", "device.key", "provisioned-display", "updates", kFactoryResetFile})
+  for (const char* gone : {"page-key.pem", "page-authority.pem", "device.key",
+                           "provisioned-display", "updates", kFactoryResetFile})
     EXPECT_FALSE(IsThere(gone)) << gone;
   for (const char* kept : {"profiles/S1.json", "calibration/S1.yaml"})
     EXPECT_TRUE(IsThere(kept)) << kept;
@@ -92,8 +93,8 @@ TEST_F(FactoryResetTest, WipingLeavesAnEmptyStoreThatSaysWhoAskedForIt) {
   EXPECT_EQ(log[0].action, "system.factory_reset");
   EXPECT_EQ(log[0].user, kAnna.user);
   EXPECT_TRUE(fs::is_empty(state() / "scans"));
-  for (const char* gone : {"page-key.pem", "provisioned-display", "profiles", "calibration",
-                           "set-aside", "link", "updates", kFactoryResetFile})
+  for (const char* gone : {"page-key.pem", "page-authority.pem", "provisioned-display", "profiles",
+                           "calibration", "set-aside", "link", "updates", kFactoryResetFile})
     EXPECT_FALSE(IsThere(gone)) << gone;
 }
 

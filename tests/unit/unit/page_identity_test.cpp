@@ -93,15 +93,45 @@ TEST_F(PageIdentityTest, SecretsAreForTheOwnerAlone) {
   (void)Identify("0.0.0.0");
   const std::string device_key = options_.device_key;
   EXPECT_EQ(device_key.size(), 32U);
-  for (const char* name : {"page-key.pem", "device.key"}) {
+  for (const char* name : {"page-key.pem", "page-authority.pem", "device.key"}) {
     EXPECT_EQ(fs::status(folder_ / name).permissions(), fs::perms(0600)) << name;
     fs::permissions(folder_ / name, fs::perms(0644));
   }
   (void)Identify("0.0.0.0");
-  for (const char* name : {"page-key.pem", "device.key"})
+  (void)options_.make_certificate(std::chrono::system_clock::now());
+  for (const char* name : {"page-key.pem", "page-authority.pem", "device.key"})
     EXPECT_EQ(fs::status(folder_ / name).permissions(), fs::perms(0600)) << name << ", again";
   EXPECT_EQ(options_.device_key, device_key) << "browsers stay known";
   ::umask(022);
+}
+
+TEST_F(PageIdentityTest, RenewalsComeFromTheSameAuthorityUntilTheUnitHasAnotherName) {
+  (void)Identify("0.0.0.0");
+  const auto first = web::OwnAuthorityOf(options_.tls.value().certificate_pem);
+  ASSERT_TRUE(first);
+  const auto now = std::chrono::system_clock::now();
+  const auto authority_of = [&](std::chrono::system_clock::time_point when) {
+    return web::OwnAuthorityOf(options_.make_certificate(when).certificate_pem)
+        .value_or(web::AuthorityCertificate{})
+        .fingerprint;
+  };
+  EXPECT_EQ(authority_of(now), first->fingerprint);
+  EXPECT_EQ(authority_of(now + std::chrono::hours(24 * 3000)), first->fingerprint);
+  (void)Identify("0.0.0.0");
+  EXPECT_EQ(authority_of(now), first->fingerprint) << "after a restart";
+  config_.web.host_names = {"renamed.clinic.example"};
+  (void)Identify("0.0.0.0");
+  EXPECT_NE(authority_of(now), first->fingerprint) << "it may not sign that name";
+  EXPECT_EQ(authority_of(now), authority_of(now)) << "the new one stays";
+}
+
+TEST_F(PageIdentityTest, ASelfSignedOneOfBeforeStaysUntilItIsRenewed) {
+  const web::TlsIdentity before = web::MakeTlsIdentity({});
+  KeepPageIdentity(folder_, before);
+  EXPECT_EQ(Identify("0.0.0.0").certificate, before.fingerprint);
+  EXPECT_FALSE(fs::exists(folder_ / "page-authority.pem")) << "nothing to install yet";
+  const web::TlsIdentity next = options_.make_certificate(std::chrono::system_clock::now());
+  EXPECT_TRUE(web::OwnAuthorityOf(next.certificate_pem));
 }
 
 TEST_F(PageIdentityTest, WhatCannotBeUsedStaysAsItIsAndIsTold) {

@@ -2,10 +2,13 @@
 // What is reported about a certificate, on both sides of each limit; openssl makes them.
 #include "web/security/certificate_care.hpp"
 
+#include <array>
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <iterator>
+#include <memory>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -120,6 +123,81 @@ TEST_F(CertificateCareTest, TheAppliancesOwnIsNothingToTellOf) {
   EXPECT_THAT(EnglishTexts(CertificateWarnings(own.certificate_pem, now_)), IsEmpty());
   EXPECT_THAT(EnglishTexts(CertificateWarnings(own.key_pem + own.certificate_pem, now_)),
               IsEmpty());
+}
+
+class AuthorityTest : public CertificateCareTest {
+ protected:
+  /// What openssl says of the identity to somebody who trusts the authority only.
+  std::string Verified(const std::string& authority, const TlsIdentity& identity,
+                       const std::string& how) {
+    std::ofstream(folder_ / "ca.pem") << authority;
+    std::ofstream(folder_ / "leaf.pem") << identity.certificate_pem;
+    const std::string command =
+        fmt::format("cd {} && openssl verify -x509_strict -CAfile ca.pem {} leaf.pem 2>&1",
+                    folder_.path().string(), how);
+    const std::unique_ptr<FILE, int (*)(FILE*)> out(::popen(command.c_str(), "r"), &::pclose);
+    std::array<char, 2000> text{};
+    return {text.data(), std::fread(text.data(), 1, text.size(), out.get())};
+  }
+  const std::vector<std::string> names_ = {"plumb-3.clinic.example", "10.1.2.3"};
+};
+
+TEST_F(AuthorityTest, WhoTrustsItTrustsThisUnitAndEachRenewalAndNothingElse) {
+  const std::string authority = MakeAuthority(names_, begin_);
+  const TlsIdentity first = IssueTlsIdentity(authority, names_, begin_);
+  const auto begin = system_clock::to_time_t(begin_);
+  const auto at = [&](const std::string& name, int days) {
+    return fmt::format("-verify_{} {} -attime {}", name == "10.1.2.3" ? "ip" : "hostname", name,
+                       begin + std::time_t{86400} * days);
+  };
+  for (const char* name : {"plumb-3.clinic.example", "10.1.2.3", "localhost"})
+    EXPECT_EQ(Verified(authority, first, at(name, 0)), "leaf.pem: OK\n") << name;
+  EXPECT_THAT(Verified(authority, first, at("localhost", 397)), HasSubstr("expired"));
+  const TlsIdentity next =
+      IssueTlsIdentity(authority, names_, begin_ + std::chrono::hours(24 * 340));
+  EXPECT_NE(next.fingerprint, first.fingerprint);
+  EXPECT_EQ(Verified(authority, next, at("localhost", 397)), "leaf.pem: OK\n");
+  // By another authority, or for a site that is not this unit's.
+  EXPECT_THAT(Verified(MakeAuthority(names_, begin_), first, at("localhost", 0)),
+              HasSubstr("verification failed"));
+  const TlsIdentity stolen = IssueTlsIdentity(authority, {"bank.example"}, begin_);
+  EXPECT_THAT(Verified(authority, stolen, at("bank.example", 0)), HasSubstr("permitted subtree"));
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(first.certificate_pem, begin_)), IsEmpty());
+}
+
+TEST_F(AuthorityTest, ItIssuesWhatBrowsersTakeForAsLongAsThatIsValid) {
+  const std::string authority = MakeAuthority(names_, begin_);
+  const std::chrono::hours day(24);
+  EXPECT_TRUE(CanIssue(authority, names_, begin_));
+  EXPECT_FALSE(CanIssue(authority, {"renamed.example"}, begin_)) << "not for another name";
+  EXPECT_TRUE(CanIssue(authority, {"10.9.9.9", "2001:db8::7"}, begin_)) << "addresses change";
+  EXPECT_FALSE(CanIssue(authority, names_, begin_ - 2 * day)) << "its clock was wrong";
+  EXPECT_TRUE(CanIssue(authority, names_, begin_ + (7300 - 399) * day));
+  EXPECT_FALSE(CanIssue(authority, names_, begin_ + (7300 - 397) * day));
+  EXPECT_THROW((void)CanIssue("no authority", names_, begin_), DataError);
+  EXPECT_THROW((void)IssueTlsIdentity(MakeTlsIdentity({}).certificate_pem, names_, begin_),
+               DataError)
+      << "without a key";
+  const TlsIdentity own = IssueTlsIdentity(authority, names_, begin_);
+  const auto left =
+      system_clock::from_time_t(FactsOfCertificate(own.certificate_pem).valid_until) - begin_;
+  EXPECT_LE(left + day, 398 * day) << "it begins a day before";
+  EXPECT_GT(left, 390 * day);
+}
+
+TEST_F(AuthorityTest, WhatItHasSignedIsRenewedAndKnown) {
+  const std::string authority = MakeAuthority(names_, begin_);
+  const std::string own = IssueTlsIdentity(authority, names_, begin_).certificate_pem;
+  const std::chrono::hours day(24);
+  EXPECT_FALSE(IsDueForRenewal(own, begin_ + 335 * day, names_));
+  EXPECT_TRUE(IsDueForRenewal(own, begin_ + 337 * day, names_));
+  EXPECT_TRUE(IsDueForRenewal(own, std::nullopt, {"renamed.example"}));
+  ASSERT_TRUE(OwnAuthorityOf(own));
+  EXPECT_THAT(authority, HasSubstr(OwnAuthorityOf(own)->pem));
+  EXPECT_EQ(OwnAuthorityOf(own)->pem.find("PRIVATE"), std::string::npos);
+  for (const std::string& other : {MakeTlsIdentity({}).certificate_pem, Made(kCurve, 100),
+                                   own + Made(kCurve, 100), std::string("nothing")})
+    EXPECT_FALSE(OwnAuthorityOf(other));
 }
 
 TEST_F(CertificateCareTest, WhatIsNoCertificateIsRefused) {

@@ -25,6 +25,7 @@ const std::set<std::string> kWithoutPatients = {
     "/breath",
     "/assets/{name}",
     "/health",
+    "/authority.crt",
     "/api/v1/session",
     "/api/v1/session/last-login",
     "/api/v1/login/people",  // names of staff, to a browser that knows them

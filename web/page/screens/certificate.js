@@ -47,6 +47,18 @@ function change(load) {
   field(text.which, choice), files);
 }
 
+/// How a tablet comes to trust this unit, once.
+function authority(fingerprint) {
+  const text = S.certificate;
+  const { href } = new URL('/authority.crt', location.href);
+  return h('details', { class: 'authority' }, h('summary', {}, text.authority),
+    h('p', {}, text.authorityHint, ' ', h('code', {}, fingerprint)),
+    h('p', {}, h('a', { class: 'button', href, download: 'plumb-authority.crt' },
+      text.authorityLink)),
+    h('ul', {}, Object.values(text.authoritySteps)
+      .map((step) => h('li', {}, typeof step === 'function' ? step(href) : step))));
+}
+
 export function certificateCard() {
   const text = S.certificate;
   const place = h('section', { class: 'card certificate' });
@@ -57,6 +69,7 @@ export function certificateCard() {
       now.fingerprint && h('p', {}, `${text.fingerprint}: `, h('code', {}, now.fingerprint)),
       now.subject && h('p', {}, `${text.subject}: ${now.subject}. ${text.validUntil}: `,
         `${localTime(now.valid_until)}.`),
+      now.authority && authority(now.authority),
       now.replaceable ? change(load) : h('p', {}, text.fixed));
   };
   load().catch((error) => clear(place, error.message));

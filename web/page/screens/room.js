@@ -149,6 +149,9 @@ const computing = (status) => [word(S.room.computing, 'info'),
 const saysNoSession = (status) => (status.state === 'ready' || status.state === 'result')
   && !status.session && status.next_purpose !== 'daily_check';
 
+const wristband = ({ session }) => [word(S.room.wristband, 'info'),
+  h('p', { class: 'room-hint' }, S.room.wristbandHint(session?.patient_code ?? ''))];
+
 function resting(status) {
   const text = S.room;
   if (status.state === 'no_sensor') {
@@ -159,6 +162,7 @@ function resting(status) {
     return [word(text.fault, 'bad'),
       h('p', { class: 'room-hint' }, faultWords(status))];
   }
+  if (status.wants_wristband) return wristband(status);
   const closed = saysNoSession(status);
   const siteHint = status.next_purpose !== 'daily_check' && status.session?.sweep_hint;
   return [word(closed ? text.noSession : text.ready, closed ? 'bad' : 'good'),
@@ -362,7 +366,9 @@ function display(main, speak) {
     answer.tick();
     if (visible) {
       clear(body, status.press === 'monitoring'
-        && h('p', { class: 'room-hint' }, S.stateHints.at_rest));
+        ? h('p', { class: 'room-hint' }, S.stateHints.at_rest)
+        : status.wants_wristband && h('p', { class: 'room-hint' },
+          S.room.wristbandHint(session.patient_code)));
       drawn = '';
       return;
     }
@@ -370,7 +376,7 @@ function display(main, speak) {
     const fraction = status.state === 'scanning' ? scan?.coverage : scan?.step_fraction;
     const key = JSON.stringify([S.languageName, status.state, scan?.guidance,
       fraction === null, scan?.step, isCheck && status.last_check, faultWords(status),
-      session?.id, status.next_purpose, status.press]);
+      session?.id, status.next_purpose, status.press, status.wants_wristband]);
     if (key === drawn && body.hasChildNodes()) {
       update(fraction);
       return;

@@ -6,6 +6,7 @@ import {
 import { action, card, clear, done, enable, h, hint, say } from '../dom.js';
 import { liveSurface } from '../drawings/live_surface.js';
 import { sweepHelp } from '../help/drawings.js';
+import { wristbandForm } from '../scanner.js';
 import { isAcknowledged, sessionLine, sessionName } from '../treatment.js';
 import { S, said } from '../words.js';
 import {
@@ -94,7 +95,8 @@ function buttons() {
     request = next.request;
     if (press.textContent !== next.label) press.textContent = next.label;
     press.classList.toggle('stop', status.state === 'scanning');
-    enable(press, Boolean(request) && live.connected && isAcknowledged());
+    const isHeld = request === 'scan/start' && status.wants_wristband;
+    enable(press, Boolean(request) && live.connected && isAcknowledged() && !isHeld);
     enable(discard, live.connected);
     const isOver = !['scanning', 'working'].includes(status.state);
     if (isOver && document.activeElement === discard) press.focus();
@@ -144,13 +146,15 @@ export async function showScan(place, what) {
   const soFar = h('div', {});
   const help = sweepHelp();
   const control = buttons();
+  const wristband = wristbandForm();
   const drawSession = sessionLine(who, { mayClose: may('scan') });
   const shown = {};
 
   clear(place, h('h1', { class: 'visually-hidden' }, text.title),
     h('div', { class: 'scan-grid' },
       h('section', { class: 'card sweep' }, who, known.element, headline, guidance, siteHint,
-        caution, toResult, h('div', { class: 'bar' }, bar, barText), control.element, soFar),
+        caution, toResult, h('div', { class: 'bar' }, bar, barText), wristband.element,
+        control.element, soFar),
       card(S.status.preview, camera.element, seen, facts, help)));
 
   const drawWho = (status) => {
@@ -206,6 +210,7 @@ export async function showScan(place, what) {
     headline.dataset.state = state;
     toResult.hidden = state !== 'result' || !status.last_result;
     control.draw(status);
+    wristband.draw(status);
     showSurface(status.state === 'scanning');
     help.hidden = ['scanning', 'working'].includes(status.state);
     drawProgress(status);
