@@ -18,6 +18,7 @@
 #include "daemon/pipeline/scan_runner.hpp"
 #include "daemon/reports/text_report.hpp"
 #include "daemon/result/result_folder.hpp"
+#include "daemon/result/shown_rows.hpp"
 #include "words/cli.hpp"
 #include "words/progress.hpp"
 
@@ -93,16 +94,12 @@ int RunOne(const CompareArguments& options, const CommandContext& context) {
 /// Numbers that must not be acted on are not in the table, as they are in no other one.
 BatchAnswer ComparisonAnswer(const std::filesystem::path& output) {
   const StoredResult result = ReadResult(output);
-  const bool is_answer = result.verdict != Verdict::kNoAnswer && result.correction;
+  std::vector<ShownRow> rows(kNumberNames.size());
+  if (const std::vector<ShownRow> shown = ShownRowsOf(result); !shown.empty()) rows = shown;
   TableRow cells;
-  for (const bool is_u95 : {false, true}) {
-    for (std::size_t i = 0; i < std::size(kNumberNames); ++i) {
-      const auto number = !is_answer ? std::optional<double>()
-                          : is_u95   ? result.correction->u95[i]
-                                     : result.correction->value[i];
-      cells.push_back(number ? fmt::to_string(*number) : std::string());
-    }
-  }
+  for (const auto number : {&ShownRow::value, &ShownRow::u95})
+    for (const ShownRow& row : rows)
+      cells.push_back(row.*number ? fmt::to_string(*(row.*number)) : std::string());
   return {.exit_code = result.verdict == Verdict::kNoAnswer ? kNoAnswer : kDone,
           .verdict = std::string(Name(result.verdict)),
           .cells = std::move(cells)};

@@ -311,7 +311,7 @@ void AddComparison(py::module_& module) {
             if (!c.correction) return py::none();
             return Numbers(c.correction->value);
           },
-          "The six numbers to apply, or None")
+          "The six numbers: what to apply, unless the verdict is no_answer; or None")
       .def_property_readonly(
           "u95",
           [](const Comparison& c) -> py::object {

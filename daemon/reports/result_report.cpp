@@ -5,7 +5,7 @@
 
 #include "algo/base/units.hpp"
 #include "daemon/reports/text_report.hpp"
-#include "daemon/result/axis_names.hpp"
+#include "daemon/result/shown_rows.hpp"
 #include "words/result.hpp"
 #include "words/text_report.hpp"
 
@@ -33,18 +33,7 @@ ResultWords WordsOfVerdict(Verdict verdict) {
 /// None without an answer, which must not be acted on.
 std::vector<CouchRow> RowsOf(const StoredResult& result) {
   std::vector<CouchRow> rows;
-  if (!result.correction || result.verdict == Verdict::kNoAnswer) return rows;
-  const StoredCorrection& correction = *result.correction;
-  const std::array<Message, 6> names = AxisNames(result.body);
-  for (std::size_t i = 0; i < names.size(); ++i)
-    rows.push_back(OnCouch({.name = names[i].empty() ? AxisName(i) : names[i],
-                            .number = i,
-                            .value = correction.value[i],
-                            .u95 = correction.u95[i],
-                            .tolerance = result.limits.ToleranceOf(i),
-                            .judgement = correction.judgements[i],
-                            .words = correction.words[i]},
-                           result.verdict, {}));
+  for (const ShownRow& row : ShownRowsOf(result)) rows.push_back(OnCouch(row, result.verdict, {}));
   return rows;
 }
 

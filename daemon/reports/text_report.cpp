@@ -2,13 +2,16 @@
 #include "daemon/reports/text_report.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <functional>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "algo/acceptance/shown_row.hpp"
 #include "algo/base/units.hpp"
 #include "algo/base/utf8.hpp"
+#include "daemon/result/shown_rows.hpp"
 #include "words/number.hpp"
 #include "words/result.hpp"
 #include "words/text_report.hpp"
@@ -30,10 +33,11 @@ Message Title(Verdict verdict) {
   return say::text_report::NoAnswer();
 }
 
-Message RowMark(NumberJudgement judgement) {
-  return judgement == NumberJudgement::kOutside  ? say::text_report::RowMove()
-         : judgement == NumberJudgement::kWithin ? say::text_report::RowOk()
-                                                 : say::text_report::RowUnsure();
+/// Only the verdict MOVE asks for moves.
+Message Heading(Verdict verdict, const Eigen::Vector3d& isocentre_m) {
+  const auto say =
+      verdict == Verdict::kMove ? say::text_report::Correction : say::text_report::Measured;
+  return say(isocentre_m.x(), isocentre_m.y(), isocentre_m.z());
 }
 
 Message NumberName(std::string_view name) {
@@ -52,7 +56,7 @@ class Report {
     Line("  " + Left(Said(label), 16) + " " + Said(value));
   }
 
-  void Correction(const StoredCorrection& correction, const StoredLimits& limits);
+  void Numbers(const std::vector<ShownRow>& rows, Verdict verdict);
   void Trust(const StoredResult& result);
   [[nodiscard]] const std::string& text() const { return text_; }
 
@@ -72,44 +76,43 @@ class Report {
     std::replace(number.begin(), number.end(), '.', language_.decimal);
     return number;
   }
-  [[nodiscard]] std::size_t MarkWidth() const {
+  [[nodiscard]] std::size_t Width(const std::vector<ShownRow>& rows,
+                                  const std::function<Message(const ShownRow&)>& text) const {
     std::size_t width = 0;
-    for (const NumberJudgement judgement :
-         {NumberJudgement::kOutside, NumberJudgement::kWithin, NumberJudgement::kUnsure})
-      width = std::max(width, Utf8Characters(Said(RowMark(judgement))));
+    for (const ShownRow& row : rows) width = std::max(width, Utf8Characters(Said(text(row))));
     return width;
   }
-  void NumberRow(std::size_t number, const StoredCorrection& correction, double tolerance);
 
   const Catalogue& language_;
   std::string text_;
 };
 
-void Report::NumberRow(std::size_t number, const StoredCorrection& correction, double tolerance) {
-  const std::string label = "  " + Left(Said(NumberName(kNumberNames.at(number))), 14) + " ";
-  const std::optional<double>& value = correction.value.at(number);
-  if (!value) return Line(label + "  " + Said(say::text_report::Refused()));
-  const char* const unit = UnitOf(number);
-  const int digits = IsShift(number) ? 1 : 2;
-  // printed as zero, without sign and direction
-  const bool is_zero = std::abs(*value) < (digits == 1 ? 0.05 : 0.005);
-  const std::string numbers = Number(
-      fmt::format("{:>+9.{}f} {:<4}  ±{:>5.{}f}   {:>5.3g} {:<4}", is_zero ? 0.0 : *value, digits,
-                  unit, correction.u95.at(number).value_or(NAN), digits, tolerance, unit));
-  Line(label + numbers + " " + Left(Said(RowMark(correction.judgements.at(number))), MarkWidth()) +
-       "  " + (is_zero ? "" : Said(correction.words.at(number))));
-}
-
-void Report::Correction(const StoredCorrection& correction, const StoredLimits& limits) {
-  const Eigen::Vector3d& isocentre_m = correction.isocentre;
-  Line("\n" +
-       Said(say::text_report::Correction(isocentre_m.x(), isocentre_m.y(), isocentre_m.z())) +
-       "\n");
-  Line(Right(Said(say::text_report::Value()), 26) +
+void Report::Numbers(const std::vector<ShownRow>& rows, Verdict verdict) {
+  const auto name_of = [](const ShownRow& row) { return row.name; };
+  const auto mark_of = [](const ShownRow& row) { return JudgementWord(row.judgement); };
+  const std::size_t names = std::max<std::size_t>(14, Width(rows, name_of));
+  const std::size_t marks = Width(rows, mark_of);
+  Line(Right(Said(say::text_report::Value()), names + 12) +
        Right(Said(say::text_report::Confidence()), 12) +
        Right(Said(say::text_report::Tolerance()), 12));
-  for (std::size_t i = 0; i < kNumberNames.size(); ++i)
-    NumberRow(i, correction, limits.ToleranceOf(i));
+  for (const ShownRow& row : rows) {
+    const std::string label = "  " + Left(Said(row.name), names) + " ";
+    if (!row.value) {
+      Line(label + "  " + Said(say::text_report::Refused()));
+      continue;
+    }
+    const char* const unit = UnitOf(row.number);
+    const int digits = IsShift(row.number) ? 1 : 2;
+    // printed as zero, without sign
+    const bool is_zero = std::abs(*row.value) < (digits == 1 ? 0.05 : 0.005);
+    const std::string half =
+        row.u95 && *row.u95 > 0 ? fmt::format("{:.{}f}", *row.u95, digits) : "?";
+    const std::string numbers =
+        Number(fmt::format("{:>+9.{}f} {:<4}  ±{:>5}   {:>5.3g} {:<4}", is_zero ? 0.0 : *row.value,
+                           digits, unit, half, row.tolerance, unit));
+    Line(label + numbers + " " + Left(Said(mark_of(row)), marks) + "  " +
+         Said(WayOf(row, verdict)));
+  }
 }
 
 void Report::Trust(const StoredResult& result) {
@@ -155,8 +158,9 @@ std::string ComparisonText(const StoredResult& result, const Catalogue& language
   Report report(language);
   report.Line(report.Said(Title(result.verdict)));
   for (const Message& reason : result.reasons) report.Line("  " + report.Said(reason));
-  if (result.correction) {
-    report.Correction(*result.correction, result.limits);
+  if (const std::vector<ShownRow> rows = ShownRowsOf(result); !rows.empty()) {
+    report.Line("\n" + report.Said(Heading(result.verdict, result.correction->isocentre)) + "\n");
+    report.Numbers(rows, result.verdict);
     if (!result.body || !result.body->room_known)
       report.Line("\n  " + report.Said(say::text_report::RoomUnknown()));
   }
@@ -167,16 +171,16 @@ std::string ComparisonText(const StoredResult& result, const Catalogue& language
 
 std::string PictureSubtitle(const Comparison& comparison) {
   std::string text = Title(comparison.verdict).English();
-  if (comparison.correction) {
+  if (comparison.correction && comparison.verdict != Verdict::kNoAnswer) {
     const CouchNumbers& v = comparison.correction->value;
     const auto shift = [](const std::optional<double>& mm) {
       return mm ? fmt::format("{:+.1f}", *mm) : std::string("refused");
     };
     text += fmt::format(
-        "; apply vertical {}, longitudinal {}, lateral {} mm; pitch {:+.2f}, roll {:+.2f}, yaw "
+        "; {} vertical {}, longitudinal {}, lateral {} mm; pitch {:+.2f}, roll {:+.2f}, yaw "
         "{:+.2f} deg",
-        shift(v.vertical_mm), shift(v.longitudinal_mm), shift(v.lateral_mm), v.pitch_deg,
-        v.roll_deg, v.yaw_deg);
+        comparison.verdict == Verdict::kMove ? "apply" : "measured", shift(v.vertical_mm),
+        shift(v.longitudinal_mm), shift(v.lateral_mm), v.pitch_deg, v.roll_deg, v.yaw_deg);
   } else if (!comparison.reasons.empty()) {
     text += ": " + comparison.reasons.front().English();
   }

@@ -10,8 +10,8 @@
 
 namespace plumb {
 
-/// Verdict with its reasons, the six numbers by name with direction, uncertainty and tolerance, and
-/// the scan quality, in this language.
+/// Verdict with its reasons, the six numbers by name with uncertainty, tolerance, judgement and
+/// what to do, and the scan quality, in this language. Without an answer there are no numbers.
 [[nodiscard]] std::string ComparisonText(const StoredResult& result, const Catalogue& language);
 
 /// One line for a picture, in English: the verdict and the residual if nothing else is known.

@@ -155,7 +155,7 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
         {"verdict", Name(scan.result->verdict)},
         {"correction", NumbersJson(is_answer ? scan.result->correction : std::nullopt)},
         {"u95", NumbersJson(is_answer ? scan.result->u95 : std::nullopt)},
-        {"words", WordsJson(scan.result->words)},
+        {"words", WordsJson(is_answer ? scan.result->words : std::array<Message, 6>())},
         {"axes", AxesJson(*scan.result)},
         {"numbers", RowsJson(*scan.result)},
         {"along_couch", RunsAlongCouch(*scan.result)},

@@ -26,7 +26,7 @@
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/language.hpp"
 #include "daemon/control/control_protocol.hpp"
-#include "daemon/result/stored_result.hpp"
+#include "daemon/result/shown_rows.hpp"
 #include "drivers/files/unix_socket.hpp"
 #include "words/cli.hpp"
 #include "words/control.hpp"
@@ -108,19 +108,14 @@ Json Ask(const std::filesystem::path& socket, const ControlRequest& request,
 }
 
 /// One of the six numbers: "+1.2 ± 0.3 mm  up", with no digit below the uncertainty.
-std::string NumberText(const StoredCorrection& correction, std::size_t i,
-                       const CommandContext& context) {
-  const std::optional<double>&value = correction.value.at(i), &u95 = correction.u95.at(i);
-  if (!value) return context.Said(say::cli::NumberNotKnown());
-  const int most = IsShift(i) ? 1 : 2;
+std::string NumberText(const ShownRow& row, Verdict verdict, const CommandContext& context) {
+  if (!row.value) return context.Said(WayOf(row, verdict));
+  const int most = IsShift(row.number) ? 1 : 2;
   std::string number =
-      fmt::format("{:>+8.{}f} \u00b1 {}", *value, DecimalsFor(u95.value_or(0.0), most),
-                  u95 ? fmt::format("{:.{}f}", *u95, most) : "?");
+      fmt::format("{:>+8.{}f} \u00b1 {}", *row.value, DecimalsFor(row.u95.value_or(NAN), most),
+                  row.u95 ? fmt::format("{:.{}f}", *row.u95, most) : "?");
   std::replace(number.begin(), number.end(), '.', context.language.decimal);
-  const bool is_still = u95 && !(std::abs(*value) > *u95);
-  return fmt::format(
-      "{} {:<4} {}", number, UnitOf(i),
-      context.Said(is_still ? say::cli::BelowUncertainty() : correction.words.at(i)));
+  return fmt::format("{} {:<4} {}", number, UnitOf(row.number), context.Said(WayOf(row, verdict)));
 }
 
 /// "state    ready: why", with the label in the language of the reader.
@@ -163,12 +158,10 @@ void AddLastResult(StatusLines& lines, const Json& last, const CommandContext& c
                 ? say::cli::ResultOfScan(last.value("scan", ""), verdict.get<std::string>())
                 : say::cli::ReferenceOfScan(last.value("scan", "")));
   if (const Json sent = last.value("correction", Json()); sent.is_object()) {
-    const StoredCorrection correction = ParseCorrection(sent);
-    for (std::size_t i = 0; i < kNumberNames.size(); ++i) {
-      const std::string name(kNumberNames[i]);
-      const Message shown = MessageFromJson({{"id", "number." + name}}, name);
-      lines.More(LeftAligned(context.Said(shown), 13) + NumberText(correction, i, context));
-    }
+    const Verdict shown = Named<Verdict>(verdict.is_string() ? verdict.get<std::string>() : "")
+                              .value_or(Verdict::kNoAnswer);
+    for (const ShownRow& row : ShownRowsOf(ParseCorrection(sent), shown))
+      lines.More(LeftAligned(context.Said(row.name), 13) + NumberText(row, shown, context));
   }
   for (const Message& reason : AllSaidIn(last, "reason")) lines.More(reason);
 }
