@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <map>
@@ -106,11 +107,6 @@ bool Deliver(const std::string& serial, bool is_depth, void* image, std::uint32_
   waiting.push_back(one);
   changed.notify_all();
   return changed.wait_for(lock, std::chrono::seconds(10), [&] { return one->is_done; });
-}
-
-bool AwaitStreaming(const std::string& serial, std::chrono::seconds patience) {
-  std::unique_lock lock(mutex);
-  return changed.wait_for(lock, patience, [&] { return Streaming(serial) != nullptr; });
 }
 
 int FlagOf(const std::string& serial, int flag) {

@@ -4,7 +4,6 @@
 // same one.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <string>
 
@@ -22,8 +21,6 @@ void Detach(const std::string& serial);
 /// The library calls back with the image, on the thread that processes its events. False if the
 /// Kinect does not stream, or nobody takes the image within ten seconds.
 bool Deliver(const std::string& serial, bool is_depth, void* image, std::uint32_t stamp);
-/// Whether both streams are started within the time.
-[[nodiscard]] bool AwaitStreaming(const std::string& serial, std::chrono::seconds patience);
 /// The value that a flag was set to; nothing was set: -1.
 [[nodiscard]] int FlagOf(const std::string& serial, int flag);
 /// Contexts, opened Kinects and lists that were given out and not released.

@@ -1,76 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/devices/orbbec/fake_orbbec.hpp"
 
-#include <algorithm>
-#include <atomic>
-#include <condition_variable>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <utility>
+
+#include "tests/devices/fake_ports.hpp"
 
 using namespace plumb::fake_orbbec;
 
 namespace {
 
-std::atomic<int> num_alive = 0;
-
-/// Counts the objects that the library has given out.
-struct Counted {
-  Counted() { ++num_alive; }
-  ~Counted() { --num_alive; }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
-};
-
-struct Started {
-  plumb::orbbec::FrameArrived call = nullptr;
-  void* user = nullptr;
-};
-
-/// A camera in its port.
-struct Plugged {
-  FakeCamera camera;
-  bool is_open = false;
-  std::map<int, Started> started;  ///< By type of sensor.
-  std::map<int, int> properties;
-  int num_delivering = 0;
-};
+using Ports = plumb::testing::FakePorts<FakeCamera, plumb::orbbec::FrameArrived,
+                                        plumb::orbbec::DevicesChanged, plumb::orbbec::DeviceList>;
+using Port = std::shared_ptr<Ports::Port>;
 
 }  // namespace
 
 namespace plumb::orbbec {
 
-struct Error : Counted {
+struct Error : Ports::Counted {
   std::string message;
 };
-struct Context : Counted {};
-struct DeviceList : Counted {
-  std::vector<std::shared_ptr<Plugged>> cameras;
+struct Context : Ports::Counted {};
+struct DeviceList : Ports::Counted {
+  Ports::Ports ports;
 };
-struct Device : Counted {
-  std::shared_ptr<Plugged> camera;
+struct Device : Ports::Counted {
+  Port port;
 };
-struct DeviceInfo : Counted {
+struct DeviceInfo : Ports::Counted {
   FakeCamera camera;
 };
-struct Sensor : Counted {
-  std::shared_ptr<Plugged> camera;
+struct Sensor : Ports::Counted {
+  Port port;
   int type = 0;
 };
-struct ProfileList : Counted {
-  std::shared_ptr<Plugged> camera;
+struct ProfileList : Ports::Counted {
+  Port port;
   int type = 0;
   [[nodiscard]] const std::vector<FakeMode>& modes() const {
-    return type == kSensorDepth ? camera->camera.depth_modes : camera->camera.color_modes;
+    return type == kSensorDepth ? port->camera.depth_modes : port->camera.color_modes;
   }
 };
-struct Profile : Counted {
-  std::shared_ptr<Plugged> camera;
+struct Profile : Ports::Counted {
+  Port port;
   int type = 0;
   FakeMode mode;
 };
-struct ObFrame : Counted {
+struct ObFrame : Ports::Counted {
   FakeImage image;
 };
 
@@ -80,101 +57,37 @@ using namespace plumb::orbbec;
 
 namespace {
 
-std::mutex mutex;
-std::condition_variable changed;
-std::vector<std::shared_ptr<Plugged>> plugged;
-DevicesChanged listener = nullptr;
-void* listener_user = nullptr;
 int version = 20807;
-
-std::shared_ptr<Plugged> Find(const std::string& serial) {
-  const auto found =
-      std::ranges::find(plugged, serial, [](const auto& p) { return p->camera.serial; });
-  return found == plugged.end() ? nullptr : *found;
-}
 
 void Fail(Error** error, const std::string& why) {
   *error = new Error;
   (*error)->message = why;
 }
 
-/// The library makes both lists, and who is called deletes them.
-void Tell(const std::vector<std::shared_ptr<Plugged>>& removed,
-          const std::vector<std::shared_ptr<Plugged>>& added) {
-  DevicesChanged call = nullptr;
-  void* user = nullptr;
-  {
-    const std::lock_guard lock(mutex);
-    call = listener;
-    user = listener_user;
-  }
-  if (call == nullptr) return;
-  auto* first = new DeviceList;
-  auto* second = new DeviceList;
-  first->cameras = removed;
-  second->cameras = added;
-  call(first, second, user);
-}
-
 }  // namespace
 
 namespace plumb::fake_orbbec {
 
-void Attach(FakeCamera camera) {
-  auto added = std::make_shared<Plugged>();
-  added->camera = std::move(camera);
-  {
-    const std::lock_guard lock(mutex);
-    plugged.push_back(added);
-  }
-  Tell({}, {added});
-}
-
-void Detach(const std::string& serial) {
-  std::shared_ptr<Plugged> removed;
-  {
-    const std::lock_guard lock(mutex);
-    removed = Find(serial);
-    if (!removed) return;
-    std::erase(plugged, removed);
-  }
-  Tell({removed}, {});
-}
+void Attach(FakeCamera camera) { Ports::Attach(std::move(camera)); }
+void Detach(const std::string& serial) { Ports::Detach(serial); }
 
 bool Deliver(const std::string& serial, const FakeImage& image) {
-  std::shared_ptr<Plugged> camera;
-  Started to;
-  {
-    const std::lock_guard lock(mutex);
-    camera = Find(serial);
-    const int type = image.is_depth ? kSensorDepth : kSensorColor;
-    if (!camera || !camera->started.contains(type)) return false;
-    to = camera->started[type];
-    ++camera->num_delivering;
-  }
-  auto* frame = new ObFrame;
-  frame->image = image;
-  to.call(frame, to.user);
-  const std::lock_guard lock(mutex);
-  --camera->num_delivering;
-  changed.notify_all();
-  return true;
+  return Ports::Deliver(serial, image.is_depth ? kSensorDepth : kSensorColor, [&](const auto&) {
+    auto* frame = new ObFrame;
+    frame->image = image;
+    return frame;
+  });
 }
 
 int PropertyOf(const std::string& serial, int property) {
-  const std::lock_guard lock(mutex);
-  const auto camera = Find(serial);
-  if (!camera) return -1;
-  const auto found = camera->properties.find(property);
-  return found == camera->properties.end() ? -1 : found->second;
+  return static_cast<int>(Ports::SettingOf(serial, 0, property));
 }
 
 void SetVersion(int wanted) { version = wanted; }
-int NumAlive() { return num_alive; }
+int NumAlive() { return Ports::num_alive; }
 
 void Reset() {
-  const std::lock_guard lock(mutex);
-  plugged.clear();
+  Ports::Reset();
   version = 20807;
 }
 
@@ -194,64 +107,58 @@ void ob_set_extensions_directory(const char*, Error**) {}
 
 Context* ob_create_context(Error**) { return new Context; }
 void ob_delete_context(Context* context, Error**) {
-  {
-    const std::lock_guard lock(mutex);
-    listener = nullptr;
-  }
+  Ports::Listen(nullptr, nullptr);
   delete context;
 }
 void ob_set_device_changed_callback(Context*, DevicesChanged call, void* user, Error**) {
-  const std::lock_guard lock(mutex);
-  listener = call;
-  listener_user = user;
+  Ports::Listen(call, user);
 }
 
 DeviceList* ob_query_device_list(Context*, Error**) {
   auto* list = new DeviceList;
-  const std::lock_guard lock(mutex);
-  list->cameras = plugged;
+  list->ports = Ports::All();
   return list;
 }
 void ob_delete_device_list(DeviceList* list, Error**) { delete list; }
 std::uint32_t ob_device_list_get_count(const DeviceList* list, Error**) {
-  return static_cast<std::uint32_t>(list->cameras.size());
+  return static_cast<std::uint32_t>(list->ports.size());
 }
 const char* ob_device_list_get_device_serial_number(const DeviceList* list, std::uint32_t index,
                                                     Error**) {
-  return list->cameras.at(index)->camera.serial.c_str();
+  return list->ports.at(index)->camera.serial.c_str();
 }
 const char* ob_device_list_get_device_name(const DeviceList* list, std::uint32_t index, Error**) {
-  return list->cameras.at(index)->camera.name.c_str();
+  return list->ports.at(index)->camera.name.c_str();
 }
 const char* ob_device_list_get_device_connection_type(const DeviceList* list, std::uint32_t index,
                                                       Error**) {
-  return list->cameras.at(index)->camera.port.c_str();
+  return list->ports.at(index)->camera.port.c_str();
 }
 Device* ob_device_list_get_device(const DeviceList* list, std::uint32_t index, Error** error) {
-  if (index >= list->cameras.size()) {
+  if (index >= list->ports.size()) {
     Fail(error, "index out of range");
     return nullptr;
   }
-  const std::lock_guard lock(mutex);
-  const auto& camera = list->cameras[index];
-  if (std::exchange(camera->is_open, true)) {
+  const std::lock_guard lock(Ports::mutex);
+  const Port& port = list->ports[index];
+  if (std::exchange(port->is_open, true)) {
     Fail(error, "device has been acquired already");
     return nullptr;
   }
   auto* device = new Device;
-  device->camera = camera;
+  device->port = port;
   return device;
 }
 void ob_delete_device(Device* device, Error**) {
   {
-    const std::lock_guard lock(mutex);
-    device->camera->is_open = false;
+    const std::lock_guard lock(Ports::mutex);
+    device->port->is_open = false;
   }
   delete device;
 }
 DeviceInfo* ob_device_get_device_info(const Device* device, Error**) {
   auto* info = new DeviceInfo;
-  info->camera = device->camera->camera;
+  info->camera = device->port->camera;
   return info;
 }
 void ob_delete_device_info(DeviceInfo* info, Error**) { delete info; }
@@ -266,29 +173,27 @@ bool ob_device_is_property_supported(const Device*, int property, int permission
           property == kPropertyColorExposure || property == kPropertyColorAutoWhiteBalance);
 }
 void ob_device_set_bool_property(Device* device, int property, bool value, Error**) {
-  const std::lock_guard lock(mutex);
-  device->camera->properties[property] = value ? 1 : 0;
+  Ports::Set(*device->port, 0, property, value ? 1 : 0);
 }
 void ob_device_set_int_property(Device* device, int property, std::int32_t value, Error** error) {
-  const ObRange& range = device->camera->camera.exposure;
+  const ObRange& range = device->port->camera.exposure;
   if (value < range.least || value > range.most) return Fail(error, "out of range");
-  const std::lock_guard lock(mutex);
-  device->camera->properties[property] = value;
+  Ports::Set(*device->port, 0, property, static_cast<float>(value));
 }
 ObRange ob_device_get_int_property_range(Device* device, int, Error**) {
-  return device->camera->camera.exposure;
+  return device->port->camera.exposure;
 }
 
 Sensor* ob_device_get_sensor(Device* device, int type, Error**) {
   auto* sensor = new Sensor;
-  sensor->camera = device->camera;
+  sensor->port = device->port;
   sensor->type = type;
   return sensor;
 }
 void ob_delete_sensor(Sensor* sensor, Error**) { delete sensor; }
 ProfileList* ob_sensor_get_stream_profile_list(const Sensor* sensor, Error**) {
   auto* list = new ProfileList;
-  list->camera = sensor->camera;
+  list->port = sensor->port;
   list->type = sensor->type;
   return list;
 }
@@ -297,7 +202,7 @@ std::uint32_t ob_stream_profile_list_get_count(const ProfileList* list, Error**)
 }
 Profile* ob_stream_profile_list_get_profile(const ProfileList* list, int index, Error**) {
   auto* profile = new Profile;
-  profile->camera = list->camera;
+  profile->port = list->port;
   profile->type = list->type;
   profile->mode = list->modes().at(static_cast<std::size_t>(index));
   return profile;
@@ -323,21 +228,16 @@ ObDistortion ob_video_stream_profile_get_distortion(const Profile* profile, Erro
 ObExtrinsics ob_stream_profile_get_extrinsic_to(const Profile* from, Profile* to, Error** error) {
   if (from->type != kSensorDepth || to->type != kSensorColor)
     Fail(error, "only depth to colour is known");
-  return from->camera->camera.depth_to_color;
+  return from->port->camera.depth_to_color;
 }
 
 void ob_sensor_start(Sensor* sensor, const Profile* profile, FrameArrived call, void* user,
                      Error** error) {
-  if (sensor->camera->camera.busy) return Fail(error, "device or resource busy");
+  if (sensor->port->camera.busy) return Fail(error, "device or resource busy");
   if (profile->type != sensor->type) return Fail(error, "profile of another sensor");
-  const std::lock_guard lock(mutex);
-  sensor->camera->started[sensor->type] = {call, user};
+  Ports::Start(*sensor->port, sensor->type, call, user);
 }
-void ob_sensor_stop(Sensor* sensor, Error**) {
-  std::unique_lock lock(mutex);
-  sensor->camera->started.erase(sensor->type);
-  changed.wait(lock, [&] { return sensor->camera->num_delivering == 0; });
-}
+void ob_sensor_stop(Sensor* sensor, Error**) { Ports::Stop(*sensor->port, {sensor->type}); }
 
 int ob_frame_get_type(const ObFrame* frame, Error**) {
   return frame->image.is_depth ? kFrameDepth : kFrameColor;

@@ -4,7 +4,6 @@
 // same one.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>

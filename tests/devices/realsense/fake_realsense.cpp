@@ -1,44 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/devices/realsense/fake_realsense.hpp"
 
-#include <algorithm>
-#include <atomic>
-#include <condition_variable>
 #include <memory>
-#include <mutex>
 #include <optional>
+
+#include "tests/devices/fake_ports.hpp"
 
 using namespace plumb::fake_realsense;
 
 namespace {
 
-std::atomic<int> num_alive = 0;
-
-/// Counts the objects that the library has given out.
-struct Counted {
-  Counted() { ++num_alive; }
-  ~Counted() { --num_alive; }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
-};
-
-struct Started {
-  plumb::realsense::FrameArrived call = nullptr;
-  void* user = nullptr;
-};
-
-/// A camera in its port.
-struct Plugged {
-  FakeUnit unit;
-  bool is_gone = false;
-  std::map<int, Started> started;                ///< By stream.
-  std::map<std::pair<int, int>, float> options;  ///< By sensor and option.
-  int num_delivering = 0;
-
-  [[nodiscard]] const std::vector<FakeMode>& modes(int sensor) const {
-    return sensor == 0 ? unit.depth_modes : unit.color_modes;
-  }
-};
+using Ports =
+    plumb::testing::FakePorts<FakeUnit, plumb::realsense::FrameArrived,
+                              plumb::realsense::DevicesChanged, plumb::realsense::DeviceList>;
+using Port = std::shared_ptr<Ports::Port>;
 
 }  // namespace
 
@@ -47,32 +22,32 @@ namespace plumb::realsense {
 struct Error {
   std::string message;
 };
-struct Context : Counted {
+struct Context : Ports::Counted {
   int version = 0;
 };
-struct DeviceList : Counted {
-  std::vector<std::shared_ptr<Plugged>> units;
+struct DeviceList : Ports::Counted {
+  Ports::Ports ports;
 };
-struct Device : Counted {
-  std::shared_ptr<Plugged> unit;
+struct Device : Ports::Counted {
+  Port port;
 };
-struct SensorList : Counted {
-  std::shared_ptr<Plugged> unit;
+struct SensorList : Ports::Counted {
+  Port port;
 };
 struct Profile {
-  const Plugged* unit = nullptr;
+  const Ports::Port* port = nullptr;
   int sensor = 0;
   FakeMode mode;
 };
-struct Sensor : Counted {
-  std::shared_ptr<Plugged> unit;
+struct Sensor : Ports::Counted {
+  Port port;
   int index = 0;
   std::vector<int> opened;  ///< Streams.
 };
-struct ProfileList : Counted {
+struct ProfileList : Ports::Counted {
   std::vector<Profile> profiles;
 };
-struct RsFrame : Counted {
+struct RsFrame : Ports::Counted {
   FakeImage image;
   Profile profile;
 };
@@ -83,123 +58,52 @@ using namespace plumb::realsense;
 
 namespace {
 
-std::mutex mutex;
-std::condition_variable changed;
-std::vector<std::shared_ptr<Plugged>> plugged;
-DevicesChanged listener = nullptr;
-void* listener_user = nullptr;
 int api_version = 25605;
-
-std::shared_ptr<Plugged> Find(const std::string& serial) {
-  const auto found =
-      std::ranges::find(plugged, serial, [](const auto& p) { return p->unit.serial; });
-  return found == plugged.end() ? nullptr : *found;
-}
 
 void Fail(Error** error, const std::string& why) {
   if (error != nullptr) *error = new Error{why};
 }
 
 template <typename Object>
-Object* With(std::shared_ptr<Plugged> unit) {
+Object* With(Port port) {
   auto* object = new Object;
-  object->unit = std::move(unit);
+  object->port = std::move(port);
   return object;
-}
-
-/// The library makes both lists, and who is called deletes them.
-void Tell(const std::vector<std::shared_ptr<Plugged>>& removed,
-          const std::vector<std::shared_ptr<Plugged>>& added) {
-  DevicesChanged call = nullptr;
-  void* user = nullptr;
-  {
-    const std::lock_guard lock(mutex);
-    call = listener;
-    user = listener_user;
-  }
-  if (call == nullptr) return;
-  auto* first = new DeviceList;
-  auto* second = new DeviceList;
-  first->units = removed;
-  second->units = added;
-  call(first, second, user);
 }
 
 }  // namespace
 
 namespace plumb::fake_realsense {
 
-void Attach(FakeUnit unit) {
-  auto added = std::make_shared<Plugged>();
-  added->unit = std::move(unit);
-  {
-    const std::lock_guard lock(mutex);
-    plugged.push_back(added);
-  }
-  Tell({}, {added});
-}
-
-void Detach(const std::string& serial) {
-  std::shared_ptr<Plugged> removed;
-  {
-    const std::lock_guard lock(mutex);
-    removed = Find(serial);
-    if (!removed) return;
-    removed->is_gone = true;
-    std::erase(plugged, removed);
-  }
-  Tell({removed}, {});
-}
+void Attach(FakeUnit unit) { Ports::Attach(std::move(unit)); }
+void Detach(const std::string& serial) { Ports::Detach(serial); }
 
 bool Deliver(const std::string& serial, const FakeImage& image) {
-  std::shared_ptr<Plugged> unit;
-  Started to;
-  auto* frame = new RsFrame;
-  {
-    const std::lock_guard lock(mutex);
-    unit = Find(serial);
-    if (!unit || !unit->started.contains(image.stream)) {
-      delete frame;
-      return false;
-    }
-    to = unit->started[image.stream];
-    ++unit->num_delivering;
+  return Ports::Deliver(serial, image.stream, [&](const Ports::Port& port) {
+    auto* frame = new RsFrame;
     frame->image = image;
-    frame->profile.unit = unit.get();
+    frame->profile.port = &port;
     frame->profile.mode.stream = image.stream;
     frame->profile.mode.format = image.format;
-  }
-  to.call(frame, to.user);
-  const std::lock_guard lock(mutex);
-  --unit->num_delivering;
-  changed.notify_all();
-  return true;
-}
-
-bool AwaitStreaming(const std::string& serial, std::chrono::seconds patience) {
-  std::unique_lock lock(mutex);
-  return changed.wait_for(lock, patience, [&] {
-    const auto unit = Find(serial);
-    return unit && unit->started.size() == 2;
+    return frame;
   });
 }
 
 float OptionOf(const std::string& serial, int stream, int option) {
-  const std::lock_guard lock(mutex);
-  const auto unit = Find(serial);
-  if (!unit) return -1;
-  const int sensor = stream == kStreamColor && !unit->unit.color_modes.empty() ? 1 : 0;
-  const auto found = unit->options.find({sensor, option});
-  return found == unit->options.end() ? -1 : found->second;
+  bool has_color = false;
+  {
+    const std::lock_guard lock(Ports::mutex);
+    const Port port = Ports::Find(serial);
+    has_color = port && !port->camera.color_modes.empty();
+  }
+  return Ports::SettingOf(serial, stream == kStreamColor && has_color ? 1 : 0, option);
 }
 
 void SetVersion(int version) { api_version = version; }
-int NumAlive() { return num_alive; }
+int NumAlive() { return Ports::num_alive; }
 
 void Reset() {
-  const std::lock_guard lock(mutex);
-  for (const auto& unit : plugged) unit->is_gone = true;
-  plugged.clear();
+  Ports::Reset();
   api_version = 25605;
 }
 
@@ -219,38 +123,32 @@ Context* rs2_create_context(int version, Error** error) {
   return new Context;
 }
 void rs2_delete_context(Context* context) {
-  {
-    const std::lock_guard lock(mutex);
-    listener = nullptr;
-  }
+  Ports::Listen(nullptr, nullptr);
   delete context;
 }
 void rs2_set_devices_changed_callback(const Context*, DevicesChanged call, void* user, Error**) {
-  const std::lock_guard lock(mutex);
-  listener = call;
-  listener_user = user;
+  Ports::Listen(call, user);
 }
 
 DeviceList* rs2_query_devices(const Context*, Error**) {
   auto* list = new DeviceList;
-  const std::lock_guard lock(mutex);
-  list->units = plugged;
+  list->ports = Ports::All();
   return list;
 }
 int rs2_get_device_count(const DeviceList* list, Error**) {
-  return static_cast<int>(list->units.size());
+  return static_cast<int>(list->ports.size());
 }
 void rs2_delete_device_list(DeviceList* list) { delete list; }
 int rs2_device_list_contains(const DeviceList* list, const Device* device, Error**) {
-  return std::ranges::find(list->units, device->unit) == list->units.end() ? 0 : 1;
+  return std::ranges::find(list->ports, device->port) == list->ports.end() ? 0 : 1;
 }
 Device* rs2_create_device(const DeviceList* list, int index, Error** error) {
-  const auto& unit = list->units.at(static_cast<std::size_t>(index));
-  if (unit->is_gone) {
+  const Port& port = list->ports.at(static_cast<std::size_t>(index));
+  if (port->is_gone) {
     Fail(error, "device is gone");
     return nullptr;
   }
-  return With<Device>(unit);
+  return With<Device>(port);
 }
 void rs2_delete_device(Device* device) { delete device; }
 
@@ -258,10 +156,10 @@ int rs2_supports_device_info(const Device* device, int info, Error**) {
   const bool is_known = info == kInfoName || info == kInfoSerial || info == kInfoFirmware ||
                         info == kInfoAdvisedFirmware || info == kInfoUsbType ||
                         info == kInfoProductLine;
-  return is_known && !(info == kInfoUsbType && device->unit->unit.usb.empty()) ? 1 : 0;
+  return is_known && !(info == kInfoUsbType && device->port->camera.usb.empty()) ? 1 : 0;
 }
 const char* rs2_get_device_info(const Device* device, int info, Error** error) {
-  const FakeUnit& unit = device->unit->unit;
+  const FakeUnit& unit = device->port->camera;
   switch (info) {
     case kInfoName:
       return unit.name.c_str();
@@ -282,14 +180,14 @@ const char* rs2_get_device_info(const Device* device, int info, Error** error) {
 }
 
 SensorList* rs2_query_sensors(const Device* device, Error**) {
-  return With<SensorList>(device->unit);
+  return With<SensorList>(device->port);
 }
 int rs2_get_sensors_count(const SensorList* list, Error**) {
-  return list->unit->unit.color_modes.empty() ? 1 : 2;
+  return list->port->camera.color_modes.empty() ? 1 : 2;
 }
 void rs2_delete_sensor_list(SensorList* list) { delete list; }
 Sensor* rs2_create_sensor(const SensorList* list, int index, Error**) {
-  auto* sensor = With<Sensor>(list->unit);
+  auto* sensor = With<Sensor>(list->port);
   sensor->index = index;
   return sensor;
 }
@@ -297,8 +195,9 @@ void rs2_delete_sensor(Sensor* sensor) { delete sensor; }
 
 ProfileList* rs2_get_stream_profiles(Sensor* sensor, Error**) {
   auto* list = new ProfileList;
-  for (const FakeMode& mode : sensor->unit->modes(sensor->index))
-    list->profiles.push_back({sensor->unit.get(), sensor->index, mode});
+  const FakeUnit& unit = sensor->port->camera;
+  for (const FakeMode& mode : sensor->index == 0 ? unit.depth_modes : unit.color_modes)
+    list->profiles.push_back({sensor->port.get(), sensor->index, mode});
   return list;
 }
 int rs2_get_stream_profiles_count(const ProfileList* list, Error**) {
@@ -325,11 +224,11 @@ void rs2_get_video_stream_intrinsics(const Profile* profile, RsIntrinsics* camer
 void rs2_get_extrinsics(const Profile* from, const Profile* to, RsExtrinsics* pose, Error** error) {
   if (from->mode.stream != kStreamDepth || to->mode.stream != kStreamColor)
     return Fail(error, "only depth to colour is known");
-  *pose = from->unit->unit.depth_to_color;
+  *pose = from->port->camera.depth_to_color;
 }
 float rs2_get_depth_scale(Sensor* sensor, Error** error) {
   if (sensor->index != 0) Fail(error, "not a depth sensor");
-  return sensor->unit->unit.depth_unit_m;
+  return sensor->port->camera.depth_unit_m;
 }
 
 int rs2_supports_option(const Sensor* sensor, int option, Error**) {
@@ -345,8 +244,7 @@ void rs2_get_option_range(const Sensor*, int option, float* least, float* most, 
 }
 void rs2_set_option(const Sensor* sensor, int option, float value, Error** error) {
   if (rs2_supports_option(sensor, option, nullptr) == 0) return Fail(error, "not supported");
-  const std::lock_guard lock(mutex);
-  sensor->unit->options[{sensor->index, option}] = value;
+  Ports::Set(*sensor->port, sensor->index, option, value);
 }
 
 void rs2_open_multiple(Sensor* sensor, const Profile** profiles, int count, Error** error) {
@@ -357,16 +255,10 @@ void rs2_open_multiple(Sensor* sensor, const Profile** profiles, int count, Erro
 }
 void rs2_close(const Sensor*, Error**) {}
 void rs2_start(const Sensor* sensor, FrameArrived call, void* user, Error** error) {
-  if (sensor->unit->unit.busy) return Fail(error, "device or resource busy");
-  const std::lock_guard lock(mutex);
-  for (const int stream : sensor->opened) sensor->unit->started[stream] = {call, user};
-  changed.notify_all();
+  if (sensor->port->camera.busy) return Fail(error, "device or resource busy");
+  for (const int stream : sensor->opened) Ports::Start(*sensor->port, stream, call, user);
 }
-void rs2_stop(const Sensor* sensor, Error**) {
-  std::unique_lock lock(mutex);
-  for (const int stream : sensor->opened) sensor->unit->started.erase(stream);
-  changed.wait(lock, [&] { return sensor->unit->num_delivering == 0; });
-}
+void rs2_stop(const Sensor* sensor, Error**) { Ports::Stop(*sensor->port, sensor->opened); }
 
 const Profile* rs2_get_frame_stream_profile(const RsFrame* frame, Error**) {
   return &frame->profile;

@@ -4,7 +4,6 @@
 // get the same one.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -46,8 +45,6 @@ void Attach(FakeUnit unit);
 void Detach(const std::string& serial);
 /// Calls back with the image, on this thread. False if nobody has started that stream.
 bool Deliver(const std::string& serial, const FakeImage& image);
-/// Whether both streams are started within the time.
-[[nodiscard]] bool AwaitStreaming(const std::string& serial, std::chrono::seconds patience);
 /// The value that an option was set to; nothing was set: -1.
 [[nodiscard]] float OptionOf(const std::string& serial, int stream, int option);
 /// As major * 10000 + minor * 100 + patch.

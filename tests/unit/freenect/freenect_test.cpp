@@ -1,85 +1,65 @@
 // SPDX-License-Identifier: Apache-2.0
 // The driver "freenect" on a fake library: what it sets and reads, plugging, stalls, and Kinects
 // and libraries that it must refuse.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <condition_variable>
-#include <mutex>
-
 #include <opencv2/core.hpp>
 
-#include "algo/base/errors.hpp"
-#include "drivers/files/file_io.hpp"
 #include "drivers/freenect/freenect_api.hpp"
-#include "drivers/live/sensor_driver.hpp"
 #include "tests/devices/freenect/fake_freenect.hpp"
-#include "tests/support/message_of.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "tests/support/sdk_driver_cases.hpp"
 
 namespace plumb {
 namespace {
 
 namespace fake = fake_freenect;
-using namespace std::chrono_literals;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using testing::MessageOf;
-using testing::TempFolder;
+using testing::Refusal;
 
 const std::string kSerial = fake::FakeKinect().serial;
 constexpr std::uint32_t kPeriod_ticks = 2'000'000;  // 60 MHz.
 
-class FreenectTest : public ::testing::Test {
- protected:
-  FreenectTest() {
-    fake::Reset();
-    settings_.calibration_folder = folder_ / "calibration";
-    settings_.library = PLUMB_FAKE_FREENECT;
-  }
-  ~FreenectTest() override {
-    provider_.reset();
-    EXPECT_EQ(fake::NumAlive(), 0) << "what the library gives out is given back";
-  }
+struct FreenectMaker {
+  static constexpr const char* kDriver = "freenect";
+  static constexpr const char* kLibrary = PLUMB_FAKE_FREENECT;
+  static constexpr int kToldOfUnplugging = 2;  // By its events and by the bus.
+  static constexpr std::pair kSize{640, 480};
+  static std::string Serial() { return kSerial; }
+  static void AttachUsual() { fake::Attach({}); }
+  static void Detach(const std::string& serial) { fake::Detach(serial); }
+  static void Reset() { fake::Reset(); }
+  static int NumAlive() { return fake::NumAlive(); }
 
-  SensorProvider& Provider() {
-    if (!provider_) {
-      setup_ = BuiltInSensors().Choose("freenect", false).set_up(settings_, {}, {}, {});
-      provider_ = setup_->MakeProvider();
-      provider_->SetListener([this] {
-        const std::lock_guard lock(mutex_);
-        ++num_changes_;
-        changed_.notify_all();
-      });
-    }
-    return *provider_;
-  }
-  std::unique_ptr<LiveSensor> Open() { return OpenSensor(Provider(), ""); }
-  bool AwaitChanges(int count) {
-    std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, 20s, [&] { return num_changes_ >= count; });
-  }
-  /// As many pairs as are left out while the exposure settles, and one that is not.
-  void DeliverPairs() {
+  static void DeliverPair(std::int64_t number, std::uint32_t first_ticks = 6'000'000) {
     cv::Mat color(480, 640, CV_8UC3, cv::Scalar(10, 20, 30));
     cv::Mat depth(480, 640, CV_16UC1, cv::Scalar(750));
-    for (int i = 0; i < 20; ++i) {
-      stamp_ += kPeriod_ticks;
-      EXPECT_TRUE(fake::Deliver(kSerial, false, color.data, stamp_));
-      EXPECT_TRUE(fake::Deliver(kSerial, true, depth.data, stamp_ + 120'000));
-    }
+    const std::uint32_t at = first_ticks + static_cast<std::uint32_t>(number) * kPeriod_ticks;
+    EXPECT_TRUE(fake::Deliver(kSerial, false, color.data, at));
+    EXPECT_TRUE(fake::Deliver(kSerial, true, depth.data, at + 120'000));
   }
 
-  const TempFolder folder_;
-  SensorSettings settings_;
-  std::unique_ptr<SensorSetup> setup_;
-  std::unique_ptr<SensorProvider> provider_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  int num_changes_ = 0;
-  std::uint32_t stamp_ = 6'000'000;
+  static std::vector<Refusal> Refused() {
+    return {{[] { fake::Attach({.has_registered = false}); },
+             {kSerial, "no depth images", "docs/freenect.md"},
+             ""},
+            {[] { fake::Attach({.busy = true}); }, {kSerial, "end other programs"}, ""}};
+  }
+  static std::vector<Refusal> RefusedLibraries() {
+    return {{{}, {"nowhere", "docs/freenect.md"}, "/usr/lib/nowhere/libfreenect.so.0.5"},
+            {{}, {"freenect_init"}, "libz.so.1"}};
+  }
+  static void AttachForDoctor() { AttachUsual(); }
+  static std::vector<std::string> DoctorNames() {
+    return {"libfreenect 0.5", kLibrary, "Kinect " + kSerial};
+  }
 };
+
+}  // namespace
+
+namespace testing {
+INSTANTIATE_TYPED_TEST_SUITE_P(Freenect, SdkDriverTest, FreenectMaker);
+}  // namespace testing
+
+namespace {
+
+using FreenectTest = testing::SdkDriverTest<FreenectMaker>;
 
 TEST_F(FreenectTest, ImagesComeRegisteredWithTheStampsOfTheKinect) {
   fake::Attach({});
@@ -99,11 +79,11 @@ TEST_F(FreenectTest, ImagesComeRegisteredWithTheStampsOfTheKinect) {
 }
 
 TEST_F(FreenectTest, StampsPassTheEndOfTheKinectsCounter) {
-  stamp_ = 0U - 17 * kPeriod_ticks;  // After 71 s.
+  const std::uint32_t first = 0U - 18 * kPeriod_ticks;  // After 71 s.
   fake::Attach({});
   const auto sensor = Open();
   double before_s = 0.0;
-  DeliverPairs();
+  for (int n = 1; n <= 20; ++n) FreenectMaker::DeliverPair(n, first);
   for (int i = 0; i < 4; ++i) {
     const std::optional<Frame> frame = sensor->Next();
     ASSERT_TRUE(frame);
@@ -114,18 +94,6 @@ TEST_F(FreenectTest, StampsPassTheEndOfTheKinectsCounter) {
   }
 }
 
-TEST_F(FreenectTest, TheUnitsOwnCalibrationTakesPrecedence) {
-  std::filesystem::create_directories(folder_ / "calibration");
-  WriteWholeFile(folder_ / "calibration" / (kSerial + ".yaml"),
-                 std::string("%YAML:1.0\nimage_width: 640\nimage_height: 480\n"
-                             "camera_matrix: [531., 0., 320., 0., 530., 240., 0., 0., 1.]\n"
-                             "distortion_coefficients: [0.05, -0.1, 0., 0., 0.]\n"));
-  fake::Attach({});
-  const auto sensor = Open();
-  EXPECT_EQ(sensor->info().intrinsics.fx, 531.0);
-  EXPECT_FALSE(sensor->info().intrinsics_assumed);
-}
-
 TEST_F(FreenectTest, ExposureAndWhiteBalanceAreHeldDuringAScan) {
   fake::Attach({});
   const auto sensor = Open();
@@ -134,65 +102,6 @@ TEST_F(FreenectTest, ExposureAndWhiteBalanceAreHeldDuringAScan) {
   EXPECT_EQ(fake::FlagOf(kSerial, freenect::kAutoWhiteBalance), 0);
   sensor->LockExposure(false);
   EXPECT_EQ(fake::FlagOf(kSerial, freenect::kAutoExposure), 1);
-}
-
-TEST_F(FreenectTest, UnpluggingEndsTheSensorAndItComesBack) {
-  fake::Attach({});
-  auto sensor = Open();
-  const std::string uri = sensor->description().uri;
-  DeliverPairs();
-  EXPECT_TRUE(sensor->Next());
-  fake::Detach(kSerial);
-  EXPECT_THAT(MessageOf<DeviceLost>([&] {
-                while (sensor->Next()) continue;
-              }),
-              HasSubstr("was unplugged"));
-  sensor.reset();
-  ASSERT_TRUE(AwaitChanges(2)) << "the events and the bus tell of it";
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }), HasSubstr("no sensor is attached"));
-  fake::Attach({});
-  ASSERT_TRUE(AwaitChanges(3)) << "the bus is looked at, as the library tells nothing";
-  sensor = Open();
-  EXPECT_NE(sensor->description().uri, uri);
-  DeliverPairs();
-  EXPECT_TRUE(sensor->Next());
-}
-
-TEST_F(FreenectTest, AStallIsToldWithWhatCame) {
-  fake::Attach({});
-  const auto sensor = Open();
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)sensor->Next(); }),
-              AllOf(HasSubstr(kSerial), HasSubstr("no pair of images for 3000 ms")));
-}
-
-TEST_F(FreenectTest, WithoutRegisteredDepthOfItsSizeItIsRefused) {
-  fake::Attach({.has_registered = false});
-  EXPECT_THAT(
-      MessageOf<DeviceError>([&] { (void)Open(); }),
-      AllOf(HasSubstr(kSerial), HasSubstr("no depth images"), HasSubstr("docs/freenect.md")));
-}
-
-TEST_F(FreenectTest, AKinectInUseIsRefusedWithTheReason) {
-  fake::Attach({.busy = true});
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }),
-              AllOf(HasSubstr(kSerial), HasSubstr("end other programs")));
-}
-
-TEST_F(FreenectTest, OtherLibrariesAreRefusedWithWhatIsExpected) {
-  const auto refusal = [&] { return MessageOf<DeviceError>([&] { (void)Provider().List(); }); };
-  settings_.library = "/usr/lib/nowhere/libfreenect.so.0.5";
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("nowhere"), HasSubstr("docs/freenect.md")));
-  settings_.library = "libz.so.1";
-  EXPECT_THAT(refusal(), HasSubstr("freenect_init"));
-}
-
-TEST_F(FreenectTest, TheDoctorNamesLibraryAndKinects) {
-  fake::Attach({});
-  std::string text;
-  for (const SensorFinding& finding : BuiltInSensors().Choose("freenect", false).examine(settings_))
-    text += finding.found.English() + "\n";
-  EXPECT_THAT(text, AllOf(HasSubstr("libfreenect 0.5"), HasSubstr(PLUMB_FAKE_FREENECT),
-                          HasSubstr("Kinect " + kSerial)));
 }
 
 }  // namespace

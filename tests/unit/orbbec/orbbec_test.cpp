@@ -1,32 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // The driver "orbbec" on a fake library: what it sets and reads, plugging, stalls, and cameras and
 // libraries that it must refuse.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <atomic>
 #include <cmath>
 
 #include <opencv2/core.hpp>
 
-#include "algo/base/errors.hpp"
-#include "drivers/live/sensor_driver.hpp"
 #include "tests/devices/orbbec/fake_orbbec.hpp"
-#include "tests/support/message_of.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "tests/support/sdk_driver_cases.hpp"
 
 namespace plumb {
 namespace {
 
 namespace fake = fake_orbbec;
 using namespace orbbec;
-using ::testing::AllOf;
 using ::testing::HasSubstr;
-using testing::MessageOf;
-using testing::TempFolder;
+using testing::Refusal;
 
 const std::string kSerial = fake::FakeCamera().serial;
-constexpr std::uint64_t kPeriod_us = 33'333;
+constexpr std::int64_t kPeriod_us = 33'333;
 
 fake::FakeMode Mode(int format, int width, int height, float focal, std::uint32_t rate_hz = 30) {
   return {.format = format,
@@ -51,30 +42,27 @@ fake::FakeCamera Gemini() {
   return camera;
 }
 
-class OrbbecTest : public ::testing::Test {
- protected:
-  OrbbecTest() {
-    fake::Reset();
-    settings_.calibration_folder = folder_ / "calibration";
-    settings_.library = PLUMB_FAKE_ORBBEC;
-  }
-  ~OrbbecTest() override {
-    provider_.reset();
-    EXPECT_EQ(fake::NumAlive(), 0) << "what the library gives out is given back";
-    fake::Reset();
-  }
+/// A Gemini with something changed.
+template <typename Change>
+void AttachGemini(Change&& change) {
+  fake::FakeCamera camera = Gemini();
+  change(camera);
+  fake::Attach(std::move(camera));
+}
 
-  SensorProvider& Provider() {
-    if (!provider_) {
-      setup_ = BuiltInSensors().Choose("orbbec", false).set_up(settings_, {}, {}, {});
-      provider_ = setup_->MakeProvider();
-      provider_->SetListener([this] { ++num_changes_; });
-    }
-    return *provider_;
-  }
-  std::unique_ptr<LiveSensor> Open() { return OpenSensor(Provider(), ""); }
+struct OrbbecMaker {
+  static constexpr const char* kDriver = "orbbec";
+  static constexpr const char* kLibrary = PLUMB_FAKE_ORBBEC;
+  static constexpr int kToldOfUnplugging = 1;
+  static constexpr std::pair kSize{640, 360};
+  static std::string Serial() { return kSerial; }
+  static void AttachUsual() { fake::Attach(Gemini()); }
+  static void Detach(const std::string& serial) { fake::Detach(serial); }
+  static void Reset() { fake::Reset(); }
+  static int NumAlive() { return fake::NumAlive(); }
 
-  void Deliver(cv::Mat image, std::uint64_t stamp_us, float scale_mm) {
+  static void Deliver(const cv::Mat& image, std::int64_t number, std::int64_t at_us,
+                      float scale_mm) {
     const bool is_depth = image.type() == CV_16UC1;
     EXPECT_TRUE(fake::Deliver(
         kSerial, {.is_depth = is_depth,
@@ -83,28 +71,56 @@ class OrbbecTest : public ::testing::Test {
                   .height = static_cast<std::uint32_t>(image.rows),
                   .bytes = static_cast<std::uint32_t>(image.total() * image.elemSize()),
                   .data = image.data,
-                  .number = number_,
-                  .stamp_us = stamp_us,
+                  .number = static_cast<std::uint64_t>(number),
+                  .stamp_us = static_cast<std::uint64_t>(at_us),
                   .scale_mm = scale_mm}));
   }
-  void DeliverPair(cv::Size color, cv::Size depth, int value = 1000, float scale_mm = 1.0F) {
-    ++number_;
-    const std::uint64_t at_us = 5'000'000 + number_ * kPeriod_us;
-    Deliver(cv::Mat(color, CV_8UC3, cv::Scalar(10, 20, 30)), at_us, 0.0F);
-    Deliver(cv::Mat(depth, CV_16UC1, cv::Scalar(value)), at_us + 4000, scale_mm);
-  }
-  /// As many pairs as are left out while the exposure settles, and one that is not.
-  void DeliverPairs(cv::Size color, cv::Size depth, int value = 1000, float scale_mm = 1.0F) {
-    for (int i = 0; i < 20; ++i) DeliverPair(color, depth, value, scale_mm);
+  static void DeliverPair(std::int64_t number, cv::Size depth = {848, 480}, int value = 1000,
+                          float scale_mm = 1.0F) {
+    const std::int64_t at_us = 5'000'000 + number * kPeriod_us;
+    Deliver(cv::Mat(720, 1280, CV_8UC3, cv::Scalar(10, 20, 30)), number, at_us, 0.0F);
+    Deliver(cv::Mat(depth, CV_16UC1, cv::Scalar(value)), number, at_us + 4000, scale_mm);
   }
 
-  const TempFolder folder_;
-  SensorSettings settings_;
-  std::unique_ptr<SensorSetup> setup_;
-  std::unique_ptr<SensorProvider> provider_;
-  std::atomic<int> num_changes_ = 0;
-  std::uint64_t number_ = 0;
+  static std::vector<Refusal> Refused() {
+    const auto with = [](void (*change)(fake::FakeCamera&), std::vector<std::string> named) {
+      return Refusal{[=] { AttachGemini(change); }, std::move(named), ""};
+    };
+    return {
+        with([](auto& camera) { camera.port = "USB2.1"; }, {kSerial, "USB 2.1", "USB 3 port"}),
+        with([](auto& camera) { camera.firmware = "1.2.9"; }, {"1.2.9", "1.2.20", "OrbbecViewer"}),
+        with([](auto& camera) { camera.color_modes = {Mode(5, 1280, 720, 0.75F)}; },
+             {kSerial, "no colour images", "docs/orbbec.md"}),
+        with([](auto& camera) { camera.busy = true; }, {kSerial, "busy"}),
+        with([](auto& camera) { camera.color_modes[0].camera.fx = std::nanf(""); },
+             {kSerial, "calibration"}),
+        with(
+            [](auto& camera) {
+              camera.depth_modes[2].lens = {.k1 = 0.1F, .model = kDistortionKannalaBrandt};
+            },
+            {"model 5"})};
+  }
+  static std::vector<Refusal> RefusedLibraries() {
+    return {{[] { fake::SetVersion(11005); }, {"1.10.5", "2.0"}, ""},
+            {{}, {"nowhere", "docs/orbbec.md"}, "/usr/lib/nowhere/libOrbbecSDK.so.2.8"}};
+  }
+  static void AttachForDoctor() {
+    AttachGemini([](auto& camera) { camera.port = "USB2.1"; });
+  }
+  static std::vector<std::string> DoctorNames() {
+    return {"OrbbecSDK 2.8.7", kLibrary, "firmware 1.8.10", "USB 3 port"};
+  }
 };
+
+}  // namespace
+
+namespace testing {
+INSTANTIATE_TYPED_TEST_SUITE_P(Orbbec, SdkDriverTest, OrbbecMaker);
+}  // namespace testing
+
+namespace {
+
+using OrbbecTest = testing::SdkDriverTest<OrbbecMaker>;
 
 TEST_F(OrbbecTest, DepthComesInItsOwnCameraAndColourHalved) {
   fake::Attach(Gemini());
@@ -117,7 +133,7 @@ TEST_F(OrbbecTest, DepthComesInItsOwnCameraAndColourHalved) {
   EXPECT_EQ(info.depth_sensor, DepthSensor::kActiveStereo);
   EXPECT_EQ(info.usable_depth, ClassOf(DepthSensor::kActiveStereo).range);
   EXPECT_TRUE(info.warnings.empty());
-  DeliverPairs({1280, 720}, {848, 480});
+  DeliverPairs();
   const std::optional<Frame> frame = sensor->Next();
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->color_rgb.size(), cv::Size(640, 360));
@@ -131,11 +147,12 @@ TEST_F(OrbbecTest, DepthComesInItsOwnCameraAndColourHalved) {
 TEST_F(OrbbecTest, ImagesStateTheUnitOfTheirDepth) {
   fake::Attach(Gemini());
   const auto sensor = Open();
-  DeliverPairs({1280, 720}, {848, 480}, 10'000, 0.1F);
+  while (number_ < 20) OrbbecMaker::DeliverPair(++number_, {848, 480}, 10'000, 0.1F);
   std::optional<Frame> frame = sensor->Next();
   ASSERT_TRUE(frame);
   EXPECT_FLOAT_EQ(frame->depth_m.at<float>(180, 320), 1.0F);
-  DeliverPair({1280, 720}, {848, 480}, 7000, 1.0F);  // What 16 bits do not hold is left out.
+  OrbbecMaker::DeliverPair(++number_, {848, 480}, 7000,
+                           1.0F);  // What 16 bits do not hold is left out.
   while (sensor->statistics().num_pairs < 5) frame = sensor->Next();
   EXPECT_EQ(frame->depth_m.at<float>(180, 320), 0.0F);
 }
@@ -164,7 +181,7 @@ TEST_F(OrbbecTest, ATimeOfFlightCameraHasItsClassAndLens) {
   EXPECT_FLOAT_EQ(static_cast<float>(lens[2]), 0.001F) << "in OpenCV's order";
   ASSERT_EQ(sensor->info().warnings.size(), 1U);
   EXPECT_THAT(sensor->info().warnings[0].English(), HasSubstr("advises 1.1.3"));
-  DeliverPairs({1280, 720}, {640, 576});
+  for (int n = 1; n <= 20; ++n) OrbbecMaker::DeliverPair(n, {640, 576});
   EXPECT_TRUE(sensor->Next());
 }
 
@@ -185,111 +202,17 @@ TEST_F(OrbbecTest, TheConfiguredExposureHoldsDuringAScan) {
   EXPECT_EQ(fake::PropertyOf(kSerial, kPropertyColorAutoExposure), 1);
 }
 
-TEST_F(OrbbecTest, UnpluggingEndsTheSensorAndItComesBack) {
-  fake::Attach(Gemini());
-  auto sensor = Open();
-  const std::string uri = sensor->description().uri;
-  DeliverPairs({1280, 720}, {848, 480});
-  EXPECT_TRUE(sensor->Next());
-  fake::Detach(kSerial);
-  EXPECT_THAT(MessageOf<DeviceLost>([&] { (void)sensor->Next(); }), HasSubstr("was unplugged"));
-  EXPECT_EQ(num_changes_, 1);
-  sensor.reset();
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }), HasSubstr("no sensor is attached"));
-  fake::Attach(Gemini());
-  EXPECT_EQ(num_changes_, 2);
-  sensor = Open();
-  EXPECT_NE(sensor->description().uri, uri);
-  DeliverPairs({1280, 720}, {848, 480});
-  EXPECT_TRUE(sensor->Next());
-}
-
 TEST_F(OrbbecTest, AnOpenCameraIsStillListedWithItsFirmware) {
   fake::Attach(Gemini());
   const auto sensor = Open();
   EXPECT_EQ(Provider().List().size(), 1U) << "the library does not open it twice";
 }
 
-TEST_F(OrbbecTest, AStallIsToldWithWhatCame) {
-  fake::Attach(Gemini());
-  const auto sensor = Open();
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)sensor->Next(); }),
-              AllOf(HasSubstr(kSerial), HasSubstr("no pair of images for 3000 ms")));
-}
-
 TEST_F(OrbbecTest, ImagesOfAnotherSizeAreAFaultThatNamesBoth) {
   fake::Attach(Gemini());
   const auto sensor = Open();
-  DeliverPair({1280, 720}, {640, 480});
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)sensor->Next(); }),
-              AllOf(HasSubstr("depth"), HasSubstr("640x480"), HasSubstr("expected 848x480")));
-}
-
-TEST_F(OrbbecTest, AUsb2PortIsRefusedWithTheReason) {
-  fake::FakeCamera camera = Gemini();
-  camera.port = "USB2.1";
-  fake::Attach(camera);
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }),
-              AllOf(HasSubstr(kSerial), HasSubstr("USB 2.1"), HasSubstr("USB 3 port")));
-}
-
-TEST_F(OrbbecTest, TooOldFirmwareIsRefusedWithWhatUpdatesIt) {
-  fake::FakeCamera camera = Gemini();
-  camera.firmware = "1.2.9";
-  fake::Attach(camera);
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }),
-              AllOf(HasSubstr("1.2.9"), HasSubstr("1.2.20"), HasSubstr("OrbbecViewer")));
-}
-
-TEST_F(OrbbecTest, ACameraWithoutAModeOrInUseIsRefusedWithTheReason) {
-  fake::FakeCamera camera = Gemini();
-  camera.color_modes = {Mode(5, 1280, 720, 0.75F)};
-  fake::Attach(camera);
-  EXPECT_THAT(
-      MessageOf<DeviceError>([&] { (void)Open(); }),
-      AllOf(HasSubstr(kSerial), HasSubstr("no colour images"), HasSubstr("docs/orbbec.md")));
-  fake::Detach(kSerial);
-  camera = Gemini();
-  camera.busy = true;
-  fake::Attach(camera);
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }),
-              AllOf(HasSubstr(kSerial), HasSubstr("busy")));
-}
-
-TEST_F(OrbbecTest, ADamagedFactoryCalibrationIsRefused) {
-  fake::FakeCamera camera = Gemini();
-  camera.color_modes[0].camera.fx = std::nanf("");
-  fake::Attach(camera);
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }),
-              AllOf(HasSubstr(kSerial), HasSubstr("calibration")));
-  fake::Detach(kSerial);
-  camera = Gemini();
-  camera.depth_modes[2].lens = {.k1 = 0.1F, .model = kDistortionKannalaBrandt};
-  fake::Attach(camera);
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)Open(); }), HasSubstr("model 5"));
-}
-
-TEST_F(OrbbecTest, OtherLibrariesAreRefusedWithWhatIsExpected) {
-  const auto refusal = [&] { return MessageOf<DeviceError>([&] { (void)Provider().List(); }); };
-  fake::SetVersion(11005);
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("1.10.5"), HasSubstr("2.0")));
-  settings_.library = "/usr/lib/nowhere/libOrbbecSDK.so.2.8";
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("nowhere"), HasSubstr("docs/orbbec.md")));
-}
-
-TEST_F(OrbbecTest, TheDoctorNamesLibraryAndCameras) {
-  fake::FakeCamera camera = Gemini();
-  camera.port = "USB2.1";
-  fake::Attach(camera);
-  std::string text;
-  bool has_bad = false;
-  for (const SensorFinding& finding : BuiltInSensors().Choose("orbbec", false).examine(settings_)) {
-    text += finding.found.English() + " | " + finding.remedy.English() + "\n";
-    has_bad = has_bad || finding.state == SensorFinding::State::kBad;
-  }
-  EXPECT_TRUE(has_bad);
-  EXPECT_THAT(text, AllOf(HasSubstr("OrbbecSDK 2.8.7"), HasSubstr(PLUMB_FAKE_ORBBEC),
-                          HasSubstr("firmware 1.8.10"), HasSubstr("USB 3 port")));
+  OrbbecMaker::DeliverPair(1, {640, 480});
+  ExpectNamed(WhyNotNext(*sensor), {"depth", "640x480", "expected 848x480"});
 }
 
 }  // namespace
