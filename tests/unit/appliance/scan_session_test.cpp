@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
+#include "daemon/appliance/room_in_use.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
