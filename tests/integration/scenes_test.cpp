@@ -132,8 +132,8 @@ TEST_F(ScenesTest, CompareTellsTheSixNumbersByName) {
   const RunResult result = Plumb(
       {"compare", SmallScene(Reference()), SmallScene(Current()), "--out", folder_ / "result"});
   ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
-  for (const char* name : {"vertical", "longitudinal", "lateral", "pitch", "roll", "yaw", "MOVE",
-                           "Research use only"}) {
+  for (const char* name : {"Vertical", "Patient left/right", "Patient head/feet", "Tilt left/right",
+                           "Tilt head/feet", "Yaw", "MOVE", "Research use only"}) {
     EXPECT_THAT(result.out, HasSubstr(name));
   }
   for (const char* file :

@@ -119,8 +119,9 @@ TEST(TakeOtherRoomTest, WithoutACalibrationOnEitherSideThereIsNoAnswer) {
   EXPECT_FALSE(compare.T_iec_reference);
   RoomAxes old = here;
   old.too_old = Message::Verbatim("401 days");
-  EXPECT_NE(reason({.unit = "a", .version = 1, .room = SignedRoom{}}, old).find("401 days"),
-            std::string::npos);
+  EXPECT_FALSE(TakeOtherRoom({.unit = "a", .version = 1, .room = SignedRoom{}}, old, compare));
+  EXPECT_EQ(compare.why_no_room, old.too_old);
+  EXPECT_FALSE(compare.T_iec_reference);
 }
 
 TEST(RoomAgeTest, ACalibrationIsTooOldAfterItsDaysAndNeverWhereNoneAreStated) {

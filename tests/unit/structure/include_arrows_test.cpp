@@ -127,7 +127,7 @@ const Arrows kAllowed = {
       "daemon/scan_files", "daemon/reports", "daemon/export_formats", "daemon/result"}},
     {"daemon/dicomd", {"algo/base", "drivers/files", "daemon/config"}},
     {"daemon/sheets", {"algo/base", "algo/types", "algo/comparison"}},
-    {"daemon/scan_files", {"algo/base", "drivers/files"}},
+    {"daemon/scan_files", {"algo/base", "daemon/files", "drivers/files"}},
     {"daemon/database",
      {"algo/base", "algo/acceptance", "drivers/files", "web/model", "daemon/scan_files",
       "daemon/result"}},
