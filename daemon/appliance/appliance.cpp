@@ -61,10 +61,12 @@ Appliance::Appliance(SharedParts& shared)
       store_thread_(shared.store_thread),
       monitoring_(shared.monitoring),
       messages_(shared.messages),
+      peers_(shared.peers),
       sensors_(shared.sensors),
       button_(loop_, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }),
       rest_(loop_, sensors_, [this] { PublishState(); }) {
   shared.sensor_changed = [this](const SensorEvent& event) { OnSensor(event); };
+  shared.peers_changed = [this](const Message& found) { OnPeers(found); };
   shared.session_unused = [this] { OnSessionUnused(); };
   monitoring_.SetHooks(
       {.ask =
@@ -385,6 +387,26 @@ void Appliance::OnTick() {
   button_.Tick();
   WatchRest();
   LookForMessages();
+  TellPeers();
+}
+
+/// The demo's patient is nobody.
+void Appliance::TellPeers() {
+  if (!peers_.IsSetUp() || store_ == nullptr || session_.id() == peers_.session()) return;
+  std::string code;
+  try {
+    const std::optional<Patient> patient =
+        session_.IsPatients() ? store_->patients.Find(session_.patient_id()) : std::nullopt;
+    if (patient) code = patient->code;
+  } catch (const std::exception& error) {
+    return storage_.FailLater(error);
+  }
+  peers_.SetOpen(session_.id(), code);
+}
+
+void Appliance::OnPeers(const Message& found) {
+  if (!found.empty()) Audit(kSelf, "session.elsewhere", session_.id(), found);
+  notices_.TellPage(web::EventKind::kStatus);
 }
 
 void Appliance::LookForMessages() {

@@ -129,6 +129,8 @@ class Appliance : private StorageUser {
   void Count(const EndedScan& outcome);
   void OnTick();
   void LookForMessages();
+  void TellPeers();
+  void OnPeers(const Message& found);
   [[nodiscard]] std::uint64_t NeededBytes() const;
   [[nodiscard]] Answer WhyFull() const;
   [[nodiscard]] Answer WhyNoSpace() const;
@@ -155,6 +157,7 @@ class Appliance : private StorageUser {
   WorkThread& store_thread_;
   LiveMonitoring& monitoring_;
   MessagesOut& messages_;
+  PeerWatch& peers_;
   SensorThread& sensors_;
   Message space_fault_;  ///< Why no scan can be stored although the store works.
   ScanState state_;

@@ -252,6 +252,7 @@ Status Appliance::WebStatus() {
   if (!profiles_.drift().empty()) status.warnings.push_back(profiles_.drift());
   status.rolled_back = rolled_back_;
   status.messages = messages_.status();
+  status.peer_notes = peers_.notes();
   for (const MessageWay& way : status.messages)
     if (!way.failure.empty()) status.warnings.push_back(way.failure);
   room_.Report(status);

@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "daemon/unit/page_identity.hpp"
+
 namespace plumb {
 namespace {
 
@@ -37,6 +39,8 @@ SharedParts::SharedParts(EventLoop& its_loop, ApplianceParts its_parts)
       session(loop, given.config, [this] { session_unused(); }),
       messages(loop, given.config.messages, RulesOf(given.config),
                [this] { notices.TellPage(web::EventKind::kStatus); }),
+      peers(loop, given.config.peers, AccessToken(given.config.peers.secret_file),
+            [this](const Message& found) { peers_changed(found); }),
       sensors(given.make_provider,
               SensorThreadOptions{.serial = given.config.appliance.sensor_serial,
                                   .before_scan = given.before_scan},

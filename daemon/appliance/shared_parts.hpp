@@ -14,6 +14,7 @@
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/work_thread.hpp"
 #include "daemon/messages_out/messages_out.hpp"
+#include "daemon/peers/peer_watch.hpp"
 #include "daemon/storage/storage_upkeep.hpp"
 #include "daemon/storage/storage_watch.hpp"
 #include "daemon/sweep/sensor_thread.hpp"
@@ -32,6 +33,7 @@ struct SharedParts {
   /// Called on the loop; set by the appliance.
   std::function<void(const SensorEvent&)> sensor_changed;
   std::function<void()> session_unused;
+  std::function<void(const Message& found)> peers_changed;
   Notices notices;
   StorageWatch storage;       ///< Opened by the appliance.
   const CurrentStore& store;  ///< In safe mode a read-only one, or none. From any thread.
@@ -43,6 +45,7 @@ struct SharedParts {
   WorkThread store_thread{256};  ///< Changes of the store, one after the other, off the loop.
   LiveMonitoring monitoring{loop, notices, store_thread};
   MessagesOut messages;
+  PeerWatch peers;
   WorkThread check_thread{4};  ///< Reads stored files; changes do not wait for it.
   SensorThread sensors;        // last: its events use the members above
 };

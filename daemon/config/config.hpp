@@ -16,6 +16,7 @@
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/types/marker.hpp"
 #include "daemon/config/messages_settings.hpp"
+#include "daemon/config/peers_settings.hpp"
 #include "daemon/files/age_recipients.hpp"
 
 namespace plumb {
@@ -118,6 +119,7 @@ struct Config {
   WebConfig web;
   UpdateConfig update;
   MessagesSettings messages;
+  PeersSettings peers;
   std::optional<std::filesystem::path>
       region_file;  ///< Absolute, or relative to the configuration file's folder.
   /// A scene whose markers are the taught ones of the room; absolute, or relative in the same way.
@@ -158,6 +160,7 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///     [web]          listen, tls_certificate, tls_key, plain_http, host_names, metrics_token_file
 ///     [update]       folder, max_bundle_mb, channel, channel_name, channel_key, trusted
 ///     [messages]     (messages_settings.hpp)
+///     [peers]        (peers_settings.hpp)
 ///     [dicom]        (checked only; dicom_settings.hpp)
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed

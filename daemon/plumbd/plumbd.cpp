@@ -81,7 +81,8 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const PlumbdOptions& options, co
                          .height = is_small ? 240 : 480,
                          .max_scenes = static_cast<std::size_t>(options.sim_scenes),
                          .at_rest = options.sim_rest,
-                         .plugged = !options.sim_unplugged};
+                         .plugged = !options.sim_unplugged,
+                         .room = options.sim_room};
   if (options.sim_board) {
     const StreamInfo usual;
     sweeps.board_centres_m =
@@ -203,7 +204,8 @@ class Plumbd {
     web::HttpServerOptions options;
     options.listen_fd = page.fd;
     options.host_names = config.web.host_names;
-    options.metrics_token = MetricsToken(config.web);
+    options.metrics_token = AccessToken(config.web.metrics_token_file);
+    options.peer_secret = AccessToken(config.peers.secret_file);
     page_ = IdentifyPage(config, options);
     if (!page.warning.empty()) page_.warnings.push_back(page.warning);
     if (options.tls) certificate_pem_ = options.tls->certificate_pem;

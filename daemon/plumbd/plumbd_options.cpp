@@ -113,6 +113,9 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
       ->group("Virtual sensor");
   app.add_option("--sim-seed", options.sim_seed, "Seed of its scenes and noise")
       ->group("Virtual sensor");
+  app.add_option("--sim-room", options.sim_room,
+                 "Seed of another room and sensor that see the same bodies")
+      ->group("Virtual sensor");
   app.add_option("--sim-scenes", options.sim_scenes, "Number of the suite's scenes; 0: all")
       ->check(CLI::Range(0, 1000))
       ->group("Virtual sensor");
@@ -149,6 +152,7 @@ Config ReadConfiguration(const PlumbdOptions& options, const SensorRegistry& reg
     config.compare.T_iec_reference = SimulatedRoom();
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
   CheckPageIdentity(config.web);
+  (void)AccessToken(config.peers.secret_file);
   (void)registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
   if (options.state) {
     config.appliance.state = fs::absolute(*options.state);

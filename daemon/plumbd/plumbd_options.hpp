@@ -27,6 +27,7 @@ struct PlumbdOptions {
   std::optional<std::string> listen;
   int sim_frames = 300, sim_scenes = 0;
   unsigned sim_seed = 1;
+  std::optional<unsigned> sim_room;
   std::string sim_size = "640x480";
   bool sim_unplugged = false, sim_board = false, sim_rest = false;
   double sim_result_s = kResultValid_s;

@@ -133,22 +133,22 @@ void KeepPageIdentity(const fs::path& state, const web::TlsIdentity& identity) {
   KeepSecret(state / kKeyFile, fmt::format("{}\n{}", identity.certificate_pem, identity.key_pem));
 }
 
-std::string MetricsToken(const WebConfig& web) {
-  if (web.metrics_token_file.empty()) return {};
+std::string AccessToken(const fs::path& file) {
+  if (file.empty()) return {};
   constexpr std::size_t kMinToken = 32, kMaxToken = 256;
-  std::string token = ReadTextFile(web.metrics_token_file, 2 * kMaxToken);
+  std::string token = ReadTextFile(file, 2 * kMaxToken);
   while (!token.empty() && std::isspace(static_cast<unsigned char>(token.back())) != 0)
     token.pop_back();
   const bool is_plain = std::ranges::all_of(
       token, [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; });
   if (!is_plain || token.size() < kMinToken || token.size() > kMaxToken)
-    throw DataError(say::upkeep::MetricsTokenUnusable(
-        web.metrics_token_file.string(), static_cast<int>(kMinToken), static_cast<int>(kMaxToken)));
+    throw DataError(say::upkeep::MetricsTokenUnusable(file.string(), static_cast<int>(kMinToken),
+                                                      static_cast<int>(kMaxToken)));
   return token;
 }
 
 void CheckPageIdentity(const WebConfig& web) {
-  (void)MetricsToken(web);
+  (void)AccessToken(web.metrics_token_file);
   if (TransportOf(web, /*is_loopback=*/false) == PageTransport::kGivenTls) (void)GivenTls(web);
 }
 

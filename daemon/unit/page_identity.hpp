@@ -38,10 +38,12 @@ void KeepSecret(const std::filesystem::path& file, const std::string& contents);
 ///         cannot be used.
 void CheckPageIdentity(const WebConfig& web);
 
-/// The token of [web] metrics_token_file; empty if none is named.
+/// What a program shows that asks without an account, such as the token of [web]
+/// metrics_token_file.
+/// @param file  Empty: there is none, and an empty text is returned.
 /// @throws DataError if the file is missing, or the token too short to be a secret or of other than
 ///         letters, digits, '-' and '_'; IoError if the file cannot be read.
-[[nodiscard]] std::string MetricsToken(const WebConfig& web);
+[[nodiscard]] std::string AccessToken(const std::filesystem::path& file);
 
 /// Stores the identity of the page for the next start, with the owner of the folder.
 /// @throws IoError

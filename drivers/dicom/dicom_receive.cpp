@@ -27,8 +27,8 @@ namespace {
 /// Seconds until the next command of an association.
 constexpr int kIdlePatience_s = 30;
 
-constexpr auto kStoredClasses =
-    std::to_array<const char*>({UID_RTStructureSetStorage, UID_RTPlanStorage, UID_CTImageStorage});
+constexpr auto kStoredClasses = std::to_array<const char*>(
+    {UID_RTStructureSetStorage, UID_RTPlanStorage, UID_CTImageStorage, UID_RawDataStorage});
 
 /// What others wrote, for a line of the journal.
 std::string Harmless(std::string_view text) {
@@ -104,8 +104,9 @@ class Receiver {
   bool AcceptContexts() {
     auto syntaxes = std::to_array<const char*>(
         {UID_LittleEndianExplicitTransferSyntax, UID_LittleEndianImplicitTransferSyntax});
-    auto classes = std::to_array<const char*>(
-        {UID_VerificationSOPClass, kStoredClasses[0], kStoredClasses[1], kStoredClasses[2]});
+    auto classes =
+        std::to_array<const char*>({UID_VerificationSOPClass, kStoredClasses[0], kStoredClasses[1],
+                                    kStoredClasses[2], kStoredClasses[3]});
     const OFCondition chosen = ASC_acceptContextsWithPreferredTransferSyntaxes(
         association_->params, classes.data(), static_cast<int>(classes.size()), syntaxes.data(),
         static_cast<int>(syntaxes.size()));

@@ -14,11 +14,17 @@
 namespace plumb {
 
 /// kReport: Encapsulated PDF. kPicture: Secondary Capture. kSurface: Encapsulated STL.
-/// kRegistration: Spatial Registration.
-enum class DicomExportKind : std::uint8_t { kReport, kPicture, kSurface, kRegistration };
+/// kRegistration: Spatial Registration. kPatient: a patient's export for another unit, in Raw Data.
+enum class DicomExportKind : std::uint8_t {
+  kReport,
+  kPicture,
+  kSurface,
+  kRegistration,
+  kPatient,
+};
 template <>
-inline constexpr auto kNamesOf<DicomExportKind> =
-    NamesUpTo<DicomExportKind::kRegistration>({"report", "picture", "surface", "registration"});
+inline constexpr auto kNamesOf<DicomExportKind> = NamesUpTo<DicomExportKind::kPatient>(
+    {"report", "picture", "surface", "registration", "patient"});
 
 /// One object. Texts are UTF-8.
 struct DicomExport {
@@ -35,7 +41,7 @@ struct DicomExport {
   Eigen::Matrix4d T_frame_moving_mm = Eigen::Matrix4d::Identity();
   int width = 0, height = 0;  ///< Picture: its size.
   /// The PDF; the pixels of the picture, 8 bits each of red, green and blue; the binary STL in
-  /// millimetres.
+  /// millimetres; the archive of the patient's export.
   std::vector<std::uint8_t> payload;
 };
 

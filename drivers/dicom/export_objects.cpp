@@ -91,6 +91,8 @@ std::string ClassUid(DicomExportKind kind) {
       return UID_SecondaryCaptureImageStorage;
     case DicomExportKind::kSurface:
       return UID_EncapsulatedSTLStorage;
+    case DicomExportKind::kPatient:
+      return UID_RawDataStorage;
     case DicomExportKind::kRegistration:
       break;
   }
@@ -102,6 +104,7 @@ const char* ModalityOf(DicomExportKind kind) {
     case DicomExportKind::kReport:
       return "DOC";
     case DicomExportKind::kPicture:
+    case DicomExportKind::kPatient:
       return "OT";
     case DicomExportKind::kSurface:
       return "M3D";
@@ -161,6 +164,12 @@ void PutSurface(const Writer& set, const DicomExport& object) {
   set.Text(DCM_ModelModification, "NO");
   set.Text(DCM_ModelMirroring, "NO");
   set.Text(DCM_ContentDescription, std::string(kShortNotice));
+}
+
+/// A Raw Data object with the attributes of an encapsulated document, which no archive shows.
+void PutPatient(const Writer& set, const DicomExport& object) {
+  set.Text(DCM_ContentDescription, std::string(kShortNotice));
+  PutDocument(set, object, "application/octet-stream");
 }
 
 void PutPicture(const Writer& set, const DicomExport& object) {
@@ -248,8 +257,12 @@ std::vector<std::uint8_t> EncodeDicom(const DicomExport& object) {
     case DicomExportKind::kRegistration:
       PutRegistration(set, object);
       break;
+    case DicomExportKind::kPatient:
+      PutPatient(set, object);
+      break;
   }
-  if (object.kind == DicomExportKind::kReport || object.kind == DicomExportKind::kSurface)
+  if (object.kind == DicomExportKind::kReport || object.kind == DicomExportKind::kSurface ||
+      object.kind == DicomExportKind::kPatient)
     Check(format.getDataset()->putAndInsertUint32(DCM_EncapsulatedDocumentLength,
                                                   static_cast<Uint32>(object.payload.size())));
   Check(format.validateMetaInfo(EXS_LittleEndianExplicit));

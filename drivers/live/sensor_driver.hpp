@@ -56,6 +56,8 @@ struct SimulatedSweeps {
   /// Centres of the room calibration board's markers on its sheet, by id. If set, three scenes of
   /// the board come first.
   std::map<int, Eigen::Vector2d> board_centres_m = {};
+  /// Seed of another room for the same bodies, as SimulateOptions::room.
+  std::optional<unsigned> room = std::nullopt;
 };
 
 /// Called during the set-up of a driver with the completed fraction and the current step.

@@ -543,6 +543,20 @@ await h.step('a version that is approved meanwhile is a question, and changes no
   await anna.goto(`${h.url}#/scan`);
 });
 
+await h.step('that the patient is open in another unit, too, is said on page and display', async () => {
+  for (const [what, words] of [['open', 'This patient is open in plumb-b.clinic.example:8080, too'],
+    ['silent', 'Whether this patient is open in plumb-b.clinic.example:8080, too, is not known']]) {
+    h.tell(`peers ${what}`);
+    await room.locator('.room-newer', { hasText: words }).waitFor();
+    await anna.locator('.who-line .caution', { hasText: words }).waitFor();
+    await h.look(room, `room-peers-${what}`, { axe: false, fullPage: false });
+  }
+  await h.look(anna, 'scan-peers', { fullPage: false });
+  h.tell('peers nothing');
+  await room.locator('.room-newer').waitFor({ state: 'detached' });
+  await anna.locator('.who-line', { hasText: 'too, is not known' }).waitFor({ state: 'detached' });
+});
+
 await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   // Where nothing is done with who is open, the screen stays usable beside it. A reload is no
   // acknowledgement.

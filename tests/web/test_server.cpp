@@ -11,7 +11,7 @@
 // pitch, roll, yaw by degrees); hole (in the region), shifted (one marker, by 12 mm), weak (roll is
 // not well seen), hurried (a third of the frames lost); "room known", "room unknown", "room
 // lasers": what the status says; "moved z 8 HFS bare": as compared where the room is not known;
-// cold, warm (the sensor); full, emptied (the disk).
+// cold, warm (the sensor); full, emptied (the disk); "peers open", "peers silent", "peers nothing".
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -48,6 +48,7 @@
 #include "web/api/http_server.hpp"
 #include "words/check.hpp"
 #include "words/dicom.hpp"
+#include "words/peers.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
 #include "words/update.hpp"
@@ -423,6 +424,15 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "roomdue") {
     service.room.due = say::store::RoomMarkerMoved(say::check::Marker(4), 8.0);
     service.Notify(web::EventKind::kData);
+  }
+  if (name == "peers") {  // WHAT: of the other unit: open, silent or nothing
+    std::string what;
+    words >> what;
+    const std::string unit = "plumb-b.clinic.example:8080";
+    service.status.peer_notes.clear();
+    if (what == "open") service.status.peer_notes = {say::peers::OpenElsewhere(unit)};
+    if (what == "silent") service.status.peer_notes = {say::peers::NotKnown(unit)};
+    service.Notify(web::EventKind::kStatus);
   }
   if (name == "overdue") service.SetOverdue(say::scan::CheckOverdue());
   if (name == "checked") service.SetOverdue({});

@@ -24,6 +24,9 @@ void AddScanApi(Routes& routes, const Services& services);
 /// @param certificate_left  Time until the page's certificate ends; nothing without one.
 void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::string& token,
                      std::function<std::optional<std::chrono::seconds>()> certificate_left);
+/// Adds GET /peers/open for units that know the secret. @param secret  Empty: the route does not
+/// exist.
+void AddPeerRoute(Routes& routes, ApplianceService& appliance, const std::string& secret);
 /// Adds status and button, settings, audit log, updates and maintenance.
 void AddUnitApi(Routes& routes, const Services& services);
 

@@ -81,6 +81,7 @@ class HttpServer::Impl {
     AddUnitApi(routes, services);
     AddMetricsRoute(routes, services.appliance, options_.metrics_token,
                     [this] { return accounts_.CertificateLeft(); });
+    AddPeerRoute(routes, services.appliance, options_.peer_secret);
     AddMonitorApi(routes, services);
     AddResultPage(routes, services);
     AddExportRoutes(routes, services);

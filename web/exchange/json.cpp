@@ -322,6 +322,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
   PutMessage(json, "reference_block", status.reference_block);
   PutMessage(json, "rolled_back", status.rolled_back);
   PutMessages(json, "warning", status.warnings);
+  PutMessages(json, "peer_note", status.peer_notes);
   PutMessages(json["storage"], "warning", status.storage.warnings);
   // This age decides what may be acted on, so the wall clock does not replace the steady one.
   if (status.last_result && !status.last_result->age_s) json["last_result"]["age_s"] = nullptr;

@@ -151,6 +151,8 @@ struct Status {
   Message rolled_back;            ///< The same as in UpdateStatus.
   ScanCounts counts;
   std::vector<MessageWay> messages;
+  /// In which other units the open patient is open, too, and of which that is not known.
+  std::vector<Message> peer_notes = {};
 };
 
 struct UpdateStatus {

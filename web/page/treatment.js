@@ -4,7 +4,7 @@
 import { get, live, may, post } from './api.js';
 import { action, clear, done, h } from './dom.js';
 import { comparesWith, sourceVersion } from './screens/captured.js';
-import { S } from './words.js';
+import { S, saidEach } from './words.js';
 
 const kSeen = 'plumb-session-seen';
 let seen;          // the session that the person here knows to be open; undefined: not yet known
@@ -258,6 +258,7 @@ export function sessionLine(place, { mayClose }) {
         : text.fraction(session.fraction)),
       h('span', {}, text.scans(session.num_scans)),
       reference && h('span', {}, comparesWith(session)),
+      saidEach(status, 'peer_notes').map((one) => h('span', { class: 'caution', role: 'alert' }, one)),
       newer && h('span', { class: 'caution' }, text.referenceNewer(newer.version)),
       newer && mayChoose && action(text.referenceUse(newer.version),
         () => useReference(session), {}),

@@ -92,9 +92,10 @@ class Renderer {
     const auto source = simulated::MakeSource(plan_, scene);
     const double start_s = source->sweep().start_time_s;
     const fs::path file =
-        folder_ / fmt::format("{}-{}-seed{}-{}x{}-{}at{:g}hz-{}.frames", plan_.name,
-                              static_cast<int>(options_.noise), options_.seed, options_.width,
-                              options_.height, options_.frames, options_.rate_hz,
+        folder_ / fmt::format("{}-{}-seed{}{}-{}x{}-{}at{:g}hz-{}.frames", plan_.name,
+                              static_cast<int>(options_.noise), options_.seed,
+                              options_.room ? fmt::format("-room{}", *options_.room) : "",
+                              options_.width, options_.height, options_.frames, options_.rate_hz,
                               plan_.scenes[scene].name);
     const RawFrame first = MakeRaw(source->Next().value(), start_s);
     FrameCacheShape shape = shape_;
@@ -136,6 +137,7 @@ SimulateOptions ScenesOf(const VirtualSensorOptions& options) {
   SimulateOptions simulate;
   simulate.suite = options.suite;
   simulate.seed = options.seed;
+  simulate.room = options.room;
   simulate.noise = options.noise;
   simulate.faults = simulated::MildFaults(options.noise);
   simulate.frames = options.frames;

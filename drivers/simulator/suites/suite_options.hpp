@@ -35,6 +35,9 @@ struct SimulateOptions {
   unsigned seed = 1;          ///< Of room, bodies, placements and hand.
   /// Seed of the sensor; not set: the same as `seed`.
   std::optional<unsigned> unit = std::nullopt;
+  /// Seed of markers, floor, hand and noise, and of the sensor without a `unit`; not set: the same
+  /// as `seed`. With it the bodies and placements of `seed` are seen in another room.
+  std::optional<unsigned> room = std::nullopt;
   simulated::NoiseLevel noise = simulated::NoiseLevel::kNominal;
   std::optional<simulated::FaultSet> faults = std::nullopt;  ///< Not set: see FaultsOf().
   DepthSensor sensor = DepthSensor::kStructuredLight;        ///< Class of the depth camera.

@@ -180,10 +180,11 @@ constexpr double kTremble_m = 4.0 * kMillimetre;
 constexpr double kTremble_rad = 0.4 * kDegree;
 
 void PlanSweeps(SuitePlan& plan, const SimulateOptions& options, double half_way, double height) {
+  const unsigned room = options.room.value_or(options.seed);
   const double tremble = plan.unit.faults.Has(Fault::kTremble) ? HandOf(options.noise) : 0.0;
   for (std::size_t i = 0; i < plan.scenes.size(); ++i) {
     ScenePlan& scene = plan.scenes[i];
-    RandomStream random(Hash(options.seed, 65, i));
+    RandomStream random(Hash(room, 65, i));
     // The operator follows the body, but not exactly.
     const Vector3d centre = scene.T_world_body * scene.body->centroid;
     const Vector3d forward = scene.T_world_body.linear().col(0);
@@ -204,13 +205,13 @@ void PlanSweeps(SuitePlan& plan, const SimulateOptions& options, double half_way
     motion.tremor = HandOf(options.noise);
     motion.tremble_m = tremble * kTremble_m;
     motion.tremble_rad = tremble * kTremble_rad;
-    motion.seed = Hash(options.seed, 66, i);
+    motion.seed = Hash(room, 66, i);
     scene.sweep = {.motion = motion,
                    .num_frames = options.frames,
                    .rate_hz = options.rate_hz,
                    .start_time_s = kFirstStamp_s + kSceneInterval_s * static_cast<double>(i),
                    .on_before_s = kSceneInterval_s * static_cast<double>(i),
-                   .seed = Hash(options.seed, 67, i)};
+                   .seed = Hash(room, 67, i)};
   }
 }
 
@@ -223,9 +224,10 @@ SuitePlan PlanSuite(const SimulateOptions& options) {
   if (!(options.rate_hz > 0) || options.rate_hz > 60)
     throw std::invalid_argument(
         fmt::format("simulate: rate must be over 0 and up to 60 Hz, found {}", options.rate_hz));
+  const unsigned room = options.room.value_or(options.seed);
   SuitePlan plan;
   plan.name = options.suite;
-  plan.unit = MakeSensorUnit(options.noise, options.unit.value_or(options.seed), options.width,
+  plan.unit = MakeSensorUnit(options.noise, options.unit.value_or(room), options.width,
                              options.height, FaultsOf(options), options.sensor);
   GiveLens(plan.unit, options.lens);
   const bool patient = options.suite == "patient";
@@ -255,15 +257,14 @@ SuitePlan PlanSuite(const SimulateOptions& options) {
     layout.push_back({scene.body->grid, scene.T_world_body, steady});
   }
   // The room is the same for every unit and fault.
-  const SensorUnit usual =
-      MakeSensorUnit(options.noise, options.seed, options.width, options.height);
+  const SensorUnit usual = MakeSensorUnit(options.noise, room, options.width, options.height);
   const LayoutRegion region = patient ? LayoutRegion{1.02, 0.50, 26} : LayoutRegion{0.95, 0.66, 24};
-  plan.room.boards = LayBoards(region, layout, usual.color_true, options.seed);
-  ApplyRoomFaults(plan, options.seed);
+  plan.room.boards = LayBoards(region, layout, usual.color_true, room);
+  ApplyRoomFaults(plan, room);
   plan.reference_marker = plan.room.boards.front().id;
   for (ScenePlan& scene : plan.scenes) scene.sweep.reference_marker = plan.reference_marker;
-  plan.room.support_texture = std::make_shared<const Texture>(patient ? PaintSheet(options.seed)
-                                                                      : PaintFloor(options.seed));
+  plan.room.support_texture =
+      std::make_shared<const Texture>(patient ? PaintSheet(room) : PaintFloor(room));
   plan.room.skin_texture = std::make_shared<const Texture>(PaintSkin(options.seed));
   if (patient)
     plan.room.couch =

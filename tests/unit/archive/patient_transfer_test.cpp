@@ -3,7 +3,10 @@
 #include "daemon/archive/patient_transfer.hpp"
 
 #include <fstream>
+#include <string>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -24,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using testing::FilesBelow;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -69,6 +73,31 @@ class PatientTransferTest : public ::testing::Test {
   [[nodiscard]] fs::path here() const { return folder_ / "here"; }
   [[nodiscard]] fs::path there() const { return folder_ / "there"; }
   [[nodiscard]] fs::path out() const { return folder_ / "out"; }
+
+  /// Plans the newest reference of that unit anew: an approved one gets a next version.
+  static void ChangePlan(const fs::path& state, double tolerance_mm) {
+    Store store(state);
+    const Reference newest = store.references.List(store.patients.FindByCode("P-7")->id).front();
+    ReferencePlan plan = newest.plan;
+    plan.tolerance.shift_mm = tolerance_mm;
+    (void)store.references.Plan(kAnna, newest.id, newest.revision, plan);
+  }
+  /// All that the unit says of the patient's references, the newest first.
+  static std::vector<std::string> ReferencesIn(const fs::path& state) {
+    Store store(state);
+    std::vector<std::string> all;
+    for (const Reference& one : store.references.List(store.patients.FindByCode("P-7")->id))
+      all.push_back(fmt::format("{} v{} r{} {} {}", one.id, one.version, one.revision,
+                                one.approved_by, PlanJson(one.plan).dump()));
+    return all;
+  }
+  /// Imports one unit's present data into the other: it must be refused and change nothing.
+  void ExpectConflict(const fs::path& from, const fs::path& to, const char* name) {
+    const auto before = ReferencesIn(to);
+    (void)ExportPatient(from, "P-7", folder_ / name);
+    EXPECT_THROW((void)ImportPatient(folder_ / name, to), std::invalid_argument);
+    EXPECT_EQ(ReferencesIn(to), before);
+  }
 
   [[nodiscard]] std::string WhyNot() const {
     return MessageOf<DataError>([&] { (void)ImportPatient(out(), there()); });
@@ -268,6 +297,51 @@ TEST_F(PatientTransferTest, WhatWasChangedInBothUnitsStaysAsItIsInBoth) {
   EXPECT_THROW((void)ImportPatient(folder_ / "out3", here()), std::invalid_argument);
   EXPECT_EQ(FilesBelow(here() / "scans"), files_here);
   EXPECT_EQ(FilesBelow(there() / "scans"), files_there);
+}
+
+TEST_F(PatientTransferTest, ANewerPlanDoesNotReplaceTheOneInUse) {
+  (void)ExportPatient(here(), "P-7", out());
+  (void)ImportPatient(out(), there());
+  {
+    Store store(there());
+    const Reference draft = store.references.List(store.patients.FindByCode("P-7")->id).front();
+    store.references.Approve(kBert, draft.id, draft.revision);
+  }
+  ChangePlan(here(), 2.0);
+  ExpectConflict(here(), there(), "newer");
+  EXPECT_THAT(ReferencesIn(there()), ElementsAre(HasSubstr("bert")));
+}
+
+TEST_F(PatientTransferTest, AnOlderPlanDoesNotComeBack) {
+  (void)ExportPatient(here(), "P-7", out());
+  (void)ImportPatient(out(), there());
+  ChangePlan(here(), 2.0);
+  ChangePlan(there(), 4.0);
+  const auto first = ReferencesIn(here()), second = ReferencesIn(there());
+  EXPECT_THROW((void)ImportPatient(out(), here()), std::invalid_argument);
+  EXPECT_TRUE(ImportPatient(out(), there()).was_there) << "the very export that was imported";
+  EXPECT_EQ(ReferencesIn(here()), first);
+  EXPECT_EQ(ReferencesIn(there()), second);
+}
+
+TEST_F(PatientTransferTest, PlansThatWereChangedInBothUnitsStayInBoth) {
+  (void)ExportPatient(here(), "P-7", out());
+  (void)ImportPatient(out(), there());
+  ChangePlan(here(), 2.0);
+  ChangePlan(there(), 4.0);
+  ExpectConflict(here(), there(), "first");
+  ExpectConflict(there(), here(), "second");
+  // A person decides: what is wiped in one unit comes from the other, and nothing of it is
+  // approved.
+  {
+    Store store(there());
+    store.removal.WipePatient(kAnna, store.patients.FindByCode("P-7")->id);
+  }
+  (void)ImportPatient(folder_ / "first", there());
+  const auto came = ReferencesIn(there()), there_were = ReferencesIn(here());
+  ASSERT_EQ(came.size(), there_were.size());
+  for (const std::string& one : came) EXPECT_THAT(one, Not(HasSubstr("bert")));
+  EXPECT_THAT(came.front(), HasSubstr("2.0"));
 }
 
 TEST_F(PatientTransferTest, ACodeWithOtherDataIsRefused) {

@@ -506,6 +506,21 @@ TEST(ConfigTest, MessagesGoToPlainAddressesAndBeyondThisMachineOnlyWithTls) {
             "no error");
 }
 
+TEST(ConfigTest, OtherUnitsNeedASecretAndTls) {
+  const std::string secret = "secret_file = \"/etc/plumb/peers.secret\"\n";
+  const auto units = [](const std::string& one) {
+    return fmt::format("[peers]\nunits = [\"{}\"]\n", one);
+  };
+  EXPECT_EQ(ErrorOf(units("https://plumb-b.example:8080") + secret), "no error");
+  EXPECT_EQ(ErrorOf(units("http://127.0.0.1:8080") + secret), "no error");
+  EXPECT_EQ(ErrorOf("[peers]\n" + secret), "no error") << "answers, and asks nobody";
+  EXPECT_THAT(ErrorOf(units("https://plumb-b.example:8080")), HasSubstr("peers.secret_file"));
+  for (const char* wrong : {"http://plumb-b.example", "https://b.example/path", "plumb-b",
+                            "https://u@b.example", "ftp://127.0.0.1"})
+    EXPECT_THAT(ErrorOf(units(wrong) + secret), HasSubstr("peers.units")) << wrong;
+  EXPECT_THAT(ErrorOf("[peers]\nsecret = \"x\"\n"), HasSubstr("secret"));
+}
+
 TEST(ConfigTest, AChannelOfUpdatesNeedsItsKeyAndTls) {
   const std::string key = "channel_key = \"2RxgFSNjDpGISHQmSN0earBA6NTyA+BYzefuXmYB5ew=\"\n";
   EXPECT_EQ(ErrorOf("[update]\nchannel = \"https://u.example/plumb\"\n" + key), "no error");

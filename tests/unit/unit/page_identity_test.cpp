@@ -163,11 +163,11 @@ TEST_F(PageIdentityTest, WhereNothingCanBeWrittenItIsForThisRunOnly) {
 }
 
 TEST_F(PageIdentityTest, TheTokenOfMetricsIsASecretOrRefused) {
-  EXPECT_TRUE(MetricsToken(config_.web).empty());
+  EXPECT_TRUE(AccessToken(config_.web.metrics_token_file).empty());
   config_.web.metrics_token_file = folder_ / "token";
   const auto token_of = [&](const std::string& text) {
     std::ofstream(folder_ / "token") << text;
-    return MetricsToken(config_.web);
+    return AccessToken(config_.web.metrics_token_file);
   };
   const std::string shortest(32, 'a');
   EXPECT_EQ(token_of(shortest + "\n"), shortest);
@@ -178,7 +178,7 @@ TEST_F(PageIdentityTest, TheTokenOfMetricsIsASecretOrRefused) {
     EXPECT_THROW(CheckPageIdentity(config_.web), DataError);
   }
   fs::remove(folder_ / "token");
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)MetricsToken(config_.web); }), HasSubstr("token"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)AccessToken(config_.web.metrics_token_file); }), HasSubstr("token"));
 }
 
 TEST_F(PageIdentityTest, TheConfigurationsCertificateIsUsedOrRefusedByName) {

@@ -11,9 +11,8 @@
 
 #include "algo/base/names.hpp"
 #include "web/api/all_routes.hpp"
+#include "web/api/watching/bearer.hpp"
 #include "web/exchange/routes.hpp"
-#include "web/security/secrets.hpp"
-#include "words/web.hpp"
 
 namespace plumb::web {
 namespace {
@@ -170,13 +169,7 @@ void AddMetricsRoute(Routes& routes, ApplianceService& appliance, const std::str
                      std::function<std::optional<std::chrono::seconds>()> certificate_left) {
   if (token.empty()) return;
   routes.Read("/metrics", Permission::kNone, [=, &appliance](const Request& request) {
-    constexpr std::string_view kBearer = "Bearer ";
-    const std::string_view given = request.Header("authorization");
-    if (!given.starts_with(kBearer) || !IsSameSecret(given.substr(kBearer.size()), token)) {
-      Response refused = ErrorResponse(401, say::web::NotTheMetricsToken());
-      refused.headers.emplace_back("WWW-Authenticate", "Bearer");
-      return refused;
-    }
+    if (!IsBearerOf(request, token)) return NotTheBearer();
     return BodyResponse(kMetricsType, MetricsText(appliance.GetStatus(), appliance.GetHealth(),
                                                   WallClock::now(), certificate_left()));
   });

@@ -105,6 +105,8 @@ function top(status, said, isSwapped, isChecked) {
     session.reference && h('span', {}, ` · ${comparesWith(session)}`)),
     !isCheck && session?.newer_reference && h('p', { class: 'room-newer caution', role: 'alert' },
       S.session.referenceNewer(session.newer_reference.version)),
+    !isCheck && session && saidEach(status, 'peer_notes').map(
+      (one) => h('p', { class: 'room-newer caution', role: 'alert' }, one)),
     h('ul', { class: 'room-marks' },
       mark(!status.check_overdue, status.check_failed ? text.checkFailed
         : status.check_overdue ? text.checkOverdue : text.checkDone),

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/peers/peer_watch.hpp"
+
+#include <mutex>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/fake_peer.hpp"
+#include "web/security/patient_hash.hpp"
+#include "words/peers.hpp"
+
+namespace plumb {
+namespace {
+
+using ::testing::ElementsAre;
+using testing::FakePeer;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using testing::PeerConnection;
+
+const std::string kSecret(40, 's');
+
+/// Another unit, whose answer is the test's.
+class PeerWatchTest : public ::testing::Test {
+ protected:
+  PeerWatchTest() { settings_.units = {fmt::format("http://{}", name())}; }
+
+  [[nodiscard]] std::string name() const { return fmt::format("127.0.0.1:{}", server_.port()); }
+  void Make(const std::string& secret = kSecret) {
+    watch_ = std::make_unique<PeerWatch>(
+        loop_, settings_, secret,
+        [this](const Message& found) {
+          found_.push_back(found);
+          if (watch_->notes() == wanted_) loop_.Quit(0);
+        },
+        std::chrono::milliseconds(5));
+  }
+  void RunUntil(std::vector<Message> notes) {
+    wanted_ = std::move(notes);
+    auto patience = loop_.MakeTimer("patience", [this] { loop_.Quit(1); });
+    patience.ArmAfter(std::chrono::seconds(60));
+    EXPECT_EQ(loop_.Run(), 0) << "in vain";
+  }
+  void Answer(const std::string& answer) {
+    const std::lock_guard lock(mutex_);
+    answer_ = answer;
+  }
+  static std::string Json(const std::string& body) {
+    return fmt::format("HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n{}", body.size(), body);
+  }
+  [[nodiscard]] std::string head() {
+    const std::lock_guard lock(mutex_);
+    return head_;
+  }
+
+  std::mutex mutex_;
+  std::string head_, answer_ = Json("{\"open\": true}");
+  FakePeer server_{[this](PeerConnection& client) {
+    const std::string head = client.ReadTo("\r\n\r\n");
+    const std::lock_guard lock(mutex_);
+    head_ = head;
+    client.Write(answer_);
+  }};
+  PeersSettings settings_;
+  EventLoop loop_;
+  std::vector<Message> found_, wanted_;
+  std::unique_ptr<PeerWatch> watch_;
+};
+
+TEST_F(PeerWatchTest, AsksByTheHashOnlyAndSaysWhereThePatientIsOpen) {
+  Make();
+  watch_->SetOpen("7", "Anna-1");
+  RunUntil({say::peers::OpenElsewhere(name())});
+  EXPECT_THAT(found_, ElementsAre(say::peers::OpenElsewhere(name())));
+  EXPECT_THAT(head(), HasSubstr("Authorization: Bearer " + kSecret));
+  EXPECT_THAT(head(), HasSubstr("GET /peers/open?patient=" + web::PatientHash("ANNA-1", kSecret)));
+  EXPECT_THAT(head(), Not(HasSubstr("Anna")));
+  Answer(Json("{\"open\": false}"));
+  RunUntil({});
+  EXPECT_EQ(watch_->session(), "7");
+  Answer(Json("{\"open\": true}"));
+  RunUntil({say::peers::OpenElsewhere(name())});
+  watch_->SetOpen("", "");
+  EXPECT_THAT(watch_->notes(), IsEmpty());
+}
+
+TEST_F(PeerWatchTest, WhateverElseIsAnsweredIsNotKnown) {
+  Make();
+  for (const std::string& answer :
+       {std::string("HTTP/1.1 401 No\r\nContent-Length: 0\r\n\r\n"), Json("{\"open\": 1}"),
+        Json("[]"), Json("no"), Json("{\"open\": true, \"x\": \"" + std::string(300, 'x') + "\"}"),
+        std::string("HTTP/1.1 302 No\r\nLocation: /metrics\r\nContent-Length: 0\r\n\r\n"),
+        std::string()}) {
+    SCOPED_TRACE(answer);
+    Answer(answer);
+    watch_->SetOpen("7", "P");
+    RunUntil({say::peers::NotKnown(name())});
+    watch_->SetOpen("", "");
+  }
+  for (const Message& found : found_) EXPECT_TRUE(found.empty()) << found.English();
+}
+
+TEST_F(PeerWatchTest, NobodyIsAskedWithoutAPatientOrASecret) {
+  Make("");
+  EXPECT_FALSE(watch_->IsSetUp());
+  watch_->SetOpen("7", "P");
+  EXPECT_THAT(watch_->notes(), IsEmpty());
+  Make();
+  EXPECT_TRUE(watch_->IsSetUp());
+  // The first question is the one for the patient that was opened.
+  watch_->SetOpen("8", "Q");
+  RunUntil({say::peers::OpenElsewhere(name())});
+  EXPECT_THAT(head(), HasSubstr(web::PatientHash("q", kSecret)));
+}
+
+}  // namespace
+}  // namespace plumb
