@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <thread>
@@ -14,6 +15,9 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "daemon/config/sensor_settings.hpp"
+#include "drivers/replay/tum_recording.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/unit/plumbd/stored_scan.hpp"
 
 namespace plumb::testing {
@@ -67,6 +71,29 @@ inline Config ConfigForDriver(const std::string& driver, const std::string& libr
                                  driver, library, more, markers.dictionary, markers.length_m,
                                  markers.reference.value()),
                      "plumb.toml");
+}
+
+/// A scan with the driver, from its name in a configuration to what is stored, while a camera plays
+/// the sweep. @param more  Further keys of [sensor]. @return the recording.
+template <typename Deliver>
+std::unique_ptr<FrameSource> ExpectStoredScan(EventLoop& loop, const std::string& driver,
+                                              const std::string& library, const PlayedSweep& sweep,
+                                              const std::string& serial, Deliver&& deliver,
+                                              const std::string& more = "") {
+  static const TempFolder folder;
+  Config config = ConfigForDriver(driver, library, sweep.info.room_markers, more);
+  config.appliance.state = folder / driver;
+  const std::jthread camera([&](const std::stop_token& stop) { sweep.Play(stop, deliver); });
+  const std::unique_ptr<SensorSetup> setup = BuiltInSensors()
+                                                 .Choose(config.appliance.sensor_driver, false)
+                                                 .set_up(SensorSettingsOf(config), {}, {}, {});
+  const StoredScan stored = ScanWith(loop, *setup, config, kPlayedWholeWay);
+  EXPECT_EQ(stored.status["sensor"]["serial"], serial) << stored.status.dump(2);
+  EXPECT_EQ(stored.status["last_result"]["is_reference"], true);
+  EXPECT_TRUE(std::filesystem::exists(stored.folder / "scene" / "scene.json"));
+  auto recording = OpenTumRecording(stored.folder / "recording");
+  EXPECT_GE(recording->info().num_frames, kPlayedFrames / 2);
+  return recording;
 }
 
 }  // namespace plumb::testing
