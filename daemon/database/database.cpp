@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "daemon/database/examination.hpp"
+#include "daemon/database/keyed_digest.hpp"
 #include "daemon/database/page_seals.hpp"
 #include "daemon/database/sealed_pages.hpp"
 #include "daemon/database/sealed_vfs.hpp"
@@ -243,6 +244,10 @@ bool Database::Checkpoint() {
       sqlite3_wal_checkpoint_v2(handle_, "main", SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   sqlite3_busy_timeout(handle_, static_cast<int>(busy_wait_.count()));
   return code == SQLITE_OK;
+}
+
+void Database::UseKey(const std::string& key) {
+  if (const int code = AddKeyedDigest(handle_, key); code != SQLITE_OK) Fail(code, "set_up");
 }
 
 void Database::WriteSealed(const std::filesystem::path& file) {

@@ -88,7 +88,8 @@ inline void MakeSchema9(const std::filesystem::path& database) {
           "templates DROP COLUMN posture; ALTER TABLE templates DROP COLUMN hint; ALTER TABLE "
           "patients DROP COLUMN alert; ALTER TABLE patients DROP COLUMN photo; DROP TABLE "
           "backup_scans; DROP TABLE backups; DROP TABLE removals; DROP "
-          "TABLE bin; DROP TABLE second_factors; DROP TABLE pins; PRAGMA user_version = 9");
+          "TABLE bin; DROP TABLE second_factors; DROP TABLE pins; DROP TABLE row_digests; PRAGMA "
+          "user_version = 9");
 }
 
 /// Turns a database into one of the schema of 0.1.0, without what that cannot hold.
