@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 
 #include "daemon/database/audit_chain.hpp"
-#include "daemon/database/keyed_digest.hpp"
 #include "daemon/database/schema.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "drivers/files/file_io.hpp"
@@ -22,6 +21,8 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kRowKeyBytes = 32;
 
 /// What a kind's digests are made of.
 struct SignedRows {
