@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_json.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "web/model/wall_clock.hpp"
@@ -12,6 +13,7 @@ namespace plumb {
 namespace {
 
 CouchProfile ReadCouchFrom(Database& database) {
+  RequireRow(database, RowKind::kSetting, "couch");
   const std::optional<std::string> stored =
       database.FirstText("SELECT value FROM settings WHERE name = 'couch'");
   return stored ? ParseCouch(*stored) : CouchProfile{};

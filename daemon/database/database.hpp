@@ -160,6 +160,8 @@ class Database {
   /// Moves the log of writes into the database and empties it. False: another connection is
   /// reading, or the disk refuses; everything stays in the log then.
   bool Checkpoint();
+  /// Of `keyed_digest(...)` in its statements: HMAC-SHA256 of types and values, in hexadecimal.
+  void UseKey(const std::string& key);
   /// A copy whose pages carry checksums. The file must not exist. @throws IoError and its kinds
   void WriteSealed(const std::filesystem::path& file);
 

@@ -7,12 +7,15 @@
 #include <utility>
 
 #include "daemon/database/audit_chain.hpp"
+#include "daemon/database/row_digests.hpp"
 
 namespace plumb {
 
 StoreDatabase::StoreDatabase(std::unique_ptr<Database> write, const std::filesystem::path& file,
                              Database::Access readers)
-    : write_(std::move(write)), row_(file, readers), list_(file, readers) {}
+    : write_(std::move(write)), row_(file, readers), list_(file, readers) {
+  for (Database* reader : {&row_, &list_}) UseRowKey(*reader, file.parent_path());
+}
 
 namespace {
 

@@ -32,7 +32,7 @@ class StoreDatabase {
     Database* database_;
   };
 
-  /// @param write    The connection for changes, with tables of this version.
+  /// @param write    The connection for changes, with tables of this version and its digests.
   /// @param readers  How the two others open the same file.
   /// @throws IoError and its kinds
   StoreDatabase(std::unique_ptr<Database> write, const std::filesystem::path& file,

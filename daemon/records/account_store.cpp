@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "words/store.hpp"
@@ -47,11 +48,15 @@ constexpr const char* kSecondFactorOf =
 }  // namespace
 
 std::vector<User> UserStore::List() {
-  return database_.ForRows()->All(kUserColumns + "ORDER BY name LIMIT 1000", ReadUser);
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRows(*rows, RowKind::kAccount);
+  return rows->All(kUserColumns + "ORDER BY name LIMIT 1000", ReadUser);
 }
 
 std::optional<User> UserStore::Find(const std::string& name) {
-  return database_.ForRows()->First(kUserColumns + "WHERE name = ?", ReadUser, name);
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRow(*rows, RowKind::kAccount, name);
+  return rows->First(kUserColumns + "WHERE name = ?", ReadUser, name);
 }
 
 void UserStore::Add(const Actor& actor, const User& user) {
@@ -70,6 +75,7 @@ void UserStore::Add(const Actor& actor, const User& user) {
 
 void UserStore::Change(const Actor& actor, const UserChange& wanted) {
   StoreChange change(database_);
+  RequireRow(*change, RowKind::kAccount, wanted.name);
   const std::optional<User> found =
       change->First(kUserColumns + "WHERE name = ?", ReadUser, wanted.name);
   if (!found) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoAccount());
@@ -96,7 +102,9 @@ void UserStore::Change(const Actor& actor, const UserChange& wanted) {
 }
 
 std::optional<SecondFactor> UserStore::SecondFactorOf(const std::string& name) {
-  return database_.ForRows()->First(kSecondFactorOf, ReadSecondFactor, name);
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRow(*rows, RowKind::kAccount, name);
+  return rows->First(kSecondFactorOf, ReadSecondFactor, name);
 }
 
 void UserStore::SetSecondFactor(const Actor& actor, const std::string& name,
@@ -104,6 +112,7 @@ void UserStore::SetSecondFactor(const Actor& actor, const std::string& name,
                                 const std::optional<SecondFactor>& wanted,
                                 const std::string& action) {
   StoreChange change(database_);
+  RequireRow(*change, RowKind::kAccount, name);
   if (!change->Has("SELECT 1 FROM users WHERE name = ?", name))
     throw StoreRefusal(ChangeResult::kNotFound, say::store::NoAccount());
   if (change->First(kSecondFactorOf, ReadSecondFactor, name) != expected)
@@ -123,7 +132,9 @@ void UserStore::SetSecondFactor(const Actor& actor, const std::string& name,
 }
 
 std::optional<std::string> UserStore::PinOf(const std::string& name) {
-  return database_.ForRows()->First(
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRow(*rows, RowKind::kAccount, name);
+  return rows->First(
       "SELECT hash FROM pins WHERE user = ?", [](const Statement& row) { return row.Text(0); },
       name);
 }
@@ -131,6 +142,7 @@ std::optional<std::string> UserStore::PinOf(const std::string& name) {
 void UserStore::SetPin(const Actor& actor, const std::string& name,
                        const std::optional<std::string>& hash) {
   StoreChange change(database_);
+  RequireRow(*change, RowKind::kAccount, name);
   if (!change->Has("SELECT 1 FROM users WHERE name = ?", name))
     throw StoreRefusal(ChangeResult::kNotFound, say::store::NoAccount());
   if (hash) {
@@ -172,7 +184,9 @@ void Insert(StoreChange& change, const Actor& actor, const Display& display) {
 }  // namespace
 
 std::vector<Display> DisplayStore::List() {
-  return database_.ForRows()->All(
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRows(*rows, RowKind::kDisplay);
+  return rows->All(
       "SELECT id, name, token_hash, paired_at, paired_by FROM displays ORDER BY id LIMIT 100",
       [](const Statement& row) {
         return Display{.id = row.Text(0),

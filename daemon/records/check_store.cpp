@@ -2,6 +2,7 @@
 #include "daemon/records/check_store.hpp"
 
 #include "algo/base/errors.hpp"
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "words/store.hpp"
@@ -95,7 +96,15 @@ std::optional<CheckBaseline> CheckStore::Baseline() {
 }
 
 std::optional<MarkerBaseline> CheckStore::BaselineMarkers() {
-  const std::optional<std::string> json = database_.ForRows()->FirstText(
+  const StoreDatabase::Held rows = database_.ForRows();
+  const auto newest =
+      rows->First("SELECT id, check_id FROM check_baselines ORDER BY id DESC LIMIT 1",
+                  [](const Statement& row) { return std::pair(row.Text(0), row.Text(1)); });
+  if (newest) {
+    RequireRow(*rows, RowKind::kBaseline, newest->first);
+    RequireRow(*rows, RowKind::kCheck, newest->second);
+  }
+  const std::optional<std::string> json = rows->FirstText(
       "SELECT json FROM check_baselines JOIN checks ON checks.id = check_id ORDER BY "
       "check_baselines.id DESC LIMIT 1");
   if (!json) return std::nullopt;

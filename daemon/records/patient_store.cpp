@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "web/model/limits.hpp"
@@ -239,7 +240,9 @@ void TreatmentStore::CloseAll(const Actor& actor) {
 }
 
 std::optional<std::string> TreatmentStore::PatientOf(const std::string& session_id) {
-  return database_.ForRows()->First(
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRow(*rows, RowKind::kSession, session_id);
+  return rows->First(
       "SELECT patient_id FROM sessions WHERE id = ?",
       [](const Statement& row) { return row.Text(0); }, ParseId(session_id));
 }
@@ -300,7 +303,8 @@ void TreatmentStore::UseReference(const Actor& actor, const std::string& session
 }
 
 std::optional<TreatmentSession> TreatmentStore::Opened() {
-  return database_.ForRows()->First(
+  const StoreDatabase::Held rows = database_.ForRows();
+  std::optional<TreatmentSession> opened = rows->First(
       "WITH open AS (SELECT sessions.*, (SELECT id FROM refs WHERE refs.patient_id = "
       "sessions.patient_id AND approved_by <> '' ORDER BY version DESC LIMIT 1) AS newest_id FROM "
       "sessions WHERE closed_at IS NULL ORDER BY id DESC LIMIT 1) "
@@ -343,6 +347,8 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
         if (!row.IsNull(16)) session.other_reference = version(16, 18);
         return session;
       });
+  if (opened) RequireRow(*rows, RowKind::kSession, opened->id);
+  return opened;
 }
 
 }  // namespace plumb

@@ -5,6 +5,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_json.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/database/stored_values.hpp"
@@ -106,6 +107,12 @@ void RequireSecondPerson(const Reference& reference, const Actor& approver) {
     throw StoreRefusal(ChangeResult::kRefused, say::store::ReferenceSecondPerson());
 }
 
+/// @throws DatabaseCorrupt if the row is not as it was written
+std::optional<Reference> AsSigned(Database& rows, std::optional<Reference> reference) {
+  if (reference) RequireRow(rows, RowKind::kReference, reference->id);
+  return reference;
+}
+
 }  // namespace
 
 std::vector<WaitingReference> ReferenceStore::Waiting() {
@@ -131,23 +138,29 @@ std::vector<Reference> ReferenceStore::List(const std::string& patient_id) {
 }
 
 std::optional<Reference> ReferenceStore::Find(const std::string& id) {
-  return database_.ForRows()->First(kReferenceColumns + "WHERE id = ?", ReadReference, ParseId(id));
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRow(*rows, RowKind::kReference, id);
+  return rows->First(kReferenceColumns + "WHERE id = ?", ReadReference, ParseId(id));
 }
 
 std::optional<Reference> ReferenceStore::Approved(const std::string& patient_id) {
-  return database_.ForRows()->First(
-      kReferenceColumns +
-          "WHERE patient_id = ? AND approved_by <> '' ORDER BY version DESC LIMIT 1",
-      ReadReference, ParseId(patient_id));
+  const StoreDatabase::Held rows = database_.ForRows();
+  return AsSigned(*rows, rows->First(kReferenceColumns + "WHERE patient_id = ? AND approved_by <> "
+                                                         "'' ORDER BY version DESC LIMIT 1",
+                                     ReadReference, ParseId(patient_id)));
 }
 
 std::optional<Reference> ReferenceStore::OfSession(const std::string& session_id) {
-  return database_.ForRows()->First(
-      kReferenceColumns +
-          "WHERE id = (SELECT ifnull(reference_id, (SELECT id FROM refs WHERE refs.patient_id = "
-          "sessions.patient_id AND approved_by <> '' ORDER BY version DESC LIMIT 1)) FROM sessions "
-          "WHERE sessions.id = ?)",
-      ReadReference, ParseId(session_id));
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRow(*rows, RowKind::kSession, session_id);
+  return AsSigned(
+      *rows,
+      rows->First(
+          kReferenceColumns +
+              "WHERE id = (SELECT ifnull(reference_id, (SELECT id FROM refs WHERE refs.patient_id "
+              "= sessions.patient_id AND approved_by <> '' ORDER BY version DESC LIMIT 1)) FROM "
+              "sessions WHERE sessions.id = ?)",
+          ReadReference, ParseId(session_id)));
 }
 
 KnownPlanning ReferenceStore::PlanningOf(const std::string& patient_id, const std::string& hash) {

@@ -5,6 +5,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "daemon/records/check_json.hpp"
@@ -76,7 +77,10 @@ RoomCandidate RoomStore::Candidate(const std::string& sensor_serial, WallClock::
 }
 
 std::optional<SignedRoom> RoomStore::Newest() {
-  return database_.ForRows()->First(kNewestRooms, ReadRoom, 1);
+  const StoreDatabase::Held rows = database_.ForRows();
+  std::optional<SignedRoom> newest = rows->First(kNewestRooms, ReadRoom, 1);
+  if (newest) RequireRow(*rows, RowKind::kRoom, std::to_string(newest->version));
+  return newest;
 }
 
 std::vector<SignedRoom> RoomStore::List(int limit) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/database/clock_doubt.hpp"
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_json.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "words/store.hpp"
@@ -37,7 +38,9 @@ Message ValuesForLog(const PlanTemplate& one) {
 }  // namespace
 
 Settings SettingsStore::Get() {
-  const std::optional<std::string> stored = database_.ForRows()->FirstText(kStoredSettings);
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRow(*rows, RowKind::kSetting, "settings");
+  const std::optional<std::string> stored = rows->FirstText(kStoredSettings);
   return stored ? ParseSettings(*stored) : first_;
 }
 
@@ -57,8 +60,9 @@ void SettingsStore::Change(const Actor& actor, const Settings& settings) {
 }
 
 std::vector<PlanTemplate> TemplateStore::List() {
-  return database_.ForRows()->All(std::string(kTemplateColumns) + "ORDER BY site LIMIT 100",
-                                  ReadTemplate);
+  const StoreDatabase::Held rows = database_.ForRows();
+  RequireRows(*rows, RowKind::kTemplate);
+  return rows->All(std::string(kTemplateColumns) + "ORDER BY site LIMIT 100", ReadTemplate);
 }
 
 void TemplateStore::Set(const Actor& actor, const PlanTemplate& wanted) {

@@ -15,6 +15,7 @@
 #include "daemon/database/database_mark.hpp"
 #include "daemon/database/page_seals.hpp"
 #include "daemon/database/retry_while_busy.hpp"
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/schema.hpp"
 #include "daemon/state_folder/old_copies.hpp"
 #include "daemon/state_folder/restore_note.hpp"
@@ -128,8 +129,14 @@ std::unique_ptr<Database> OpenForChanges(const ScanFolders& folders, const Store
   std::unique_ptr<Database> database =
       OpenChecked(folders.state(), options, recovery.checked_database);
   RefuseScansOfAnother(*database, folders);
+  const std::int64_t version = database->FirstInteger("PRAGMA user_version").value_or(0);
   Migrate(*database);
   RefuseLostAccounts(*database, folders.state());
+  KeepRowDigests(*database, folders.state(),
+                 version == 0                              ? RowsAre::kNew
+                 : fs::exists(folders.state() / kRestored) ? RowsAre::kRestored
+                 : version < kSchemaVersion                ? RowsAre::kOlder
+                                                           : RowsAre::kSigned);
   DoubtAfterLeap(*database, WallClock::now());
   (void)database->Checkpoint();  // so that the tables are not in the log of writes alone
   return database;

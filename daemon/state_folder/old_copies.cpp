@@ -85,6 +85,8 @@ void RemoveAccountsFromCopy(const fs::path& copy) {
     database.Run("DELETE FROM users");
     if (database.Has("SELECT 1 FROM sqlite_master WHERE name = 'displays'"))
       database.Run("DELETE FROM displays");
+    if (database.Has("SELECT 1 FROM sqlite_master WHERE name = 'row_digests'"))
+      database.Run("DELETE FROM row_digests WHERE kind IN ('account', 'display')");
   });
 }
 

@@ -16,6 +16,7 @@
 #include "daemon/archive/summed_folder.hpp"
 #include "daemon/database/clock_doubt.hpp"
 #include "daemon/database/database.hpp"
+#include "daemon/database/row_digests.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "daemon/loop/freed_memory.hpp"
 #include "daemon/loop/give_way.hpp"
@@ -210,8 +211,10 @@ void StorageUpkeep::CheckRecords() {
       // The rows that are read come from the memory: only this notices later damage on the disk.
       if (!std::exchange(is_database_checked_, false)) {
         constexpr std::chrono::minutes kLongest{30};
-        Database(storage_.state() / kDatabaseFile, Database::Access::kFromDisk)
-            .CheckIntegrity(kLongest);
+        Database database(storage_.state() / kDatabaseFile, Database::Access::kFromDisk);
+        UseRowKey(database, storage_.state());
+        database.CheckIntegrity(kLongest);
+        RequireAllRows(database);
       }
       if (const std::optional<std::int64_t> broken = store_->audit.FirstBroken())
         fault = say::upkeep::LogChanged(*broken);

@@ -25,7 +25,6 @@ constexpr const char* kPath = "/";
 constexpr const char* kInstaller = "de.pengutronix.rauc.Installer";
 constexpr const char* kProperties = "org.freedesktop.DBus.Properties";
 constexpr auto kLookAgain = std::chrono::seconds(5);
-constexpr std::chrono::seconds kRaucTimeout{60};  // RAUC reads the whole bundle before it answers
 constexpr std::size_t kMaxText = 500;
 
 /// Texts of a service are shown to people, so they are bounded and stripped of anything that is not
@@ -107,7 +106,7 @@ struct Updater::Impl {
 
   void Connect() {
     looked_at = std::chrono::steady_clock::now();
-    if (!bus.Open(options.bus_address, kRaucTimeout)) return;  // no bus on this machine
+    if (!bus.Open(options.bus_address, options.answer_within)) return;  // no bus on this machine
     sd_bus_match_signal_async(bus.get(), nullptr, kService, kPath, kProperties, "PropertiesChanged",
                               &Impl::OnChanged, nullptr, this);
     sd_bus_match_signal_async(bus.get(), nullptr, kService, kPath, kInstaller, "Completed",

@@ -38,6 +38,8 @@ struct UpdaterOptions {
   /// Called on the loop, once: the machine has started the system from before the last update, with
   /// the evidence.
   std::function<void(const Message& why)> rolled_back = {};
+  /// Time for each answer: RAUC reads the whole bundle before it gives one.
+  std::chrono::milliseconds answer_within{60'000};
   /// Interval for checking whether there is progress.
   std::chrono::milliseconds look_every{10'000};
   /// For tests; empty: the steady clock.

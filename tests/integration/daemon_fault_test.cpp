@@ -142,6 +142,25 @@ TEST_F(DaemonFaultTest, AProcessThatWasStoppedFailsTheSweepWithoutBlamingTheSens
   EXPECT_THAT(plumbd.log(), Not(HasSubstr("the sensor does not work")));
 }
 
+TEST_F(DaemonFaultTest, ASystemBusThatIsAwayOrNeverSpeaksHoldsNothingUp) {
+  const std::string silent = folder_ / "silent";
+  const int listening = ListenUnix(silent);
+  for (const std::string& bus : {std::string("/nonexistent/bus"), silent}) {
+    Plumbd plumbd(folder_.path(),
+                  {.environment = {{"DBUS_SYSTEM_BUS_ADDRESS", "unix:path=" + bus}}});
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    plumbd.WaitForState("ready");
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_EQ(plumbd.Ask({{"command", "update-status"}}).value("installing", true), false) << bus;
+    EXPECT_EQ(plumbd.Ask({{"command", "update"}, {"name", "plumb-9.0.raucb"}})["ok"], false);
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10))
+        << "less than a bus may take for its first words (25 s)";
+    (void)plumbd.ScanOnce();
+    EXPECT_EQ(plumbd.Stop(), 0) << bus;
+  }
+  ::close(listening);
+}
+
 TEST_F(DaemonFaultTest, AnErrorOfTheDriverIsToldAndOverOnceItWorksAgain) {
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());

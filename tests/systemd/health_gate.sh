@@ -46,6 +46,31 @@ run roll-back
 check "also where RAUC cannot mark it" '^0 .*cannot mark this system as bad' "$code $(cat log)"
 check "the machine restarts then too" 'reboot' "$(tail -1 calls)"
 
+# The database that this release has converted is no use for the system before.
+convert() {
+  rm -rf state/*
+  mkdir state/before-checksums
+  echo old >state/before-checksums/plumb.db
+  for file in plumb.db plumb.db-wal plumb.db-mark plumb.db-seals; do echo new >"state/$file"; done
+}
+convert
+: >calls
+echo true >rauc
+run roll-back
+check "the system before gets its own database" '^old old=new systemctl stop plumbd.service$' \
+  "$(cat state/plumb.db) old=$(cat state/before-restore-1/plumb.db) $(head -1 calls)"
+check "and nothing that goes with the other" '^before-checksums before-restore-1 plumb.db $' \
+  "$(cd state && echo * | tr '\n' ' ')"
+check "what was stored since stays" '^plumb.db plumb.db-mark plumb.db-seals plumb.db-wal $' \
+  "$(cd state/before-restore-1 && echo * | tr '\n' ' ')"
+run roll-back
+check "once" '^old$' "$(cat state/plumb.db)"
+convert
+touch state/before-checksums/good
+run roll-back
+check "a release that has been good keeps what it stored" '^new$' "$(cat state/plumb.db)"
+rm -rf state/*
+
 rm gate/good
 : >calls
 run roll-back
@@ -82,6 +107,13 @@ echo 'echo x >>asked
   echo "{\"status\":\"failed\",\"reason\":\"storage: no\"}"' >curl
 PLUMB_GATE_WAIT=10 run
 check "a storage fault that goes away" '^0 1$' "$code $(is_marked)"
+
+healthy
+mkdir state/before-checksums
+run
+check "a good release will not go back to the older database" '^0 yes$' \
+  "$code $([ -e state/before-checksums/good ] && echo yes)"
+rm -r state/before-checksums
 
 healthy; echo 'echo "{\"status\":\"failed\",\"reason\":\"sensor: unplug it\"}"' >curl
 run

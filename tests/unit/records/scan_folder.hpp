@@ -76,19 +76,23 @@ inline std::map<std::string, std::string> FilesBelow(const std::filesystem::path
   return files;
 }
 
-/// Turns a database into one of the schema of 0.2.0, which stored English sentences only.
+/// From this schema to that of 0.2.0, which stored English sentences only.
+inline constexpr const char* kToSchema9 =
+    "DROP TRIGGER scans_unavailable_message; ALTER TABLE scans DROP COLUMN failure_message; "
+    "ALTER TABLE scans DROP COLUMN unavailable_message; ALTER TABLE refs DROP COLUMN "
+    "approved_digest; ALTER TABLE refs DROP COLUMN source; ALTER TABLE refs DROP COLUMN "
+    "patient_hash; ALTER TABLE sessions DROP COLUMN reference_id; ALTER TABLE sessions DROP "
+    "COLUMN chosen_at_version; ALTER TABLE patients DROP COLUMN immobilisation; ALTER TABLE "
+    "templates DROP COLUMN posture; ALTER TABLE templates DROP COLUMN hint; ALTER TABLE "
+    "patients DROP COLUMN alert; ALTER TABLE patients DROP COLUMN photo; DROP TABLE "
+    "backup_scans; DROP TABLE backups; DROP TABLE removals; DROP "
+    "TABLE bin; DROP TABLE second_factors; DROP TABLE pins; DROP TABLE IF EXISTS row_digests; "
+    "PRAGMA "
+    "user_version = 9";
+
+/// Turns a database into one of the schema of 0.2.0.
 inline void MakeSchema9(const std::filesystem::path& database) {
-  Database(database, Database::Access::kReadWrite)
-      .Execute(
-          "DROP TRIGGER scans_unavailable_message; ALTER TABLE scans DROP COLUMN failure_message; "
-          "ALTER TABLE scans DROP COLUMN unavailable_message; ALTER TABLE refs DROP COLUMN "
-          "approved_digest; ALTER TABLE refs DROP COLUMN source; ALTER TABLE refs DROP COLUMN "
-          "patient_hash; ALTER TABLE sessions DROP COLUMN reference_id; ALTER TABLE sessions DROP "
-          "COLUMN chosen_at_version; ALTER TABLE patients DROP COLUMN immobilisation; ALTER TABLE "
-          "templates DROP COLUMN posture; ALTER TABLE templates DROP COLUMN hint; ALTER TABLE "
-          "patients DROP COLUMN alert; ALTER TABLE patients DROP COLUMN photo; DROP TABLE "
-          "backup_scans; DROP TABLE backups; DROP TABLE removals; DROP "
-          "TABLE bin; DROP TABLE second_factors; DROP TABLE pins; PRAGMA user_version = 9");
+  Database(database, Database::Access::kReadWrite).Execute(kToSchema9);
 }
 
 /// Turns a database into one of the schema of 0.1.0, without what that cannot hold.

@@ -39,9 +39,8 @@ class StoreCareTest : public ::testing::Test {
     }
     return ChangeResult::kDone;
   }
-  void Execute(const std::string& sql) const {
-    Database(state() / "plumb.db", Database::Access::kReadWrite).Execute(sql);
-  }
+  /// As another version writes it, which keeps the digests of rows.
+  void Execute(const std::string& sql) const { store_->database().ForChanges()->Execute(sql); }
 
   testing::TempFolder folder_;
   std::unique_ptr<Store> store_;
@@ -294,8 +293,8 @@ TEST_F(StoreCareTest, AStoredNameThatIsNoneOfOursIsAnErrorAndAnAccountOfSuchARol
 TEST_F(StoreCareTest, APlanThatCannotBeReadHidesNoOtherOfThePatient) {
   const std::string first = store_->references.Add(kAnna, StoreScan(*store_, patient_), "", {});
   const std::string second = store_->references.Add(kAnna, StoreScan(*store_, patient_), "", {});
-  store_.reset();
   Execute("UPDATE refs SET plan = '{' WHERE id = " + second);
+  store_.reset();
   store_ = std::make_unique<Store>(state());
   const std::vector<Reference> references = store_->references.List(patient_);
   ASSERT_EQ(references.size(), 2U);

@@ -138,11 +138,11 @@ TEST_F(StoreIntegrityTest, AReferenceIsApprovedOnlyAsItWasStored) {
 TEST_F(StoreIntegrityTest, APlanThatIsNotAsApprovedIsNeverUsed) {
   const std::string id = PlanAndApprove(store_, store_.references.Add(kAnna, scan_, "first", {}));
   ASSERT_TRUE(store_.references.Approved(patient_));
-  Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
-  EXPECT_THROW(direct.Execute("UPDATE refs SET approved_digest = 'x'"), ConstraintBroken);
-  direct.Execute("DROP TRIGGER refs_immutable");
+  const StoreDatabase::Held direct = store_.database().ForChanges();
+  EXPECT_THROW(direct->Execute("UPDATE refs SET approved_digest = 'x'"), ConstraintBroken);
+  direct->Execute("DROP TRIGGER refs_immutable");
   const auto replace = [&](const char* from, const char* to) {
-    direct.Run("UPDATE refs SET plan = replace(plan, ?, ?)", from, to);
+    direct->Run("UPDATE refs SET plan = replace(plan, ?, ?)", from, to);
   };
   replace("\"shift_tolerance_mm\":", "\"shift_tolerance_mm\":1");  // ten times as much
   const auto named = HasSubstr("not as it was approved");

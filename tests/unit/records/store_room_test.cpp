@@ -128,15 +128,12 @@ TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
 TEST_F(StoreRoomTest, ChecksCountEvenIfTheClockWasSetBackAfterTheSignature) {
   Scan(), Scan(), Scan();
   (void)Sign(Candidate().digest);
+  // As if the clock had been a day ahead until after the signature.
+  store_->database().ForChanges()->Execute(
+      "DROP TRIGGER room_calibrations_no_update; DROP TRIGGER checks_no_update; UPDATE "
+      "room_calibrations SET signed_at = "
+      "signed_at + 86400000000; UPDATE checks SET time = time + 86400000000");
   store_ = nullptr;
-  {
-    Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
-    // As if the clock had been a day ahead until after the signature.
-    direct.Execute(
-        "DROP TRIGGER room_calibrations_no_update; DROP TRIGGER checks_no_update; UPDATE "
-        "room_calibrations SET signed_at = "
-        "signed_at + 86400000000; UPDATE checks SET time = time + 86400000000");
-  }
   store_ = std::make_unique<Store>(folder_ / "state");
   const SignedRoom room = *store_->room.Newest();
   MarkerMap markers = MarkersOfRoom();
@@ -153,13 +150,15 @@ TEST_F(StoreRoomTest, ChecksCountEvenIfTheClockWasSetBackAfterTheSignature) {
 TEST_F(StoreRoomTest, OneThatWasTamperedWithIsNotUsed) {
   Scan(), Scan(), Scan();
   (void)Sign(Candidate().digest);
+  {
+    const StoreDatabase::Held direct = store_->database().ForChanges();
+    EXPECT_ANY_THROW(direct->Execute("UPDATE room_calibrations SET signed_by = 'x'"));
+    EXPECT_ANY_THROW(direct->Execute("DELETE FROM room_calibrations"));
+    direct->Execute(
+        "DROP TRIGGER room_calibrations_no_update; UPDATE room_calibrations SET json = "
+        "replace(json, '\"shift_m\":', '\"shift_m\":1')");
+  }
   store_ = nullptr;
-  Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
-  EXPECT_ANY_THROW(direct.Execute("UPDATE room_calibrations SET signed_by = 'x'"));
-  EXPECT_ANY_THROW(direct.Execute("DELETE FROM room_calibrations"));
-  direct.Execute(
-      "DROP TRIGGER room_calibrations_no_update; UPDATE room_calibrations SET json = "
-      "replace(json, '\"shift_m\":', '\"shift_m\":1')");
   store_ = std::make_unique<Store>(folder_ / "state");
   EXPECT_THROW((void)store_->room.Newest(), DataError);
   EXPECT_THAT(store_->room.List(10), IsEmpty());

@@ -17,6 +17,8 @@ class FakeRauc {
  public:
   std::atomic<bool> refuses_signature{false};
   std::atomic<bool> fails{false};
+  std::atomic<bool> is_silent{false};  ///< Takes questions about bundles and never answers.
+  std::atomic<int> num_asked{0};       ///< Questions about bundles.
   std::string version = "9.0", slot = "A";
   std::atomic<int> first_percent{40};
   std::atomic<const char*> first_step{"Copying image to rootfs.1"};
@@ -57,6 +59,8 @@ class FakeRauc {
  private:
   static int Info(sd_bus_message* message, void* self, sd_bus_error* error) {
     auto* rauc = static_cast<FakeRauc*>(self);
+    ++rauc->num_asked;
+    if (rauc->is_silent) return 1;
     if (rauc->refuses_signature)
       return sd_bus_error_set(error, "org.gtk.GDBus.UnmappedGError.Quark._r_2dbundle",
                               "signature verification failed");

@@ -52,7 +52,7 @@ class UpdaterTest : public UpdaterOnLoop {
           loop_, UpdaterOptions{
                      .folder = folder_ / "updates",
                      .max_bytes = 1 << 20,
-                     .bus_address = bus_.address(),
+                     .bus_address = bus_address_,
                      .version = "0.1.0",
                      .boot = boot_,
                      .blocking_reason =
@@ -67,6 +67,7 @@ class UpdaterTest : public UpdaterOnLoop {
                            ended_ = bundle + ": " + failure.English();
                          },
                      .rolled_back = [this](const Message& why) { roll_backs_ += why.English(); },
+                     .answer_within = answer_within_,
                      .look_every = std::chrono::milliseconds(1),
                      .now =
                          [this] {
@@ -88,6 +89,8 @@ class UpdaterTest : public UpdaterOnLoop {
 
   TempFolder folder_;
   PrivateBus bus_{folder_.path()};
+  std::string bus_address_ = bus_.address();
+  std::chrono::milliseconds answer_within_ = std::chrono::minutes(1);
   int num_changes_ = 0;
   std::string blocking_reason_;
   std::string ended_, roll_backs_;

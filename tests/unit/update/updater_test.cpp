@@ -12,6 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "drivers/files/unix_socket.hpp"
 #include "tests/unit/update/updater_fixture.hpp"
 
 namespace plumb {
@@ -132,6 +133,62 @@ TEST_F(UpdaterTest, ABusThatGoesAwayEndsTheInstallation) {
     EXPECT_THAT(Ended(), HasSubstr("broke"));
     EXPECT_FALSE(StatusNow().supported);
   });
+}
+
+/// Asks for a bundle without waiting for the answer.
+class QuestionTest : public UpdaterTest {
+ protected:
+  void AskWhatIsSilent(const std::function<void(std::future<Change>&)>& then) {
+    PlayWithRauc([&](FakeRauc& rauc) {
+      rauc.is_silent = true;
+      auto answer = std::make_shared<std::promise<Change>>();
+      std::future<Change> future = answer->get_future();
+      On([&] {
+        updater_->Install("plumb-9.0.raucb",
+                          [answer](const Change& change) { answer->set_value(change); });
+      });
+      ASSERT_TRUE(Becomes([&] { return rauc.num_asked > 0; }));
+      EXPECT_EQ(future.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+      then(future);
+      rauc.is_silent = false;
+    });
+  }
+};
+
+TEST_F(QuestionTest, ABusThatDiesInTheMiddleOfAQuestionIsAnAnswer) {
+  AskWhatIsSilent([&](std::future<Change>& answer) {
+    bus_.Stop();
+    ASSERT_EQ(answer.wait_for(kPatience), std::future_status::ready);
+    const Change change = answer.get();
+    EXPECT_EQ(change.result, ChangeResult::kFailed);
+    EXPECT_THAT(change.message.English(), HasSubstr("broke"));
+    EXPECT_FALSE(StatusNow().installing);
+    EXPECT_FALSE(StatusNow().supported);
+  });
+}
+
+TEST_F(QuestionTest, AnInstallerThatNeverAnswersIsRefusedAfterItsTime) {
+  answer_within_ = std::chrono::milliseconds(500);
+  AskWhatIsSilent([&](std::future<Change>& answer) {
+    ASSERT_EQ(answer.wait_for(kPatience), std::future_status::ready);
+    EXPECT_NE(answer.get().result, ChangeResult::kDone);
+    EXPECT_FALSE(StatusNow().installing) << "the next attempt can begin";
+  });
+}
+
+TEST_F(UpdaterTest, ABusThatTakesCallersAndNeverSpeaksHoldsNothingUp) {
+  const std::string path = (folder_ / "silent").string();
+  const int silent = ListenUnix(path);
+  bus_address_ = "unix:path=" + path;
+  RunBesideLoop([&] {
+    const auto begin = std::chrono::steady_clock::now();
+    Start();
+    EXPECT_FALSE(StatusNow().supported);
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kConflict);
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10))
+        << "25 s is what a bus has for its first words";
+  });
+  ::close(silent);
 }
 
 TEST_F(UpdaterTest, AnInstallerThatDiesInTheMiddleEndsTheInstallation) {
