@@ -111,11 +111,14 @@ class Pages {
     cairo_rectangle(context_.get(), x, top, width, height);
     cairo_fill(context_.get());
   }
-  void Dot(double x, double at, double radius, Ink ink) {
+  /// @param filled  Otherwise a ring: a value whose interval is not known.
+  void Dot(double x, double at, double radius, Ink ink, bool filled) {
     constexpr double kTurn = 6.283185307179586;
     cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
+    cairo_set_line_width(context_.get(), 0.7);
+    cairo_new_path(context_.get());
     cairo_arc(context_.get(), x, at, radius, 0, kTurn);
-    cairo_fill(context_.get());
+    filled ? cairo_fill(context_.get()) : cairo_stroke(context_.get());
   }
   /// CV_8UC3 RGB, as large as fits.
   void Picture(const cv::Mat& rgb, double x, double top, double width, double height) {
@@ -237,6 +240,13 @@ std::string ValueAndU95(double value, std::optional<double> u95, int most,
   return shown.value + " \u00b1" + half;
 }
 
+/// No measurement is exact: an interval of no width is not known either.
+bool IsKnown(const std::optional<double>& u95) { return u95 && *u95 > 0; }
+
+Ink InkOf(NumberJudgement judgement) {
+  return judgement == NumberJudgement::kWithin ? kGood : kMove;
+}
+
 /// The number with its interval on a line of twice the tolerance, which is shaded.
 void ToleranceBar(Pages& pages, double x, double at, double width, const CouchRow& number) {
   if (!(number.tolerance > 0)) return;
@@ -245,10 +255,11 @@ void ToleranceBar(Pages& pages, double x, double at, double width, const CouchRo
   pages.Box(place(-number.tolerance), at - 2.5, width / 2, 5, kShade);
   pages.Line(x, at, x + width, at, kLine, 0.7);
   pages.Line(middle, at - 2.5, middle, at + 2.5, kGrey, 0.7);
-  const double u95 = number.u95.value_or(0.0);
-  pages.Line(place(*number.value - u95), at, place(*number.value + u95), at, kBlack, 1.6);
-  pages.Dot(place(*number.value), at, 2.2,
-            number.judged.judgement == NumberJudgement::kWithin ? kGood : kMove);
+  const bool is_known = IsKnown(number.u95);
+  if (is_known)
+    pages.Line(place(*number.value - *number.u95), at, place(*number.value + *number.u95), at,
+               kBlack, 1.6);
+  pages.Dot(place(*number.value), at, 2.2, InkOf(number.judged.judgement), is_known);
 }
 
 void NumberLine(Pages& pages, const CouchRow& number, const Catalogue& language) {
@@ -276,7 +287,7 @@ void NumberLine(Pages& pages, const CouchRow& number, const Catalogue& language)
   pages.y = line - 1.3 * kJudgementSize;  // the first line of the judgement is on this line
   pages.Paragraph(kMargin + kJudgementAt, kWordsAt - kJudgementAt - 4,
                   Text(JudgementWord(number.judged.judgement), language), kJudgementSize,
-                  number.judged.judgement == NumberJudgement::kWithin ? kGood : kMove, true);
+                  InkOf(number.judged.judgement), true);
   const double judgement_end = pages.y;
   pages.y = line - 1.3 * kWordsSize;  // the first line of the words is on this line
   pages.Paragraph(kMargin + kWordsAt, pages.inner() - kWordsAt, Text(number.way, language),
@@ -290,7 +301,7 @@ void TrendOf(Pages& pages, const std::vector<CourseRow>& rows, std::size_t numbe
   double most = tolerance;
   for (const CourseRow& row : rows)
     if (const auto& value = row.values.at(number))
-      most = std::max(most, std::abs(value->value) + value->u95.value_or(0.0));
+      most = std::max(most, std::abs(value->value) + (IsKnown(value->u95) ? *value->u95 : 0.0));
   if (!(most > 0)) most = 1;
   constexpr double kInset = 5, kRoom = 1.1;
   const double middle = top + height / 2, scale = height / 2 / (kRoom * most);
@@ -304,10 +315,11 @@ void TrendOf(Pages& pages, const std::vector<CourseRow>& rows, std::size_t numbe
     const auto& value = rows[i].values.at(number);
     if (!value) continue;
     const double at = x + kInset + static_cast<double>(i) * step;
-    const double y = middle - value->value * scale, half = value->u95.value_or(0.0) * scale;
+    const double y = middle - value->value * scale;
     if (before) pages.Line(before->first, before->second, at, y, kLine, 0.7);
-    pages.Line(at, y - half, at, y + half, kGrey, 0.9);
-    pages.Dot(at, y, 1.8, std::abs(value->value) <= tolerance ? kGood : kMove);
+    if (IsKnown(value->u95))
+      pages.Line(at, y - *value->u95 * scale, at, y + *value->u95 * scale, kGrey, 0.9);
+    pages.Dot(at, y, 1.8, InkOf(value->judgement), IsKnown(value->u95));
     before = {at, y};
   }
 }
@@ -398,8 +410,8 @@ CourseTable TableOf(Pages& pages, const CourseReport& report) {
     cells[0] = row.fraction, cells[1] = row.when, cells[2] = row.verdict;
     for (std::size_t i = 0; i < row.values.size(); ++i) {
       if (!row.values[i]) continue;
-      const auto [value, u95] = *row.values[i];
-      cells[3 + i] = ValueAndU95(value, u95, i < 3 ? 1 : 2, *report.language);
+      const CourseValue& shown = *row.values[i];
+      cells[3 + i] = ValueAndU95(shown.value, shown.u95, i < 3 ? 1 : 2, *report.language);
     }
   }
   std::array<double, kCourseColumns> widths{};

@@ -22,6 +22,7 @@ using ReportFacts = std::vector<std::pair<std::string, std::string>>;
 struct CourseValue {
   double value = 0.0;
   std::optional<double> u95;  ///< Not set: unknown.
+  NumberJudgement judgement = NumberJudgement::kUnjudged;
 };
 
 /// A line of the course: one scan.

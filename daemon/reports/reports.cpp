@@ -243,7 +243,7 @@ CourseRow RowOf(const Scan& scan, const Catalogue& language) {
                 .values = {}};
   if (scan.result) {
     for (const ShownRow& number : ShownRows(*scan.result))
-      if (number.value) row.values[number.number] = CourseValue{*number.value, number.u95};
+      if (number.value) row.values[number.number] = CourseValue{*number.value, number.u95, number.judgement};
   }
   return row;
 }

@@ -57,7 +57,7 @@ function number(axis, numbers, tolerance) {
   return h('div', { class: `live-number ${tone}` },
     h('span', { class: 'axis' }, S.result.axes[axis.name]),
     h('strong', {}, value === null ? '–' : withUnit(signed(value, digits), unit)),
-    h('span', { class: 'fine' }, u95 === null ? ''
+    h('span', { class: 'fine' }, value === null ? '' : u95 === null ? '± ?'
       : `± ${withUnit(u95.toFixed(digits).replace('.', S.decimal), unit)}`),
     toleranceBar(value ?? 0, value === null ? NaN : u95, limit, value !== null));
 }
