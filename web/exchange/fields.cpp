@@ -6,6 +6,7 @@
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/names.hpp"
+#include "algo/base/plain_text.hpp"
 #include "algo/base/polygon.hpp"
 #include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"
