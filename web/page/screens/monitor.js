@@ -256,7 +256,9 @@ export async function showMonitor(place) {
   };
   const record = h('button', {
     class: 'quiet', type: 'button',
-    onclick: () => saveFrom('/api/v1/monitor/record.csv', 'plumb_monitoring.csv'),
+    onclick: () => saveFrom(
+      `/api/v1/monitor/record.csv?language=${document.documentElement.lang}`,
+      'plumb_monitoring.csv'),
   }, text.record);
   clear(place, h('h1', {}, text.title),
     h('section', { class: 'card' }, view.element, warnings, hint(text.motion)),
