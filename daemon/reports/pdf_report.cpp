@@ -10,7 +10,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -18,15 +20,16 @@
 #include "algo/acceptance/number_judgement.hpp"
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
-#include "algo/base/utf8.hpp"
+#include "daemon/sheets/paper.hpp"
+#include "daemon/sheets/print_text.hpp"
 #include "drivers/files/image_file.hpp"
 #include "words/result.hpp"
 
 namespace plumb {
 namespace {
 
-/// A4 in points.
-struct Paper {
+/// In points.
+struct PageSize {
   double width, height;
 };
 // Of this layer: the command line has no web.
@@ -34,8 +37,19 @@ std::string Word(MessageId id, const Catalogue& language) {
   return Text(Message(id, {}), language);
 }
 
-constexpr Paper kUpright{595.28, 841.89}, kAcross{841.89, 595.28};
-constexpr double kMargin = 42.0;
+constexpr double kMargin = 42.0, kUnbounded = 10'000.0;
+
+/// A4 where the name is that of no paper.
+PageSize Upright(std::string_view name) {
+  const Paper* const named = FindPaper(name);
+  const Paper& paper = named == nullptr ? kPapers.front() : *named;
+  return {paper.width_mm * kPointsPerMm, paper.height_mm * kPointsPerMm};
+}
+
+PageSize Across(std::string_view name) {
+  const PageSize upright = Upright(name);
+  return {upright.height, upright.width};
+}
 
 struct Ink {
   double r, g, b;
@@ -47,11 +61,12 @@ constexpr Ink kShade{0.89, 0.92, 0.94}, kGood{0.04, 0.4, 0.24}, kMove{0.58, 0.3,
 class Pages {
  public:
   /// @param total  How many pages there will be.
-  Pages(const Catalogue& language, std::string footer, const Paper& paper, int total)
+  Pages(const Catalogue& language, std::string footer, const PageSize& paper, int total)
       : language_(language), footer_(std::move(footer)), paper_(paper), total_(total) {
     surface_.reset(
         cairo_pdf_surface_create_for_stream(&Append, &bytes_, paper_.width, paper_.height));
     context_.reset(cairo_create(surface_.get()));
+    text_.emplace(context_.get());
     Top();
   }
 
@@ -61,36 +76,22 @@ class Pages {
   /// Width between the margins, and where the space for contents ends.
   [[nodiscard]] double inner() const { return paper_.width - 2 * kMargin; }
   [[nodiscard]] double bottom() const { return paper_.height - 58.0; }
-  double Width(const std::string& text, double size, bool bold = false) {
-    Font(size, bold);
-    cairo_text_extents_t extents;
-    cairo_text_extents(context_.get(), ValidUtf8(text).c_str(), &extents);
-    return extents.x_advance;
+  double Width(const std::string& text, double size, bool bold = false) const {
+    return text_->Width(text, {.size = size, .is_bold = bold});
   }
+  /// One line, which ends in an ellipsis before the right margin, or where it is wider than `most`.
   void Text(double x, double baseline, const std::string& text, double size, Ink ink = kBlack,
-            bool bold = false) {
-    Font(size, bold);
+            bool bold = false, double most = kUnbounded) {
     cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
-    cairo_move_to(context_.get(), x, baseline);
-    // What is no UTF-8 (a path in a reason) would end all drawing.
-    cairo_show_text(context_.get(), ValidUtf8(text).c_str());
+    text_->Line(x, baseline, text, {.size = size, .is_bold = bold},
+                std::min(most, paper_.width - kMargin - x + 0.5));
   }
   /// Breaks the text into lines of that width and moves y below it.
   void Paragraph(double x, double width, const std::string& text, double size, Ink ink = kBlack,
                  bool bold = false) {
-    std::string line;
-    std::size_t at = 0;
-    while (at < text.size()) {
-      const std::size_t end = std::min(text.find(' ', at), text.size());
-      const std::string word = text.substr(at, end - at);
-      if (!line.empty() && Width(line + " " + word, size, bold) > width) {
-        Text(x, y += 1.3 * size, line, size, ink, bold);
-        line.clear();
-      }
-      line += (line.empty() ? "" : " ") + word;
-      at = end + 1;
-    }
-    if (!line.empty()) Text(x, y += 1.3 * size, line, size, ink, bold);
+    cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
+    const double step = 1.3 * size;
+    y += step * text_->Paragraph(x, y + step, step, width, text, {.size = size, .is_bold = bold});
   }
   void Rule(double at, Ink ink = kLine, double line_width = 0.7) {
     cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
@@ -182,11 +183,6 @@ class Pages {
     static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
     return CAIRO_STATUS_SUCCESS;
   }
-  void Font(double size, bool bold) {
-    cairo_select_font_face(context_.get(), "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
-                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(context_.get(), size);
-  }
   void Top() {
     ++page_;
     y = kMargin - 12;
@@ -195,18 +191,20 @@ class Pages {
   }
   void Foot() {
     Rule(paper_.height - 44);
-    Text(kMargin, paper_.height - 30, footer_, 7.5, kGrey);
     const std::string number = plumb::Text(say::result::ReportPage(page_, total_), language_);
-    Text(paper_.width - kMargin - Width(number, 8), paper_.height - 30, number, 8, kGrey);
+    const double number_width = Width(number, 8);
+    Text(kMargin, paper_.height - 30, footer_, 7.5, kGrey, false, inner() - number_width - 8);
+    Text(paper_.width - kMargin - number_width, paper_.height - 30, number, 8, kGrey);
   }
 
   const Catalogue& language_;
   std::string bytes_, footer_;
-  Paper paper_;
+  PageSize paper_;
   int page_ = 0, total_;
   std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface_{
       nullptr, &cairo_surface_destroy};
   std::unique_ptr<cairo_t, decltype(&cairo_destroy)> context_{nullptr, &cairo_destroy};
+  std::optional<PrintText> text_;
 };
 
 /// In two columns, name and text.
@@ -219,9 +217,11 @@ void Facts(Pages& pages, const ReportFacts& facts) {
     const double x = kMargin + (i < half ? 0 : column);
     if (i == half) pages.y = top;
     const double line = pages.y;
-    pages.Text(x, line + 1.3 * 8.5, facts[i].first, 8.5, kGrey);
+    pages.Paragraph(x, name_width - 4, facts[i].first, 8.5, kGrey);
+    const double name_end = pages.y;
+    pages.y = line;
     pages.Paragraph(x + name_width, column - name_width - 8, facts[i].second, 8.5);
-    pages.y = std::max(pages.y, line + 1.3 * 8.5);
+    pages.y = std::max(pages.y, name_end);
     lowest = std::max(lowest, pages.y);
   }
   pages.y = lowest + 4;
@@ -438,7 +438,7 @@ CourseTable TableOf(Pages& pages, const CourseReport& report) {
 /// Each page states how many there are, which is known only after drawing: a report of several
 /// pages is drawn twice.
 template <typename Contents>
-std::string Numbered(const Catalogue& language, const std::string& footer, const Paper& paper,
+std::string Numbered(const Catalogue& language, const std::string& footer, const PageSize& paper,
                      const Contents& draw) {
   Pages counted(language, footer, paper, 1);
   draw(counted);
@@ -532,12 +532,12 @@ void Draw(Pages& pages, const CourseReport& report) {
 }  // namespace
 
 std::string PdfOf(const ScanReport& report) {
-  return Numbered(*report.language, report.footer, kUpright,
+  return Numbered(*report.language, report.footer, Upright(report.paper),
                   [&](Pages& pages) { Draw(pages, report); });
 }
 
 std::string PdfOf(const CourseReport& report) {
-  return Numbered(*report.language, report.footer, kAcross,
+  return Numbered(*report.language, report.footer, Across(report.paper),
                   [&](Pages& pages) { Draw(pages, report); });
 }
 
