@@ -143,6 +143,10 @@ void Take(Fields& fields, const char* name, std::optional<std::string>& wanted) 
     return;
   }
   wanted = fields.Text(name, 1, 16);
+  if (std::string_view(name) == "paper") {
+    if (!IsReportPaper(*wanted)) throw DataError(say::web::FieldPaper());
+    return;
+  }
   if (!IsAcceptLive(*wanted)) throw DataError(say::web::FieldAcceptLive());
 }
 
