@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/plain_text.hpp"
 #include "daemon/archive/summed_folder.hpp"
 #include "daemon/database/store_json.hpp"
 #include "daemon/scan_files/scan_files.hpp"
@@ -99,7 +100,8 @@ void CheckValue(const std::string& table, const ColumnOf& column, const Json& va
   const bool is_json = column.name == "json" || column.name == "plan";
   if (!value.is_string() ||
       value.get_ref<const std::string&>().size() > (is_json ? kMaxJson : kMaxText) ||
-      value.get_ref<const std::string&>().find('\0') != std::string::npos)
+      value.get_ref<const std::string&>().find('\0') != std::string::npos ||
+      (!is_json && !IsPlainText(value.get_ref<const std::string&>(), /*allow_lines=*/true)))
     Refuse(table, column.name, say::backup::RecordNoText());
 }
 

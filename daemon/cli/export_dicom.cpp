@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
+#include "algo/base/errors.hpp"
+#include "algo/base/plain_text.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/language.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/dicom/result_export.hpp"
 #include "words/cli.hpp"
 #include "words/dicom.hpp"
+#include "words/web.hpp"
 
 namespace plumb {
 namespace {
@@ -20,6 +24,9 @@ struct ExportDicomArguments {
 };
 
 int ExportDicom(const ExportDicomArguments& options, const CommandContext& context) {
+  for (const auto& [name, text] : {std::pair("--patient-id", options.request.patient_id),
+                                   std::pair("--patient-name", options.request.patient_name)})
+    if (!IsPlainText(text)) throw InvalidRequest(say::web::FieldPlainText(name));
   { const AtomicFolder check(options.out, DicomExportOutput()); }  // a bad place, before the work
   Progress progress(context.language);
   progress.Update(say::cli::ReadingScenes(), 0.1);
@@ -53,6 +60,9 @@ Command AddExportDicom(CLI::App& app) {
   app.add_option("--out", options->out, "Folder to write")->required()->type_name("DIR");
   app.add_option("--report", request.report, "A PDF to send in place of the result's own page")
       ->type_name("FILE.pdf");
+  app.add_option("--paper", request.paper, "Of the result's own page")
+      ->check(CLI::IsMember({"A4", "Letter"}))
+      ->capture_default_str();
   app.add_option("--patient-id", request.patient_id,
                  "Patient ID; default: a code that is the same for each scan compared with this "
                  "reference")

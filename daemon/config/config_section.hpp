@@ -22,6 +22,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/names.hpp"
 #include "algo/base/nearest_name.hpp"
+#include "algo/base/plain_text.hpp"
 #include "daemon/config/toml.hpp"
 #include "words/config.hpp"
 
@@ -68,6 +69,8 @@ class Section {
     } else {
       found = node->value_exact<T>();
     }
+    if constexpr (std::same_as<T, std::string>)
+      if (found && !IsPlainText(*found)) Fail(*node, key, say::config::ExpectedPlainText());
     if (!found || !is_valid(*found)) Fail(*node, key, expected);
     value = *found;
   }
@@ -136,7 +139,8 @@ class Section {
     names.clear();
     for (const toml::node& element : *array) {
       const std::optional<std::string> name = element.value_exact<std::string>();
-      if (!name || name->empty() || name->size() > 255 || !is_valid(*name))
+      if (!name || name->empty() || name->size() > 255 || !IsPlainText(*name) ||
+          !is_valid(*name))
         Fail(element, key, expected);
       names.push_back(*name);
     }

@@ -78,6 +78,12 @@ class Stored {
       Fail(say::store::ValueNoAcceptLive(key));
     return value->get<std::string>();
   }
+  [[nodiscard]] std::string Paper(const char* key) const {
+    const StoredJson* value = Find(key);
+    if (value == nullptr || !value->is_string() || !IsReportPaper(value->get<std::string>()))
+      Fail(say::store::ValueNoPaper(key));
+    return value->get<std::string>();
+  }
   [[nodiscard]] std::string Text(const char* key) const {
     const StoredJson* value = Find(key);
     if (value == nullptr || !value->is_string()) Fail(say::store::ValueNoText(key));
@@ -180,6 +186,7 @@ Settings ParseSettings(const std::string& text) {
   whole("idle_logout_min", s.idle_logout_min, kIdleLogout_min);
   if (stored.Find("accept_live") != nullptr) s.accept_live = stored.AcceptLive("accept_live");
   number("breath_window_mm", s.breath_window_mm, kBreathWindow_mm);
+  if (stored.Find("paper") != nullptr) s.paper = stored.Paper("paper");
   return s;
 }
 

@@ -138,8 +138,10 @@ class ExportMaker {
           !std::equal(kPdf.begin(), kPdf.end(), object.payload.begin()))
         throw DataError(say::dicom::NotPdf(request_.report->string()));
     } else {
-      const std::string pdf = PdfOf(DescribeResult(result_, object.patient_id,
-                                                   Now("%Y-%m-%d %H:%M %Z"), pictures_, language_));
+      ScanReport report = DescribeResult(result_, object.patient_id, Now("%Y-%m-%d %H:%M %Z"),
+                                         pictures_, language_);
+      report.paper = request_.paper;
+      const std::string pdf = PdfOf(report);
       object.payload.assign(pdf.begin(), pdf.end());
     }
     Add(kExportFiles[0], std::move(object));

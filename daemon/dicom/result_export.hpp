@@ -21,6 +21,7 @@ struct ResultExportRequest {
   std::optional<std::filesystem::path> report;       ///< A PDF in place of the result's own page.
   /// Empty: a code that is the same for everything that is compared with this reference.
   std::string patient_id, patient_name;
+  std::string paper = "A4";  ///< Of the result's own page; or Letter.
 };
 
 struct NamedExport {

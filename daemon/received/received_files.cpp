@@ -10,7 +10,7 @@
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
-#include "algo/base/utf8.hpp"
+#include "algo/base/plain_text.hpp"
 #include "daemon/planning/patient_hash.hpp"
 #include "daemon/unit/page_identity.hpp"
 #include "drivers/dicom/planning_files.hpp"
@@ -39,7 +39,7 @@ bool IsOwnName(const std::string& name) {
 std::string WordIn(const Json& json, const char* key) {
   const auto found = json.find(key);
   return found != json.end() && found->is_string()
-             ? ValidUtf8(found->get<std::string>().substr(0, kMostWord))
+             ? AsPlainText(found->get<std::string>().substr(0, kMostWord))
              : std::string();
 }
 
@@ -119,7 +119,7 @@ ReceivedFiles::Known ReceivedFiles::ReadOne(const std::string& name) const {
   try {
     const PlanningContent content = ReadDicomFile(spool_ / (name + ".dcm"), "DICOM");
     known.instance_uid = content.file.instance_uid;
-    known.label = ValidUtf8(content.file.label.substr(0, kMostWord));
+    known.label = AsPlainText(content.file.label.substr(0, kMostWord));
     known.patient_hash = PatientHash(key_, content.file.patient_id);
     if (content.structures) known.kind = ReceivedKind::kStructures;
     if (content.plan) {

@@ -10,7 +10,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -18,15 +20,16 @@
 #include "algo/acceptance/number_judgement.hpp"
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
-#include "algo/base/utf8.hpp"
+#include "daemon/sheets/paper.hpp"
+#include "daemon/sheets/print_text.hpp"
 #include "drivers/files/image_file.hpp"
 #include "words/result.hpp"
 
 namespace plumb {
 namespace {
 
-/// A4 in points.
-struct Paper {
+/// In points.
+struct PageSize {
   double width, height;
 };
 // Of this layer: the command line has no web.
@@ -34,8 +37,19 @@ std::string Word(MessageId id, const Catalogue& language) {
   return Text(Message(id, {}), language);
 }
 
-constexpr Paper kUpright{595.28, 841.89}, kAcross{841.89, 595.28};
-constexpr double kMargin = 42.0;
+constexpr double kMargin = 42.0, kUnbounded = 10'000.0;
+
+/// A4 where the name is that of no paper.
+PageSize Upright(std::string_view name) {
+  const Paper* const named = FindPaper(name);
+  const Paper& paper = named == nullptr ? kPapers.front() : *named;
+  return {paper.width_mm * kPointsPerMm, paper.height_mm * kPointsPerMm};
+}
+
+PageSize Across(std::string_view name) {
+  const PageSize upright = Upright(name);
+  return {upright.height, upright.width};
+}
 
 struct Ink {
   double r, g, b;
@@ -47,11 +61,12 @@ constexpr Ink kShade{0.89, 0.92, 0.94}, kGood{0.04, 0.4, 0.24}, kMove{0.58, 0.3,
 class Pages {
  public:
   /// @param total  How many pages there will be.
-  Pages(const Catalogue& language, std::string footer, const Paper& paper, int total)
+  Pages(const Catalogue& language, std::string footer, const PageSize& paper, int total)
       : language_(language), footer_(std::move(footer)), paper_(paper), total_(total) {
     surface_.reset(
         cairo_pdf_surface_create_for_stream(&Append, &bytes_, paper_.width, paper_.height));
     context_.reset(cairo_create(surface_.get()));
+    text_.emplace(context_.get());
     Top();
   }
 
@@ -61,36 +76,22 @@ class Pages {
   /// Width between the margins, and where the space for contents ends.
   [[nodiscard]] double inner() const { return paper_.width - 2 * kMargin; }
   [[nodiscard]] double bottom() const { return paper_.height - 58.0; }
-  double Width(const std::string& text, double size, bool bold = false) {
-    Font(size, bold);
-    cairo_text_extents_t extents;
-    cairo_text_extents(context_.get(), ValidUtf8(text).c_str(), &extents);
-    return extents.x_advance;
+  double Width(const std::string& text, double size, bool bold = false) const {
+    return text_->Width(text, {.size = size, .is_bold = bold});
   }
+  /// One line, which ends in an ellipsis before the right margin, or where it is wider than `most`.
   void Text(double x, double baseline, const std::string& text, double size, Ink ink = kBlack,
-            bool bold = false) {
-    Font(size, bold);
+            bool bold = false, double most = kUnbounded) {
     cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
-    cairo_move_to(context_.get(), x, baseline);
-    // What is no UTF-8 (a path in a reason) would end all drawing.
-    cairo_show_text(context_.get(), ValidUtf8(text).c_str());
+    text_->Line(x, baseline, text, {.size = size, .is_bold = bold},
+                std::min(most, paper_.width - kMargin - x + 0.5));
   }
   /// Breaks the text into lines of that width and moves y below it.
   void Paragraph(double x, double width, const std::string& text, double size, Ink ink = kBlack,
                  bool bold = false) {
-    std::string line;
-    std::size_t at = 0;
-    while (at < text.size()) {
-      const std::size_t end = std::min(text.find(' ', at), text.size());
-      const std::string word = text.substr(at, end - at);
-      if (!line.empty() && Width(line + " " + word, size, bold) > width) {
-        Text(x, y += 1.3 * size, line, size, ink, bold);
-        line.clear();
-      }
-      line += (line.empty() ? "" : " ") + word;
-      at = end + 1;
-    }
-    if (!line.empty()) Text(x, y += 1.3 * size, line, size, ink, bold);
+    cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
+    const double step = 1.3 * size;
+    y += step * text_->Paragraph(x, y + step, step, width, text, {.size = size, .is_bold = bold});
   }
   void Rule(double at, Ink ink = kLine, double line_width = 0.7) {
     cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
@@ -111,11 +112,14 @@ class Pages {
     cairo_rectangle(context_.get(), x, top, width, height);
     cairo_fill(context_.get());
   }
-  void Dot(double x, double at, double radius, Ink ink) {
+  /// @param filled  Otherwise a ring: a value whose interval is not known.
+  void Dot(double x, double at, double radius, Ink ink, bool filled) {
     constexpr double kTurn = 6.283185307179586;
     cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
+    cairo_set_line_width(context_.get(), 0.7);
+    cairo_new_path(context_.get());
     cairo_arc(context_.get(), x, at, radius, 0, kTurn);
-    cairo_fill(context_.get());
+    filled ? cairo_fill(context_.get()) : cairo_stroke(context_.get());
   }
   /// CV_8UC3 RGB, as large as fits.
   void Picture(const cv::Mat& rgb, double x, double top, double width, double height) {
@@ -179,11 +183,6 @@ class Pages {
     static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
     return CAIRO_STATUS_SUCCESS;
   }
-  void Font(double size, bool bold) {
-    cairo_select_font_face(context_.get(), "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
-                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(context_.get(), size);
-  }
   void Top() {
     ++page_;
     y = kMargin - 12;
@@ -192,18 +191,20 @@ class Pages {
   }
   void Foot() {
     Rule(paper_.height - 44);
-    Text(kMargin, paper_.height - 30, footer_, 7.5, kGrey);
     const std::string number = plumb::Text(say::result::ReportPage(page_, total_), language_);
-    Text(paper_.width - kMargin - Width(number, 8), paper_.height - 30, number, 8, kGrey);
+    const double number_width = Width(number, 8);
+    Text(kMargin, paper_.height - 30, footer_, 7.5, kGrey, false, inner() - number_width - 8);
+    Text(paper_.width - kMargin - number_width, paper_.height - 30, number, 8, kGrey);
   }
 
   const Catalogue& language_;
   std::string bytes_, footer_;
-  Paper paper_;
+  PageSize paper_;
   int page_ = 0, total_;
   std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface_{
       nullptr, &cairo_surface_destroy};
   std::unique_ptr<cairo_t, decltype(&cairo_destroy)> context_{nullptr, &cairo_destroy};
+  std::optional<PrintText> text_;
 };
 
 /// In two columns, name and text.
@@ -216,9 +217,11 @@ void Facts(Pages& pages, const ReportFacts& facts) {
     const double x = kMargin + (i < half ? 0 : column);
     if (i == half) pages.y = top;
     const double line = pages.y;
-    pages.Text(x, line + 1.3 * 8.5, facts[i].first, 8.5, kGrey);
+    pages.Paragraph(x, name_width - 4, facts[i].first, 8.5, kGrey);
+    const double name_end = pages.y;
+    pages.y = line;
     pages.Paragraph(x + name_width, column - name_width - 8, facts[i].second, 8.5);
-    pages.y = std::max(pages.y, line + 1.3 * 8.5);
+    pages.y = std::max(pages.y, name_end);
     lowest = std::max(lowest, pages.y);
   }
   pages.y = lowest + 4;
@@ -237,6 +240,13 @@ std::string ValueAndU95(double value, std::optional<double> u95, int most,
   return shown.value + " \u00b1" + half;
 }
 
+/// No measurement is exact: an interval of no width is not known either.
+bool IsKnown(const std::optional<double>& u95) { return u95 && *u95 > 0; }
+
+Ink InkOf(NumberJudgement judgement) {
+  return judgement == NumberJudgement::kWithin ? kGood : kMove;
+}
+
 /// The number with its interval on a line of twice the tolerance, which is shaded.
 void ToleranceBar(Pages& pages, double x, double at, double width, const CouchRow& number) {
   if (!(number.tolerance > 0)) return;
@@ -245,10 +255,11 @@ void ToleranceBar(Pages& pages, double x, double at, double width, const CouchRo
   pages.Box(place(-number.tolerance), at - 2.5, width / 2, 5, kShade);
   pages.Line(x, at, x + width, at, kLine, 0.7);
   pages.Line(middle, at - 2.5, middle, at + 2.5, kGrey, 0.7);
-  const double u95 = number.u95.value_or(0.0);
-  pages.Line(place(*number.value - u95), at, place(*number.value + u95), at, kBlack, 1.6);
-  pages.Dot(place(*number.value), at, 2.2,
-            number.judged.judgement == NumberJudgement::kWithin ? kGood : kMove);
+  const bool is_known = IsKnown(number.u95);
+  if (is_known)
+    pages.Line(place(*number.value - *number.u95), at, place(*number.value + *number.u95), at,
+               kBlack, 1.6);
+  pages.Dot(place(*number.value), at, 2.2, InkOf(number.judged.judgement), is_known);
 }
 
 void NumberLine(Pages& pages, const CouchRow& number, const Catalogue& language) {
@@ -276,7 +287,7 @@ void NumberLine(Pages& pages, const CouchRow& number, const Catalogue& language)
   pages.y = line - 1.3 * kJudgementSize;  // the first line of the judgement is on this line
   pages.Paragraph(kMargin + kJudgementAt, kWordsAt - kJudgementAt - 4,
                   Text(JudgementWord(number.judged.judgement), language), kJudgementSize,
-                  number.judged.judgement == NumberJudgement::kWithin ? kGood : kMove, true);
+                  InkOf(number.judged.judgement), true);
   const double judgement_end = pages.y;
   pages.y = line - 1.3 * kWordsSize;  // the first line of the words is on this line
   pages.Paragraph(kMargin + kWordsAt, pages.inner() - kWordsAt, Text(number.way, language),
@@ -290,7 +301,7 @@ void TrendOf(Pages& pages, const std::vector<CourseRow>& rows, std::size_t numbe
   double most = tolerance;
   for (const CourseRow& row : rows)
     if (const auto& value = row.values.at(number))
-      most = std::max(most, std::abs(value->value) + value->u95.value_or(0.0));
+      most = std::max(most, std::abs(value->value) + (IsKnown(value->u95) ? *value->u95 : 0.0));
   if (!(most > 0)) most = 1;
   constexpr double kInset = 5, kRoom = 1.1;
   const double middle = top + height / 2, scale = height / 2 / (kRoom * most);
@@ -304,10 +315,11 @@ void TrendOf(Pages& pages, const std::vector<CourseRow>& rows, std::size_t numbe
     const auto& value = rows[i].values.at(number);
     if (!value) continue;
     const double at = x + kInset + static_cast<double>(i) * step;
-    const double y = middle - value->value * scale, half = value->u95.value_or(0.0) * scale;
+    const double y = middle - value->value * scale;
     if (before) pages.Line(before->first, before->second, at, y, kLine, 0.7);
-    pages.Line(at, y - half, at, y + half, kGrey, 0.9);
-    pages.Dot(at, y, 1.8, std::abs(value->value) <= tolerance ? kGood : kMove);
+    if (IsKnown(value->u95))
+      pages.Line(at, y - *value->u95 * scale, at, y + *value->u95 * scale, kGrey, 0.9);
+    pages.Dot(at, y, 1.8, InkOf(value->judgement), IsKnown(value->u95));
     before = {at, y};
   }
 }
@@ -398,8 +410,8 @@ CourseTable TableOf(Pages& pages, const CourseReport& report) {
     cells[0] = row.fraction, cells[1] = row.when, cells[2] = row.verdict;
     for (std::size_t i = 0; i < row.values.size(); ++i) {
       if (!row.values[i]) continue;
-      const auto [value, u95] = *row.values[i];
-      cells[3 + i] = ValueAndU95(value, u95, i < 3 ? 1 : 2, *report.language);
+      const CourseValue& shown = *row.values[i];
+      cells[3 + i] = ValueAndU95(shown.value, shown.u95, i < 3 ? 1 : 2, *report.language);
     }
   }
   std::array<double, kCourseColumns> widths{};
@@ -426,7 +438,7 @@ CourseTable TableOf(Pages& pages, const CourseReport& report) {
 /// Each page states how many there are, which is known only after drawing: a report of several
 /// pages is drawn twice.
 template <typename Contents>
-std::string Numbered(const Catalogue& language, const std::string& footer, const Paper& paper,
+std::string Numbered(const Catalogue& language, const std::string& footer, const PageSize& paper,
                      const Contents& draw) {
   Pages counted(language, footer, paper, 1);
   draw(counted);
@@ -520,12 +532,12 @@ void Draw(Pages& pages, const CourseReport& report) {
 }  // namespace
 
 std::string PdfOf(const ScanReport& report) {
-  return Numbered(*report.language, report.footer, kUpright,
+  return Numbered(*report.language, report.footer, Upright(report.paper),
                   [&](Pages& pages) { Draw(pages, report); });
 }
 
 std::string PdfOf(const CourseReport& report) {
-  return Numbered(*report.language, report.footer, kAcross,
+  return Numbered(*report.language, report.footer, Across(report.paper),
                   [&](Pages& pages) { Draw(pages, report); });
 }
 

@@ -22,6 +22,7 @@ using ReportFacts = std::vector<std::pair<std::string, std::string>>;
 struct CourseValue {
   double value = 0.0;
   std::optional<double> u95;  ///< Not set: unknown.
+  NumberJudgement judgement = NumberJudgement::kUnjudged;
 };
 
 /// A line of the course: one scan.
@@ -45,6 +46,7 @@ struct ScanReport {
   std::vector<cv::Mat> pictures;   ///< CV_8UC3 RGB.
   std::string pictures_note = {};  ///< Below the pictures.
   std::string footer;              ///< Version and time of the report.
+  std::string paper = "A4";        ///< Or Letter.
 };
 
 struct CourseReport {
@@ -56,9 +58,10 @@ struct CourseReport {
   std::array<double, 2> tolerance = {};
   std::string note;  ///< Below the rows.
   std::string footer;
+  std::string paper = "A4";  ///< Or Letter; the rows run across it.
 };
 
-/// A4, as the bytes of a PDF file; every page has the notice and its number.
+/// As the bytes of a PDF file; every page has the notice and its number.
 /// @throws IoError if the drawing library fails.
 [[nodiscard]] std::string PdfOf(const ScanReport& report);
 [[nodiscard]] std::string PdfOf(const CourseReport& report);

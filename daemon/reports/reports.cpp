@@ -243,7 +243,8 @@ CourseRow RowOf(const Scan& scan, const Catalogue& language) {
                 .values = {}};
   if (scan.result) {
     for (const ShownRow& number : ShownRows(*scan.result))
-      if (number.value) row.values[number.number] = CourseValue{*number.value, number.u95};
+      if (number.value)
+        row.values[number.number] = CourseValue{*number.value, number.u95, number.judgement};
   }
   return row;
 }
@@ -315,7 +316,8 @@ ScanReport DescribeScan(const ReportSources& stored, const Scan& scan, const Cat
       .body = {},
       .pictures = std::move(drawn.pictures),
       .pictures_note = std::move(drawn.note),
-      .footer = Footer(language)};
+      .footer = Footer(language),
+      .paper = stored.paper};
   if (report.numbers.empty()) return report;
   if (RunsAlongCouch(*scan.result))
     for (const Message& note : CouchNotes(stored.couch))
@@ -336,7 +338,8 @@ CourseReport DescribeCourse(const ReportSources& stored, const Patient& patient,
                    {Word(say::result::kReportScans, language), std::to_string(patient.num_scans)}},
       .rows = {},
       .note = Word(say::result::kReportDigitsNote, language),
-      .footer = Footer(language)};
+      .footer = Footer(language),
+      .paper = stored.paper};
   if (const auto reference = stored.references.Find(patient.approved_reference_id)) {
     AddReferenceTo(report.identity, *reference, language);
     const Tolerance& tolerance = reference->plan.tolerance;

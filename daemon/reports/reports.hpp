@@ -25,6 +25,7 @@ struct ReportSources {
   double warm_up_min;       ///< Time that a sensor must have been on to be warm.
   RoomFinder room_in = {};  ///< As the room is known now: for pictures of plans.
   CouchProfile couch = {};
+  std::string paper = "A4";  ///< Or Letter.
 };
 
 /// One page: identity, plan and approval, verdict, the six numbers with uncertainty and tolerance,

@@ -145,7 +145,17 @@ class WebScans final : public web::ScanService {
             store.scans,
             references_.warm_up_min(),
             [this](const MarkerMap& scene) { return room_.In(scene); },
-            store.couch.Get()};
+            store.couch.Get(),
+            PaperIn(store)};
+  }
+
+  /// Settings that cannot be read stop no report.
+  static std::string PaperIn(Store& store) {
+    try {
+      return store.settings.Get().paper;
+    } catch (const DataError&) {
+      return Settings{}.paper;
+    }
   }
 
   /// @throws DataError if there is none, or it cannot be read.

@@ -25,6 +25,7 @@ Message CheckSettings(const SettingsChange& change) {
   if (wrong.empty() && !IsPosture(settings.posture))
     wrong = say::scan::SettingPosture({kPostures.begin(), kPostures.end()});
   if (wrong.empty() && !IsAcceptLive(settings.accept_live)) wrong = say::scan::SettingAcceptLive();
+  if (wrong.empty() && !IsReportPaper(settings.paper)) wrong = say::scan::SettingPaper();
   return wrong;
 }
 

@@ -10,19 +10,21 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/notice.hpp"
 #include "algo/base/units.hpp"
 #include "algo/comparison/room_board.hpp"
+#include "daemon/sheets/paper.hpp"
+#include "daemon/sheets/print_text.hpp"
 #include "words/file.hpp"
 #include "words/sheet.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr double kPointsPerMm = 72.0 / 25.4;
 constexpr double kMargin_mm = 6.0;   // printers leave about 5 mm white
 constexpr double kFooter_mm = 22.0;  // ruler and notice
 constexpr double kLabel_mm =
@@ -62,17 +64,19 @@ void Finish(const CairoSurface& surface, const std::filesystem::path& file) {
 struct MarkerSheet::Canvas {
   Canvas(cairo_surface_t* surface, double units_per_mm) : cr(cairo_create(surface)) {
     cairo_scale(cr, units_per_mm, units_per_mm);
-    cairo_select_font_face(cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    text.emplace(cr);
   }
-  ~Canvas() { cairo_destroy(cr); }
+  ~Canvas() {
+    text.reset();
+    cairo_destroy(cr);
+  }
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
   void Grey(double level) const { cairo_set_source_rgb(cr, level, level, level); }
-  void Text(double x, double y, double size_mm, const std::string& text) const {
-    cairo_set_font_size(cr, size_mm);
-    cairo_move_to(cr, x, y);
-    cairo_show_text(cr, text.c_str());
+  /// @param right  Where the line must end.
+  void Text(double x, double y, double size_mm, const std::string& line, double right) const {
+    text->Line(x, y, line, {.size = size_mm}, right - x);
   }
   void Line(double x0, double y0, double x1, double y1, double width) const {
     cairo_set_line_width(cr, width);
@@ -82,21 +86,8 @@ struct MarkerSheet::Canvas {
   }
 
   cairo_t* cr;
+  std::optional<PrintText> text;
 };
-
-namespace {
-
-struct Paper {
-  std::string_view name;
-  double width_mm, height_mm;
-};
-// ISO 216, and ANSI/ASME Y14.1 (8.5 by 11 and 11 by 17 inches).
-constexpr std::array<Paper, 4> kPapers = {{{"A4", 210.0, 297.0},
-                                           {"A3", 297.0, 420.0},
-                                           {"Letter", 215.9, 279.4},
-                                           {"Tabloid", 279.4, 431.8}}};
-
-}  // namespace
 
 MarkerSheet::MarkerSheet(const SheetOptions& options)
     : options_(options), dictionary_(Dictionary(options.dictionary)) {
@@ -104,8 +95,8 @@ MarkerSheet::MarkerSheet(const SheetOptions& options)
     LayBoard();
     return;
   }
-  const auto paper = std::ranges::find(kPapers, options.paper, &Paper::name);
-  if (paper == kPapers.end()) throw InvalidRequest(say::sheet::Paper(options.paper));
+  const Paper* const paper = FindPaper(options.paper);
+  if (paper == nullptr) throw InvalidRequest(say::sheet::Paper(options.paper));
   width_mm_ = paper->width_mm;
   height_mm_ = paper->height_mm;
   if (options.ids.empty() || options.ids.size() > kMaxIds)
@@ -175,7 +166,7 @@ void MarkerSheet::DrawCross(const Canvas& canvas) const {
   cairo_line_to(canvas.cr, x - 1.5, kMargin_mm + 3.0);
   cairo_close_path(canvas.cr);
   cairo_fill(canvas.cr);
-  canvas.Text(x + 3.0, kMargin_mm + 2.8, 3.2, Said(say::sheet::ToGantry()));
+  canvas.Text(x + 3.0, kMargin_mm + 2.8, 3.2, Said(say::sheet::ToGantry()), width_mm_ - kMargin_mm);
 }
 
 void MarkerSheet::DrawMarker(const Canvas& canvas, const PlacedMarker& marker) const {
@@ -203,7 +194,8 @@ void MarkerSheet::DrawMarker(const Canvas& canvas, const PlacedMarker& marker) c
   cairo_close_path(canvas.cr);
   cairo_fill(canvas.cr);
   canvas.Line(x + 1.5, y - 1.0, x + 1.5, y + 0.6, 0.6);
-  canvas.Text(x + 4.5, y, 3.6, Said(say::sheet::Marker(marker.id, side_mm)));
+  canvas.Text(x + 4.5, y, 3.6, Said(say::sheet::Marker(marker.id, side_mm)),
+              width_mm_ - kMargin_mm);
 }
 
 std::string MarkerSheet::Said(const Message& message) const {
@@ -212,20 +204,22 @@ std::string MarkerSheet::Said(const Message& message) const {
 
 void MarkerSheet::DrawRuler(const Canvas& canvas, int page) const {
   const double x = kMargin_mm, y = height_mm_ - kMargin_mm - 12.0;
+  const double right = width_mm_ - kMargin_mm;
   canvas.Grey(0);
   for (int mm = 0; mm <= static_cast<int>(kRuler_mm); ++mm) {
     const double height = mm % 10 == 0 ? 4.0 : mm % 5 == 0 ? 2.8 : 1.6;
     canvas.Line(x + mm, y, x + mm, y - height, 0.12);
   }
   canvas.Line(x, y, x + kRuler_mm, y, 0.12);
-  canvas.Text(x + kRuler_mm + 3.0, y, 3.2, Said(say::sheet::Ruler()));
+  canvas.Text(x + kRuler_mm + 3.0, y, 3.2, Said(say::sheet::Ruler()), right);
   canvas.Grey(kTextGrey);
   const double length_mm = options_.length_m / kMillimetre;
   canvas.Text(x, y + 5.0, 3.0,
               Said(options_.is_board ? say::sheet::BoardFooter(dictionary_.name(), length_mm)
                                      : say::sheet::PageFooter(dictionary_.name(), length_mm,
-                                                              page + 1, num_pages())));
-  canvas.Text(x, y + 9.5, 2.2, std::string(kResearchNotice));
+                                                              page + 1, num_pages())),
+              right);
+  canvas.Text(x, y + 9.5, 2.2, std::string(kResearchNotice), right);
 }
 
 void MarkerSheet::Draw(const Canvas& canvas, int page) const {

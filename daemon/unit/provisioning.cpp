@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <fstream>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -80,6 +81,14 @@ bool IsAddressWithPrefix(const std::string& text) {
 
 bool IsHostName(const std::string& text) {
   return IsWord(text, "-", 63) && text.front() != '-' && text.back() != '-';
+}
+
+/// A file of the system's time zones, and nothing outside their folder.
+bool IsTimeZone(const std::string& name) {
+  if (!IsWord(name, "/_+-", 64) || name.front() == '/') return false;
+  std::ifstream file(fs::path("/usr/share/zoneinfo") / name, std::ios::binary);
+  std::array<char, 4> kind{};
+  return file.read(kind.data(), kind.size()) && std::string_view(kind.data(), 4) == "TZif";
 }
 
 bool IsServer(const std::string& text) { return IsAddress(text) || IsWord(text, ".-", 253); }
@@ -178,6 +187,7 @@ Provisioning ReadProvisioning(const fs::path& file) {
   unit.Take("serial", given.serial, say::config::ExpectedUnitSerial(),
             [](const std::string& value) { return IsWord(value, "._-", 32); });
   unit.Take("host_name", given.host_name, say::config::ExpectedUnitName(), IsHostName);
+  unit.Take("time_zone", given.time_zone, say::config::ExpectedTimeZone(), IsTimeZone);
   unit.RejectUnknownKeys();
   ReadNetwork(Section(root, "network", name), name, given);
   ReadPage(Section(root, "page", name), file, given);
@@ -200,6 +210,7 @@ void ApplyProvisioning(const Provisioning& given, const fs::path& unit, const fs
   const auto line = [](const std::string& text) { return text.empty() ? "" : text + "\n"; };
   Put(unit / "serial", line(given.serial));
   Put(unit / "host-name", line(given.host_name));
+  Put(unit / "time-zone", line(given.time_zone));
   Put(unit / "network", NetworkFile(given));
   Put(unit / "time-servers",
       given.time_servers.empty()

@@ -17,6 +17,7 @@ namespace plumb {
 struct Provisioning {
   std::string serial;     ///< Serial number of the unit; empty if not given, like the others.
   std::string host_name;  ///< One label; the appliance also answers to NAME.local.
+  std::string time_zone;  ///< Of this system, such as "Europe/Berlin"; empty: UTC.
   std::string address;    ///< With its prefix, such as "192.168.10.5/24"; empty: DHCP.
   std::string gateway;
   std::vector<std::string> dns, time_servers;
@@ -31,8 +32,8 @@ struct Provisioning {
 /// For systemd-networkd: every wired interface, with the address or by DHCP.
 [[nodiscard]] std::string NetworkFile(const Provisioning& given);
 
-/// Writes the given settings, each file in one step: `serial`, `host-name`, `network`,
-/// `time-servers` to `unit`, the page's key and the display to `state` with that folder's owner.
+/// Writes the given settings, each file in one step: `serial`, `host-name`, `time-zone`,
+/// `network`, `time-servers` to `unit`, the page's key and the display to `state` with that folder's owner.
 /// Settings that are not given are removed from `unit`.
 /// @throws IoError
 void ApplyProvisioning(const Provisioning& given, const std::filesystem::path& unit,

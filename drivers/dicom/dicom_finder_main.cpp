@@ -23,6 +23,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/plain_text.hpp"
 #include "algo/base/utf8.hpp"
 #include "drivers/dicom/dicom_association.hpp"
 #include "drivers/dicom/dicom_network.hpp"
@@ -44,7 +45,7 @@ constexpr unsigned kLongest_s = 9;
 std::string ShortText(DcmItem& item, const DcmTagKey& tag, std::size_t most) {
   OFString value;
   (void)item.findAndGetOFString(tag, value);
-  return ValidUtf8(std::string(value.c_str()).substr(0, most));
+  return AsPlainText(std::string(value.c_str()).substr(0, most));
 }
 
 void FillQuery(DcmDataset& query, const WorklistRequest& request) {

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/plain_text.hpp"
 #include "algo/base/utf8.hpp"
 #include "words/dicom.hpp"
 
@@ -36,7 +37,7 @@ class Item {
   /// Empty where the value is missing. Of several values all, as they stand in the file.
   [[nodiscard]] std::string Text(const DcmTagKey& tag) const {
     const std::string_view raw = Trimmed(Raw(tag)).substr(0, kMostText);
-    if (is_utf8_) return ValidUtf8(raw);
+    if (is_utf8_) return AsPlainText(raw);
     // Latin-1, the usual set of Western planning systems; of others the letters are wrong, but
     // names still differ.
     std::string text;
@@ -49,7 +50,7 @@ class Item {
         text += static_cast<char>(0x80 | (code & 0x3F));
       }
     }
-    return ValidUtf8(text);
+    return AsPlainText(text);
   }
 
   /// Numbers of a decimal or integer string. Longer than the 16 characters of the standard, with

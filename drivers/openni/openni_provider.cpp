@@ -10,7 +10,7 @@
 #include <span>
 
 #include "algo/base/errors.hpp"
-#include "algo/base/utf8.hpp"
+#include "algo/base/plain_text.hpp"
 #include "drivers/live/sensor_events.hpp"
 #include "drivers/openni/openni_library.hpp"
 #include "drivers/openni/openni_sensor.hpp"
@@ -67,7 +67,7 @@ struct OpenNiProvider::Impl {
         library->DeviceGetProperty(device, ONI_DEVICE_PROPERTY_SERIAL_NUMBER, serial.data(), &size);
     library->DeviceClose(device);
     serial.back() = '\0';
-    return status == ONI_STATUS_OK ? ValidUtf8(serial.data()) : std::string();
+    return status == ONI_STATUS_OK ? AsPlainText(serial.data()) : std::string();
   }
 
   SensorDescription Describe(const OniDeviceInfo& info) {
@@ -82,7 +82,7 @@ struct OpenNiProvider::Impl {
       if (!serial.empty()) serials[info.uri] = serial;
     }
     return {info.uri, serial.empty() ? info.uri : serial,
-            ValidUtf8(fmt::format("{} {}", info.vendor, info.name)), info.usbVendorId,
+            AsPlainText(fmt::format("{} {}", info.vendor, info.name)), info.usbVendorId,
             info.usbProductId};
   }
 

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "algo/base/utf8.hpp"
+#include "algo/base/plain_text.hpp"
 #include "drivers/sdk/version_numbers.hpp"
 #include "words/sdk.hpp"
 
@@ -12,7 +12,7 @@ namespace plumb {
 std::string SdkText(const char* text) {
   constexpr std::size_t kMostBytes = 64;
   return text == nullptr ? std::string()
-                         : ValidUtf8(std::string(text, ::strnlen(text, kMostBytes)));
+                         : AsPlainText(std::string(text, ::strnlen(text, kMostBytes)));
 }
 
 std::optional<Message> WhyUnusable(const SdkUnit& unit) {

@@ -3,6 +3,7 @@
 // the text or refuses it.
 #include <cstdlib>
 
+#include "algo/base/plain_text.hpp"
 #include "tests/fuzz/fuzz_one.hpp"
 #include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"

@@ -54,6 +54,8 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
       {"import-dicom", "structures.dcm", "plan.dcm"},
       {"export-dicom", "result", "--reference", "a", "--current", "b"},
       {"export-dicom", "result", "--reference", "a", "--out", "x"},
+      {"export-dicom", "result", "--reference", "a", "--current", "b", "--out", "x",
+       "--patient-name", "DOE^J\u202E"},
       {"send-dicom", "a.dcm"},
       {"send-dicom", "a.dcm", "--to", "ARCHIVE"},
       {"send-dicom", "a.dcm", "--to", "ARCHIVE@host:0"},

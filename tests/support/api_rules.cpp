@@ -308,7 +308,8 @@ TEST_F(ApiRules, SettingsAreKeptAsTheyWereWrittenAndBounded) {
                        {"auto_stop_s", 7.0},        {"scan_limit_s", 33.0},
                        {"keep_recordings", true},   {"retention_days", 730},
                        {"idle_logout_min", 11},     {"accept_live", "signature"},
-                       {"breath_window_mm", 5.0},   {"scan_wristband", true}};
+                       {"breath_window_mm", 5.0},   {"scan_wristband", true},
+                       {"paper", "Letter"}};
   ASSERT_NE(engineer.Get("/api/v1/settings").json(), wanted);
   for (const char* role : {"technician", "physicist"})
     EXPECT_EQ(LoggedIn(role).Put("/api/v1/settings", wanted).status, 403) << role;
@@ -323,7 +324,8 @@ TEST_F(ApiRules, SettingsAreKeptAsTheyWereWrittenAndBounded) {
                                                                 {"retention_days", -1},
                                                                 {"idle_logout_min", 0},
                                                                 {"accept_live", "nobody"},
-                                                                {"breath_window_mm", 20.5}}) {
+                                                                {"breath_window_mm", 20.5},
+                                                                {"paper", "A3"}}) {
     json wrong = wanted;
     wrong[field] = value;
     const HttpAnswer answer = engineer.Put("/api/v1/settings", wrong);
@@ -348,7 +350,8 @@ TEST_F(ApiRules, ASettingThatIsNotSentStaysAsItIsStored) {
                                                                 {"retention_days", 730},
                                                                 {"idle_logout_min", 11},
                                                                 {"accept_live", "signature"},
-                                                                {"breath_window_mm", 5.0}}) {
+                                                                {"breath_window_mm", 5.0},
+                                                                {"paper", "Letter"}}) {
     ASSERT_NE(wanted[field], value) << field;
     wanted[field] = value;
     EXPECT_EQ(engineer.Put("/api/v1/settings", {{field, value}}).status, 200) << field;

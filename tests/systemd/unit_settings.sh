@@ -20,10 +20,14 @@ run() { "$source/systemd/unit-settings" "$@" >out 2>&1 && code=0 || code=$?; }
 echo plumb >host-name
 run
 check "a unit without a file keeps its name" '^0 plumb$' "$code $(cat host-name)"
-printf '%s\n' '[unit]' 'serial = "PL-1"' 'host_name = "first"' '[network]' \
+check "and has the time of UTC" '^/usr/share/zoneinfo/Etc/UTC$' "$(readlink run/plumb-localtime)"
+printf '%s\n' '[unit]' 'serial = "PL-1"' 'host_name = "first"' 'time_zone = "America/Bogota"' \
+  '[network]' \
   'address = "10.1.1.5/8"' 'time_servers = ["10.1.1.1"]' >data/provision/plumb-provision.toml
 run
 check "name" '^0 first$' "$code $(cat host-name)"
+check "time zone" '^/usr/share/zoneinfo/America/Bogota -0500$' \
+  "$(readlink run/plumb-localtime) $(TZ=:$work/run/plumb-localtime date -d @0 +%z)"
 check "network" 'Address=10.1.1.5/8' "$(cat run/systemd/network/10-plumb.network)"
 check "time servers" 'NTP=10.1.1.1' "$(cat run/systemd/timesyncd.conf.d/10-plumb.conf)"
 check "serial number" '^PL-1$' "$(cat data/unit/serial)"

@@ -8,6 +8,7 @@ import tempfile
 import tomllib
 
 PROVISION = pathlib.Path(__file__).resolve().parents[2] / "toolchain" / "provision"
+ZONES = "serial,time_zone\n"
 HEADER = "serial,host_name,address,gateway,dns,time_servers,display\n"
 
 
@@ -52,11 +53,16 @@ def check_twenty(folder):
     assert (folder / "out" / "PL-0007" / "display.key").stat().st_mode & 0o777 == 0o600
     assert run(folder, HEADER + "".join(rows)).returncode == 0
     assert files(folder / "out") == made, "a second run gives other files"
+    assert run(folder, ZONES + "Z,Europe/Berlin\n").returncode == 0
+    unit = tomllib.loads((folder / "out" / "Z" / "plumb-provision.toml").read_text())
+    assert unit == {"unit": {"serial": "Z", "time_zone": "Europe/Berlin"}}, unit
 
 
 def check_wrong(folder):
     good = "A,a,10.0.0.1/8,,,,\n"
     for table, says in {
+        ZONES + "A,Europe/Bielefeld\n": "row 1: time_zone: expected the name of a time zone",
+        ZONES + "A,../zoneinfo/Etc/UTC\n": "row 1: time_zone",
         "": "expected one column 'serial'",
         HEADER: "no units",
         "serial,colour\nA,red\n": "unknown column 'colour'",

@@ -16,6 +16,7 @@ const { useCatalogue } = await load('words');
 const catalogues = readCatalogues(words);
 const useLanguage = (code) => useCatalogue(catalogues[code]);
 const { detailWords, subjectWords, userWords } = await load('audit_words');
+const { csvOf } = await load('csv');
 rmSync(folder, { recursive: true });
 
 const failures = [];
@@ -131,6 +132,9 @@ for (const [language, retention, fraction, gone, button] of [
   equal(subjectWords({ subject: '7', about: { ...about, exists: false } }), gone, language);
   equal(subjectWords({ subject: '', about: null }), '', language);
 }
+equal(csvOf(['a', 'b'], [['=1', 'x;"y"']], '.'),
+  '\ufeff"a","b"\r\n"\'=1","x;""y"""\r\n', 'commas');
+equal(csvOf(['a', 'b'], [['1', '2']], ','), '\ufeff"a";"b"\r\n"1";"2"\r\n', 'semicolons');
 for (const failure of failures) console.log(`  - ${failure}`);
 console.log(failures.length ? `${failures.length} failures` : 'all well');
 process.exit(failures.length ? 1 : 0);

@@ -10,6 +10,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/names.hpp"
+#include "algo/base/plain_text.hpp"
 #include "web/api/look_back.hpp"
 #include "web/exchange/json.hpp"
 #include "web/exchange/routes.hpp"

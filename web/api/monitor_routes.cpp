@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/parse_number.hpp"
+#include "web/exchange/csv.hpp"
 #include "web/exchange/json.hpp"
 #include "web/exchange/routes.hpp"
 #include "words/web.hpp"
@@ -31,9 +32,10 @@ Response RecordResponse(MonitoringService& monitoring, const Request& request) {
     if (report.is_null()) return ErrorResponse(404, say::web::NothingHere());
     return BodyResponse("application/json", report.dump());
   }
-  std::string csv = monitoring.MonitorCsv(scan, *number);
+  const std::string csv = monitoring.MonitorCsv(scan, *number);
   if (csv.empty()) return ErrorResponse(404, say::web::NothingHere());
-  return Download(kCsv, std::move(csv), fmt::format("plumb_monitoring_{}_{}.csv", scan, *number));
+  return Download(kCsv, CsvFor(LanguageIn(request), csv),
+                  fmt::format("plumb_monitoring_{}_{}.csv", scan, *number));
 }
 
 }  // namespace
@@ -61,10 +63,11 @@ void AddMonitorApi(Routes& routes, const Services& services) {
                });
   routes
       .ReadInBackground("/api/v1/monitor/record.csv", Permission::kView,
-                        [&monitoring](const Request&) {
-                          std::string csv = monitoring.MonitorCsv("", 0);
+                        [&monitoring](const Request& request) {
+                          const std::string csv = monitoring.MonitorCsv("", 0);
                           if (csv.empty()) return ErrorResponse(404, say::web::NothingHere());
-                          return Download(kCsv, std::move(csv), "plumb_monitoring.csv");
+                          return Download(kCsv, CsvFor(LanguageIn(request), csv),
+                                          "plumb_monitoring.csv");
                         })
       .Discloses("", "download.monitoring");
   routes

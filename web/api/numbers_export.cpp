@@ -20,34 +20,40 @@ namespace {
 
 constexpr int kMaxScans = 1000;
 
-std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
-  std::string text = "patient,scan,fraction,purpose,started_at,verdict";
-  for (const char* prefix : {",", ",u95_"})
-    for (const NumberAxis& axis : kNumberAxes) text.append(prefix).append(axis.key);
-  text += ",accepted_by,accepted_at,accepted_reason,check_overdue,check_failed";
-  for (const NumberAxis& axis : kNumberAxes) text.append(",judgement_").append(axis.name);
-  text += "\r\n";
+std::string Csv(const Patient& patient, const std::vector<Scan>& scans, const Catalogue& language) {
+  CsvTable table(language);
+  for (const char* name : {"patient", "scan", "fraction", "purpose", "started_at", "verdict"})
+    table.Plain(name);
+  for (const char* prefix : {"", "u95_"})
+    for (const NumberAxis& axis : kNumberAxes) table.Plain(prefix + std::string(axis.key));
+  for (const char* name :
+       {"accepted_by", "accepted_at", "accepted_reason", "check_overdue", "check_failed"})
+    table.Plain(name);
+  for (const NumberAxis& axis : kNumberAxes) table.Plain("judgement_" + std::string(axis.name));
+  table.EndRow();
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != ScanOutcome::kDone) continue;
     std::vector<ShownRow> rows(kNumberAxes.size());
     const bool is_advice = scan->result && !ShownRows(*scan->result).empty();
     if (is_advice) rows = ShownRows(*scan->result);
-    text +=
-        fmt::format("{},{},{},{},{},{}", CsvCell(patient.code), CsvCell(scan->id),
-                    scan->fraction > 0 ? std::to_string(scan->fraction) : "", Name(scan->purpose),
-                    TimeText(scan->started_at), scan->result ? Name(scan->result->verdict) : "");
-    for (const ShownRow& row : rows) text += "," + CsvNumber(row.value);
-    for (const ShownRow& row : rows) text += "," + CsvNumber(row.u95);
-    text += fmt::format(",{},{},{},{},{}", CsvCell(scan->accepted_by),
-                        scan->accepted_at ? TimeText(*scan->accepted_at) : "",
-                        CsvCell(scan->accepted_reason),
-                        scan->daily_check != DailyCheck::kPassed ? "yes" : "no",
-                        scan->daily_check == DailyCheck::kFailed ? "yes" : "no");
+    table.Text(patient.code)
+        .Text(scan->id)
+        .Plain(scan->fraction > 0 ? std::to_string(scan->fraction) : "")
+        .Plain(Name(scan->purpose))
+        .Plain(TimeText(scan->started_at))
+        .Plain(scan->result ? Name(scan->result->verdict) : "");
+    for (const ShownRow& row : rows) table.Number(row.value);
+    for (const ShownRow& row : rows) table.Number(row.u95);
+    table.Text(scan->accepted_by)
+        .Plain(scan->accepted_at ? TimeText(*scan->accepted_at) : "")
+        .Text(scan->accepted_reason)
+        .Plain(scan->daily_check != DailyCheck::kPassed ? "yes" : "no")
+        .Plain(scan->daily_check == DailyCheck::kFailed ? "yes" : "no");
     for (const ShownRow& row : rows)
-      text.append(1, ',').append(is_advice ? Name(row.judgement) : std::string_view());
-    text += "\r\n";
+      table.Plain(is_advice ? Name(row.judgement) : std::string_view());
+    table.EndRow();
   }
-  return text;
+  return table.Take();
 }
 
 std::string NumbersJson(const Patient& patient, const std::vector<Scan>& scans) {
@@ -87,14 +93,15 @@ void AddReports(Routes& routes, PatientService& patients, ScanService& scans) {
 
 void AddNumbers(Routes& routes, PatientService& patients, ScanService& scans) {
   routes
-      .ReadInBackground("/api/v1/patients/{id}/numbers.csv", Permission::kView,
-                        [&patients, &scans](const Request& request) {
-                          const auto patient = patients.FindPatient(request.arguments[0]);
-                          if (!patient) return ErrorResponse(404, say::store::NoPatient());
-                          return Download("text/csv; charset=utf-8",
-                                          Csv(*patient, scans.Scans(patient->id, kMaxScans)),
-                                          fmt::format("plumb_numbers_{}.csv", patient->code));
-                        })
+      .ReadInBackground(
+          "/api/v1/patients/{id}/numbers.csv", Permission::kView,
+          [&patients, &scans](const Request& request) {
+            const auto patient = patients.FindPatient(request.arguments[0]);
+            if (!patient) return ErrorResponse(404, say::store::NoPatient());
+            return Download("text/csv; charset=utf-8",
+                            Csv(*patient, scans.Scans(patient->id, kMaxScans), LanguageIn(request)),
+                            fmt::format("plumb_numbers_{}.csv", patient->code));
+          })
       .Discloses("", "download.numbers");
   routes
       .ReadInBackground("/api/v1/patients/{id}/numbers.json", Permission::kView,
@@ -151,20 +158,21 @@ void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files
 /// All data of a course in one file.
 void AddCourse(Routes& routes, PatientService& patients, ScanService& scans) {
   routes
-      .ReadInBackground("/api/v1/patients/{id}/course.zip", Permission::kView,
-                        [&patients, &scans](const Request& request) {
-                          const auto patient = patients.FindPatient(request.arguments[0]);
-                          if (!patient) return ErrorResponse(404, say::store::NoPatient());
-                          const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
-                          std::vector<ArchivedFile> files = {
-                              {.name = "numbers.csv", .bytes = Csv(*patient, list)},
-                              {.name = "numbers.json", .bytes = NumbersJson(*patient, list)}};
-                          if (auto pdf = scans.CourseReport(patient->id, LanguageIn(request)))
-                            files.push_back({.name = "course.pdf", .bytes = std::move(*pdf)});
-                          AddResults(list, files);
-                          return Download("application/zip", ZipOf(files),
-                                          fmt::format("plumb_course_{}.zip", patient->code));
-                        })
+      .ReadInBackground(
+          "/api/v1/patients/{id}/course.zip", Permission::kView,
+          [&patients, &scans](const Request& request) {
+            const auto patient = patients.FindPatient(request.arguments[0]);
+            if (!patient) return ErrorResponse(404, say::store::NoPatient());
+            const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
+            std::vector<ArchivedFile> files = {
+                {.name = "numbers.csv", .bytes = Csv(*patient, list, LanguageIn(request))},
+                {.name = "numbers.json", .bytes = NumbersJson(*patient, list)}};
+            if (auto pdf = scans.CourseReport(patient->id, LanguageIn(request)))
+              files.push_back({.name = "course.pdf", .bytes = std::move(*pdf)});
+            AddResults(list, files);
+            return Download("application/zip", ZipOf(files),
+                            fmt::format("plumb_course_{}.zip", patient->code));
+          })
       .Discloses("", "download.course");
 }
 

@@ -128,38 +128,43 @@ Json StatisticsJson(const Courses& courses) {
 }
 
 /// A line for each course, then one for each site: there the deviation is the systematic error.
-std::string StatisticsCsv(const Courses& courses) {
-  std::string text =
-      "kind,site,patient,reference,courses,fractions,scans,accepted,overrides,minutes";
+std::string StatisticsCsv(const Courses& courses, const Catalogue& language) {
+  CsvTable table(language);
+  for (const char* name : {"kind", "site", "patient", "reference", "courses", "fractions", "scans",
+                           "accepted", "overrides", "minutes"})
+    table.Plain(name);
   for (const auto& [name, which] : kWhich)
     for (const NumberAxis& axis : kNumberAxes)
       for (const char* what : {"mean", "deviation", "random"})
-        text += fmt::format(",{}_{}_{}", name, what, axis.key);
-  text += "\r\n";
+        table.Plain(fmt::format("{}_{}_{}", name, what, axis.key));
+  table.EndRow();
   for (const auto& [patient, version, course] : courses.all) {
-    text += fmt::format("course,{},{},{},1,{},{},{},{},{}", CsvCell(patient.site),
-                        CsvCell(patient.code), version, course.fractions, course.scans,
-                        course.accepted, course.overrides, CsvNumber(course.minutes));
+    table.Plain("course").Text(patient.site).Text(patient.code);
+    for (const auto count :
+         {version, 1, course.fractions, course.scans, course.accepted, course.overrides})
+      table.Plain(std::to_string(count));
+    table.Number(course.minutes);
     for (const auto& [name, which] : kWhich)
       for (const NumberSpread& spread : course.*which)
-        text += fmt::format(",{},{},",
-                            CsvNumber(spread.count > 0 ? std::optional(spread.mean) : std::nullopt),
-                            CsvNumber(spread.deviation));
-    text += "\r\n";
+        table.Number(spread.count > 0 ? std::optional(spread.mean) : std::nullopt)
+            .Number(spread.deviation)
+            .Empty();
+    table.EndRow();
   }
   for (const auto& [key, site] : BySite(courses.all)) {
-    text += fmt::format("site,{},,,{},,,,,", CsvCell(site.first), site.second.size());
+    table.Plain("site").Text(site.first).Empty().Empty().Plain(std::to_string(site.second.size()));
+    for (int i = 0; i < 5; ++i) table.Empty();
     for (const auto& [name, which] : kWhich) {
       for (std::size_t i = 0; i < kNumberAxes.size(); ++i) {
         const GroupSpread spread = GroupSpreadOf(site.second, which, i);
-        text += fmt::format(
-            ",{},{},{}", CsvNumber(spread.courses > 0 ? std::optional(spread.mean) : std::nullopt),
-            CsvNumber(spread.systematic), CsvNumber(spread.random));
+        table.Number(spread.courses > 0 ? std::optional(spread.mean) : std::nullopt)
+            .Number(spread.systematic)
+            .Number(spread.random);
       }
     }
-    text += "\r\n";
+    table.EndRow();
   }
-  return text;
+  return table.Take();
 }
 
 }  // namespace
@@ -184,9 +189,9 @@ void AddStatisticsRoutes(Routes& routes, const Services& services) {
       .Discloses("view.statistics");
   routes
       .ReadInBackground("/api/v1/statistics.csv", Permission::kView,
-                        [services](const Request&) {
+                        [services](const Request& request) {
                           return Download("text/csv; charset=utf-8",
-                                          StatisticsCsv(ReadCourses(services)),
+                                          StatisticsCsv(ReadCourses(services), LanguageIn(request)),
                                           "plumb_statistics.csv");
                         })
       .Discloses("", "download.statistics");

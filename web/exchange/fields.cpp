@@ -6,6 +6,7 @@
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/names.hpp"
+#include "algo/base/plain_text.hpp"
 #include "algo/base/polygon.hpp"
 #include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"
@@ -142,6 +143,10 @@ void Take(Fields& fields, const char* name, std::optional<std::string>& wanted) 
     return;
   }
   wanted = fields.Text(name, 1, 16);
+  if (std::string_view(name) == "paper") {
+    if (!IsReportPaper(*wanted)) throw DataError(say::web::FieldPaper());
+    return;
+  }
   if (!IsAcceptLive(*wanted)) throw DataError(say::web::FieldAcceptLive());
 }
 

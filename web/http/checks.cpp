@@ -64,18 +64,6 @@ std::optional<std::string> UnescapeForm(std::string_view text) {
 
 }  // namespace
 
-bool IsPlainText(std::string_view text, bool allow_lines) {
-  while (!text.empty()) {
-    std::uint32_t code = 0;
-    const std::size_t length = Utf8Length(text, code);
-    if (length == 0) return false;
-    const bool line = code == '\n' || code == '\t';
-    if ((code < 0x20 && !(line && allow_lines)) || (code >= 0x7F && code < 0xA0)) return false;
-    text.remove_prefix(length);
-  }
-  return true;
-}
-
 bool IsKnownHost(std::string_view host, std::span<const std::string> names) {
   if (host.empty() || host.size() > kMaxHost) return false;
   const auto bracket = host.rfind(']');

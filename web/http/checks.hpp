@@ -11,9 +11,6 @@
 
 namespace plumb::web {
 
-/// Well-formed UTF-8 without control characters (except tab and line feed, if allowed).
-[[nodiscard]] bool IsPlainText(std::string_view text, bool allow_lines = false);
-
 /// True for "localhost", a numeric address, or one of `names`, each with or without a port. Rejects
 /// a foreign page whose name resolves to this machine (DNS rebinding).
 [[nodiscard]] bool IsKnownHost(std::string_view host, std::span<const std::string> names);

@@ -14,6 +14,7 @@
 #include <cstring>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/plain_text.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/exchange.hpp"
 #include "web/http/listen_socket.hpp"

@@ -3,6 +3,7 @@
 // its own copy in web/page/limits.js; a test compares them.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -49,6 +50,9 @@ inline constexpr int kMaxFraction = 999;
 /// person's signature on the live value.
 inline constexpr std::string_view kBySweep = "sweep", kBySignature = "signature";
 
+/// The papers of reports.
+inline constexpr std::array<std::string_view, 2> kReportPapers = {"A4", "Letter"};
+
 /// Head or feet first, supine or prone.
 inline constexpr auto kPostures = kNamesOf<PatientPosture>;
 
@@ -58,6 +62,10 @@ inline constexpr auto kPostures = kNamesOf<PatientPosture>;
 
 [[nodiscard]] constexpr bool IsAcceptLive(std::string_view text) {
   return text == kBySweep || text == kBySignature;
+}
+
+[[nodiscard]] constexpr bool IsReportPaper(std::string_view text) {
+  return text == kReportPapers[0] || text == kReportPapers[1];
 }
 
 }  // namespace plumb

@@ -24,6 +24,7 @@ struct Settings {
   int idle_logout_min = 15;
   std::string accept_live{kBySweep};  ///< Or kBySignature.
   double breath_window_mm = 3.5;      ///< Of a breath hold.
+  std::string paper{kReportPapers.front()};  ///< Of reports; one of kReportPapers.
 };
 
 /// Calls visit(name, change, value, limits) for each of them, or without limits where it has none.
@@ -45,6 +46,7 @@ void ForEachSetting(Change& change, Values& values, const Visit& visit) {
   visit("idle_logout_min", change.idle_logout_min, values.idle_logout_min, kIdleLogout_min);
   visit("accept_live", change.accept_live, values.accept_live);
   visit("breath_window_mm", change.breath_window_mm, values.breath_window_mm, kBreathWindow_mm);
+  visit("paper", change.paper, values.paper);
 }
 
 /// Settings that are not set keep their stored value, so that two people who change different ones
@@ -58,6 +60,7 @@ struct SettingsChange {
   std::optional<int> retention_days, idle_logout_min;
   std::optional<std::string> accept_live;
   std::optional<double> breath_window_mm;
+  std::optional<std::string> paper;
 
   SettingsChange() = default;
   /// Changes all of them.

@@ -29,7 +29,9 @@ function planChange(detail) {
 
 /// Each setting that was changed, before and after.
 const settingsWords = (changes) => Object.entries(changes).map(([name, values]) => {
-  const words = { posture: S.plan.postures, accept_live: S.settings.acceptLiveBy }[name];
+  const words = {
+    posture: S.plan.postures, accept_live: S.settings.acceptLiveBy, paper: S.settings.papers,
+  }[name];
   const told = (value) => (words ? wordOf(words, value) : plain(value));
   return `${wordOf(S.settings, name)}: ${[values].flat().map(told).join(' → ')}`;
 }).join('; ');

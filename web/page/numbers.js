@@ -74,6 +74,7 @@ function drawing(name, value) {
 }
 
 /// The value with its uncertainty on the range of tolerance, whose ends carry their numbers.
+/// @param u95  Where it is not known, the mark is hollow: no value is exact.
 /// @param isKnown  Otherwise only the range is drawn.
 export function toleranceBar(value, u95, tolerance, isKnown = true) {
   const span = 2.5 * tolerance;
@@ -87,11 +88,13 @@ export function toleranceBar(value, u95, tolerance, isKnown = true) {
       x: x(-tolerance), y: 6, width: x(tolerance) - x(-tolerance), height: 14, rx: 3, class: 'zone',
     }),
     svg('line', { x1: 100, x2: 100, y1: 3, y2: 23, class: 'zero' }),
-    u95 >= 0
+    u95 > 0
       && svg('line', { x1: x(value - u95), x2: x(value + u95), y1: 13, y2: 13, class: 'whisker' }),
     !isKnown ? null : beyond
       ? svg('path', { d: value > 0 ? 'M188 4l10 9-10 9z' : 'M12 4L2 13l10 9z', class: 'mark' })
-      : svg('rect', { x: x(value) - 2, y: 2, width: 4, height: 22, rx: 1, class: 'mark' }),
+      : svg('rect', {
+        x: x(value) - 2, y: 2, width: 4, height: 22, rx: 1, class: u95 > 0 ? 'mark' : 'mark open',
+      }),
     tick(-tolerance), tick(tolerance));
 }
 

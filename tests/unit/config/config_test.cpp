@@ -39,6 +39,12 @@ TEST(ConfigTest, AnEmptyFileKeepsEveryDefault) {
   EXPECT_FALSE(config.region_file);
 }
 
+TEST(ConfigTest, TextsArePlain) {
+  for (const char* line : {"[compare]\nregion = \"tor\u202Eso.json\"",
+                           "[web]\nhost_names = [\"plumb\u200B\"]"})
+    EXPECT_THAT(ErrorOf(line), AllOf(HasSubstr("test.toml:2"), HasSubstr("expected")));
+}
+
 TEST(ConfigTest, ReadsEveryKeyInItsUnit) {
   const Config config = ParseConfig(R"(
 [markers]

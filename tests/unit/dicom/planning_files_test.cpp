@@ -101,6 +101,13 @@ TEST_F(PlanningFilesTest, NamesInLatin1AreRead) {
   EXPECT_EQ(ReadStructureSet(Write("structures.dcm", bytes)).rois[0].name, "K\u00f6rper");
 }
 
+TEST_F(PlanningFilesTest, NamesWithInvisibleCharactersShowThem) {
+  auto [written, plan] = SmallCt();
+  written.rois[0].name = "BO\u202EDY\u200B";
+  EXPECT_EQ(ReadStructureSet(Write("structures.dcm", DicomBytes(written))).rois[0].name,
+            "BO\uFFFDDY\uFFFD");
+}
+
 TEST_F(PlanningFilesTest, OtherFilesAreRefusedWithTheirKind) {
   const auto [structures, plan] = SmallCt();
   const auto s = Write("structures.dcm", DicomBytes(structures));

@@ -6,11 +6,14 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <opencv2/core.hpp>
 
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/records/store.hpp"
 #include "daemon/reports/scan_quality.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
+#include "tests/support/process.hpp"
 #include "tests/support/result_with.hpp"
 #include "tests/support/synthetic_scene.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -92,6 +95,19 @@ const std::string kMove = testing::ResultWith(
         "body":{"parts":[{"words_now":"left shoulder 12 mm high",
           "words_after":"left shoulder 9 mm high"}]}})");
 
+/// Of the first page of the report: how many pixels have the colour of what is not in tolerance.
+int MarkPixels(const ScanReport& report) {
+  const testing::TempFolder folder;
+  WriteWholeFile(folder / "report.pdf", PdfOf(report));
+  const RunResult run = Run({"/usr/bin/pdftoppm", "-png", "-r", "200", "-singlefile",
+                             folder / "report.pdf", folder / "page"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  cv::Mat marked;
+  cv::inRange(ReadColorImage(folder / "page.png"), cv::Scalar(138, 66, 0), cv::Scalar(158, 86, 10),
+              marked);
+  return cv::countNonZero(marked);
+}
+
 std::string ValueOf(const ReportFacts& facts, std::string_view name) {
   for (const auto& [key, value] : facts) {
     if (key == name) return value;
@@ -112,6 +128,60 @@ TEST_F(ReportsTest, AReasonThatIsNoUtf8EndsNoReport) {
   EXPECT_GT(report_of_failure("cannot write /data/se\xF1"
                               "al: no space"),
             usual - usual / 50);
+}
+
+/// What poppler's program says of a report.
+std::string ToldOf(const std::string& pdf, std::vector<std::string> program) {
+  const testing::TempFolder folder;
+  WriteWholeFile(folder / "report.pdf", pdf);
+  program.push_back(folder / "report.pdf");
+  program.emplace_back("-");
+  if (program.front().ends_with("pdfinfo")) program.pop_back();
+  const RunResult run = Run(program);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  return run.out;
+}
+
+TEST_F(ReportsTest, NamesOfEachScriptAreWholeAndStayOnThePage) {
+  const std::string word(64, 'W');
+  patient_ = store_.patients.Add(kAnna, "P-0043", "放疗科 " + word);
+  const std::string id = AddScan(Approved(), kMove);
+  store_.scans.Accept({.user = "张伟", .address = {}}, id, "سبب " + word + word + " 😀");
+  const ReportSources& sources = sources_;
+  for (const std::string& pdf :
+       {ScanReportPdf(sources, *store_.scans.Find(id), EnglishCatalogue()),
+        CourseReportPdf(sources, *store_.patients.Find(patient_), EnglishCatalogue())}) {
+    const std::string told = ToldOf(pdf, {"/usr/bin/pdftotext", "-layout"});
+    for (const char* name : {"放疗科", "张伟"}) EXPECT_THAT(told, HasSubstr(name));
+    const std::string boxes = ToldOf(pdf, {"/usr/bin/pdftotext", "-bbox"});
+    const std::string page = "page width=\"", right = "xMax=\"";
+    const double width = std::stod(boxes.substr(boxes.find(page) + page.size()));
+    int words = 0;
+    for (std::size_t at = boxes.find(right); at != std::string::npos;
+         at = boxes.find(right, at + 1), ++words)
+      EXPECT_LE(std::stod(boxes.substr(at + right.size())), width - 42 + 1.5);
+    EXPECT_GT(words, 50);
+  }
+}
+
+TEST_F(ReportsTest, ReportsAreMadeForThePaperOfTheUnit) {
+  const std::string id = AddScan(Approved(), kMove);
+  const auto size_of = [&](const std::string& pdf) {
+    const std::string told = ToldOf(pdf, {"/usr/bin/pdfinfo"});
+    const std::size_t at = told.find("Page size:");
+    return told.substr(at, told.find('\n', at) - at);
+  };
+  const auto scan = [&] {
+    return ScanReportPdf(sources_, *store_.scans.Find(id), EnglishCatalogue());
+  };
+  const auto course = [&] {
+    return CourseReportPdf(sources_, *store_.patients.Find(patient_), EnglishCatalogue());
+  };
+  EXPECT_THAT(size_of(scan()), HasSubstr("595.276 x 841.89 pts (A4)"));
+  EXPECT_THAT(size_of(course()), HasSubstr("841.89 x 595.276 pts (A4)"));
+  sources_.paper = "Letter";
+  EXPECT_THAT(size_of(scan()), HasSubstr("612 x 792 pts (letter)"));
+  EXPECT_THAT(size_of(course()), HasSubstr("792 x 612 pts (letter)"));
 }
 
 TEST_F(ReportsTest, NumbersAreThoseOfTheCouchAndRecordsStayAsTheyAre) {
@@ -322,6 +392,20 @@ TEST_F(ReportsTest, AScanForAReferenceNamesThePlanThatWasMadeOfItAndWhoApprovedI
                     "Approved by"),
             before);
   EXPECT_TRUE(PdfOf(report).starts_with("%PDF-"));
+
+  // A dot of an unknown interval is a ring without a line, in the bar and in the trend.
+  ScanReport drawn{.title = "t", .verdict = "v"};
+  drawn.numbers = {report.numbers[1]};
+  drawn.numbers[0].judged.judgement = NumberJudgement::kUnjudged;
+  CourseRow row;
+  row.values[0] = CourseValue{1.0, 0.9, NumberJudgement::kUnjudged};
+  drawn.trend = {row, row};
+  const int known = MarkPixels(drawn);
+  drawn.numbers[0].u95 = std::nullopt;
+  const int bar_unknown = MarkPixels(drawn);
+  EXPECT_LT(bar_unknown, known - 10);
+  for (CourseRow& one : drawn.trend) one.values[0]->u95 = std::nullopt;
+  EXPECT_LT(MarkPixels(drawn), bar_unknown - 10);
 }
 
 TEST_F(ReportsTest, ThePictureOfAPlanThatNamesSidesAsksWhetherThePatientLiesSo) {

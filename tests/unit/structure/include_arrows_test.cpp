@@ -152,7 +152,7 @@ const Arrows kAllowed = {
     {"daemon/reports",
      {"algo/base", "algo/types", "algo/acceptance", "algo/motion", "algo/comparison", "algo/render",
       "drivers/files", "web/model", "web/service", "web/exchange", "daemon/loop", "daemon/config",
-      "daemon/files", "daemon/records", "daemon/result"}},
+      "daemon/files", "daemon/records", "daemon/result", "daemon/sheets"}},
     {"daemon/unit",
      {"algo/base", "drivers/files", "web/model", "web/security", "web/http", "daemon/config",
       "daemon/files", "daemon/database", "daemon/records", "daemon/archive"}},

@@ -56,12 +56,14 @@ TEST_F(ProvisioningTest, EachValueArrivesWhereItActs) {
   WriteWholeFile(folder_ / "page.pem", identity.certificate_pem);
   WriteWholeFile(folder_ / "page.key", identity.key_pem);
   const Provisioning given = Read(
-      "[unit]\nserial = \"PL-0042\"\nhost_name = \"plumb-3\"\n[network]\naddress = "
+      "[unit]\nserial = \"PL-0042\"\nhost_name = \"plumb-3\"\ntime_zone = \"Asia/Kolkata\"\n"
+      "[network]\naddress = "
       "\"192.168.10.5/24\"\ngateway = \"192.168.10.1\"\ndns = [\"192.168.10.1\", \"fd00::1\"]\n"
       "time_servers = [\"ntp.example\"]\n[page]\ncertificate = \"page.pem\"\nkey = \"page.key\"\n");
   Apply(given);
   EXPECT_EQ(Written("serial"), "PL-0042\n");
   EXPECT_EQ(Written("host-name"), "plumb-3\n");
+  EXPECT_EQ(Written("time-zone"), "Asia/Kolkata\n");
   EXPECT_EQ(Written("network"),
             "[Match]\nName=en* eth*\n[Network]\nMulticastDNS=yes\nAddress=192.168.10.5/24\n"
             "Gateway=192.168.10.1\nDNS=192.168.10.1\nDNS=fd00::1\n");
@@ -75,10 +77,13 @@ TEST_F(ProvisioningTest, EachValueArrivesWhereItActs) {
 }
 
 TEST_F(ProvisioningTest, WhatIsNotGivenIsTheDefaultAgain) {
-  Apply(Read("[unit]\nserial = \"A\"\nhost_name = \"a\"\n[network]\ntime_servers = [\"t\"]"));
+  Apply(
+      Read("[unit]\nserial = \"A\"\nhost_name = \"a\"\ntime_zone = \"Etc/UTC\"\n"
+           "[network]\ntime_servers = [\"t\"]"));
   Apply(Read(""));
   EXPECT_EQ(Written("serial"), "missing");
   EXPECT_EQ(Written("host-name"), "missing");
+  EXPECT_EQ(Written("time-zone"), "missing");
   EXPECT_EQ(Written("time-servers"), "missing");
   EXPECT_THAT(Written("network"), HasSubstr("DHCP=yes"));
   EXPECT_FALSE(fs::exists(folder_ / "state" / "page-key.pem"));
@@ -102,6 +107,11 @@ TEST_F(ProvisioningTest, BothSidesOfEachBound) {
 TEST_F(ProvisioningTest, NothingHostileIsTakenOver) {
   for (const char* bad : {"[unit]\nserial = \"a b\"",
                           "[unit]\nserial = 7",
+                          "[unit]\ntime_zone = \"Europe/Bielefeld\"",
+                          "[unit]\ntime_zone = \"Europe\"",
+                          "[unit]\ntime_zone = \"zone.tab\"",
+                          "[unit]\ntime_zone = \"../../../etc/passwd\"",
+                          "[unit]\ntime_zone = \"/usr/share/zoneinfo/UTC\"",
                           "[unit]\nserial = \"\"",
                           "[unit]\nhost_name = \"-a\"",
                           "[unit]\nhost_name = \"a.b\"",

@@ -140,6 +140,10 @@ TEST_F(StatisticsRouteTest, CoursesAndSitesAreListedAndExported) {
   EXPECT_NE(csv.find("\r\ncourse,Thorax,P-1,0,1,2,4,2,1,5.5000,1.0000,5.6569,,"), csv.npos) << csv;
   EXPECT_NE(csv.find("\r\nsite,Thorax,,,2,,,,,,1.0000,0.0000,5.6569,"), csv.npos) << csv;
   EXPECT_NE(csv.find(",'=cmd,"), csv.npos) << "what a person typed is no formula";
+  const std::string german = client.Get("/api/v1/statistics.csv?language=de").body;
+  EXPECT_TRUE(german.starts_with("\xEF\xBB\xBFkind;site;patient;")) << german;
+  EXPECT_NE(german.find("\r\ncourse;Thorax;P-1;0;1;2;4;2;1;5,5000;1,0000;5,6569;;"), csv.npos)
+      << german;
 }
 
 }  // namespace

@@ -108,13 +108,13 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   EXPECT_THAT(files.at("left_out.txt"), HasSubstr("s7/overlay.png\r\n"));
   EXPECT_THAT(files.at("left_out.txt"),
               HasSubstr("s6: its files cannot be used now: its folder is missing\r\n"));
-  EXPECT_THAT(files.at("numbers.csv"), HasSubstr("P-0042,s7"));
-  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",-8.2500,")) << "a number stays one";
+  EXPECT_THAT(files.at("numbers.csv"), HasSubstr("P-0042;s7"));
+  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(";-8,2500;")) << "a number stays one";
   EXPECT_THAT(files.at("numbers.csv"), HasSubstr(R"("'=cmd|'/C calc'!A0, ""really""")"))
       << "what a person typed is no formula";
   EXPECT_THAT(files.at("numbers.csv"),
-              HasSubstr(",check_overdue,check_failed,judgement_vertical,"));
-  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",yes,yes,"));
+              HasSubstr(";check_overdue;check_failed;judgement_vertical;"));
+  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(";yes;yes;"));
   EXPECT_EQ(service_.report_language, Catalogues().back()->code);
   EXPECT_EQ(client.Get("/api/v1/patients/p1/course.zip?language=xx").status, 400);
   EXPECT_EQ(client.Get("/api/v1/patients/p2/course.zip").status, 404);

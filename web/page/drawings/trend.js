@@ -84,7 +84,7 @@ function chart(axis, fractions, limit, isTitled) {
       points: points.map((p) => `${x(p.i) + 3},${y(p.last.value)}`).join(' '), class: 'line',
     }),
     points.map(({ i, fraction, first, last }) => [
-      last.u95 !== null && svg('line', {
+      last.u95 > 0 && svg('line', {
         x1: x(i) + 3, x2: x(i) + 3, y1: y(last.value - last.u95), y2: y(last.value + last.u95),
         class: 'whisker',
       }),

@@ -2,20 +2,11 @@
 // The audit log: what was done, by whom and from where. It can be filtered and exported as CSV.
 import { get } from '../api.js';
 import { detailWords, subjectWords, userWords } from '../audit_words.js';
+import { csvOf } from '../csv.js';
 import { action, checkbox, clear, field, h, hint, redraw, row, saveBlob, table } from '../dom.js';
 import { S, wordOf } from '../words.js';
 
 const kPage = 100;
-
-/// A field of a CSV file: one that a spreadsheet would take as a formula is text.
-export function csvField(value) {
-  const text = String(value ?? '');
-  const safe = /^[=+\-@\t\r]/.test(text) ? `'${text}` : text;
-  return `"${safe.replaceAll('"', '""')}"`;
-}
-
-const csvOf = (heads, rows) => [heads, ...rows]
-  .map((words) => `${words.map(csvField).join(',')}\r\n`).join('');
 
 export async function showAudit(place) {
   const text = S.audit;

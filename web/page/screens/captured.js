@@ -27,7 +27,7 @@ export async function capturedAgainst(reference) {
 
 const one = ({ value, u95, unit }, i) => (value === null ? S.none
   : withUnit(signed(value, digitsOf(u95 ?? NaN, mostDigits(kAxes[i]))), unit)
-    + (u95 === null ? '' : ` ±${withUnit(u95.toFixed(2).replace('.', S.decimal), unit)}`));
+    + (u95 === null ? ' ±?' : ` ±${withUnit(u95.toFixed(2).replace('.', S.decimal), unit)}`));
 
 /// The correction between both: of the surface against the CT.
 export function capturedCard(captured) {

@@ -57,7 +57,7 @@ function number(axis, numbers, tolerance) {
   return h('div', { class: `live-number ${tone}` },
     h('span', { class: 'axis' }, S.result.axes[axis.name]),
     h('strong', {}, value === null ? '–' : withUnit(signed(value, digits), unit)),
-    h('span', { class: 'fine' }, u95 === null ? ''
+    h('span', { class: 'fine' }, value === null ? '' : u95 === null ? '± ?'
       : `± ${withUnit(u95.toFixed(digits).replace('.', S.decimal), unit)}`),
     toleranceBar(value ?? 0, value === null ? NaN : u95, limit, value !== null));
 }
@@ -267,7 +267,9 @@ export async function showMonitor(place) {
   };
   const record = h('button', {
     class: 'quiet', type: 'button',
-    onclick: () => saveFrom('/api/v1/monitor/record.csv', 'plumb_monitoring.csv'),
+    onclick: () => saveFrom(
+      `/api/v1/monitor/record.csv?language=${document.documentElement.lang}`,
+      'plumb_monitoring.csv'),
   }, text.record);
   const latency = hint('');
   clear(place, h('h1', {}, text.title),

@@ -91,7 +91,8 @@ export async function showMonitoringRecord(place, argument = '') {
   card(text.numbers, facts(report),
     h('button', {
       type: 'button',
-      onclick: () => saveFrom(`/api/v1/${path(scan, number)}.csv?download`,
+      onclick: () => saveFrom(
+        `/api/v1/${path(scan, number)}.csv?download&language=${document.documentElement.lang}`,
         `plumb_monitoring_${scan}_${number}.csv`),
     }, text.download)),
   card(text.motion, hint(S.monitor.motion),

@@ -406,7 +406,8 @@ export async function showPatient(place, id) {
     card(text.history, scans,
       h('div', { class: 'row below' },
         file(`report.pdf?language=${document.documentElement.lang}`, text.report),
-        file('numbers.csv', text.csv), file('numbers.json', text.json),
+        file(`numbers.csv?language=${document.documentElement.lang}`, text.csv),
+        file('numbers.json', text.json),
         file(`course.zip?language=${document.documentElement.lang}`, text.course)),
       correction), spread, setUp,
     about, may('wipe') && wipe(patient));

@@ -103,11 +103,12 @@ export async function showSettings(place) {
     { required: true, disabled: !editable });
   const acceptLive = select(text.acceptLiveBy, settings.accept_live,
     { required: true, disabled: !editable });
+  const paper = select(text.papers, settings.paper, { required: true, disabled: !editable });
   const alert = fault && h('p', { class: 'caution', role: 'alert' }, text.enterAll, ' ',
     h('code', {}, fault));
   let stored = settings;
   const entered = () => ({
-    posture: posture.value, accept_live: acceptLive.value,
+    posture: posture.value, accept_live: acceptLive.value, paper: paper.value,
     ...Object.fromEntries(Object.keys(kBounds).map((name) => [name, Number(inputs[name].value)])),
     ...Object.fromEntries(kFlags.map((name) => [name, inputs[name].isOn()])),
   });
@@ -120,6 +121,7 @@ export async function showSettings(place) {
     stored = await get('settings').catch(() => ({ ...stored, ...wanted }));
     posture.value = stored.posture;
     acceptLive.value = stored.accept_live;
+    paper.value = stored.paper;
     for (const name of Object.keys(kBounds)) inputs[name].value = stored[name];
     for (const name of kFlags) inputs[name].turn(stored[name]);
     alert?.remove();
@@ -128,7 +130,8 @@ export async function showSettings(place) {
   clear(place, h('h1', {}, text.title), !editable && h('p', { class: 'lead' }, text.readOnly),
     alert,
     h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
-      field(text.posture, posture), field(text.accept_live, acceptLive), flags,
+      field(text.posture, posture), field(text.accept_live, acceptLive),
+      field(text.paper, paper), flags,
       editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),
     profileCard(), editable && backupCard(), editable && messagesCard(),
     editable && certificateCard());

@@ -94,7 +94,8 @@ export async function showStatistics(place) {
       field(text.which, which)), body] : hint(text.empty),
     leftOut > 0 && h('p', { class: 'caution' }, text.leftOut(leftOut)),
     h('div', { class: 'row below' }, h('a', {
-      class: 'button', href: '/api/v1/statistics.csv', download: '',
+      class: 'button', download: '',
+      href: `/api/v1/statistics.csv?language=${document.documentElement.lang}`,
     }, text.csv))));
   if (sites.length) draw();
 }
