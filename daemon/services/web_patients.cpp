@@ -156,8 +156,9 @@ class WebPatients final : public web::PatientService {
       return done(AnswerOf(say::scan::OtherWristband(patient->code)));
     session_.ConfirmWristband(std::chrono::steady_clock::now());
     notices_.TellPage(web::EventKind::kStatus);
-    store_.Write(&Store::audit, std::move(done),
-                 [=](AuditStore& audit) { audit.Log(actor, "session.wristband", session_id, {}); });
+    store_.Write(&Store::audit, std::move(done), [=](AuditStore& audit) {
+      audit.Log(actor, "session.wristband", session_id, Message());
+    });
   }
 
   void CorrectFraction(const Actor& actor, const std::string& session_id, int fraction,

@@ -52,7 +52,7 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
       profiles_(MakeWebSensorProfiles(appliance, shared.profiles, shared.notices, store_)),
       displays_(MakeWebDisplays(store_)),
       accounts_(MakeWebAccounts(store_)),
-      settings_(MakeWebSettings(store_)),
+      settings_(MakeWebSettings(shared.notices, store_)),
       maintenance_(MakeWebMaintenance(appliance, shared.upkeep, shared.messages,
                                       shared.loop.meter(), store_)),
       updates_(

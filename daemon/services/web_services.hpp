@@ -51,7 +51,8 @@ namespace plumb {
                                                              StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::SensorProfileService> MakeWebSensorProfiles(
     Appliance& appliance, UnitProfiles& profiles, const Notices& notices, StoreAccess& store);
-[[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(const Notices& notices,
+                                                                     StoreAccess& store);
 
 /// Owns the services, one class for each subject. Used on the loop's thread.
 class WebServices {

@@ -664,7 +664,8 @@ await h.step('where the settings ask for it, no sweep begins before the wristban
   await h.look(anna, 'wristband-asked', { fullPage: false });
   h.tell('press');  // by the button in the room
   const refused = await h.api(anna, 'scan/start', 'POST');
-  equal(`${refused.status} ${refused.body.error_message.id}`, '409 scan.wristband_first', 'a start');
+  equal(`${refused.status} ${refused.body.error_message.id}`, '409 scan.wristband_first',
+    'a start');
   equal((await h.api(anna, 'press', 'POST')).status, 409, 'a press');
   check(!['scanning', 'working'].includes((await state()).state), 'nothing began');
   for (const [language, word, hint] of [

@@ -343,7 +343,7 @@ TEST_F(ApplianceTest, WhereTheSettingsAskForItNoSweepBeginsBeforeTheWristbandWas
     const auto confirm = [&](const std::string& of, const std::string& code) {
       services_->services().patients.ConfirmWristband(
           tess, of, code, [&](const Change& change) { answer = change; });
-      return answer.reason.English();
+      return answer.message.English();
     };
     On([&] {
       Store& store = *shared_->store.get();
