@@ -7,9 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "algo/acceptance/repeatability.hpp"
 #include "algo/base/errors.hpp"
-#include "algo/base/message_json.hpp"
 #include "algo/comparison/comparison.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
@@ -17,7 +15,7 @@
 #include "daemon/cli/progress.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
-#include "daemon/result/result_folder.hpp"
+#include "daemon/result/measured_repeats.hpp"
 #include "words/cli.hpp"
 #include "words/progress.hpp"
 #include "words/repeat.hpp"
@@ -25,38 +23,16 @@
 namespace plumb {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 struct RepeatArguments {
   std::vector<std::filesystem::path> sweeps;
   MethodOptions method;
   bool json = false;
 };
 
-struct Repeats {
-  std::vector<RepeatedSweep> sweeps;
-  std::vector<RepeatedPair> pairs;
-  Repeatability judged;
-};
-
 /// "1 (sweep-a)": folders of different sweeps often have the same name.
 std::string NameOf(std::size_t index, const std::filesystem::path& path) {
   const std::filesystem::path name = path.has_filename() ? path : path.parent_path();
   return fmt::format("{} ({})", index + 1, name.filename().string());
-}
-
-RepeatedPair PairOf(std::size_t reference, std::size_t current, const Comparison& comparison) {
-  RepeatedPair pair{.reference = reference,
-                    .current = current,
-                    .verdict = comparison.verdict,
-                    .reasons = comparison.reasons};
-  const StoredResult result = Stored(comparison);
-  if (!result.correction) return pair;
-  for (std::size_t i = 0; i < pair.numbers.size(); ++i) {
-    const auto &value = result.correction->value[i], &u95 = result.correction->u95[i];
-    if (value && u95) pair.numbers[i] = MeasuredNumber{.value = *value, .u95 = *u95, .words = {}};
-  }
-  return pair;
 }
 
 Scene SceneOf(const std::filesystem::path& path, const std::string& name, const Config& config,
@@ -67,57 +43,24 @@ Scene SceneOf(const std::filesystem::path& path, const std::string& name, const 
                  [&](const ScanProgress& scan) { Show(progress, name, scan); });
 }
 
-Repeats Measure(const RepeatArguments& options, const CommandContext& context) {
+MeasuredRepeats Measure(const RepeatArguments& options, const CommandContext& context) {
   const Config config = options.method.Read();
   Progress progress(context.language);
-  Repeats repeats;
+  std::vector<std::string> names;
   std::vector<Scene> scenes;
   for (const std::filesystem::path& path : options.sweeps) {
-    const std::string name = NameOf(scenes.size(), path);
-    scenes.push_back(SceneOf(path, name, config, progress, context));
-    repeats.sweeps.push_back(
-        {.name = name, .chi2_per_term = scenes.back().calibration_chi2_per_term});
+    names.push_back(NameOf(scenes.size(), path));
+    scenes.push_back(SceneOf(path, names.back(), config, progress, context));
   }
   progress.Update(say::progress::Comparing(), 0.0);
   CompareOptions compare = config.compare;
   compare.stop = context.stop;
-  for (std::size_t a = 0; a < scenes.size(); ++a)
-    for (std::size_t b = a + 1; b < scenes.size(); ++b)
-      repeats.pairs.push_back(PairOf(a, b, Compare(scenes[a], scenes[b], compare)));
+  MeasuredRepeats repeats = MeasureRepeats(scenes, names, compare);
   progress.Clear();
-  repeats.judged = JudgeRepeats(repeats.sweeps, repeats.pairs);
   return repeats;
 }
 
-std::string JsonText(const Repeats& repeats) {
-  Json json = {{"format", 1}, {"fit", repeats.judged.is_fit()}};
-  json["reasons"] = EnglishTexts(repeats.judged.reasons);
-  json["reason_messages"] = MessagesJson(repeats.judged.reasons);
-  json["intervals"] = {{"held", repeats.judged.held}, {"of", repeats.judged.judged}};
-  const auto key = [](std::size_t number) {
-    return fmt::format("{}_{}", kNumberNames.at(number), UnitOf(number));
-  };
-  for (std::size_t i = 0; i < repeats.judged.scatter.size(); ++i)
-    json["scatter"][key(i)] = repeats.judged.scatter[i] ? Json(*repeats.judged.scatter[i]) : Json();
-  json["sweeps"] = Json::array();
-  for (const RepeatedSweep& sweep : repeats.sweeps)
-    json["sweeps"].push_back(
-        {{"name", sweep.name},
-         {"chi_square_per_term", sweep.chi2_per_term ? Json(*sweep.chi2_per_term) : Json()}});
-  json["pairs"] = Json::array();
-  for (const RepeatedPair& pair : repeats.pairs) {
-    Json& one = json["pairs"].emplace_back(Json{
-        {"reference", pair.reference}, {"current", pair.current}, {"verdict", Name(pair.verdict)}});
-    for (std::size_t i = 0; i < pair.numbers.size(); ++i) {
-      const auto& number = pair.numbers[i];
-      one[key(i)] = number ? Json(number->value) : Json();
-      one["uncertainty"][key(i)] = number ? Json(number->u95) : Json();
-    }
-  }
-  return json.dump(1) + "\n";
-}
-
-std::string Table(const Repeats& repeats, const CommandContext& context) {
+std::string Table(const MeasuredRepeats& repeats, const CommandContext& context) {
   constexpr std::size_t kLabel = 14, kColumn = 20;
   std::string text = LeftAligned("", kLabel);
   for (const RepeatedPair& pair : repeats.pairs)
@@ -152,8 +95,8 @@ std::string Table(const Repeats& repeats, const CommandContext& context) {
 }
 
 int Run(const RepeatArguments& options, const CommandContext& context) {
-  const Repeats repeats = Measure(options, context);
-  PrintOut(options.json ? JsonText(repeats) : Table(repeats, context));
+  const MeasuredRepeats repeats = Measure(options, context);
+  PrintOut(options.json ? RepeatsJson(repeats).dump(1) + "\n" : Table(repeats, context));
   return repeats.judged.is_fit() ? kDone : kNoAnswer;
 }
 

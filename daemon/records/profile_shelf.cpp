@@ -26,6 +26,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kHead = "plumb-profile-version 1 ";
 constexpr const char* kEnding = ".profile";
+constexpr const char* kRepeats = "repeats.json";
 constexpr const char* kSetAside = "set-aside";
 constexpr std::size_t kMaxProfileBytes = 1U << 20U;
 constexpr int kMaxVersion = 999'999'999;
@@ -172,6 +173,24 @@ int ProfileShelf::Add(const std::string& serial, const SensorProfile& profile,
 int ProfileShelf::Reset(const std::string& serial) {
   const std::lock_guard lock(mutex_);
   return Write(serial, ProfileCause::kReset, std::nullopt);
+}
+
+void ProfileShelf::KeepRepeats(const std::string& serial, const std::string& json) {
+  const std::lock_guard lock(mutex_);
+  const fs::path folder = FolderOf(serial);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw IoError(DescribeWriteError(folder, error.value()));
+  WriteFileAtomically(folder / kRepeats, [&](const fs::path& at) { WriteWholeFile(at, json); });
+}
+
+std::optional<std::string> ProfileShelf::Repeats(const std::string& serial) const {
+  const std::lock_guard lock(mutex_);
+  try {
+    return ReadTextFile(FolderOf(serial) / kRepeats, kMaxProfileBytes);
+  } catch (const std::runtime_error&) {
+    return std::nullopt;
+  }
 }
 
 int ProfileShelf::RollBack(const std::string& serial, int version) {

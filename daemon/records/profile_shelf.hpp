@@ -57,6 +57,12 @@ class ProfileShelf {
   /// The unit starts again from its stated calibration; earlier versions are kept. Returns the
   /// number. @throws IoError
   int Reset(const std::string& serial);
+  /// Keeps what sweeps of a thing that did not move have shown about the unit; one text, the
+  /// newest.
+  /// @throws IoError
+  void KeepRepeats(const std::string& serial, const std::string& json);
+  /// Nothing if there is none that can be read.
+  [[nodiscard]] std::optional<std::string> Repeats(const std::string& serial) const;
   /// Adds an earlier version again as the newest. Returns the number.
   /// @throws DataError if there is no version of that number with a profile; IoError
   int RollBack(const std::string& serial, int version);

@@ -2,13 +2,17 @@
 // The page's services for the daily check, the room's calibration and the sensor's profile.
 #include "daemon/services/web_services.hpp"
 
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/services/sensor_repeats.hpp"
 #include "words/audit.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 
@@ -98,11 +102,50 @@ class WebRoomCalibration final : public web::RoomCalibrationService {
 
 class WebSensorProfiles final : public web::SensorProfileService {
  public:
-  WebSensorProfiles(Appliance& appliance, UnitProfiles& profiles, const Notices& notices,
+  WebSensorProfiles(Appliance& appliance, SharedParts& shared, web::BackgroundWork& background,
                     StoreAccess& store)
-      : appliance_(appliance), profiles_(profiles), notices_(notices), store_(store) {}
+      : appliance_(appliance),
+        config_(shared.given.config),
+        profiles_(shared.profiles),
+        notices_(shared.notices),
+        background_(background),
+        store_(store) {}
 
   SensorProfiles GetSensorProfiles() override { return profiles_.OfConnected(); }
+
+  SensorRepeats GetSensorRepeats() override {
+    const SensorProfiles connected = profiles_.OfConnected();
+    if (!connected.why_none.empty())
+      return {.serial = connected.serial, .why_none = connected.why_none};
+    return RepeatsOf(connected.serial, NewestScans(), *profiles_.shelf(), WallClock::now());
+  }
+
+  void JudgeSensorRepeats(const Actor& actor, const std::string& serial, Done done) override {
+    if (RefuseIf(appliance_.WhyNotIdle(), done)) return;
+    if (RefuseIf(profiles_.WhyNotChange(serial), done)) return;
+    const auto failure = std::make_shared<Change>(DoneWith(""));
+    const auto judge = [=, this, options = config_.compare, shelf = profiles_.shelf()] {
+      try {
+        const std::vector<Scan> scans = NewestScans();
+        const auto now = WallClock::now();
+        JudgeRepeatsOf(RepeatsOf(serial, scans, *shelf, now), scans, options, actor, *shelf, now);
+      } catch (const DataError& error) {
+        *failure = Refused(ChangeResult::kConflict, error.message());
+      } catch (const std::exception& error) {
+        *failure = Refused(ChangeResult::kFailed, MessageOf(error));
+      }
+    };
+    const auto log = [=, this, done = std::move(done)] {
+      if (failure->result != ChangeResult::kDone) return done(*failure);
+      store_.Write(&Store::audit, done, [=](AuditStore& audit) {
+        audit.Log(actor, "sensor.judged", serial, Message());
+      });
+    };
+    if (!background_.RunInBackground(web::BackgroundPool::kFiles, judge, log)) {
+      *failure = Refused(ChangeResult::kFailed, say::store::RepeatsBusy());
+      log();
+    }
+  }
 
   std::optional<std::string> SensorProfileFile(int version) override {
     return profiles_.FileOf(version);
@@ -128,6 +171,10 @@ class WebSensorProfiles final : public web::SensorProfileService {
   }
 
  private:
+  [[nodiscard]] std::vector<Scan> NewestScans() const {
+    constexpr int kLooked = 20;
+    return store_.Read(&Store::scans, [](ScanStore& scans) { return scans.List("", kLooked); });
+  }
   /// As StoreAccess::Change(); afterwards the last scan's objection to the profile is discarded.
   void ChangeProfile(const std::string& serial, const Done& done,
                      std::function<void(AuditStore&)> change) {
@@ -146,8 +193,10 @@ class WebSensorProfiles final : public web::SensorProfileService {
   }
 
   Appliance& appliance_;
+  const Config& config_;
   UnitProfiles& profiles_;
   const Notices& notices_;
+  web::BackgroundWork& background_;
   StoreAccess& store_;
 };
 
@@ -165,10 +214,10 @@ std::unique_ptr<web::RoomCalibrationService> MakeWebRoomCalibration(RoomInUse& r
 }
 
 std::unique_ptr<web::SensorProfileService> MakeWebSensorProfiles(Appliance& appliance,
-                                                                 UnitProfiles& profiles,
-                                                                 const Notices& notices,
+                                                                 SharedParts& shared,
+                                                                 web::BackgroundWork& background,
                                                                  StoreAccess& store) {
-  return std::make_unique<WebSensorProfiles>(appliance, profiles, notices, store);
+  return std::make_unique<WebSensorProfiles>(appliance, shared, background, store);
 }
 
 }  // namespace plumb

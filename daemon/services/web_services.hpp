@@ -50,8 +50,9 @@ namespace plumb {
                                                              const RoomInUse& room,
                                                              StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::SensorProfileService> MakeWebSensorProfiles(
-    Appliance& appliance, UnitProfiles& profiles, const Notices& notices, StoreAccess& store);
-[[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(StoreAccess& store);
+    Appliance& appliance, SharedParts& shared, web::BackgroundWork& background, StoreAccess& store);
+[[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(const Notices& notices,
+                                                                    StoreAccess& store);
 
 /// Owns the services, one class for each subject. Used on the loop's thread.
 class WebServices {

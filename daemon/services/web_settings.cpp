@@ -31,7 +31,7 @@ Message CheckSettings(const SettingsChange& change) {
 
 class WebSettings final : public web::SettingsService {
  public:
-  explicit WebSettings(StoreAccess& store) : store_(store) {}
+  WebSettings(const Notices& notices, StoreAccess& store) : notices_(notices), store_(store) {}
 
   Settings GetSettings() override {
     return store_.Read(&Store::settings, [](SettingsStore& settings) { return settings.Get(); });
@@ -42,7 +42,12 @@ class WebSettings final : public web::SettingsService {
       return done(Refused(ChangeResult::kInvalid, wrong));
     // The store's thread makes one change after the other, so none comes between reading and
     // writing.
-    store_.Write(&Store::settings, std::move(done), [=](SettingsStore& stored) {
+    // The status says what the next sweep needs.
+    const Done told = [this, done = std::move(done)](const Change& answer) {
+      notices_.TellPage(web::EventKind::kStatus);
+      done(answer);
+    };
+    store_.Write(&Store::settings, told, [=](SettingsStore& stored) {
       stored.Change(actor, change.AppliedTo(change.is_complete() ? Settings{} : stored.Get()));
     });
   }
@@ -63,13 +68,14 @@ class WebSettings final : public web::SettingsService {
   }
 
  private:
+  const Notices& notices_;
   StoreAccess& store_;
 };
 
 }  // namespace
 
-std::unique_ptr<web::SettingsService> MakeWebSettings(StoreAccess& store) {
-  return std::make_unique<WebSettings>(store);
+std::unique_ptr<web::SettingsService> MakeWebSettings(const Notices& notices, StoreAccess& store) {
+  return std::make_unique<WebSettings>(notices, store);
 }
 
 }  // namespace plumb

@@ -423,6 +423,35 @@ void FakeAppliance::SetCheckBaseline(const Actor& actor, const std::string& chec
   Did(actor, "check.baseline", check_id, done);
 }
 
+SensorRepeats FakeAppliance::GetSensorRepeats() {
+  SensorRepeats told = repeats;
+  told.serial = profiles.serial;
+  for (const Scan& scan : scans)
+    if (scan.patient_id.empty() && scan.outcome == ScanOutcome::kDone && scan.id > judged_to_)
+      told.sweeps.push_back({scan.id, scan.started_at});
+  if (told.sweeps.size() > kRepeatsWanted)
+    told.sweeps.erase(told.sweeps.begin(), told.sweeps.end() - kRepeatsWanted);
+  return told;
+}
+
+void FakeAppliance::JudgeSensorRepeats(const Actor& actor, const std::string& serial, Done done) {
+  const SensorRepeats now = GetSensorRepeats();
+  if (serial != profiles.serial)
+    return Finish(done, Refused(ChangeResult::kConflict, say::scan::OtherSensor(serial)));
+  if (now.sweeps.size() < kRepeatsWanted)
+    return Finish(done, Refused(ChangeResult::kConflict,
+                                say::store::RepeatsTooFew(static_cast<int>(now.sweeps.size()),
+                                                          kRepeatsWanted)));
+  judged_to_ = now.sweeps.back().scan_id;
+  repeats.judged =
+      R"({"format":1,"fit":true,"reasons":[],"reason_messages":[],"intervals":{"held":18,"of":18},)"
+      R"("scatter":{"vertical_mm":0.21,"longitudinal_mm":0.34,"lateral_mm":0.29,"pitch_deg":0.041,)"
+      R"("roll_deg":0.052,"yaw_deg":0.033},"user":")" +
+      actor.user + R"(","made_s":1790000000,"profile_version":3,"scans":[]})";
+  repeats.is_due = false;
+  Did(actor, "sensor.judged", serial, done);
+}
+
 std::optional<std::string> FakeAppliance::SensorProfileFile(int version) {
   for (const SensorProfileVersion& one : profiles.versions)
     if (one.version == version && one.num_sweeps > 0) return "{}";
@@ -432,6 +461,7 @@ std::optional<std::string> FakeAppliance::SensorProfileFile(int version) {
 void FakeAppliance::ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) {
   if (serial != profiles.serial)
     return Finish(done, Refused(ChangeResult::kConflict, "the sensor is not connected"));
+  repeats.is_due = true;
   SensorProfileVersion reset;
   reset.version = profiles.versions.empty() ? 1 : profiles.versions.front().version + 1;
   reset.made_at = WallClock::now();

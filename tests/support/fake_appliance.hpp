@@ -53,6 +53,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::vector<Scan> scans;                      ///< Oldest first.
   CheckStatus checks;
   SensorProfiles profiles;
+  SensorRepeats repeats;  ///< Its sweeps are those without a patient that are not judged yet.
   web::RoomCalibrationStatus room;
   bool is_board_there = false;            ///< Check scans see the board of the room's calibration.
   std::optional<CheckRecord> next_check;  ///< What the next check scan finds; nothing: it passes.
@@ -248,6 +249,8 @@ class FakeAppliance : public web::BackgroundWork,
   std::optional<std::string> RoomBoardPdf(Message& why_not) override;
   SensorProfiles GetSensorProfiles() override { return profiles; }
   std::optional<std::string> SensorProfileFile(int version) override;
+  SensorRepeats GetSensorRepeats() override;
+  void JudgeSensorRepeats(const Actor& actor, const std::string& serial, Done done) override;
   void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) override;
   void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
                              Done done) override;
@@ -319,6 +322,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::optional<std::chrono::steady_clock::time_point> phase_begun_;
   std::size_t num_finished_ = 0;
   bool is_check_ = false;     ///< The next or running scan is a check.
+  std::string judged_to_;     ///< The newest sweep by which the sensor was judged.
   std::string wristband_of_;  ///< The session for whose next sweep it has been scanned.
   std::string checker_, patient_before_check_;
   int next_id_ = 1;

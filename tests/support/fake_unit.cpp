@@ -122,6 +122,7 @@ std::vector<AuditEntry> FakeAppliance::Audit(const AuditQuery& query) {
 
 void FakeAppliance::ChangeSettings(const Actor& actor, const SettingsChange& change, Done done) {
   settings = change.AppliedTo(settings);
+  Notify(EventKind::kStatus);
   Did(actor, "settings.change", "", done);
 }
 

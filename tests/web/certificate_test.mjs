@@ -92,7 +92,7 @@ await h.step('a new one of the unit’s own is used for new connections at once'
   second = await card.locator('code').first().textContent();
   check(second !== first, 'another fingerprint');
   equal(await shown(), second, 'what a new connection is shown');
-  equal((await fetched('/health', authority)).status, 200, 'no question to those who trust the unit');
+  equal((await fetched('/health', authority)).status, 200, 'those who trust it are not asked');
   equal((await fetched('/authority.crt', authority)).body, authority, 'the same authority');
 });
 

@@ -226,7 +226,7 @@ async function closeSession() {
 }
 const verdict = (page, kind) => page.locator(`.verdict.${kind}`).waitFor(kSlow);
 
-await h.step('fraction 1: one tap to six numbers, the couch is moved, the other technician accepts',
+await h.step('fraction 1: one tap to six numbers, the couch is moved, another person accepts',
   async () => {
   await openSession(1);
   await scene(kMoved);
@@ -251,7 +251,8 @@ await h.step('fraction 1: one tap to six numbers, the couch is moved, the other 
   await closeSession();
 });
 
-await h.step('fraction 2: a power cut in the middle of a sweep leaves nothing to accept', async () => {
+await h.step('fraction 2: a power cut in the middle of a sweep leaves nothing to accept',
+  async () => {
   await openSession(2);
   await scene(kMoved);
   await scanOn(anna);

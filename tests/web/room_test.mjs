@@ -678,7 +678,8 @@ await h.step('where the settings ask for it, no sweep begins before the wristban
   await h.look(anna, 'wristband-asked', { fullPage: false });
   h.tell('press');  // by the button in the room
   const refused = await h.api(anna, 'scan/start', 'POST');
-  equal(`${refused.status} ${refused.body.error_message.id}`, '409 scan.wristband_first', 'a start');
+  equal(`${refused.status} ${refused.body.error_message.id}`, '409 scan.wristband_first',
+    'a start');
   equal((await h.api(anna, 'press', 'POST')).status, 409, 'a press');
   check(!['scanning', 'working'].includes((await state()).state), 'nothing began');
   for (const [language, word, hint] of [
@@ -730,6 +731,32 @@ await h.step('without a session the button makes an unassigned scan that says so
   await room.locator('.verdict', { hasText: 'UNASSIGNED SCAN' }).waitFor();
   await anna.locator('.verdict', { hasText: 'UNASSIGNED SCAN' }).waitFor();
   await h.look(anna, 'result-unassigned');
+});
+
+await h.step('three sweeps of a phantom judge the sensor, and a reset of its profile asks again',
+  async () => {
+  await engineer.goto(`${h.url}#/repeats`);
+  await engineer.getByText('This sensor has not been judged yet').waitFor();
+  const made = engineer.locator('.sweeps li');
+  const judge = engineer.getByRole('button', { name: 'Judge the three sweeps' });
+  for (let n = await made.count(); n < 3; ++n) {
+    equal(await judge.isVisible(), false, `${n} sweeps`);
+    await engineer.getByRole('button', { name: `Start sweep ${n + 1} of 3` }).click();
+    await made.nth(n).waitFor(kSlow);
+  }
+  await judge.click();
+  await engineer.locator('.verdict.in_tolerance', { hasText: 'FIT' }).waitFor();
+  await engineer.getByText('18 of 18 intervals of 95 % contain the truth').waitFor();
+  await engineer.getByRole('row', { name: 'Longitudinal' }).getByText('0.34 mm').waitFor();
+  await h.look(engineer, 'repeats-judged', { axe: false });
+  const { serial, due } = await ok(engineer, 'sensor-repeats', 'GET');
+  equal(due, false, 'nothing is asked for');
+  for (const [what, id] of [[serial, 'store.repeats_too_few'], ['X', 'scan.other_sensor']]) {
+    const { status, body } = await h.api(engineer, 'sensor-repeats', 'POST', { serial: what });
+    equal(`${status} ${body.error_message.id}`, `409 ${id}`, what);
+  }
+  await ok(engineer, 'sensor-profile/reset', 'POST', { serial, password: h.password });
+  await engineer.getByText('The profile was reset since').waitFor();
 });
 
 await h.step('eight tabs of one browser and three browsers: every one live, one stream a browser',

@@ -434,6 +434,8 @@ await h.step('patients, plans, the check, and what engineers see', async () => {
     { name: 'users', route: 'users', who: 'engineer', hash: 'users', ready: 'tbody tr' },
     { name: 'settings', route: 'settings', who: 'engineer', hash: 'settings',
       ready: '.certificate' },
+    { name: 'repeats-due', route: 'repeats', who: 'engineer', hash: 'repeats',
+      ready: '.caution' },
     { name: 'update', route: 'update', who: 'engineer', hash: 'update', ready: '.bundle' },
   );
 });

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <utility>
 
+#include "algo/base/bounded_json.hpp"
 #include "web/api/all_routes.hpp"
 #include "web/exchange/csv.hpp"
 #include "web/exchange/json.hpp"
@@ -194,7 +195,30 @@ int VersionIn(const std::string& text) {
   return error == std::errc() && end == text.data() + text.size() ? version : 0;
 }
 
+Json RepeatsJson(const SensorRepeats& repeats) {
+  Json json = {
+      {"serial", repeats.serial},
+      {"due", repeats.is_due},
+      {"wanted", kRepeatsWanted},
+      {"sweeps", Json::array()},
+      {"judged", repeats.judged.empty() ? Json() : ParseBoundedJson<Json>(repeats.judged)}};
+  PutMessage(json, "why_none", repeats.why_none, "");
+  for (const SensorRepeats::Sweep& sweep : repeats.sweeps)
+    json["sweeps"].push_back({{"scan_id", sweep.scan_id}, {"time", sweep.time}});
+  return json;
+}
+
 void AddProfiles(Routes& routes, SensorProfileService& profiles) {
+  routes.ReadInBackground("/api/v1/sensor-repeats", Permission::kView, [&profiles](const Request&) {
+    return JsonResponse(RepeatsJson(profiles.GetSensorRepeats()));
+  });
+  routes.Write("POST", "/api/v1/sensor-repeats", Permission::kScan, BodyKind::kJson,
+               [&profiles](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::string serial = fields.Text("serial", 1, 256);
+                 fields.Finish();
+                 profiles.JudgeSensorRepeats(request.actor(), serial, done);
+               });
   routes.ReadInBackground("/api/v1/sensor-profile", Permission::kView, [&profiles](const Request&) {
     return JsonResponse(ProfilesJson(profiles.GetSensorProfiles()));
   });

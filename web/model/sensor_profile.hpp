@@ -36,4 +36,22 @@ struct SensorProfiles {
   std::vector<SensorProfileVersion> versions;  ///< Newest first; the first one is in use.
 };
 
+/// Sweeps by which a unit is judged.
+inline constexpr int kRepeatsWanted = 3;
+
+/// What sweeps of a thing that did not move have shown about the connected unit.
+struct SensorRepeats {
+  struct Sweep {
+    std::string scan_id;
+    WallClock::time_point time;
+  };
+  std::string serial;
+  Message why_none;                ///< Why the unit cannot be judged; empty if it can.
+  std::vector<Sweep> sweeps = {};  ///< Made since, oldest first; the newest kRepeatsWanted at most.
+  /// The newest judgement as `plumb repeat --json` writes it, with `user`, `made_s`,
+  /// `profile_version` and `scans`; empty: none.
+  std::string judged = {};
+  bool is_due = true;  ///< There is none, or the profile was reset since.
+};
+
 }  // namespace plumb

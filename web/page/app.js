@@ -26,6 +26,7 @@ import { showSettings } from './screens/settings.js';
 import { showStatistics } from './screens/patient/statistics.js';
 import { showStatus } from './screens/status.js';
 import { showUpdate } from './screens/update.js';
+import { showRepeats } from './set_up/repeats.js';
 import { showUsers } from './screens/users.js';
 import { followReference, followSession, forgetSession } from './treatment.js';
 import { S, said } from './words.js';
@@ -44,6 +45,7 @@ const kScreens = {
   users: { show: showUsers, permission: 'login', nav: true },
   audit: { show: showAudit, permission: 'audit', nav: true },
   settings: { show: showSettings, permission: 'view', nav: true },
+  repeats: { show: showRepeats, permission: 'view', parent: 'settings' },
   update: { show: showUpdate, permission: 'view', nav: true },
 };
 

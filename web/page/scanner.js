@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scanners of wristbands type a code and Enter, wherever the focus is: one listener for the whole
 // page takes such a burst, so that its Enter presses no button, and says whose wristband it is.
-import { currentSession, get, live, may, post } from './api.js';
-import {
-  action, done, field, form, h, hint, warn,
-} from './dom.js';
+import { currentSession, get, live, may } from './api.js';
+import { action, done, h, warn } from './dom.js';
+import { confirmWristband } from './wristband.js';
 import { S } from './words.js';
 
 const kGap_ms = 30;       // between two characters; people are slower
@@ -17,36 +16,6 @@ export const plainCode = (code) => code.replace(/[\s-]/g, '').toUpperCase();
 export const lookOf = (code) => plainCode(code).replace(/[._]/g, '').replaceAll('O', '0')
   .replace(/[IL]/g, '1').replaceAll('S', '5').replaceAll('Z', '2').replaceAll('B', '8')
   .replace(/^0+(?=.)/, '');
-
-/// Lets one sweep of the open session begin, where the settings ask for it.
-async function confirm(session, code) {
-  await post('treatment/wristband', { session_id: session.id, code });
-  done(S.scanner.confirmed(session.patient_code));
-}
-
-/// Above the button that begins a sweep, while the wristband has to be scanned first.
-export function wristbandForm() {
-  const text = S.scanner;
-  const element = h('div', { class: 'wristband', hidden: true });
-  let shown = '';
-  const draw = ({ wants_wristband: isWanted, session, state }) => {
-    const isHere = isWanted && session && may('scan') && !['scanning', 'working'].includes(state);
-    element.hidden = !isHere;
-    const key = isHere ? session.id : '';
-    if (shown === key) return;
-    shown = key;
-    const code = h('input', {
-      autocomplete: 'off', required: true, maxlength: 64,
-    });
-    element.replaceChildren(...(isHere ? [form({ class: 'form inline' }, async () => {
-      const typed = code.value.trim();
-      code.value = '';
-      await confirm(session, typed);
-    }, field(text.wristband(session.patient_code), code),
-    h('button', {}, text.wristbandSubmit)), hint(text.wristbandHint)] : []));
-  };
-  return { element, draw };
-}
 
 let box = null;
 
@@ -81,7 +50,7 @@ async function answer(code) {
       : text.unknown(code));
   } else if (session?.patient_id === found.id) {
     warn('');
-    if (live.status.wants_wristband && may('scan')) await confirm(session, code);
+    if (live.status.wants_wristband && may('scan')) await confirmWristband(session, code);
     else done(text.same(found.code));
   } else if (state === 'scanning' || state === 'working') {
     // A question over the page would hide the way to discard the scan.

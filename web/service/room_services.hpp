@@ -103,6 +103,10 @@ class SensorProfileService {
   /// @param serial  Serial of the unit that the user has seen; kConflict if another one is
   ///         connected, and during a scan.
   virtual void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) = 0;
+  [[nodiscard]] virtual SensorRepeats GetSensorRepeats() = 0;  ///< (background)
+  /// Judges the unit by the newest sweeps without a patient; takes some seconds. kConflict where
+  /// there are too few, for another unit, and during a scan.
+  virtual void JudgeSensorRepeats(const Actor& actor, const std::string& serial, Done done) = 0;
   /// Restores an earlier version as the newest. kNotFound if it holds no profile.
   virtual void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
                                      Done done) = 0;

@@ -127,7 +127,7 @@ TEST_F(PageIdentityTest, RenewalsComeFromTheSameAuthorityUntilTheUnitHasAnotherN
 
 TEST_F(PageIdentityTest, ASelfSignedOneOfBeforeStaysUntilItIsRenewed) {
   const web::TlsIdentity before = web::MakeTlsIdentity({});
-  KeepPageIdentity(folder_ / "", before);
+  KeepPageIdentity(folder_.path(), before);
   EXPECT_EQ(Identify("0.0.0.0").certificate, before.fingerprint);
   EXPECT_FALSE(fs::exists(folder_ / "page-authority.pem")) << "nothing to install yet";
   const web::TlsIdentity next = options_.make_certificate(std::chrono::system_clock::now());

@@ -36,6 +36,7 @@ const std::set<std::string> kWithoutPatients = {
     "/api/v1/room-calibration",
     "/api/v1/room-calibration/board.pdf",
     "/api/v1/sensor-profile",
+    "/api/v1/sensor-repeats",
     "/api/v1/sensor-profile/{version}/file",
     "/api/v1/displays",
     "/api/v1/displays/presence",

@@ -43,6 +43,8 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/monitor/breath/teach", "TPE"},
     {"POST /api/v1/monitor/breath/forget", "TPE"},
     {"POST /api/v1/scan/start", "TPE"},
+    {"GET /api/v1/sensor-repeats", "TPE"},
+    {"POST /api/v1/sensor-repeats", "TPE"},
     {"POST /api/v1/scan/end", "TPE"},
     {"POST /api/v1/cancel", "TPE"},
     {"GET /api/v1/patients", "TPE"},

@@ -2,6 +2,7 @@
 // Shows and replaces the TLS certificate.
 import { get, post, put } from '../api.js';
 import { clear, done, field, h, hint, localTime, select } from '../dom.js';
+import { authority } from '../set_up/authority.js';
 import { signedForm } from '../signed_form.js';
 import { S } from '../words.js';
 
@@ -45,18 +46,6 @@ function change(load) {
     await load();
   }, h('div', { class: 'row' }, h('button', { class: 'danger' }, text.submit)),
   field(text.which, choice), files);
-}
-
-/// How a tablet comes to trust this unit, once.
-function authority(fingerprint) {
-  const text = S.certificate;
-  const { href } = new URL('/authority.crt', location.href);
-  return h('details', { class: 'authority' }, h('summary', {}, text.authority),
-    h('p', {}, text.authorityHint, ' ', h('code', {}, fingerprint)),
-    h('p', {}, h('a', { class: 'button', href, download: 'plumb-authority.crt' },
-      text.authorityLink)),
-    h('ul', {}, Object.values(text.authoritySteps)
-      .map((step) => h('li', {}, typeof step === 'function' ? step(href) : step))));
 }
 
 export function certificateCard() {

@@ -6,8 +6,8 @@ import {
 import { action, card, clear, done, enable, h, hint, say } from '../dom.js';
 import { liveSurface } from '../drawings/live_surface.js';
 import { sweepHelp } from '../help/drawings.js';
-import { wristbandForm } from '../scanner.js';
 import { isAcknowledged, sessionLine, sessionName } from '../treatment.js';
+import { wristbandForm } from '../wristband.js';
 import { S, said } from '../words.js';
 import {
   faultWords, follow, lastKnownNote, sentence, stateHere, stateHint,

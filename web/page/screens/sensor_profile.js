@@ -56,6 +56,8 @@ export function profileCard() {
       profile.serial && h('p', {}, `${text.serial}: `, h('code', {}, profile.serial)),
       profile.why_none ? h('p', {}, text.noneKept, said(profile, 'why_none'))
         : profile.versions.length === 0 && h('p', {}, text.none),
+      !profile.why_none && h('p', {}, h('a', { class: 'button', href: '#/repeats' },
+        S.repeats.title)),
       profile.versions.length > 0 && table(heads, profile.versions.map(versionRow), text.title),
       profile.versions.length > 0 && may('settings') && change(profile, load));
   };
