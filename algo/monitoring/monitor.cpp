@@ -101,6 +101,18 @@ std::optional<MonitorLine> Monitor::Add(const Frame& frame, std::size_t index) {
   return line;
 }
 
+MonitorLine Monitor::LineAside(const Frame& frame, std::size_t index) const {
+  const Sensor& sensor = sensors_.at(index);
+  MonitorLine line{.time_s = frame.depth_time_s, .sensor = index, .takes_part = false};
+  if (sensor.moved) {
+    line.state = MonitorState::kMovedSensor;
+  } else if (sensor.at_rest.stage() != RestStage::kMounting) {
+    line.state = MonitorState::kBlind;
+    line.reason = BlindReason::kNoZero;
+  }
+  return line;
+}
+
 void Monitor::Mount(Sensor& sensor, const Frame& frame) {
   const auto mounted = [](const Sensor& one) {
     return one.at_rest.stage() != RestStage::kMounting;

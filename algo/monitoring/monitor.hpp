@@ -82,6 +82,8 @@ struct MonitorLine {
   int markers_seen = 0;
   BlindReason reason = BlindReason::kNone;
   bool couch_moved = false;  ///< Markers moved, but the sensor did not.
+  /// False: its image was not judged, since others go on without this sensor.
+  bool takes_part = true;
 };
 
 /// Runs sensors from their mounting on. Frames in the order of their stamps, which are of one
@@ -104,6 +106,9 @@ class Monitor {
 
   /// @return Nothing for a frame of a sensor that takes no part while another one does.
   [[nodiscard]] std::optional<MonitorLine> Add(const Frame& frame, std::size_t sensor = 0);
+  /// The line of such a frame: unknown, and why that sensor takes no part. It is no advice: the
+  /// others go on.
+  [[nodiscard]] MonitorLine LineAside(const Frame& frame, std::size_t sensor) const;
 
   [[nodiscard]] const MonitoredScene& scene() const { return scene_; }
   [[nodiscard]] std::size_t num_sensors() const { return sensors_.size(); }

@@ -118,6 +118,10 @@ TEST_F(MonitorTest, TwoSensorsGoOnWhileOneIsBlindAndAfterOneWasPushed) {
   EXPECT_EQ(pushed.back().state, MonitorState::kMonitoring);
   EXPECT_EQ(pushed.back().sensors_used, 1);
   EXPECT_EQ(pushed.back().sensor, 1U) << "the one that was pushed takes no part any more";
+  const MonitorLine aside = monitor_->LineAside(sensors_[0]->At(time_s_), 0);
+  EXPECT_EQ(aside.state, MonitorState::kMovedSensor) << "its own reason";
+  EXPECT_EQ(aside.advice, LiveAdvice::kUnknown);
+  EXPECT_FALSE(aside.since_zero);
   EXPECT_NEAR(OffBy(pushed.back(), shift_m), 0.0, 0.5);
 
   sensors_[1]->Push({0.002, 0.001, 0.0});
@@ -140,6 +144,10 @@ TEST_F(MonitorTest, OneThatIsNotMountedInTimeTakesNoPart) {
   EXPECT_EQ(lines.back().sensors_used, 1);
   EXPECT_TRUE(monitor_->takes_part(0));
   EXPECT_FALSE(monitor_->takes_part(1));
+  const MonitorLine aside = monitor_->LineAside(sensors_[1]->At(time_s_), 1);
+  EXPECT_EQ(aside.state, MonitorState::kMounting) << "it was never mounted";
+  EXPECT_EQ(aside.sensor, 1U);
+  EXPECT_FALSE(aside.takes_part);
 }
 
 TEST_F(MonitorTest, TheZeroIsTheSameInWhateverPortionsItIsMade) {
