@@ -31,6 +31,9 @@ constexpr double kAgree = 3.0;  // standard deviations
 constexpr double kMountTogether_s = 1.0;
 // The fits at rest are spread over about this time.
 constexpr double kFitting_s = 0.6;
+// A whole breath is looked for from this time of zeroing on, that often.
+constexpr double kFirstTry_s = 5.0;
+constexpr double kTryAgain_s = 0.5;
 
 }  // namespace
 
@@ -130,15 +133,26 @@ void Monitor::Mount(Sensor& sensor, const Frame& frame) {
 void Monitor::Collect(Sensor& sensor, const Frame& frame) {
   if (!zeroing_since_s_) zeroing_since_s_ = frame.depth_time_s;
   sensor.at_rest.AddStill(frame);
-  if (frame.depth_time_s - *zeroing_since_s_ >= options_.zeroing_s) TakeZeros();
+  const double age_s = frame.depth_time_s - *zeroing_since_s_;
+  const bool last = age_s >= options_.zeroing_s;
+  const bool due = age_s >= kFirstTry_s &&
+                   (!zero_tried_s_ || frame.depth_time_s - *zero_tried_s_ >= kTryAgain_s);
+  if (!last && !due) return;
+  zero_tried_s_ = frame.depth_time_s;
+  TakeZeros(last);
 }
 
-void Monitor::TakeZeros() {
+void Monitor::TakeZeros(bool last) {
+  const auto zeroes = [last](Sensor& one) {
+    return one.takes_part && one.at_rest.Zero(last ? ZeroKind::kAny : ZeroKind::kOfWholeBreath);
+  };
   std::vector<std::pair<std::size_t, const SensorAtRest*>> zeroed;
   std::size_t frames = 0;
   for (std::size_t i = 0; i < sensors_.size(); ++i) {
     Sensor& sensor = sensors_[i];
-    sensor.takes_part = sensor.takes_part && sensor.at_rest.Zero();
+    const bool has_zero = zeroes(sensor);
+    if (sensor.takes_part && !has_zero && !last) return;  // All of them begin together.
+    sensor.takes_part = has_zero;
     if (!sensor.takes_part) continue;
     zeroed.emplace_back(i, &sensor.at_rest);
     frames += sensor.at_rest.still_times_s().size();
@@ -147,7 +161,8 @@ void Monitor::TakeZeros() {
   no_zero_ = !rest_fits_ || rest_fits_->size() == 0;
   if (no_zero_) return;
   const double frames_of_fitting =
-      std::max(1.0, static_cast<double>(frames) * kFitting_s / options_.zeroing_s);
+      std::max(1.0, static_cast<double>(frames) * kFitting_s /
+                        std::max(kFirstTry_s, *zero_tried_s_ - *zeroing_since_s_));
   fits_at_a_time_ = static_cast<std::size_t>(
       std::ceil(static_cast<double>(rest_fits_->size()) / frames_of_fitting));
   stage_ = Stage::kFitting;

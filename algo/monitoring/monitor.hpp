@@ -57,7 +57,9 @@ struct MonitorOptions {
   /// The numbers against the reference are judged; without an accepted result they are unknown.
   bool judges_reference = false;
   std::vector<Eigen::Vector2d> region_polygon_m = {};
-  double zeroing_s = 8.0;  ///< The zero is the mean over the last whole breath in this time.
+  /// The zero is the mean over the last whole breath in this time; zeroing ends before, as soon as
+  /// a whole breath was surely seen.
+  double zeroing_s = 8.0;
 };
 
 /// What monitoring takes from a configuration; with a reference, the result of the comparison with
@@ -133,7 +135,8 @@ class Monitor {
 
   void Mount(Sensor& sensor, const Frame& frame);
   void Collect(Sensor& sensor, const Frame& frame);
-  void TakeZeros();
+  /// @param last  There will be no other: also without a breath.
+  void TakeZeros(bool last);
   void FitSome();
   void Follow(Sensor& sensor, const Frame& frame, MonitorLine& line);
   [[nodiscard]] SensorSet SensorsThatMaySee(double time_s) const;
@@ -154,7 +157,7 @@ class Monitor {
   std::deque<Sensor> sensors_;
   AdviceFilter advice_;
   Stage stage_ = Stage::kMounting;
-  std::optional<double> mounted_since_s_, zeroing_since_s_, zero_time_s_;
+  std::optional<double> mounted_since_s_, zeroing_since_s_, zero_tried_s_, zero_time_s_;
   bool no_zero_ = false;
   std::optional<RestFits> rest_fits_;
   std::size_t fits_at_a_time_ = 1;

@@ -135,7 +135,12 @@ FitView SensorAtRest::StillView(const BlockImage& image, std::size_t frame) cons
   return ViewOf(image, breathing_ ? breathing_->sizes_m[frame] : Eigen::Vector2d::Zero());
 }
 
-bool SensorAtRest::Zero() {
+bool SensorAtRest::Zero(ZeroKind kind) {
+  // Nothing is left of an earlier try.
+  correction_.clear();
+  breathing_.reset();
+  zero_modes_m_.setZero();
+  faces_.clear();
   const Pose T_scene_camera = place_.T_camera_scene.inverse();
   const auto render = [&](const Pose& T_motion) {
     const Pose T_back = T_motion.inverse();
@@ -158,6 +163,7 @@ bool SensorAtRest::Zero() {
   render(first.T);
   std::optional<BreathingMode> mode =
       LearnBreathing(still_, model_, grid_, T_scene_camera, scene_.support.normal);
+  if (kind == ZeroKind::kOfWholeBreath && !(mode && mode->is_whole)) return false;
   const std::pair<std::size_t, std::size_t> zero_frames =
       mode ? mode->last_breath : std::pair<std::size_t, std::size_t>{0, still_.size()};
   const std::vector<float> zero = MeanOf(still_, zero_frames);

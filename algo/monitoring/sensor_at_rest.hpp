@@ -41,6 +41,9 @@ struct MonitoredScene {
 /// Where the sensor is in its work.
 enum class RestStage : std::uint8_t { kMounting, kZeroing, kReady };
 
+/// What a zero must rest on.
+enum class ZeroKind : std::uint8_t { kAny, kOfWholeBreath };
+
 /// One sensor. Not thread-safe; calls are in the order of the frames. Deterministic.
 class SensorAtRest {
  public:
@@ -53,8 +56,10 @@ class SensorAtRest {
   /// Collects a frame of the body at rest.
   void AddStill(const Frame& frame);
   /// Makes the model of the zero from the frames collected.
-  /// @return False if the surface does not match what was seen: another scene, or another body.
-  [[nodiscard]] bool Zero();
+  /// @return False if the surface does not match what was seen: another scene, or another body; and
+  ///         for kOfWholeBreath, as long as it is not sure that one was seen. More frames may then
+  ///         be collected, and Zero() called again.
+  [[nodiscard]] bool Zero(ZeroKind kind = ZeroKind::kAny);
 
   /// Of a frame after the zero: averages it, follows the drift, checks the place some times a
   /// second.
