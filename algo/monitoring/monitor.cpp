@@ -24,8 +24,12 @@ constexpr double kUnguarded_s = 10.0;
 // from it, as far as they belong together.
 constexpr double kStaticReach_m = 10 * kMillimetre;
 constexpr double kOfMotion = 0.003;  // scale errors of depth and map
+// What no longer cancels does so in patches: of the sensor's own error this share remains of the
+// mean over the body, and turns it as over this length.
+constexpr double kStaticShare = 0.1;
+constexpr double kStaticLever_m = 0.25;
 // The numbers are means over this time, of the frames that agree with the newest.
-constexpr double kMean_s = 0.25;
+constexpr double kMean_s = 0.4;
 constexpr double kAgree = 3.0;  // standard deviations
 // Sensors that are mounted within this time after the first one are zeroed with it.
 constexpr double kMountTogether_s = 1.0;
@@ -192,18 +196,21 @@ Matrix6d Monitor::CovarianceOf(const MotionFit& fit, const SensorSet& set,
       (since_zero * scene_.centroid_m - scene_.centroid_m).norm() + 0.2 * RotationAngle(since_zero);
   // The zero itself, and what does not cancel any more.
   std::size_t frames_in_zero = 0;
-  double ratio = 0;
+  double ratio = 0, static_m = 0;
   for (std::size_t i = 0; i < set.size(); ++i) {
     const SensorAtRest& sensor = sensors_[set[i]].at_rest;
     frames_in_zero += sensor.frames_in_zero();
+    static_m = std::max(static_m, sensor.static_error_m());
     ratio = std::max(ratio, sensor.static_error() / std::max(0.1, 1.5 * at_rest.residual[i]));
   }
   const double of_zero = 1.0 / std::max<double>(4.0, static_cast<double>(frames_in_zero) / 4);
   const double share = std::min(1.0, shift_m / kStaticReach_m);
   const double of_static = 0.25 * share * share * ratio * ratio;
   Matrix6d covariance = frame + (of_zero + of_static) * single;
-  const double of_motion_m = kOfMotion * shift_m;
+  const double of_motion_m = std::hypot(kOfMotion * shift_m, kStaticShare * share * static_m);
   covariance.bottomRightCorner<3, 3>().diagonal().array() += of_motion_m * of_motion_m;
+  const double of_motion_rad = kStaticShare * share * static_m / kStaticLever_m;
+  covariance.topLeftCorner<3, 3>().diagonal().array() += of_motion_rad * of_motion_rad;
   return covariance;
 }
 

@@ -82,6 +82,8 @@ class SensorAtRest {
   /// Root mean square, in standard deviations of one measurement, of what the sensor measured wrong
   /// at the zero and always does there.
   [[nodiscard]] double static_error() const { return static_error_; }
+  /// The same in metres, about its mean: what changes where the body moves away from the zero.
+  [[nodiscard]] double static_error_m() const { return static_error_m_; }
   [[nodiscard]] std::size_t frames_in_zero() const { return frames_in_zero_; }
   [[nodiscard]] const PlaceCheck& check() const { return check_; }
   /// Depth now over depth at the zero, of surfaces that stayed where they were.
@@ -96,6 +98,9 @@ class SensorAtRest {
   };
 
   [[nodiscard]] SeenCorners Detect(const Frame& frame) const;
+  /// Blocks at the body's outline, where a pixel is of one surface or the other: what is measured
+  /// wrong there is another error as soon as the body moves.
+  void DropOutlines(const std::vector<float>& zero);
   void SetCorrection(const std::vector<float>& zero);
   void FindFaces();
   void FollowDrift(double time_s);
@@ -121,7 +126,7 @@ class SensorAtRest {
   std::vector<float> zero_inverse_depth_, correction_;
   std::optional<BreathingMode> breathing_;
   Eigen::Vector2d zero_modes_m_ = Eigen::Vector2d::Zero();
-  double static_error_ = 0.0;
+  double static_error_ = 0.0, static_error_m_ = 0.0;
   std::size_t frames_in_zero_ = 0;
 
   BlockImage image_;
