@@ -21,6 +21,7 @@ constexpr double kLagToThird = 2.0;     // stands out from the third.
 constexpr double kSmoothing_s = 0.4;
 constexpr double kShortestBreath_s = 1.5;
 constexpr double kLeastOverlap_s = 2.0;
+constexpr double kSurelyLonger_s = 0.3;
 constexpr double kLeastAmplitude_m = 0.5 * kMillimetre;
 
 // Mean over the 3 x 3 blocks around one of the region, of those that have a value.
@@ -107,6 +108,7 @@ struct Breaths {
   std::pair<std::size_t, std::size_t> last;
   double period_s = 0.0;
   double low = 0.0, high = 0.0;  // Ends of expiration and inspiration.
+  bool is_whole = false;
 };
 
 // The shift in time after which the signal is most like itself, once it was unlike itself: then its
@@ -122,7 +124,7 @@ std::optional<Breaths> FindBreaths(const VectorXd& trace, const std::vector<doub
   for (const double x : smooth) mean += x / all;
   for (const double x : smooth) variance += (x - mean) * (x - mean) / all;
   bool was_unlike = false;
-  double best = kLike;
+  double best = kLike, longest_s = 0;
   for (std::size_t lag = 1; lag < smooth.size(); ++lag) {
     if (time_s.back() - time_s[lag] < kLeastOverlap_s) break;
     double difference = 0;
@@ -131,12 +133,14 @@ std::optional<Breaths> FindBreaths(const VectorXd& trace, const std::vector<doub
     difference /= 2 * variance * static_cast<double>(smooth.size() - lag);
     was_unlike = was_unlike || difference > kUnlike;
     const double period_s = time_s.back() - time_s[time_s.size() - 1 - lag];
+    longest_s = period_s;
     if (!was_unlike || period_s < kShortestBreath_s || difference >= best) continue;
     best = difference;
     breaths.period_s = period_s;
     breaths.last = {smooth.size() - lag, smooth.size()};
   }
   if (!(breaths.period_s > 0)) return std::nullopt;
+  breaths.is_whole = longest_s - breaths.period_s >= kSurelyLonger_s;
   return breaths;
 }
 
@@ -244,6 +248,7 @@ std::optional<BreathingMode> LearnBreathing(const BlockSeries& series, const Vie
   mode.period_s = breaths->period_s;
   mode.amplitude_m = breaths->high - breaths->low;
   mode.last_breath = breaths->last;
+  mode.is_whole = breaths->is_whole;
   for (Eigen::Index i = 0; i < 3; ++i)
     mode.shares[static_cast<std::size_t>(i)] = values[last - i] / total;
   for (Eigen::Index k = 0; k < trace.size(); ++k) mode.sizes_m.emplace_back(trace[k], lag[k]);

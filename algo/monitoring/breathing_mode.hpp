@@ -43,6 +43,8 @@ struct BreathingMode {
   /// Shares of the first three components in all that moved, 0 to 1.
   std::array<double, 3> shares = {};
   std::pair<std::size_t, std::size_t> last_breath = {};  ///< Frames of it: begin, end.
+  /// Longer breaths than the one found were possible, and fit less: it is no part of a longer one.
+  bool is_whole = false;
   std::vector<Eigen::Vector2d> sizes_m = {};  ///< Of both patterns, by frame, about their means.
 
   /// Height of the belly's highest point above the end of expiration.

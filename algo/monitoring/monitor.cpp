@@ -24,13 +24,20 @@ constexpr double kUnguarded_s = 10.0;
 // from it, as far as they belong together.
 constexpr double kStaticReach_m = 10 * kMillimetre;
 constexpr double kOfMotion = 0.003;  // scale errors of depth and map
+// What no longer cancels does so in patches: of the sensor's own error this share remains of the
+// mean over the body, and turns it as over this length.
+constexpr double kStaticShare = 0.1;
+constexpr double kStaticLever_m = 0.25;
 // The numbers are means over this time, of the frames that agree with the newest.
-constexpr double kMean_s = 0.25;
+constexpr double kMean_s = 0.4;
 constexpr double kAgree = 3.0;  // standard deviations
 // Sensors that are mounted within this time after the first one are zeroed with it.
 constexpr double kMountTogether_s = 1.0;
 // The fits at rest are spread over about this time.
 constexpr double kFitting_s = 0.6;
+// A whole breath is looked for from this time of zeroing on, that often.
+constexpr double kFirstTry_s = 5.0;
+constexpr double kTryAgain_s = 0.5;
 
 }  // namespace
 
@@ -101,6 +108,18 @@ std::optional<MonitorLine> Monitor::Add(const Frame& frame, std::size_t index) {
   return line;
 }
 
+MonitorLine Monitor::LineAside(const Frame& frame, std::size_t index) const {
+  const Sensor& sensor = sensors_.at(index);
+  MonitorLine line{.time_s = frame.depth_time_s, .sensor = index, .takes_part = false};
+  if (sensor.moved) {
+    line.state = MonitorState::kMovedSensor;
+  } else if (sensor.at_rest.stage() != RestStage::kMounting) {
+    line.state = MonitorState::kBlind;
+    line.reason = BlindReason::kNoZero;
+  }
+  return line;
+}
+
 void Monitor::Mount(Sensor& sensor, const Frame& frame) {
   const auto mounted = [](const Sensor& one) {
     return one.at_rest.stage() != RestStage::kMounting;
@@ -118,15 +137,26 @@ void Monitor::Mount(Sensor& sensor, const Frame& frame) {
 void Monitor::Collect(Sensor& sensor, const Frame& frame) {
   if (!zeroing_since_s_) zeroing_since_s_ = frame.depth_time_s;
   sensor.at_rest.AddStill(frame);
-  if (frame.depth_time_s - *zeroing_since_s_ >= options_.zeroing_s) TakeZeros();
+  const double age_s = frame.depth_time_s - *zeroing_since_s_;
+  const bool last = age_s >= options_.zeroing_s;
+  const bool due = age_s >= kFirstTry_s &&
+                   (!zero_tried_s_ || frame.depth_time_s - *zero_tried_s_ >= kTryAgain_s);
+  if (!last && !due) return;
+  zero_tried_s_ = frame.depth_time_s;
+  TakeZeros(last);
 }
 
-void Monitor::TakeZeros() {
+void Monitor::TakeZeros(bool last) {
+  const auto zeroes = [last](Sensor& one) {
+    return one.takes_part && one.at_rest.Zero(last ? ZeroKind::kAny : ZeroKind::kOfWholeBreath);
+  };
   std::vector<std::pair<std::size_t, const SensorAtRest*>> zeroed;
   std::size_t frames = 0;
   for (std::size_t i = 0; i < sensors_.size(); ++i) {
     Sensor& sensor = sensors_[i];
-    sensor.takes_part = sensor.takes_part && sensor.at_rest.Zero();
+    const bool has_zero = zeroes(sensor);
+    if (sensor.takes_part && !has_zero && !last) return;  // All of them begin together.
+    sensor.takes_part = has_zero;
     if (!sensor.takes_part) continue;
     zeroed.emplace_back(i, &sensor.at_rest);
     frames += sensor.at_rest.still_times_s().size();
@@ -135,7 +165,8 @@ void Monitor::TakeZeros() {
   no_zero_ = !rest_fits_ || rest_fits_->size() == 0;
   if (no_zero_) return;
   const double frames_of_fitting =
-      std::max(1.0, static_cast<double>(frames) * kFitting_s / options_.zeroing_s);
+      std::max(1.0, static_cast<double>(frames) * kFitting_s /
+                        std::max(kFirstTry_s, *zero_tried_s_ - *zeroing_since_s_));
   fits_at_a_time_ = static_cast<std::size_t>(
       std::ceil(static_cast<double>(rest_fits_->size()) / frames_of_fitting));
   stage_ = Stage::kFitting;
@@ -165,18 +196,21 @@ Matrix6d Monitor::CovarianceOf(const MotionFit& fit, const SensorSet& set,
       (since_zero * scene_.centroid_m - scene_.centroid_m).norm() + 0.2 * RotationAngle(since_zero);
   // The zero itself, and what does not cancel any more.
   std::size_t frames_in_zero = 0;
-  double ratio = 0;
+  double ratio = 0, static_m = 0;
   for (std::size_t i = 0; i < set.size(); ++i) {
     const SensorAtRest& sensor = sensors_[set[i]].at_rest;
     frames_in_zero += sensor.frames_in_zero();
+    static_m = std::max(static_m, sensor.static_error_m());
     ratio = std::max(ratio, sensor.static_error() / std::max(0.1, 1.5 * at_rest.residual[i]));
   }
   const double of_zero = 1.0 / std::max<double>(4.0, static_cast<double>(frames_in_zero) / 4);
   const double share = std::min(1.0, shift_m / kStaticReach_m);
   const double of_static = 0.25 * share * share * ratio * ratio;
   Matrix6d covariance = frame + (of_zero + of_static) * single;
-  const double of_motion_m = kOfMotion * shift_m;
+  const double of_motion_m = std::hypot(kOfMotion * shift_m, kStaticShare * share * static_m);
   covariance.bottomRightCorner<3, 3>().diagonal().array() += of_motion_m * of_motion_m;
+  const double of_motion_rad = kStaticShare * share * static_m / kStaticLever_m;
+  covariance.topLeftCorner<3, 3>().diagonal().array() += of_motion_rad * of_motion_rad;
   return covariance;
 }
 

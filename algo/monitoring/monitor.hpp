@@ -57,7 +57,9 @@ struct MonitorOptions {
   /// The numbers against the reference are judged; without an accepted result they are unknown.
   bool judges_reference = false;
   std::vector<Eigen::Vector2d> region_polygon_m = {};
-  double zeroing_s = 8.0;  ///< The zero is the mean over the last whole breath in this time.
+  /// The zero is the mean over the last whole breath in this time; zeroing ends before, as soon as
+  /// a whole breath was surely seen.
+  double zeroing_s = 8.0;
 };
 
 /// What monitoring takes from a configuration; with a reference, the result of the comparison with
@@ -82,6 +84,8 @@ struct MonitorLine {
   int markers_seen = 0;
   BlindReason reason = BlindReason::kNone;
   bool couch_moved = false;  ///< Markers moved, but the sensor did not.
+  /// False: its image was not judged, since others go on without this sensor.
+  bool takes_part = true;
 };
 
 /// Runs sensors from their mounting on. Frames in the order of their stamps, which are of one
@@ -104,6 +108,9 @@ class Monitor {
 
   /// @return Nothing for a frame of a sensor that takes no part while another one does.
   [[nodiscard]] std::optional<MonitorLine> Add(const Frame& frame, std::size_t sensor = 0);
+  /// The line of such a frame: unknown, and why that sensor takes no part. It is no advice: the
+  /// others go on.
+  [[nodiscard]] MonitorLine LineAside(const Frame& frame, std::size_t sensor) const;
 
   [[nodiscard]] const MonitoredScene& scene() const { return scene_; }
   [[nodiscard]] std::size_t num_sensors() const { return sensors_.size(); }
@@ -128,7 +135,8 @@ class Monitor {
 
   void Mount(Sensor& sensor, const Frame& frame);
   void Collect(Sensor& sensor, const Frame& frame);
-  void TakeZeros();
+  /// @param last  There will be no other: also without a breath.
+  void TakeZeros(bool last);
   void FitSome();
   void Follow(Sensor& sensor, const Frame& frame, MonitorLine& line);
   [[nodiscard]] SensorSet SensorsThatMaySee(double time_s) const;
@@ -149,7 +157,7 @@ class Monitor {
   std::deque<Sensor> sensors_;
   AdviceFilter advice_;
   Stage stage_ = Stage::kMounting;
-  std::optional<double> mounted_since_s_, zeroing_since_s_, zero_time_s_;
+  std::optional<double> mounted_since_s_, zeroing_since_s_, zero_tried_s_, zero_time_s_;
   bool no_zero_ = false;
   std::optional<RestFits> rest_fits_;
   std::size_t fits_at_a_time_ = 1;

@@ -135,7 +135,12 @@ FitView SensorAtRest::StillView(const BlockImage& image, std::size_t frame) cons
   return ViewOf(image, breathing_ ? breathing_->sizes_m[frame] : Eigen::Vector2d::Zero());
 }
 
-bool SensorAtRest::Zero() {
+bool SensorAtRest::Zero(ZeroKind kind) {
+  // Nothing is left of an earlier try.
+  correction_.clear();
+  breathing_.reset();
+  zero_modes_m_.setZero();
+  faces_.clear();
   const Pose T_scene_camera = place_.T_camera_scene.inverse();
   const auto render = [&](const Pose& T_motion) {
     const Pose T_back = T_motion.inverse();
@@ -158,6 +163,7 @@ bool SensorAtRest::Zero() {
   render(first.T);
   std::optional<BreathingMode> mode =
       LearnBreathing(still_, model_, grid_, T_scene_camera, scene_.support.normal);
+  if (kind == ZeroKind::kOfWholeBreath && !(mode && mode->is_whole)) return false;
   const std::pair<std::size_t, std::size_t> zero_frames =
       mode ? mode->last_breath : std::pair<std::size_t, std::size_t>{0, still_.size()};
   const std::vector<float> zero = MeanOf(still_, zero_frames);
@@ -177,6 +183,25 @@ bool SensorAtRest::Zero() {
   return model_.CountOf(SurfacePart::kRegion) >= kLeastRegionBlocks;
 }
 
+void SensorAtRest::DropOutlines(const std::vector<float>& zero) {
+  constexpr float kFarOff = 3.5F;  // standard deviations of all
+  std::vector<float> ratios, off;
+  for (std::size_t b = 0; b < grid_.size(); ++b) {
+    if (model_.part[b] == SurfacePart::kRegion && zero[b] > 0)
+      ratios.push_back(model_.inverse_depth[b] / zero[b]);
+  }
+  if (ratios.empty()) return;
+  std::vector<float> sorted = ratios;
+  const float middle = TakeMedian(sorted);
+  for (const float ratio : ratios) off.push_back(std::abs(ratio - middle));
+  const float limit = kFarOff * 1.4826F * TakeMedian(off);
+  for (std::size_t b = 0; b < grid_.size(); ++b) {
+    if (model_.part[b] == SurfacePart::kRegion && zero[b] > 0 &&
+        std::abs(model_.inverse_depth[b] / zero[b] - middle) > limit)
+      model_.part[b] = SurfacePart::kNone;
+  }
+}
+
 void SensorAtRest::SetCorrection(const std::vector<float>& zero) {
   zero_inverse_depth_ = zero;
   recent_ = zero;
@@ -184,7 +209,8 @@ void SensorAtRest::SetCorrection(const std::vector<float>& zero) {
                               place_.T_camera_scene.inverse(), info_.depth_noise,
                               [&](const Vector3d& p) { return scene_.PartOf(p); });
   correction_.assign(grid_.size(), 0.0F);
-  double squares = 0;
+  DropOutlines(zero);
+  double squares = 0, sum_m = 0, squares_m = 0;
   std::size_t count = 0;
   for (std::size_t b = 0; b < grid_.size(); ++b) {
     if (model_.part[b] != SurfacePart::kRegion) continue;
@@ -194,11 +220,16 @@ void SensorAtRest::SetCorrection(const std::vector<float>& zero) {
       continue;
     }
     correction_[b] = ratio;
-    const double in_sigmas = (ratio - 1.0F) / model_.inverse_depth[b] / model_.sigma_m[b];
+    const double off_m = (ratio - 1.0F) / model_.inverse_depth[b];
+    const double in_sigmas = off_m / model_.sigma_m[b];
     squares += in_sigmas * in_sigmas;
+    sum_m += off_m;
+    squares_m += off_m * off_m;
     ++count;
   }
-  static_error_ = count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
+  const double all = std::max(1.0, static_cast<double>(count));
+  static_error_ = std::sqrt(squares / all);
+  static_error_m_ = std::sqrt(std::max(0.0, squares_m / all - sum_m * sum_m / (all * all)));
   // Where the body may move to, the sensor's error is taken to be that of the nearest blocks;
   // farther away nothing is taken to be the body.
   constexpr int kReach = 12;

@@ -41,6 +41,9 @@ struct MonitoredScene {
 /// Where the sensor is in its work.
 enum class RestStage : std::uint8_t { kMounting, kZeroing, kReady };
 
+/// What a zero must rest on.
+enum class ZeroKind : std::uint8_t { kAny, kOfWholeBreath };
+
 /// One sensor. Not thread-safe; calls are in the order of the frames. Deterministic.
 class SensorAtRest {
  public:
@@ -53,8 +56,10 @@ class SensorAtRest {
   /// Collects a frame of the body at rest.
   void AddStill(const Frame& frame);
   /// Makes the model of the zero from the frames collected.
-  /// @return False if the surface does not match what was seen: another scene, or another body.
-  [[nodiscard]] bool Zero();
+  /// @return False if the surface does not match what was seen: another scene, or another body; and
+  ///         for kOfWholeBreath, as long as it is not sure that one was seen. More frames may then
+  ///         be collected, and Zero() called again.
+  [[nodiscard]] bool Zero(ZeroKind kind = ZeroKind::kAny);
 
   /// Of a frame after the zero: averages it, follows the drift, checks the place some times a
   /// second.
@@ -77,6 +82,8 @@ class SensorAtRest {
   /// Root mean square, in standard deviations of one measurement, of what the sensor measured wrong
   /// at the zero and always does there.
   [[nodiscard]] double static_error() const { return static_error_; }
+  /// The same in metres, about its mean: what changes where the body moves away from the zero.
+  [[nodiscard]] double static_error_m() const { return static_error_m_; }
   [[nodiscard]] std::size_t frames_in_zero() const { return frames_in_zero_; }
   [[nodiscard]] const PlaceCheck& check() const { return check_; }
   /// Depth now over depth at the zero, of surfaces that stayed where they were.
@@ -91,6 +98,9 @@ class SensorAtRest {
   };
 
   [[nodiscard]] SeenCorners Detect(const Frame& frame) const;
+  /// Blocks at the body's outline, where a pixel is of one surface or the other: what is measured
+  /// wrong there is another error as soon as the body moves.
+  void DropOutlines(const std::vector<float>& zero);
   void SetCorrection(const std::vector<float>& zero);
   void FindFaces();
   void FollowDrift(double time_s);
@@ -116,7 +126,7 @@ class SensorAtRest {
   std::vector<float> zero_inverse_depth_, correction_;
   std::optional<BreathingMode> breathing_;
   Eigen::Vector2d zero_modes_m_ = Eigen::Vector2d::Zero();
-  double static_error_ = 0.0;
+  double static_error_ = 0.0, static_error_m_ = 0.0;
   std::size_t frames_in_zero_ = 0;
 
   BlockImage image_;

@@ -168,7 +168,7 @@ double CornerMeans::Scatter_px() const {
 
 PlaceWatch::PlaceWatch(const Intrinsics& camera, const MarkerMap& scene, const SensorPlace& place,
                        SeenCorners corners, double scatter_px, const Eigen::Vector3d& body_m)
-    : camera_(camera), body_camera_(place.T_camera_scene * body_m) {
+    : camera_(camera), body_camera_(place.T_camera_scene * body_m), scatter_px_(scatter_px) {
   for (const int id : place.markers) {
     start_[id] = corners.at(id);
     for (std::size_t c = 0; c < 4; ++c)
@@ -191,7 +191,7 @@ std::vector<ImageCorners> PlaceWatch::Expected() const {
   return expected;
 }
 
-Pose PlaceWatch::MotionOf(const SeenCorners& now) const {
+Pose PlaceWatch::MotionOf(const SeenCorners& now, Doubt& doubt) const {
   // Relative to the start, so that errors of the map and of the lens cancel.
   std::vector<Sighting> sightings;
   for (const auto& [id, corners] : now) {
@@ -202,6 +202,16 @@ Pose PlaceWatch::MotionOf(const SeenCorners& now) const {
   }
   Pose T = Pose::Identity();
   Refine(T, sightings, camera_, 0.5 * camera_.width / 640.0);
+  Matrix6d information = Matrix6d::Zero();
+  for (const Sighting& s : sightings) {
+    const Matrix2x6d J = PixelJacobian(camera_, s.p);
+    information += J.transpose() * J;
+  }
+  const double of_corner_px = scatter_px_ / std::sqrt(static_cast<double>(kImagesJudged));
+  const Matrix6d covariance = of_corner_px * of_corner_px * information.inverse();
+  const Matrix3x6d to_body = PointJacobian(body_camera_);
+  doubt = {.shift_m = std::sqrt((to_body * covariance * to_body.transpose()).trace()),
+           .turn_rad = std::sqrt(covariance.topLeftCorner<3, 3>().trace())};
   return T;
 }
 
@@ -225,11 +235,14 @@ PlaceCheck PlaceWatch::Check(
   }
   constexpr std::size_t kLeastForPose = 3;
   if (recent_.size() < kImagesJudged || now.size() < kLeastForPose) return check;
-  check.T_now_before = MotionOf(now);
+  Doubt doubt;
+  check.T_now_before = MotionOf(now, doubt);
   check.shift_m = (check.T_now_before * body_camera_ - body_camera_).norm();
   check.turn_rad = RotationAngle(check.T_now_before);
   const bool some_moved = check.still.size() < now.size();
-  const bool all_moved = check.shift_m > shift_limit_m_ || check.turn_rad > turn_limit_rad_;
+  // Where an arm covers most of the markers, the few others say less.
+  const bool all_moved = check.shift_m > std::max(shift_limit_m_, kSurely * doubt.shift_m) ||
+                         check.turn_rad > std::max(turn_limit_rad_, kSurely * doubt.turn_rad);
   if (!all_moved) {
     check.couch_moved = some_moved && 2 * check.still.size() < now.size();
     return check;

@@ -82,15 +82,19 @@ class PlaceWatch {
   [[nodiscard]] const SeenCorners& at_start() const { return start_; }
 
  private:
+  /// What the markers seen now leave open, in standard deviations.
+  struct Doubt {
+    double shift_m = 0.0, turn_rad = 0.0;  ///< Of the body, and of the camera frame.
+  };
   /// Motion of the camera frame that explains the shifts of the corners.
-  [[nodiscard]] Pose MotionOf(const SeenCorners& now) const;
+  [[nodiscard]] Pose MotionOf(const SeenCorners& now, Doubt& doubt) const;
 
   Intrinsics camera_;
   std::map<int, MarkerCorners> in_camera_;
   SeenCorners start_, last_;
   std::vector<SeenCorners> recent_;
   Eigen::Vector3d body_camera_;
-  double still_px_, shift_limit_m_, turn_limit_rad_;
+  double scatter_px_, still_px_, shift_limit_m_, turn_limit_rad_;
 };
 
 }  // namespace plumb

@@ -115,7 +115,7 @@ LiveEvaluation EvaluateLive(const Suite& suite, const EvaluateOptions& evaluate,
         WatchRecordings(recordings, current, monitoring, name, progress, context);
     EnsureFolder(out / "monitoring");
     WriteMonitoring(record, out / "monitoring" / name);
-    live[name] = FiguresOf(record.lines, truth, record.centroid_m, record.reference_centroid_m,
+    live[name] = FiguresOf(record.judged(), truth, record.centroid_m, record.reference_centroid_m,
                            ReadSceneTruth(suite.truths.at(truth.reference)).T_world_body,
                            config.compare.limits);
     live[name].cpu_s = record.cpu_s;

@@ -67,7 +67,7 @@ MonitoringRecord Watch(const MonitorArguments& options, const CommandContext& co
 Message WhyNot(const MonitoringRecord& record) {
   if (record.began()) return {};
   MonitorState last = MonitorState::kMounting;
-  for (const MonitorLine& line : record.lines) last = std::max(last, line.state);
+  for (const MonitorLine& line : record.judged()) last = std::max(last, line.state);
   return last == MonitorState::kMounting  ? say::monitoring::NeverMounted()
          : last == MonitorState::kZeroing ? say::monitoring::NeverZeroed()
                                           : say::monitoring::NoSurface();
@@ -77,20 +77,21 @@ std::string Summary(const MonitoringRecord& record, const CommandContext& contex
   std::string text;
   const auto say = [&](const Message& message) { text += context.Said(message) + "\n"; };
   std::map<LiveAdvice, double> share;
-  for (const MonitorLine& line : record.lines)
-    share[line.advice] += 100.0 / static_cast<double>(record.lines.size());
+  const std::vector<MonitorLine> lines = record.judged();
+  for (const MonitorLine& line : lines)
+    share[line.advice] += 100.0 / static_cast<double>(lines.size());
   for (const Message& warning : record.warnings) say(warning);
   if (const Message why = WhyNot(record); !why.empty()) {
     say(why);
     return text;
   }
-  say(say::monitoring::Summary(record.lines.size(), share[LiveAdvice::kIn], share[LiveAdvice::kOut],
+  say(say::monitoring::Summary(lines.size(), share[LiveAdvice::kIn], share[LiveAdvice::kOut],
                                share[LiveAdvice::kUnknown]));
   const BreathingMode* breathing = record.breathing();
   say(breathing != nullptr
           ? say::monitoring::Breathing(breathing->amplitude_m / kMillimetre, breathing->period_s)
           : say::monitoring::NoBreathing());
-  for (const MonitorLine& line : record.lines) {
+  for (const MonitorLine& line : lines) {
     if (line.state != MonitorState::kMovedSensor) continue;
     say(say::monitoring::SensorMoved(line.time_s - record.lines.front().time_s));
     break;
@@ -159,12 +160,12 @@ MonitoringRecord WatchRecordings(const Recordings& recordings, const Scene& scen
     // Of this thread alone: another one decodes the next frames.
     timespec start{}, end{};
     ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &start);
-    const std::optional<MonitorLine> line = monitor.Add(*next[sensor], sensor);
+    const Frame& frame = *next[sensor];
+    const std::optional<MonitorLine> judged = monitor.Add(frame, sensor);
     ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &end);
+    record.lines.push_back(judged ? *judged : monitor.LineAside(frame, sensor));
     next[sensor] = recordings[sensor]->Next();
-    if (!line) continue;
-    record.lines.push_back(*line);
-    if (line->state >= MonitorState::kMonitoring)
+    if (judged && judged->state >= MonitorState::kMonitoring)
       record.cpu_s.push_back(static_cast<double>(end.tv_sec - start.tv_sec) +
                              1e-9 * static_cast<double>(end.tv_nsec - start.tv_nsec));
     progress.Update(step, all > 0 ? static_cast<double>(frames) / all : 0.0,

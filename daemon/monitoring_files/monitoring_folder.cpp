@@ -2,6 +2,7 @@
 #include "daemon/monitoring_files/monitoring_folder.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 
 #include <fmt/format.h>
@@ -163,6 +164,12 @@ const BreathingMode* MonitoringRecord::breathing() const {
   return nullptr;
 }
 
+std::vector<MonitorLine> MonitoringRecord::judged() const {
+  std::vector<MonitorLine> judged;
+  std::ranges::copy_if(lines, std::back_inserter(judged), &MonitorLine::takes_part);
+  return judged;
+}
+
 bool MonitoringRecord::began() const {
   return std::any_of(lines.begin(), lines.end(), [](const MonitorLine& line) {
     return line.state == MonitorState::kMonitoring;
@@ -196,7 +203,8 @@ std::string MonitoringCsv(const MonitoringRecord& record) {
 
 std::string MonitoringJson(const MonitoringRecord& record) {
   std::map<std::string, std::size_t> states, advice;
-  for (const MonitorLine& line : record.lines) {
+  const std::vector<MonitorLine> lines = record.judged();
+  for (const MonitorLine& line : lines) {
     ++states[std::string(Name(line.state))];
     ++advice[std::string(Name(line.advice))];
   }
@@ -218,12 +226,12 @@ std::string MonitoringJson(const MonitoringRecord& record) {
                        {"zeroing_s", record.zeroing_s},
                        {"judges", record.has_reference ? "against_reference" : "since_zero"}}},
                      {"zero", ZeroOf(record)},
-                     {"drift", MonitoringDrift(record.lines)},
+                     {"drift", MonitoringDrift(lines)},
                      {"breathing", BreathingOf(record.breathing())},
                      {"frames", record.lines.size()},
                      {"states", states},
                      {"advice", advice},
-                     {"events", MonitoringEvents(record.lines)},
+                     {"events", MonitoringEvents(lines)},
                      {"warnings", EnglishTexts(record.warnings)},
                      {"timings_ms_per_frame", timings}};
   return json.dump(1) + "\n";

@@ -48,6 +48,8 @@ struct MonitoringRecord {
   [[nodiscard]] const BreathingMode* breathing() const;
 
   void Describe(const Monitor& monitor, const MonitorOptions& options);
+  /// The lines without those of sensors that took no part while another one did.
+  [[nodiscard]] std::vector<MonitorLine> judged() const;
   /// Whether it came to numbers.
   [[nodiscard]] bool began() const;
 };

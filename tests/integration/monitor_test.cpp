@@ -101,13 +101,21 @@ TEST_F(MonitorTest, TwoSensorsGoOnWhileAnArmCoversOneAndAfterItWasPushed) {
   ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
   const std::vector<Row> rows = RowsOf(out / "monitor.csv");
   const double start_s = std::stod(rows.front().at("time_s"));
-  std::map<std::string, int> used_late;
+  std::map<std::string, int> used_late, lines_of;
+  int pushed_lines = 0;
   bool by_both = false, by_one = false;
   double last_s = 0;
   for (const Row& row : rows) {
     const double time_s = std::stod(row.at("time_s")) - start_s;
     EXPECT_GE(time_s, last_s) << "one clock";
     last_s = time_s;
+    ++lines_of[row.at("sensor")];
+    if (row.at("state") == "moved_sensor") {
+      ++pushed_lines;
+      EXPECT_EQ(row.at("sensor"), "1");
+      EXPECT_EQ(row.at("advice"), "unknown");
+      EXPECT_EQ(row.at("lateral_mm"), "");
+    }
     if (row.at("state") != "monitoring") continue;
     if (time_s < 13.0) by_both = by_both || row.at("sensors_used") == "2";
     if (time_s > 14.0 && time_s < 15.5) by_one = by_one || row.at("sensors_used") == "1";
@@ -117,8 +125,11 @@ TEST_F(MonitorTest, TwoSensorsGoOnWhileAnArmCoversOneAndAfterItWasPushed) {
   EXPECT_TRUE(by_one) << "covered by the arm";
   EXPECT_GT(used_late["1"], 0);
   EXPECT_EQ(used_late["2"], 0) << "one that was pushed does not come back";
+  EXPECT_EQ(lines_of["1"], lines_of["2"]) << "a line for each depth image";
+  EXPECT_GT(pushed_lines, 0);
   const json facts = json::parse(ReadText(out / "monitor.json"));
   EXPECT_EQ(facts.at("zero").at("sensors").size(), 2U);
+  EXPECT_EQ(facts.at("frames"), rows.size());
   EXPECT_FALSE(facts.at("states").contains("moved_sensor"));
 }
 

@@ -69,8 +69,9 @@ SimulatedSource::Fate SimulatedSource::FateOf(int index) const {
   if (index == 0 || index + 1 == sweep_.num_frames) return Fate::kGiven;
   const double chance =
       simulated::UnitUniform(simulated::Hash(sweep_.seed, 54, static_cast<std::uint64_t>(index)));
-  if (chance < unit_.lost_frames) return Fate::kLost;
-  return chance < unit_.lost_frames + unit_.doubled_frames ? Fate::kDoubled : Fate::kGiven;
+  const double lost = unit_.lost_frames + sweep_.lost_frames;
+  if (chance < lost) return Fate::kLost;
+  return chance < lost + unit_.doubled_frames ? Fate::kDoubled : Fate::kGiven;
 }
 
 void SimulatedSource::Take(Frame& frame, double color_time, double depth_time) {
@@ -85,7 +86,8 @@ void SimulatedSource::Take(Frame& frame, double color_time, double depth_time) {
     return std::make_shared<const simulated::World>(
         WorldAt(*world_, sweep_.events, time, T_world_camera));
   };
-  const Eigen::Vector3f gain = GainAt(unit_, sweep_.seed, color_time);
+  Eigen::Vector3f gain = GainAt(unit_, sweep_.seed, color_time);
+  if (sweep_.events.live && sweep_.events.live->DarkAt(color_time)) gain.setZero();
   if (color_.empty() || next_ % sweep_.color_every == 0) {
     color_ = color_camera_.Render(*world_at(color_time, truth_.T_world_camera_at_color),
                                   trajectory_, color_time, Hash(sweep_.seed, 52, index), gain);
@@ -116,6 +118,9 @@ std::optional<Frame> SimulatedSource::Next() {
   frame.color_time_s = sweep_.start_time_s + color_time + unit_.color_stamp_bias_s +
                        unit_.stamp_jitter_s * random.Normal();
   frame.depth_time_s = sweep_.start_time_s + depth_time + unit_.stamp_jitter_s * random.Normal();
+  constexpr double kLate = 0.8;
+  if (sweep_.late_frames > 0 && random.Uniform() < sweep_.late_frames)
+    frame.depth_time_s += kLate / sweep_.rate_hz;
   if (unit_.doubled_frames > 0) last_ = frame;
   ++next_;
   return frame;

@@ -29,6 +29,8 @@ struct SimulatedSweep {
   simulated::SceneEvents events = {};
   /// Only every n-th colour image is rendered, and shown until the next one: for a sensor at rest.
   int color_every = 1;
+  double lost_frames = 0.0;  ///< Probability of one, besides the unit's own.
+  double late_frames = 0.0;  ///< Likewise: stamped late by most of a frame's time.
 };
 
 /// True values for one frame. Times on the scale of the stamps, without their errors.

@@ -17,6 +17,7 @@ using Eigen::Vector3d;
 constexpr double kLiveInterval_s = 100.0;
 constexpr double kColorRate_hz = 5.0;
 constexpr std::size_t kFirstOfTwo = 5;  // among LiveNames()
+constexpr std::size_t kFirstOfOthers = 7;
 
 // Looks at the body from one side, its length along the image.
 Pose PlaceOfSensor(const Vector3d& at, double side, RandomStream& random) {
@@ -101,12 +102,27 @@ void AddCoughs(LiveScript& script, RandomStream& random) {
   script.steps.push_back({30.0, 31.0, Shift(-3.0, 2.0, 0, 0, -1.0)});
 }
 
+// What happens to room, sensor and driver, by the place among the names after those of two sensors.
+void AddOther(LiveScript& script, SensorAtPlace& place, std::size_t other) {
+  const Vector3d direction = Vector3d(0.8, -0.5, 0.3).normalized();
+  if (other == 0) {
+    script.dark = {{14.0, 28.0}};
+    script.steps = {{18.0, 18.3, Shift(0, 5.0, 0)}, {31.0, 31.3, Shift(0, -5.0, 0)}};
+  }
+  if (other == 2) script.sheet = {{15.0, 25.0}};
+  if (other == 3) place.sway_m = 0.2 * kMillimetre;
+  if (other < 4) return;
+  place.pushed_at_s = 20.0;
+  place.T_before_after.translation() = (other == 4 ? 2.0 : 5.0) * kMillimetre * direction;
+}
+
 }  // namespace
 
 const std::vector<std::string>& LiveNames() {
-  static const std::vector<std::string> names = {"live_still",    "live_steps",  "live_passing",
-                                                 "live_cough",    "live_pushed", "live_two_left",
-                                                 "live_two_right"};
+  static const std::vector<std::string> names = {
+      "live_still",    "live_steps",      "live_passing",   "live_cough", "live_pushed",
+      "live_two_left", "live_two_right",  "live_dark",      "live_lossy", "live_sheet",
+      "live_sway",     "live_pushed_2mm", "live_pushed_5mm"};
   return names;
 }
 
@@ -127,7 +143,8 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
     scene.sweep.motion.at_rest = place;
     scene.sweep.num_frames = static_cast<int>(std::lround(options.live_s * options.rate_hz));
     // Both of two sensors at the same time.
-    const double after_s = kLiveInterval_s * static_cast<double>(std::min(i, kFirstOfTwo) + 1);
+    const std::size_t at = i < kFirstOfOthers ? std::min(i, kFirstOfTwo) : i;
+    const double after_s = kLiveInterval_s * static_cast<double>(at + 1);
     scene.sweep.start_time_s += after_s;
     scene.sweep.on_before_s += after_s;
     scene.sweep.seed = Hash(options.seed, 132, i);
@@ -136,7 +153,8 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
     scene.sweep.events.live = script;
     return &scene;
   };
-  for (std::size_t i = 0; i <= kFirstOfTwo; ++i) {
+  for (std::size_t i = 0; i < LiveNames().size(); ++i) {
+    if (i > kFirstOfTwo && i < kFirstOfOthers) continue;
     RandomStream random(Hash(options.seed, 131, i));
     LiveScript script{.exhaled = swept.body->grid, .chest = with_chest, .belly = with_belly};
     script.breaths = Breathe(random, options.live_s);
@@ -153,8 +171,11 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
       place.T_before_after.translation() = Vector3d(0.8, -0.5, 0.3) * kMillimetre;
     }
     if (i == kFirstOfTwo) AddForTwo(script, place.T_world_camera, random);
+    if (i >= kFirstOfOthers) AddOther(script, place, i - kFirstOfOthers);
     const auto shared = std::make_shared<const LiveScript>(std::move(script));
-    add(i, shared, place);
+    ScenePlan* const scene = add(i, shared, place);
+    if (scene != nullptr && i == kFirstOfOthers + 1)
+      scene->sweep.lost_frames = scene->sweep.late_frames = 0.1;
     if (i != kFirstOfTwo) continue;
     ScenePlan* right =
         add(i + 1, shared, {.T_world_camera = PlaceOfSensor(shared->centre, -side, random)});

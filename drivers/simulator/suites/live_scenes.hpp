@@ -17,7 +17,10 @@ namespace plumb::simulated {
 /// (only breathing), `live_steps` (the couch is moved under it in steps), `live_passing` (a gantry
 /// passes, and the body moves behind it), `live_cough` (coughs, slides, a jerk), `live_pushed` (the
 /// sensor is pushed by a millimetre), and `live_two_left` and `live_two_right`, two sensors that
-/// see the same: an arm covers the left one, which is pushed later, while the body moves.
+/// see the same: an arm covers the left one, which is pushed later, while the body moves. Then
+/// `live_dark` (the lights go off, and the body moves in the dark), `live_lossy` (frames are lost
+/// and late), `live_sheet` (a sheet is put on the chest), `live_sway` (the mount sways by 0.2 mm,
+/// twice a second), `live_pushed_2mm` and `live_pushed_5mm`.
 void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options);
 
 /// Adds `rest`, one breath of four seconds before a sensor at rest over the body of a sweep, which

@@ -96,8 +96,15 @@ Pose LiveScript::BodyAt(double time_s) const {
   return T;
 }
 
+bool LiveScript::DarkAt(double time_s) const {
+  return std::ranges::any_of(dark, [&](const Stretch& one) { return one.Has(time_s); });
+}
+
 DistanceGrid LiveScript::ShapeAt(double time_s) const {
-  return DistanceGrid::Between(*exhaled, *chest, ChestAt(time_s) / kRise_m, *belly,
+  const bool covered =
+      std::ranges::any_of(sheet, [&](const Stretch& one) { return one.Has(time_s); });
+  const double chest_m = ChestAt(time_s) + (covered ? kSheet_m : 0.0);
+  return DistanceGrid::Between(*exhaled, *chest, chest_m / kRise_m, *belly,
                                BellyAt(time_s) / kRise_m);
 }
 

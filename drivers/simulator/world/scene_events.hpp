@@ -68,9 +68,18 @@ struct LiveScript {
     Rod from, to;
   };
   std::vector<Passing> passing = {};
+  struct Stretch {
+    double begin_s = 0.0, end_s = 0.0;
+    [[nodiscard]] bool Has(double time_s) const { return time_s >= begin_s && time_s < end_s; }
+  };
+  std::vector<Stretch> dark = {};  ///< The lights are off: the colour camera sees nothing.
+  /// A folded sheet lies on the chest, which is that much higher.
+  std::vector<Stretch> sheet = {};
+  static constexpr double kSheet_m = 0.025;
 
   [[nodiscard]] double BellyAt(double time_s) const;  ///< Rise, metres.
   [[nodiscard]] double ChestAt(double time_s) const;
+  [[nodiscard]] bool DarkAt(double time_s) const;
   [[nodiscard]] Pose BodyAt(double time_s) const;  ///< T_world_body.
   [[nodiscard]] DistanceGrid ShapeAt(double time_s) const;
 };

@@ -89,7 +89,10 @@ Pose Trajectory::T_world_camera(double time_s) const {
     const SensorAtPlace& place = *options_.at_rest;
     constexpr double kPush_s = 0.1;
     const double pushed = std::clamp((time_s - place.pushed_at_s) / kPush_s, 0.0, 1.0);
-    return place.T_world_camera * Interpolate(Pose::Identity(), place.T_before_after, pushed);
+    Pose T = place.T_world_camera * Interpolate(Pose::Identity(), place.T_before_after, pushed);
+    constexpr double kSway_hz = 2.0;
+    T.translate(Eigen::Vector3d(place.sway_m * std::sin(kTwoPi * kSway_hz * time_s), 0.0, 0.0));
+    return T;
   }
   const double along = options_.half_way_m * (2.0 * SoftRamp(time_s / options_.duration_s) - 1.0);
   const double swing =

@@ -16,6 +16,7 @@ struct SensorAtPlace {
   Pose T_world_camera = Pose::Identity();
   double pushed_at_s = 1e9;                ///< Within a tenth of a second.
   Pose T_before_after = Pose::Identity();  ///< In the camera's frame.
+  double sway_m = 0.0;                     ///< To and fro along the image's x, twice a second.
 };
 
 /// A sweep in its own frame: x from head to feet, z up from the support, origin under the middle of

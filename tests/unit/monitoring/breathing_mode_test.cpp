@@ -59,6 +59,21 @@ TEST_F(BreathingModeTest, FindsPeriodAndAmplitudeAtAnyPhase) {
   }
 }
 
+TEST_F(BreathingModeTest, ItIsSureOnlyWhereALongerBreathWasPossible) {
+  const auto after = [&](double period_s, double length_s) {
+    BlockSeries series = Series(0.008, period_s);
+    const auto frames = static_cast<std::size_t>(length_s * kRate_hz);
+    series.time_s.resize(frames);
+    series.inverse_depth.resize(frames);
+    const auto mode = Learn(series);
+    return mode && mode->is_whole;
+  };
+  EXPECT_TRUE(after(3.1, 5.8));
+  EXPECT_FALSE(after(3.1, 4.9)) << "two seconds to compare it with, and some";
+  EXPECT_FALSE(after(5.4, 6.0)) << "a part of a breath is none";
+  EXPECT_TRUE(after(5.4, 8.0));
+}
+
 TEST_F(BreathingModeTest, ASurfaceAtRestDoesNotBreathe) { EXPECT_FALSE(Learn(Series(0.0, 4.0))); }
 
 TEST_F(BreathingModeTest, TheMeanLeavesOutWhatWasHardlySeen) {
