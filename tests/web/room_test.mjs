@@ -669,6 +669,11 @@ await h.step('where the settings ask for it, no sweep begins before the wristban
   await engineer.getByLabel('Ask for the wristband before each sweep').check();
   await engineer.getByRole('button', { name: 'Save', exact: true }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  // A new session: the room display shows no result, but what comes next.
+  await ok(anna, 'treatment/close', 'POST', { session_id: (await state()).session.id });
+  await h.acknowledge(anna, bob, clara);
+  await openOnPage(anna, 'P-0042');
+  await h.acknowledge(anna, bob, clara);
   const { session } = await state();
   await anna.goto(`${h.url}#/scan`);
   const start = anna.locator('.giant');

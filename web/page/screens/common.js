@@ -42,8 +42,12 @@ export function stateHere({ state, session, last_result: last }) {
 }
 
 /// What to do in that state; where the sensor is at rest, what the next press starts.
-export const stateHint = (status) => (status.press === 'monitoring'
-  ? S.stateHints.at_rest : S.stateHints[stateHere(status)]);
+export const stateHint = (status) => {
+  if (status.press === 'monitoring') return S.stateHints.at_rest;
+  const state = stateHere(status);
+  const isHeld = status.wants_wristband && ['ready', 'result'].includes(state);
+  return isHeld ? S.room.wristbandHint(status.session.patient_code) : S.stateHints[state];
+};
 
 export const verdictIcon = (verdict) =>
   ({ in_tolerance: '✓', unsure: '≈', move: '↔', no_answer: '?' })[verdict] ?? '–';
