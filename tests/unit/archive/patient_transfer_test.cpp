@@ -88,7 +88,7 @@ class PatientTransferTest : public ::testing::Test {
     std::vector<std::string> all;
     for (const Reference& one : store.references.List(store.patients.FindByCode("P-7")->id))
       all.push_back(fmt::format("{} v{} r{} {} {}", one.id, one.version, one.revision,
-                                one.approved_by, PlanJson(one.plan).dump()));
+                                one.approved_by, PlanJson(one.plan)));
     return all;
   }
   /// Imports one unit's present data into the other: it must be refused and change nothing.
