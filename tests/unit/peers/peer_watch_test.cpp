@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/peers/peer_watch.hpp"
 
+#include <functional>
+#include <memory>
 #include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -34,15 +39,28 @@ class PeerWatchTest : public ::testing::Test {
         loop_, settings_, secret,
         [this](const Message& found) {
           found_.push_back(found);
-          if (watch_->notes() == wanted_) loop_.Quit(0);
+          Look();
         },
         std::chrono::milliseconds(5));
   }
-  void RunUntil(std::vector<Message> notes) {
-    wanted_ = std::move(notes);
+  /// What must be noted, and what the test does then.
+  struct Step {
+    std::vector<Message> wanted;
+    std::function<void()> then = [] {};
+  };
+  /// Runs the loop, which runs only once, until all of it has come in this order.
+  void Run(std::vector<Step> steps) {
+    steps_ = std::move(steps);
     auto patience = loop_.MakeTimer("patience", [this] { loop_.Quit(1); });
     patience.ArmAfter(std::chrono::seconds(60));
-    EXPECT_EQ(loop_.Run(), 0) << "in vain";
+    EXPECT_EQ(loop_.Run(), 0) << steps_.size() << " steps are left";
+  }
+  void Look() {
+    if (steps_.empty() || watch_->notes() != steps_.front().wanted) return;
+    const auto then = steps_.front().then;
+    steps_.erase(steps_.begin());
+    loop_.Post("then", then);
+    if (steps_.empty()) loop_.Post("end", [this] { loop_.Quit(0); });
   }
   void Answer(const std::string& answer) {
     const std::lock_guard lock(mutex_);
@@ -66,40 +84,44 @@ class PeerWatchTest : public ::testing::Test {
   }};
   PeersSettings settings_;
   EventLoop loop_;
-  std::vector<Message> found_, wanted_;
+  std::vector<Message> found_;
+  std::vector<Step> steps_;
   std::unique_ptr<PeerWatch> watch_;
 };
 
 TEST_F(PeerWatchTest, AsksByTheHashOnlyAndSaysWhereThePatientIsOpen) {
   Make();
   watch_->SetOpen("7", "Anna-1");
-  RunUntil({say::peers::OpenElsewhere(name())});
-  EXPECT_THAT(found_, ElementsAre(say::peers::OpenElsewhere(name())));
+  const Message is_open = say::peers::OpenElsewhere(name());
+  Run({{{is_open}, [&] { Answer(Json("{\"open\": false}")); }},
+       {{}, [&] { Answer(Json("{\"open\": true}")); }},
+       {{is_open}, [&] { watch_->SetOpen("", ""); }},
+       {{}}});
+  EXPECT_THAT(found_, ElementsAre(is_open, Message(), is_open, Message()));
   EXPECT_THAT(head(), HasSubstr("Authorization: Bearer " + kSecret));
   EXPECT_THAT(head(), HasSubstr("GET /peers/open?patient=" + web::PatientHash("ANNA-1", kSecret)));
   EXPECT_THAT(head(), Not(HasSubstr("Anna")));
-  Answer(Json("{\"open\": false}"));
-  RunUntil({});
-  EXPECT_EQ(watch_->session(), "7");
-  Answer(Json("{\"open\": true}"));
-  RunUntil({say::peers::OpenElsewhere(name())});
-  watch_->SetOpen("", "");
-  EXPECT_THAT(watch_->notes(), IsEmpty());
 }
 
 TEST_F(PeerWatchTest, WhateverElseIsAnsweredIsNotKnown) {
   Make();
+  const Message not_known = say::peers::NotKnown(name());
+  std::vector<Step> steps;
   for (const std::string& answer :
        {std::string("HTTP/1.1 401 No\r\nContent-Length: 0\r\n\r\n"), Json("{\"open\": 1}"),
         Json("[]"), Json("no"), Json("{\"open\": true, \"x\": \"" + std::string(300, 'x') + "\"}"),
         std::string("HTTP/1.1 302 No\r\nLocation: /metrics\r\nContent-Length: 0\r\n\r\n"),
         std::string()}) {
-    SCOPED_TRACE(answer);
-    Answer(answer);
-    watch_->SetOpen("7", "P");
-    RunUntil({say::peers::NotKnown(name())});
-    watch_->SetOpen("", "");
+    steps.push_back({{not_known}, [&, answer] {
+                       Answer(answer);
+                       watch_->SetOpen("7", "P");
+                     }});
+    steps.push_back({{}});
   }
+  steps.push_back({{not_known}});
+  Answer("no HTTP");
+  watch_->SetOpen("7", "P");
+  Run(std::move(steps));
   for (const Message& found : found_) EXPECT_TRUE(found.empty()) << found.English();
 }
 
@@ -112,7 +134,7 @@ TEST_F(PeerWatchTest, NobodyIsAskedWithoutAPatientOrASecret) {
   EXPECT_TRUE(watch_->IsSetUp());
   // The first question is the one for the patient that was opened.
   watch_->SetOpen("8", "Q");
-  RunUntil({say::peers::OpenElsewhere(name())});
+  Run({{{say::peers::OpenElsewhere(name())}}});
   EXPECT_THAT(head(), HasSubstr(web::PatientHash("q", kSecret)));
 }
 
