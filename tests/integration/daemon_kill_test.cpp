@@ -31,7 +31,7 @@ class DaemonKillTest : public ::testing::Test {
   /// Adds patients until nobody answers, and notes what was confirmed.
   void Work(HttpClient& client, int round) {
     for (int i = 0;; ++i) {
-      const std::string code = fmt::format("K{}-{}", round, i);
+      const std::string code = fmt::format("K{}x{}", round, i);
       const test::HttpAnswer answer =
           client.Post("/api/v1/patients", {{"code", code}, {"site", "thorax"}});
       if (answer.status == 0) return;
