@@ -69,9 +69,9 @@ class Section {
     } else {
       found = node->value_exact<T>();
     }
-    if constexpr (std::same_as<T, std::string>)
-      if (found && !IsPlainText(*found)) Fail(*node, key, say::config::ExpectedPlainText());
     if (!found || !is_valid(*found)) Fail(*node, key, expected);
+    if constexpr (std::same_as<T, std::string>)
+      if (!IsPlainText(*found)) Fail(*node, key, say::config::ExpectedPlainText());
     value = *found;
   }
 
