@@ -35,9 +35,12 @@ constexpr double kAgree = 3.0;  // standard deviations
 constexpr double kMountTogether_s = 1.0;
 // The fits at rest are spread over about this time.
 constexpr double kFitting_s = 0.6;
-// A whole breath is looked for from this time of zeroing on, that often.
+// A body may begin to move ten seconds after the first frame: from nine on a whole breath is
+// enough, after this time of zeroing. It is looked for that often.
+constexpr double kHurry_s = 9.0;
+constexpr double kTooLate_s = 10.0;
 constexpr double kFirstTry_s = 5.0;
-constexpr double kTryAgain_s = 0.5;
+constexpr double kTryAgain_s = 0.25;
 
 }  // namespace
 
@@ -76,6 +79,7 @@ Vector6d Monitor::spread_at_zero() const {
 
 std::optional<MonitorLine> Monitor::Add(const Frame& frame, std::size_t index) {
   Sensor& sensor = sensors_.at(index);
+  if (!first_s_) first_s_ = frame.depth_time_s;
   MonitorLine line{.time_s = frame.depth_time_s, .sensor = index};
   const bool any =
       std::ranges::any_of(sensors_, [](const Sensor& one) { return one.takes_part && !one.moved; });
@@ -139,7 +143,9 @@ void Monitor::Collect(Sensor& sensor, const Frame& frame) {
   sensor.at_rest.AddStill(frame);
   const double age_s = frame.depth_time_s - *zeroing_since_s_;
   const bool last = age_s >= options_.zeroing_s;
-  const bool due = age_s >= kFirstTry_s &&
+  const double since_first_s = frame.depth_time_s - *first_s_;
+  const bool due = age_s >= kFirstTry_s && since_first_s >= kHurry_s &&
+                   since_first_s <= kTooLate_s &&
                    (!zero_tried_s_ || frame.depth_time_s - *zero_tried_s_ >= kTryAgain_s);
   if (!last && !due) return;
   zero_tried_s_ = frame.depth_time_s;

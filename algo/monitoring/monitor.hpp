@@ -57,8 +57,9 @@ struct MonitorOptions {
   /// The numbers against the reference are judged; without an accepted result they are unknown.
   bool judges_reference = false;
   std::vector<Eigen::Vector2d> region_polygon_m = {};
-  /// The zero is the mean over the last whole breath in this time; zeroing ends before, as soon as
-  /// a whole breath was surely seen.
+  /// The zero is the mean over the last whole breath in this time. Where the mount took longer than
+  /// usual, zeroing ends before, so that it is done ten seconds after the first frame, if a whole
+  /// breath was surely seen.
   double zeroing_s = 8.0;
 };
 
@@ -157,7 +158,7 @@ class Monitor {
   std::deque<Sensor> sensors_;
   AdviceFilter advice_;
   Stage stage_ = Stage::kMounting;
-  std::optional<double> mounted_since_s_, zeroing_since_s_, zero_tried_s_, zero_time_s_;
+  std::optional<double> first_s_, mounted_since_s_, zeroing_since_s_, zero_tried_s_, zero_time_s_;
   bool no_zero_ = false;
   std::optional<RestFits> rest_fits_;
   std::size_t fits_at_a_time_ = 1;

@@ -22,6 +22,7 @@
 #include "daemon/cli/work_digest.hpp"
 #include "daemon/evaluation/evaluation.hpp"
 #include "daemon/evaluation/live_accuracy.hpp"
+#include "daemon/evaluation/live_endless.hpp"
 #include "daemon/evaluation/report.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
@@ -45,6 +46,9 @@ struct EvaluateArguments {
   bool results = false;
   bool json = false;
   std::optional<double> part;
+  std::string endless;  ///< A simulated::EndlessKind; empty: suites.
+  EndlessOptions hours;
+  std::string endless_size = "320x240", endless_sensor = "structured_light";
 };
 
 /// The first frames of a recording.
@@ -336,11 +340,72 @@ int RunList(const EvaluateArguments& options, const CommandContext& context) {
   return RunBatch(options.list, out, work, context);
 }
 
+int RunHours(const EvaluateArguments& options, const CommandContext& context) {
+  if (!options.out) throw InvalidRequest(say::cli::ListOrPaths());
+  EndlessOptions hours = options.hours;
+  hours.kind = Named<simulated::EndlessKind>(options.endless).value();
+  hours.simulate.sensor = Named<DepthSensor>(options.endless_sensor).value();
+  if (options.endless_size == "320x240") hours.simulate.width = 320, hours.simulate.height = 240;
+  hours.limits = options.method.Read().compare.limits;
+  hours.out = *options.out;
+  EnsureFolder(hours.out);
+  Progress progress(context.language);
+  const std::string table = RunEndless(hours, context.stop, [&](int part, double fraction) {
+    progress.Update(say::cli::StepOf(std::to_string(part), say::cli::Simulating()), fraction);
+  });
+  progress.Clear();
+  PrintOut(table);
+  return kDone;
+}
+
 int Run(const EvaluateArguments& options, const CommandContext& context) {
+  if (!options.endless.empty())
+    return options.threads.Run([&] { return RunHours(options, context); });
   if (options.list.empty() == options.suite.empty() || (options.suite.empty() && !options.out))
     throw InvalidRequest(say::cli::ListOrPaths());
   return options.threads.Run(
       [&] { return options.list.empty() ? RunOne(options, context) : RunList(options, context); });
+}
+
+template <typename Enum>
+CLI::IsMember NamesOf() {
+  return CLI::IsMember(std::vector<std::string>(kNamesOf<Enum>.begin(), kNamesOf<Enum>.end()));
+}
+
+/// What concerns monitoring for hours.
+void AddHoursOptions(CLI::App& app, const std::shared_ptr<EvaluateArguments>& options,
+                     CLI::Option* list) {
+  EndlessOptions& hours = options->hours;
+  CLI::Option* const endless =
+      app.add_option(
+             "--live-endless", options->endless,
+             "No suite: monitor simulated units for hours, rendered and judged on the fly, "
+             "in parts that are kept in --out; a run that was ended goes on. moves: the body "
+             "leaves its place and comes back; still: it breathes; drift: the sensor warms up")
+          ->check(NamesOf<simulated::EndlessKind>())
+          ->excludes(list)
+          ->type_name("moves|still|drift");
+  const auto add = [&](CLI::Option* option) { option->needs(endless)->capture_default_str(); };
+  add(app.add_option("--parts", hours.parts, "Parts, each with a unit of its own")
+          ->check(CLI::Range(1, 10000))
+          ->type_name("N"));
+  add(app.add_option("--part-seconds", hours.part_s, "Simulated length of a part")
+          ->check(CLI::Range(20.0, 36000.0))
+          ->type_name("S"));
+  add(app.add_option("--rate", hours.rate_hz, "Frames per second")
+          ->check(CLI::Range(1.0, 30.0))
+          ->type_name("HZ"));
+  add(app.add_option("--seed", hours.simulate.seed, "Seed and unit of the first part")
+          ->type_name("N"));
+  add(app.add_option("--frames", hours.simulate.frames, "Frames of each sweep")
+          ->check(CLI::Range(20, 1000))
+          ->type_name("N"));
+  add(app.add_option("--size", options->endless_size, "Size of the images")
+          ->check(CLI::IsMember({"640x480", "320x240"}))
+          ->type_name("640x480|320x240"));
+  add(app.add_option("--sensor", options->endless_sensor, "Class of the depth camera")
+          ->check(NamesOf<DepthSensor>())
+          ->type_name("structured_light|active_stereo|time_of_flight|lidar"));
 }
 
 }  // namespace
@@ -373,6 +438,7 @@ Command AddEvaluate(CLI::App& app) {
       ->excludes(list);
   app.add_flag("--json", options->json, "Print the figures as JSON on the standard output")
       ->excludes(list);
+  AddHoursOptions(app, options, list);
   return [options](const CommandContext& context) { return Run(*options, context); };
 }
 

@@ -78,15 +78,43 @@ struct BreathingPairs {
   }
 };
 
+// Means of the errors over whole minutes.
+class MinuteMeans {
+ public:
+  void Add(double time_s, const Eigen::Vector3d& error_m) {
+    if (!begin_s_) begin_s_ = time_s;
+    constexpr double kMinute_s = 60.0;
+    if (time_s - *begin_s_ >= kMinute_s) {
+      largest_m_ = std::max(largest_m_, (sum_m_ / static_cast<double>(count_)).norm());
+      begin_s_ = time_s;
+      sum_m_.setZero();
+      count_ = 0;
+    }
+    sum_m_ += error_m;
+    ++count_;
+  }
+  [[nodiscard]] double largest_m() const { return largest_m_; }
+
+ private:
+  std::optional<double> begin_s_;
+  Eigen::Vector3d sum_m_ = Eigen::Vector3d::Zero();
+  std::size_t count_ = 0;
+  double largest_m_ = 0.0;
+};
+
 // Advice against the truth, from frame to frame.
 class AdviceCheck {
  public:
-  AdviceCheck(const AcceptanceLimits& limits, LiveFigures& figures)
-      : limits_(limits), figures_(figures) {}
+  AdviceCheck(const AcceptanceLimits& limits, const std::vector<LiveStep>& steps,
+              LiveFigures& figures)
+      : limits_(limits), steps_(steps), figures_(figures) {}
   void Add(const MonitorLine& line, const Vector6d& truth, bool sensor_moved) {
     const bool in = line.advice == LiveAdvice::kIn;
     const bool out = IsOut(truth, limits_, 1.0);
+    if (in) ++figures_.in;
+    if (out) ++figures_.out;
     if (in && out) ++figures_.false_in;
+    AddStep(line.time_s, in);
     if (out && !was_out_ && was_in_) went_out_s_ = line.time_s;
     if (went_out_s_ && !in) {
       figures_.hold_after_s.push_back(line.time_s - *went_out_s_);
@@ -100,7 +128,29 @@ class AdviceCheck {
   }
 
  private:
+  void AddStep(double time_s, bool in) {
+    constexpr double kMost_s = 2.0;  // A later hold has another reason.
+    if (stepped_ != nullptr && time_s - stepped_->time_s > kMost_s) {
+      ++figures_.not_held[stepped_->size];
+      stepped_ = nullptr;
+    }
+    if (stepped_ != nullptr && !in) {
+      figures_.hold_after_step_s[stepped_->size].push_back(time_s - stepped_->time_s);
+      stepped_ = nullptr;
+    }
+    for (; next_step_ < steps_.size() && steps_[next_step_].time_s <= time_s; ++next_step_) {
+      if (stepped_ != nullptr) ++figures_.not_held[stepped_->size];
+      stepped_ = was_in_ ? &steps_[next_step_] : nullptr;
+      if (stepped_ == nullptr || in) continue;
+      figures_.hold_after_step_s[stepped_->size].push_back(time_s - stepped_->time_s);
+      stepped_ = nullptr;
+    }
+  }
+
   const AcceptanceLimits& limits_;
+  const std::vector<LiveStep>& steps_;
+  std::size_t next_step_ = 0;
+  const LiveStep* stepped_ = nullptr;  ///< The last one, until hold.
   LiveFigures& figures_;
   bool was_in_ = false, was_out_ = false;
   std::optional<double> went_out_s_;
@@ -173,7 +223,8 @@ LiveFigures FiguresOf(std::span<const MonitorLine> lines, const LiveTruth& truth
   figures.frames = lines.size();
   std::vector<double> shift_mm, turn_deg, against_mm, against_deg;
   BreathingPairs breathing;
-  AdviceCheck advice(limits, figures);
+  AdviceCheck advice(limits, truth.steps, figures);
+  MinuteMeans minutes;
   std::optional<double> pushed_s;
   const Pose T_marker_world = truth.T_world_reference_marker.inverse();
   const auto motion = [&](const LiveTruthLine& now, const Pose& from, const Eigen::Vector3d& at) {
@@ -197,6 +248,7 @@ LiveFigures FiguresOf(std::span<const MonitorLine> lines, const LiveTruth& truth
     if (now.sensor_moved) continue;
     if (line.since_zero) {
       AddErrors(*line.since_zero, true_numbers, shift_mm, turn_deg);
+      minutes.Add(line.time_s, (line.since_zero->value - true_numbers).head<3>());
       for (Eigen::Index i = 0; i < 6; ++i) {
         ++figures.intervals.count;
         if (std::abs(line.since_zero->value[i] - true_numbers[i]) <= line.since_zero->u95[i])
@@ -215,6 +267,7 @@ LiveFigures FiguresOf(std::span<const MonitorLine> lines, const LiveTruth& truth
   figures.turn_deg = Summarise(turn_deg);
   figures.against_shift_mm = Summarise(against_mm);
   figures.against_turn_deg = Summarise(against_deg);
+  figures.minute_mm = minutes.largest_m() / kMillimetre;
   breathing.Into(figures);
   return figures;
 }
@@ -256,6 +309,8 @@ std::string LiveTable(const LiveEvaluation& evaluation) {
 std::string LiveJson(const LiveEvaluation& evaluation) {
   OrderedJson recordings = OrderedJson::object();
   for (const auto& [name, f] : evaluation) {
+    std::vector<double> cpu_ms = f.cpu_s;
+    for (double& value : cpu_ms) value *= 1e3;
     const auto summary = [](const ErrorSummary& e) {
       return OrderedJson{{"count", e.count}, {"median", e.median}, {"p95", e.p95}, {"max", e.max}};
     };
@@ -271,12 +326,17 @@ std::string LiveJson(const LiveEvaluation& evaluation) {
         {"against_turn_deg", summary(f.against_turn_deg)},
         {"breathing_r", f.breathing_r ? OrderedJson(*f.breathing_r) : OrderedJson()},
         {"breathing_rms_mm", f.breathing_rms_mm},
+        {"in", f.in},
+        {"out", f.out},
         {"false_in", f.false_in},
         {"false_moved", f.false_moved},
         {"needless_holds", f.needless_holds},
         {"hold_after_s", f.hold_after_s},
+        {"hold_after_step_s", f.hold_after_step_s},
+        {"steps_not_held", f.not_held},
+        {"minute_mm", f.minute_mm},
         {"moved_after_s", f.moved_after_s ? OrderedJson(*f.moved_after_s) : OrderedJson()},
-        {"cpu_ms", summary(Summarise(f.cpu_s))}};
+        {"cpu_ms", summary(Summarise(cpu_ms))}};
   }
   return OrderedJson{{"format", 1}, {"recordings", recordings}}.dump(1) + "\n";
 }

@@ -26,12 +26,19 @@ struct LiveTruthLine {
   bool sensor_moved = false;
 };
 
+/// A motion of the body away from its place at the zero, at once.
+struct LiveStep {
+  double time_s = 0.0;
+  std::string size;  ///< As shown: "5 mm".
+};
+
 /// live.json and live.csv.
 struct LiveTruth {
   std::string scene, reference;          ///< Names of the suite's scenes.
   Pose T_world_body = Pose::Identity();  ///< At the zero.
   Pose T_world_reference_marker = Pose::Identity();
   std::vector<LiveTruthLine> lines;  ///< Increasing in time.
+  std::vector<LiveStep> steps = {};  ///< Likewise; only of recordings without files.
 };
 
 /// @throws DataError naming the file and what is wrong with it.
@@ -49,11 +56,17 @@ struct LiveFigures {
   ErrorSummary against_shift_mm, against_turn_deg;  ///< Against the reference, likewise.
   std::optional<double> breathing_r;                ///< Correlation with the truth,
   double breathing_rms_mm = 0.0;                    ///< and the error.
+  std::size_t in = 0, out = 0;                      ///< Frames `in`; with the truth out.
   std::size_t false_in = 0;                         ///< Frames `in` while the truth is out.
   std::size_t false_moved = 0;  ///< Frames `moved_sensor` while it has not moved.
   /// Times `in` was left while the truth was within 60 % of every tolerance.
   std::size_t needless_holds = 0;
-  std::vector<double> hold_after_s;     ///< From the truth's going out to hold.
+  std::vector<double> hold_after_s;  ///< From the truth's going out to hold.
+  /// From a step until hold, by its size, where the advice was `in` before; and how many led to
+  /// none.
+  std::map<std::string, std::vector<double>> hold_after_step_s;
+  std::map<std::string, std::size_t> not_held;
+  double minute_mm = 0.0;               ///< Largest mean error of shift over a whole minute: drift.
   std::optional<double> moved_after_s;  ///< From a push of the sensor until it was found.
   std::vector<double> cpu_s;            ///< Of each frame after the zero.
 };

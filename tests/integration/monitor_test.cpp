@@ -154,6 +154,26 @@ TEST_F(MonitorTest, ASensorThatMovesNeverBegins) {
   for (const Row& row : RowsOf(out / "monitor.csv")) EXPECT_EQ(row.at("advice"), "unknown");
 }
 
+TEST_F(MonitorTest, HoursAreJudgedOnTheFlyAndGoOnWhereTheyEnded) {
+  const fs::path out = folder_ / "hours";
+  const auto run = [&](const char* parts) {
+    return Plumb({"evaluate", "--live-endless", "moves", "--out", out, "--part-seconds", "30",
+                  "--rate", "8", "--frames", "60", "--seed", "5", "--parts", parts});
+  };
+  const RunResult first = run("1");
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_THAT(first.out, StartsWith("1 parts, 240 frames"));
+  EXPECT_THAT(first.out, HasSubstr("in while out 0; false moved_sensor frames 0"));
+  EXPECT_THAT(first.out, HasSubstr("a step of ")) << "it was in, and then was not";
+  const fs::path part = out / "moves-structured_light-5.json";
+  const auto made = fs::last_write_time(part);
+  const RunResult again = run("1");
+  EXPECT_EQ(again.out, first.out);
+  EXPECT_EQ(fs::last_write_time(part), made) << "not made again";
+  for (const auto& entry : fs::recursive_directory_iterator(out))
+    EXPECT_EQ(entry.path(), part) << "no images";
+}
+
 TEST_F(MonitorTest, BadInputLeavesNothingBehind) {
   const RunResult result = Plumb(
       {"monitor", Recording(), "--scene", folder_ / "nothing", "--out", folder_ / "monitoring"});

@@ -80,7 +80,6 @@ struct ColorCamera::Shot {
   cv::Mat material;                    // CV_16UC1, at each pixel's centre.
   cv::Mat depth;                       // CV_32FC1, metres along the optical axis.
   cv::Mat edge;                        // CV_8UC1
-  std::uint64_t noise_seed;
   int tiles_across;
   Vector3f gain;  // Red, green, blue.
 };
@@ -304,7 +303,7 @@ float ColorCamera::GlareAt(const Shot& shot, int x, int y) const {
   return shot.world.GlareAt(material, PointAt(shot, x, y), pose.p_world);
 }
 
-void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
+void ColorCamera::Gather(const Shot& shot, int tile_row, cv::Mat& light_of) const {
   const int width = rays_.width();
   const int height = rays_.height();
   const Intrinsics& camera = unit_.color_true;
@@ -313,9 +312,6 @@ void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
   const auto vignetting = static_cast<float>(
       4.0 * unit_.vignetting /
       (static_cast<double>(width) * width + static_cast<double>(height) * height));
-  const auto shot_noise = static_cast<float>(unit_.shot_noise);
-  const auto read_variance = static_cast<float>(unit_.read_noise * unit_.read_noise);
-  const bool noisy = unit_.shot_noise > 0 || unit_.read_noise > 0;
   const int y_end = std::min(height, (tile_row + 1) * kTileSize);
   // Processed by tiles, so that neighbours find each other's texels in the cache.
   for (int tile = 0; tile < shot.tiles_across; ++tile) {
@@ -333,27 +329,42 @@ void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
         light += Vector3f::Constant(GlareAt(shot, x, y));
         light *= kGain * (1.0F - vignetting * (dx * dx + dy * dy));
         light = light.cwiseProduct(shot.gain);
-        auto& pixel = rgb.at<cv::Vec3b>(y, x);
-        const std::uint64_t hash =
-            noisy ? Hash(shot.noise_seed,
-                         static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
-                             static_cast<std::uint64_t>(x))
-                  : 0;
-        for (int channel = 0; channel < 3; ++channel) {
-          float value = light[channel];
-          if (noisy)
-            value += std::sqrt(shot_noise * value + read_variance) *
-                     NearlyNormal(channel == 2 ? Hash(hash) : hash >> (32 * channel));
-          pixel[channel] = codes_[static_cast<std::size_t>(
-              std::clamp(value, 0.0F, 1.0F) * (kLightLevels - 1) + 0.5F)];
-        }
+        light_of.at<cv::Vec3f>(y, x) = {light.x(), light.y(), light.z()};
       }
     }
   }
 }
 
+cv::Mat ColorCamera::Expose(const cv::Mat& light, std::uint64_t noise_seed) const {
+  const auto shot_noise = static_cast<float>(unit_.shot_noise);
+  const auto read_variance = static_cast<float>(unit_.read_noise * unit_.read_noise);
+  const bool noisy = unit_.shot_noise > 0 || unit_.read_noise > 0;
+  cv::Mat rgb(light.rows, light.cols, CV_8UC3);
+  tbb::parallel_for(0, light.rows, [&](int y) {
+    for (int x = 0; x < light.cols; ++x) {
+      const auto index = static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(light.cols) +
+                         static_cast<std::uint64_t>(x);
+      const std::uint64_t hash = noisy ? Hash(noise_seed, index) : 0;
+      for (int channel = 0; channel < 3; ++channel) {
+        float value = light.at<cv::Vec3f>(y, x)[channel];
+        if (noisy)
+          value += std::sqrt(shot_noise * value + read_variance) *
+                   NearlyNormal(channel == 2 ? Hash(hash) : hash >> (32 * channel));
+        rgb.at<cv::Vec3b>(y, x)[channel] = codes_[static_cast<std::size_t>(
+            std::clamp(value, 0.0F, 1.0F) * (kLightLevels - 1) + 0.5F)];
+      }
+    }
+  });
+  return rgb;
+}
+
 cv::Mat ColorCamera::Render(const World& world, const Trajectory& trajectory, double time_s,
                             std::uint64_t noise_seed, const Vector3f& gain) const {
+  return Expose(Light(world, trajectory, time_s, gain), noise_seed);
+}
+
+cv::Mat ColorCamera::Light(const World& world, const Trajectory& trajectory, double time_s,
+                           const Vector3f& gain) const {
   const int width = rays_.width();
   const int height = rays_.height();
   const int tile_rows = (height + kTileSize - 1) / kTileSize;
@@ -364,7 +375,6 @@ cv::Mat ColorCamera::Render(const World& world, const Trajectory& trajectory, do
             cv::Mat(height, width, CV_16UC1),
             cv::Mat(height, width, CV_32FC1),
             cv::Mat(),
-            noise_seed,
             tiles_across,
             gain};
   tbb::parallel_for(0, height, [&](int y) {
@@ -373,9 +383,9 @@ cv::Mat ColorCamera::Render(const World& world, const Trajectory& trajectory, do
   });
   tbb::parallel_for(0, tile_rows, [&](int row) { Cast(shot, row); });
   shot.edge = EdgeMask(shot);
-  cv::Mat rgb(height, width, CV_8UC3);
-  tbb::parallel_for(0, tile_rows, [&](int row) { Develop(shot, row, rgb); });
-  return rgb;
+  cv::Mat light(height, width, CV_32FC3);
+  tbb::parallel_for(0, tile_rows, [&](int row) { Gather(shot, row, light); });
+  return light;
 }
 
 }  // namespace plumb::simulated

@@ -27,6 +27,11 @@ class ColorCamera {
   [[nodiscard]] cv::Mat Render(const World& world, const Trajectory& trajectory, double time_s,
                                std::uint64_t noise_seed,
                                const Eigen::Vector3f& gain = Eigen::Vector3f::Ones()) const;
+  /// The two parts of Render(): the light on each pixel, CV_32FC3, which can be exposed again and
+  /// again, each time with its own noise.
+  [[nodiscard]] cv::Mat Light(const World& world, const Trajectory& trajectory, double time_s,
+                              const Eigen::Vector3f& gain = Eigen::Vector3f::Ones()) const;
+  [[nodiscard]] cv::Mat Expose(const cv::Mat& light, std::uint64_t noise_seed) const;
 
  private:
   struct Samples {
@@ -36,7 +41,7 @@ class ColorCamera {
   void BuildSamples();
   void Cast(Shot& shot, int tile_row) const;
   [[nodiscard]] cv::Mat EdgeMask(const Shot& shot) const;
-  void Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const;
+  void Gather(const Shot& shot, int tile_row, cv::Mat& light) const;
   static constexpr std::size_t kNumPatterns = 32;
   using Patterns = std::vector<std::vector<Samples>>;
   [[nodiscard]] static const std::vector<Samples>& PatternOf(const Patterns& patterns, int x,

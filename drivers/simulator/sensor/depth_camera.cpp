@@ -206,9 +206,9 @@ inline double DepthCamera::WithSystematicErrors(int x, int y, double true_z, dou
               (unit_.depth_tilt_per_m[0] * u + unit_.depth_tilt_per_m[1] * v) * inverse_corner);
 }
 
-void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m,
-                          const cv::Mat& incidence_cosine, std::uint64_t noise_seed,
-                          const ClassDepth* other, cv::Mat& measured_m) const {
+void DepthCamera::MeasureRow(int y, const Layers& layers, const cv::Mat& true_m,
+                             const cv::Mat& incidence_cosine, std::uint64_t noise_seed,
+                             const ClassDepth* other, cv::Mat& measured_m) const {
   const int width = rays_.width();
   const int height = rays_.height();
   const auto* truth = true_m.ptr<float>(y);
@@ -316,45 +316,59 @@ cv::Mat DepthCamera::Register(const cv::Mat& measured_m) const {
   return registered;
 }
 
-DepthShot DepthCamera::Render(const World& world, const Trajectory& trajectory, double time_s,
-                              std::uint64_t noise_seed, double warm_up) const {
+DepthView DepthCamera::See(const World& world, const Trajectory& trajectory, double time_s,
+                           std::uint64_t noise_seed) const {
   const int width = rays_.width();
   const int height = rays_.height();
   std::vector<MovingPose> rows;
   for (int y = 0; y < height; ++y)
     rows.push_back(PoseAt(trajectory, time_s + unit_.depth_readout_s * ((y + 0.5) / height - 0.5),
                           unit_.T_color_depth_true));
-  const double pixels = width / 640.0;
+  Layers layers;
+  if (unit_.lateral_noise > 0) {
+    const double sigma_px = kJitterFilterPx * (width / 640.0);
+    layers.jitter_x = CorrelatedNoise(Hash(noise_seed, 1), width, height, sigma_px);
+    layers.jitter_y = CorrelatedNoise(Hash(noise_seed, 2), width, height, sigma_px);
+  }
+  DepthView view;
+  view.true_m = cv::Mat(height, width, CV_32FC1);
+  const bool is_other = unit_.depth_sensor != DepthSensor::kStructuredLight;
+  if (is_other) view.skin = cv::Mat(height, width, CV_8UC1);
+  if (is_other || unit_.axial_noise > 0 || unit_.speckle > 0 || unit_.dropout > 0)
+    view.incidence_cosine = cv::Mat(height, width, CV_32FC1);
+  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize, [&](int row) {
+    Cast(world, rows, row, layers, view.true_m, view.incidence_cosine, view.skin);
+  });
+  return view;
+}
+
+DepthShot DepthCamera::Measure(const DepthView& view, double time_s, std::uint64_t noise_seed,
+                               double warm_up) const {
+  const int width = rays_.width();
+  const int height = rays_.height();
   Layers layers;
   layers.warm_up = warm_up;
-  if (unit_.lateral_noise > 0) {
-    layers.jitter_x = CorrelatedNoise(Hash(noise_seed, 1), width, height, kJitterFilterPx * pixels);
-    layers.jitter_y = CorrelatedNoise(Hash(noise_seed, 2), width, height, kJitterFilterPx * pixels);
-  }
   if (unit_.axial_noise > 0)
     layers.axial =
         CorrelatedNoise(Hash(noise_seed, 3), width, height, FilterSigmaOfLag(unit_.correlation_px));
-
   DepthShot shot;
-  shot.true_m = cv::Mat(height, width, CV_32FC1);
+  shot.true_m = view.true_m;
   shot.measured_m = cv::Mat(height, width, CV_32FC1);
-  cv::Mat incidence_cosine, skin;
-  const bool is_other = unit_.depth_sensor != DepthSensor::kStructuredLight;
-  if (is_other) skin = cv::Mat(height, width, CV_8UC1);
-  if (is_other || unit_.axial_noise > 0 || unit_.speckle > 0 || unit_.dropout > 0)
-    incidence_cosine = cv::Mat(height, width, CV_32FC1);
-  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize, [&](int row) {
-    Cast(world, rows, row, layers, shot.true_m, incidence_cosine, skin);
-  });
   std::optional<ClassDepth> other;
-  if (is_other) other.emplace(unit_, shot.true_m, skin, time_s, noise_seed);
+  if (unit_.depth_sensor != DepthSensor::kStructuredLight)
+    other.emplace(unit_, view.true_m, view.skin, time_s, noise_seed);
   tbb::parallel_for(0, height, [&](int y) {
-    Measure(y, layers, shot.true_m, incidence_cosine, noise_seed, other ? &*other : nullptr,
-            shot.measured_m);
-    if (unit_.projector_baseline_m > 0) CastShadow(y, shot.true_m, shot.measured_m);
+    MeasureRow(y, layers, view.true_m, view.incidence_cosine, noise_seed, other ? &*other : nullptr,
+               shot.measured_m);
+    if (unit_.projector_baseline_m > 0) CastShadow(y, view.true_m, shot.measured_m);
   });
   shot.registered = Register(shot.measured_m);
   return shot;
+}
+
+DepthShot DepthCamera::Render(const World& world, const Trajectory& trajectory, double time_s,
+                              std::uint64_t noise_seed, double warm_up) const {
+  return Measure(See(world, trajectory, time_s, noise_seed), time_s, noise_seed, warm_up);
 }
 
 }  // namespace plumb::simulated

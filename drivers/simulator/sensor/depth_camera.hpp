@@ -25,6 +25,13 @@ struct DepthShot {
   cv::Mat true_m;
 };
 
+/// What the infrared camera sees of a world at one moment, before anything is measured.
+struct DepthView {
+  cv::Mat true_m;            ///< As DepthShot has it.
+  cv::Mat incidence_cosine;  ///< CV_32FC1; may be empty.
+  cv::Mat skin;              ///< CV_8UC1; may be empty.
+};
+
 /// Renders depth images by the chain true z -> scale, offset, bow, field -> lateral jitter ->
 /// correlated axial noise -> quantisation -> projector shadow -> drop-outs and flying pixels ->
 /// registration. Immutable; parallel inside, and the result does not depend on the number of
@@ -38,13 +45,20 @@ class DepthCamera {
   /// @param warm_up  Scale error at this moment, in addition to the unit's own.
   [[nodiscard]] DepthShot Render(const World& world, const Trajectory& trajectory, double time_s,
                                  std::uint64_t noise_seed, double warm_up = 0.0) const;
+  /// The two parts of Render(): a still view can be measured again and again, each time with its
+  /// own noise, for much less time; only where its edges lie in the image then stays the same.
+  [[nodiscard]] DepthView See(const World& world, const Trajectory& trajectory, double time_s,
+                              std::uint64_t noise_seed) const;
+  [[nodiscard]] DepthShot Measure(const DepthView& view, double time_s, std::uint64_t noise_seed,
+                                  double warm_up = 0.0) const;
 
  private:
   struct Layers;
   void Cast(const World& world, std::span<const MovingPose> rows, int tile_row,
             const Layers& layers, cv::Mat& true_m, cv::Mat& incidence_cosine, cv::Mat& skin) const;
-  void Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence_cosine,
-               std::uint64_t noise_seed, const ClassDepth* other, cv::Mat& measured_m) const;
+  void MeasureRow(int y, const Layers& layers, const cv::Mat& true_m,
+                  const cv::Mat& incidence_cosine, std::uint64_t noise_seed,
+                  const ClassDepth* other, cv::Mat& measured_m) const;
   void CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) const;
   [[nodiscard]] float SlantAt(
       float cosine) const;  ///< NguyenSlant() by the cosine of the incidence.

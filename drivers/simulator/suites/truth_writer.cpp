@@ -151,7 +151,8 @@ std::vector<std::uint8_t> BodyPly(const ScenePlan& scene, const std::vector<int>
   return bytes;
 }
 
-// Of the belly's highest point above that of the exhaled body, in the body's own frame.
+}  // namespace
+
 double BellyHeight(const LiveScript& script, double time_s) {
   const DistanceGrid shape = script.ShapeAt(time_s);
   constexpr float kAbove_m = 0.5F;
@@ -168,8 +169,6 @@ double BellyHeight(const LiveScript& script, double time_s) {
   };
   return height(shape) - height(*script.exhaled);
 }
-
-}  // namespace
 
 VertexSightings::VertexSightings(const SuitePlan& plan, std::size_t scene)
     : plan_(plan), scene_(plan.scenes.at(scene)) {

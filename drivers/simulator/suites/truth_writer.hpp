@@ -40,6 +40,9 @@ void WriteTruth(const std::filesystem::path& folder, const SuitePlan& plan, cons
 /// @throws IoError
 void WriteRoom(const std::filesystem::path& suite, const SuitePlan& plan);
 
+/// Height of the belly's highest point above that of the exhaled body, in the body's own frame.
+[[nodiscard]] double BellyHeight(const LiveScript& script, double time_s);
+
 /// One line of live.csv: the body before a sensor at rest, at the depth image's time.
 class LiveTruth {
  public:

@@ -239,21 +239,22 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
     SharedParts shared(around.loop, PartsOf(around.config, around.bus));
     Appliance appliance(shared);
     StoreAccess access(shared.loop, shared.storage, shared.store_thread, shared.notices);
-    EXPECT_EQ(MakeWebSettings(access)->GetSettings().idle_logout_min, 7);
+    EXPECT_EQ(MakeWebSettings(shared.notices, access)->GetSettings().idle_logout_min, 7);
   }
   set("{");
   EventLoop another;
   SharedParts shared(another, PartsOf(around.config, around.bus));
   Appliance appliance(shared);
   StoreAccess access(shared.loop, shared.storage, shared.store_thread, shared.notices);
-  EXPECT_THAT(testing::MessageOf<IoError>([&] { (void)MakeWebSettings(access)->GetSettings(); }),
+  EXPECT_THAT(testing::MessageOf<IoError>(
+                  [&] { (void)MakeWebSettings(shared.notices, access)->GetSettings(); }),
               HasSubstr("what is stored cannot be read: the stored settings cannot be read: "))
       << "the page goes by this sentence";
   // A complete set replaces them.
   Settings entered;
   entered.idle_logout_min = 9;
   std::optional<Change> changed;
-  const auto settings = MakeWebSettings(access);
+  const auto settings = MakeWebSettings(shared.notices, access);
   settings->ChangeSettings({.user = "anna", .address = {}}, entered,
                            [&](const Change& change) { changed = change; });
   EXPECT_TRUE(RunUntil(another, [&] { return changed.has_value(); }));

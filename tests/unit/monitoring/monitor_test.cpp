@@ -74,12 +74,10 @@ class MonitorTest : public testing::Test {
 TEST_F(MonitorTest, OneSensorFollowsTheBodyAndNoFrameTakesLong) {
   AddSensor(1.0);
   Begin();
-  const std::vector<MonitorLine> start = RunUntil(109.0);
-  ASSERT_EQ(start.back().state, MonitorState::kMonitoring) << "within nine seconds";
-  // A breath of four seconds, two more to compare it with, and what makes it sure.
-  EXPECT_NEAR(static_cast<double>(monitor_->sensor().still_times_s().size()) / RestFrames::kRate_hz,
-              6.5, 0.6);
-  EXPECT_NEAR(monitor_->sensor().breathing()->period_s, RestFrames::kBreath_s, 0.3);
+  const std::vector<MonitorLine> start = RunUntil(110.5);
+  ASSERT_EQ(start.back().state, MonitorState::kMonitoring) << "within ten seconds and a half";
+  EXPECT_NEAR(static_cast<double>(monitor_->sensor().still_times_s().size()), 121, 1)
+      << "eight seconds";
   const Eigen::Vector3d shift_m(0.004, -0.003, 0.002);
   Move(shift_m);
   const std::vector<MonitorLine> moved = RunUntil(112.0);
@@ -91,6 +89,21 @@ TEST_F(MonitorTest, OneSensorFollowsTheBodyAndNoFrameTakesLong) {
   EXPECT_LT(longest_s_, 0.25);
 #endif
   RecordProperty("longest_frame_cpu_ms", std::to_string(1e3 * longest_s_));
+}
+
+TEST_F(MonitorTest, ASlowMountIsMadeUpForWhereAWholeBreathIsSeen) {
+  AddSensor(1.0);
+  Begin();
+  // Something hides the markers at first: the first second is of no use.
+  std::vector<MonitorLine> lines;
+  for (; time_s_ < 110.2; time_s_ += kFrame_s) {
+    Frame frame = sensors_[0]->At(time_s_);
+    if (time_s_ < 100.9) frame.color_rgb = cv::Mat::zeros(frame.color_rgb.size(), CV_8UC3);
+    if (const auto line = monitor_->Add(frame)) lines.push_back(*line);
+  }
+  ASSERT_EQ(lines.back().state, MonitorState::kMonitoring);
+  EXPECT_LT(monitor_->sensor().still_times_s().size(), 115U) << "less than eight seconds";
+  EXPECT_NEAR(monitor_->sensor().breathing()->period_s, RestFrames::kBreath_s, 0.3);
 }
 
 TEST_F(MonitorTest, TwoSensorsGoOnWhileOneIsBlindAndAfterOneWasPushed) {

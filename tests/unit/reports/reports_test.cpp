@@ -473,7 +473,9 @@ TEST_F(ReportsTest, AnAbsentUncertaintyOrCoverageIsNotKnownAndNotZero) {
   EXPECT_TRUE(PdfOf(report).starts_with("%PDF-"));
 
   // A dot of an unknown interval is a ring without a line, in the bar and in the trend.
-  ScanReport drawn{.title = "t", .verdict = "v"};
+  ScanReport drawn;
+  drawn.title = "t";
+  drawn.verdict = "v";
   drawn.numbers = {report.numbers[1]};
   drawn.numbers[0].judged.judgement = NumberJudgement::kUnjudged;
   CourseRow row;
