@@ -481,10 +481,10 @@ TEST_F(ReportsTest, AnAbsentUncertaintyOrCoverageIsNotKnownAndNotZero) {
   CourseRow row;
   row.values[0] = CourseValue{1.0, 0.9, NumberJudgement::kUnjudged};
   drawn.trend = {row, row};
-  const int known = MarkPixels(drawn);
+  const int with_interval = MarkPixels(drawn);
   drawn.numbers[0].u95 = std::nullopt;
   const int bar_unknown = MarkPixels(drawn);
-  EXPECT_LT(bar_unknown, known - 10);
+  EXPECT_LT(bar_unknown, with_interval - 10);
   for (CourseRow& one : drawn.trend) one.values[0]->u95 = std::nullopt;
   EXPECT_LT(MarkPixels(drawn), bar_unknown - 10);
 }
