@@ -184,12 +184,14 @@ Message WhySign(Database& database, const fs::path& state, RowsAre rows) {
 void UseRowKey(Database& database, const fs::path& state) {
   const fs::path file = state / kRowKeyFile;
   std::error_code error;
-  const std::string key = fs::is_regular_file(fs::symlink_status(file, error))
-                              ? ReadTextFile(file, kRowKeyBytes + 1)
-                              : std::string();
-  if (key.size() != kRowKeyBytes)
+  if (!fs::is_regular_file(fs::symlink_status(file, error)) ||
+      fs::file_size(file, error) != kRowKeyBytes)
     throw DatabaseCorrupt(say::store::RowKeyGone(file.string(), kRowsRightFile));
-  database.UseKey(key);
+  try {
+    database.UseKey(ReadTextFile(file, kRowKeyBytes));
+  } catch (const DataError& unreadable) {  // The disk's fault, not that of what is stored.
+    throw DiskRefused(unreadable.message());
+  }
 }
 
 void KeepRowDigests(Database& database, const fs::path& state, RowsAre rows) {

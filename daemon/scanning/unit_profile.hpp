@@ -11,7 +11,7 @@
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/sensor_calibration/profile_gate.hpp"
 #include "algo/types/scene.hpp"
-#include "daemon/records/profile_shelf.hpp"
+#include "daemon/sensor_profiles/profile_shelf.hpp"
 
 namespace plumb {
 

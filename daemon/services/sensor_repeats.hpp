@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "algo/comparison/comparison.hpp"
-#include "daemon/records/profile_shelf.hpp"
+#include "daemon/sensor_profiles/profile_shelf.hpp"
 #include "web/model/account.hpp"
 #include "web/model/scan.hpp"
 #include "web/model/sensor_profile.hpp"

@@ -140,6 +140,7 @@ void Accounts::AddRoutes(Routes& routes) {
   AddSecondFactorRoutes(routes);
   AddSessionRoutes(routes);
   AddSignedActs(routes);
+  AddCertificateRoutes(routes);
   const auto add = [&](const char* method, const char* pattern, Permission permission,
                        BodyKind body, auto handler) {
     routes.Add(method, pattern, permission, body, std::bind_front(handler, this));
@@ -181,19 +182,22 @@ void Accounts::AddRoutes(Routes& routes) {
       &Accounts::ChangeOwnPassword);
   add("PUT", "/api/v1/session/preferences", Permission::kLogin, BodyKind::kJson,
       &Accounts::SetPreferences);
-  routes.Read("/authority.crt", Permission::kNone,
-              [this](const Request&) { return SendAuthority(); });
-  routes.Read("/api/v1/certificate", Permission::kSettings,
-              [this](const Request&) { return DescribeCertificate(); });
-  add("PUT", "/api/v1/certificate", Permission::kSettings, BodyKind::kJson,
-      &Accounts::ReplaceCertificate);
-  add("POST", "/api/v1/certificate/new", Permission::kSettings, BodyKind::kJson,
-      &Accounts::MakeNewCertificate);
   routes.Read("/api/v1/users", Permission::kUsers, [this](const Request&) {
     return JsonResponse({{"users", users_.Users()}});
   });
   add("POST", "/api/v1/users", Permission::kUsers, BodyKind::kJson, &Accounts::AddUser);
   add("PUT", "/api/v1/users/{name}", Permission::kUsers, BodyKind::kJson, &Accounts::ChangeUser);
+}
+
+void Accounts::AddCertificateRoutes(Routes& routes) {
+  routes.Read("/authority.crt", Permission::kNone,
+              [this](const Request&) { return SendAuthority(); });
+  routes.Read("/api/v1/certificate", Permission::kSettings,
+              [this](const Request&) { return DescribeCertificate(); });
+  routes.Add("PUT", "/api/v1/certificate", Permission::kSettings, BodyKind::kJson,
+             std::bind_front(&Accounts::ReplaceCertificate, this));
+  routes.Add("POST", "/api/v1/certificate/new", Permission::kSettings, BodyKind::kJson,
+             std::bind_front(&Accounts::MakeNewCertificate, this));
 }
 
 void Accounts::HashThen(std::string password, const Respond& respond,

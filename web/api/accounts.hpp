@@ -141,6 +141,7 @@ class Accounts : public SessionLookup {
   void AddSigned(Routes& routes, const char* method, const char* pattern, Permission permission,
                  std::function<SignedAct(const Request&, Fields&)> parse);
   void AddSignedActs(Routes& routes);
+  void AddCertificateRoutes(Routes& routes);
   void AddSignedRoomActs(Routes& routes);
   void AddSignedUnitActs(Routes& routes);
   /// The certificate of the page.

@@ -15,8 +15,8 @@ import { showAudit } from './screens/audit.js';
 import { showCheck } from './screens/check.js';
 import { stateHere } from './screens/common.js';
 import { showFault, showFirstPassword, showLogin } from './screens/login.js';
-import { showMonitor } from './screens/monitor.js';
-import { showMonitoringRecord } from './screens/monitoring_record.js';
+import { showMonitor } from './monitoring/monitor.js';
+import { showMonitoringRecord } from './monitoring/monitoring_record.js';
 import { showPatient, showPatients } from './screens/patients.js';
 import { showPlan } from './screens/plan/plan.js';
 import { quickLogIn, quickPeople, rememberQuickPeople } from './screens/quick_login.js';
@@ -409,7 +409,7 @@ if (location.pathname === '/room') {
   import('./screens/room.js').then(({ showRoom }) => showRoom(main, { speak, applyTheme }))
     .catch(report);
 } else if (location.pathname === '/breath') {
-  import('./screens/breath.js').then(({ showBreath }) => showBreath(main, { speak, applyTheme }))
+  import('./monitoring/breath.js').then(({ showBreath }) => showBreath(main, { speak, applyTheme }))
     .catch(report);
 } else {
   listen();

@@ -116,6 +116,12 @@ void AddOther(LiveScript& script, SensorAtPlace& place, std::size_t other) {
   place.T_before_after.translation() = (other == 4 ? 2.0 : 5.0) * kMillimetre * direction;
 }
 
+std::shared_ptr<const SensorUnit> AnotherUnit(const SimulateOptions& options) {
+  return std::make_shared<const SensorUnit>(
+      MakeSensorUnit(options.noise, Hash(options.unit.value_or(options.seed), 133), options.width,
+                     options.height, FaultsOf(options), options.sensor));
+}
+
 }  // namespace
 
 const std::vector<std::string>& LiveNames() {
@@ -180,9 +186,7 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
     ScenePlan* right =
         add(i + 1, shared, {.T_world_camera = PlaceOfSensor(shared->centre, -side, random)});
     if (right == nullptr) continue;
-    right->other_unit = std::make_shared<const SensorUnit>(
-        MakeSensorUnit(options.noise, Hash(options.unit.value_or(options.seed), 133), options.width,
-                       options.height, FaultsOf(options), options.sensor));
+    right->other_unit = AnotherUnit(options);
     if (plan.scenes[plan.scenes.size() - 2].name == LiveNames()[i])
       plan.live_together["live_two"] = {LiveNames()[i], right->name};
   }

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "daemon/appliance/appliance.hpp"
-#include "daemon/records/profile_shelf.hpp"
+#include "daemon/sensor_profiles/profile_shelf.hpp"
 #include "daemon/services/web_services.hpp"
 #include "tests/support/api_rules.hpp"
 #include "tests/support/board_checks.hpp"

@@ -7,7 +7,7 @@
 
 #include "algo/base/units.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/records/profile_shelf.hpp"
+#include "daemon/sensor_profiles/profile_shelf.hpp"
 #include "daemon/scanning/unit_profile.hpp"
 #include "tests/support/board_checks.hpp"
 #include "tests/support/synthetic_scene.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Versions of a sensor unit's profile on the disk.
-#include "daemon/records/profile_shelf.hpp"
+#include "daemon/sensor_profiles/profile_shelf.hpp"
 
 #include <fstream>
 

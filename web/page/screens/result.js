@@ -14,7 +14,7 @@ import { actions } from './accept.js';
 import { capturedAgainst, capturedCard } from './captured.js';
 import { findings, follow, isAdvice, partsOf, sentence } from './common.js';
 import { meshView } from './mesh_view.js';
-import { recordsOf } from './monitoring_record.js';
+import { recordsOf } from '../monitoring/monitoring_record.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
 
 /// The newest finished scan: of this run of the appliance, else the newest that is stored.

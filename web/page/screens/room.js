@@ -17,7 +17,7 @@ import {
   sentence, sidesOf,
 } from './common.js';
 import { showFault, showLogin } from './login.js';
-import { askMonitor, monitorView } from './monitor.js';
+import { askMonitor, monitorView } from '../monitoring/monitor.js';
 import { comparesWith } from './captured.js';
 import {
   formingNumbers, preview, stepWords, surfaceIn, surfaceWords, toneOf,

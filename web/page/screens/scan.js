@@ -12,7 +12,7 @@ import { S, said } from '../words.js';
 import {
   faultWords, follow, lastKnownNote, sentence, stateHere, stateHint,
 } from './common.js';
-import { six } from './monitor.js';
+import { six } from '../monitoring/monitor.js';
 
 const kPreviewEvery_ms = 250;
 const kPreviewAgain_ms = 2000;  // without a picture

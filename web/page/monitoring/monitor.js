@@ -12,7 +12,7 @@ import { kReason } from '../limits.js';
 import { kAxes, signed, toleranceBar, withUnit } from '../numbers.js';
 import { signedForm } from '../signed_form.js';
 import { S, said, saidEach } from '../words.js';
-import { follow, sentence } from './common.js';
+import { follow, sentence } from '../screens/common.js';
 
 const kGrey_s = 0.2;
 const kUnknown_s = 0.15;

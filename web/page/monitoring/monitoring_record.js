@@ -6,7 +6,7 @@ import {
 } from '../dom.js';
 import { kAxes, mostDigits, signed, withUnit } from '../numbers.js';
 import { S, said, wordOf } from '../words.js';
-import { sentence } from './common.js';
+import { sentence } from '../screens/common.js';
 
 const kShares = ['in', 'out', 'unknown'];
 const path = (scan, number) => `scans/${scan}/monitoring/${number}`;

@@ -6,7 +6,7 @@ import { clear, h, say, svg } from '../dom.js';
 import { isLanguage, languageOf } from '../language.js';
 import { S } from '../words.js';
 import { askMonitor, presentOf } from './monitor.js';
-import { showRoom } from './room.js';
+import { showRoom } from '../screens/room.js';
 
 const kWho = 'room';
 const kLook_ms = 50;
