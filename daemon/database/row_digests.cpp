@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/database/audit_chain.hpp"
 #include "daemon/database/schema.hpp"
 #include "daemon/database/stored_values.hpp"
