@@ -107,7 +107,9 @@ check "no maintainer script removes data" \
 check "the configuration as delivered is good" "${run[@]}" tree/plumbd/usr/bin/plumbd \
   --config tree/plumbd/etc/plumb/plumb.toml --check-config
 # Every example in it too: a line "# key = ..." becomes one that counts.
-sed -E 's/^# ([a-z_]+ = )/\1/' tree/plumbd/etc/plumb/plumb.toml >examples.toml
+(umask 077 && printf '%064d' 1 >peers.secret) # a file that an example names, and that is read
+sed -E -e 's/^# ([a-z_]+ = )/\1/' -e "s|/etc/plumb/peers.secret|$PWD/peers.secret|" \
+  tree/plumbd/etc/plumb/plumb.toml >examples.toml
 check "its examples are good" "${run[@]}" tree/plumbd/usr/bin/plumbd \
   --config examples.toml --check-config
 

@@ -733,7 +733,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   const choices = form.locator('select');
   const all =
     await form.locator('input, select').evaluateAll((fields) => fields.map((one) => one.value));
-  equal(all.join(), ',,,,,,,,,,', 'nothing is filled in');
+  equal(all.join(), ',,,,,,,,,,,,', 'nothing is filled in');
   const sent = [];
   const note = (request) => { if (request.method() === 'PUT') sent.push(request.postDataJSON()); };
   engineer.on('request', note);
