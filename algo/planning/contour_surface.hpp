@@ -45,9 +45,10 @@ struct ContourSurface {
 };
 
 /// Each column of each slice takes its topmost crossing by the even-odd rule, so that holes and
-/// keyholes need no care (a contour that a slice has twice counts once), and rows between neighbouring slices are interpolated. Empty remain: the
-/// first and the last slice, which are the ends of the scan; rows in a gap; steps; what is not
-/// higher than the couch; and the field of view's edges.
+/// keyholes need no care (a contour that a slice has twice counts once), and rows between
+/// neighbouring slices are interpolated. Empty remain: the first and the last slice, which are the
+/// ends of the scan; rows in a gap; steps; what is not higher than the couch; and the field of
+/// view's edges.
 /// @param slices  In any order. Those at one place (to 0.01 mm) are joined.
 /// @throws std::invalid_argument with fewer than three places, or none with an area.
 [[nodiscard]] ContourSurface SurfaceFromAbove(std::vector<ContourSlice> slices,

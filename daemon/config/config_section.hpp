@@ -139,8 +139,7 @@ class Section {
     names.clear();
     for (const toml::node& element : *array) {
       const std::optional<std::string> name = element.value_exact<std::string>();
-      if (!name || name->empty() || name->size() > 255 || !IsPlainText(*name) ||
-          !is_valid(*name))
+      if (!name || name->empty() || name->size() > 255 || !IsPlainText(*name) || !is_valid(*name))
         Fail(element, key, expected);
       names.push_back(*name);
     }

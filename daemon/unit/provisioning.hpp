@@ -33,8 +33,8 @@ struct Provisioning {
 [[nodiscard]] std::string NetworkFile(const Provisioning& given);
 
 /// Writes the given settings, each file in one step: `serial`, `host-name`, `time-zone`,
-/// `network`, `time-servers` to `unit`, the page's key and the display to `state` with that folder's owner.
-/// Settings that are not given are removed from `unit`.
+/// `network`, `time-servers` to `unit`, the page's key and the display to `state` with that
+/// folder's owner. Settings that are not given are removed from `unit`.
 /// @throws IoError
 void ApplyProvisioning(const Provisioning& given, const std::filesystem::path& unit,
                        const std::filesystem::path& state);

@@ -41,8 +41,8 @@ struct HttpServerOptions {
   /// What a monitoring system sends as its bearer token to read /metrics; empty: there is no such
   /// page.
   std::string metrics_token;
-  /// What the other units of the clinic send as theirs to ask whether a patient is open here; empty:
-  /// none is answered.
+  /// What the other units of the clinic send as theirs to ask whether a patient is open here;
+  /// empty: none is answered.
   std::string peer_secret;
   /// Limits of open connections: strangers may use the first number. Beyond it, or beyond the
   /// second from one address, the oldest connection of the address with the most is closed. The

@@ -22,8 +22,8 @@ struct Settings {
   bool scan_wristband = false;   ///< Asked for before each sweep of a patient's session.
   int retention_days = 0;        ///< Older scans are removed; 0: never. References are kept.
   int idle_logout_min = 15;
-  std::string accept_live{kBySweep};  ///< Or kBySignature.
-  double breath_window_mm = 3.5;      ///< Of a breath hold.
+  std::string accept_live{kBySweep};         ///< Or kBySignature.
+  double breath_window_mm = 3.5;             ///< Of a breath hold.
   std::string paper{kReportPapers.front()};  ///< Of reports; one of kReportPapers.
 };
 

@@ -7,8 +7,8 @@
 
 #include "algo/base/units.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/sensor_profiles/profile_shelf.hpp"
 #include "daemon/scanning/unit_profile.hpp"
+#include "daemon/sensor_profiles/profile_shelf.hpp"
 #include "tests/support/board_checks.hpp"
 #include "tests/support/synthetic_scene.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"

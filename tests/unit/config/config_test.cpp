@@ -40,8 +40,8 @@ TEST(ConfigTest, AnEmptyFileKeepsEveryDefault) {
 }
 
 TEST(ConfigTest, TextsArePlain) {
-  for (const char* line : {"[compare]\nregion = \"tor\u202Eso.json\"",
-                           "[web]\nhost_names = [\"plumb\u200B\"]"})
+  for (const char* line :
+       {"[compare]\nregion = \"tor\u202Eso.json\"", "[web]\nhost_names = [\"plumb\u200B\"]"})
     EXPECT_THAT(ErrorOf(line), AllOf(HasSubstr("test.toml:2"), HasSubstr("expected")));
 }
 

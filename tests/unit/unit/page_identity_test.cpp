@@ -178,7 +178,8 @@ TEST_F(PageIdentityTest, TheTokenOfMetricsIsASecretOrRefused) {
     EXPECT_THROW(CheckPageIdentity(config_.web), DataError);
   }
   fs::remove(folder_ / "token");
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)AccessToken(config_.web.metrics_token_file); }), HasSubstr("token"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)AccessToken(config_.web.metrics_token_file); }),
+              HasSubstr("token"));
 }
 
 TEST_F(PageIdentityTest, TheConfigurationsCertificateIsUsedOrRefusedByName) {
