@@ -742,12 +742,13 @@ await h.step('patients, log, settings and update look finished', async () => {
   for (const [k, value] of ['5', '1', '10', '60', '0', '15', '3.5'].entries()) {
     await numbers.nth(k).fill(value);
   }
-  for (const [k, value] of ['HFS', 'sweep', 'true'].entries()) {
+  for (const [k, value] of ['HFS', 'sweep', 'A4', 'true'].entries()) {
     await choices.nth(k).selectOption(value);
   }
+  await choices.nth(5).selectOption('false');
   await save.click();
   equal(await form.evaluate((one) => one.checkValidity()), false, 'one choice is missing');
-  await choices.nth(3).selectOption('false');
+  await choices.nth(4).selectOption('false');
   await save.click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
   equal(sent.length, 1, 'nothing was sent before all was entered');
