@@ -345,7 +345,7 @@ function display(main, speak) {
     }
     const isSwapped = Boolean(session && swapped && since_s(swapped) < kSwap_s);
     const marks = JSON.stringify([S.languageName, session, isSwapped, said, isCheck,
-      status.check_overdue,
+      status.peer_notes, status.check_overdue,
       status.check_failed, status.next_purpose, status.sensor.present,
       Math.floor(status.sensor.powered_s / 60)]);
     if (marks !== shownMarks) {
