@@ -19,7 +19,7 @@ void CheckForm(std::string_view text) {
 
 void CheckText(std::string_view text) {
   // What passes as plain text must pass through JSON without being replaced.
-  if (IsPlainText(text, true) &&
+  if (plumb::IsPlainText(text, true) &&
       nlohmann::json::parse(nlohmann::json(std::string(text)).dump()) != std::string(text))
     std::abort();
   if (EscapeHtml(text).find('<') != std::string::npos) std::abort();
@@ -51,7 +51,7 @@ void CheckRoutes(std::string_view text) {
 void CheckFields(const std::string& body) {
   Fields fields(body);
   const std::string name = fields.Text("name", 1, 32);
-  if (name.empty() || name.size() > 32 || !IsPlainText(name)) std::abort();
+  if (name.empty() || name.size() > 32 || !plumb::IsPlainText(name)) std::abort();
   (void)fields.Flag("disabled");
   fields.Finish();
 }
