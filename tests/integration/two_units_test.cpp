@@ -112,7 +112,8 @@ class UnitInRoom {
               200);
   }
   [[nodiscard]] std::string PatientOf(const std::string& code) {
-    for (const json& patient : planner_->Get("/api/v1/patients").json()["patients"])
+    const json list = planner_->Get("/api/v1/patients").json();
+    for (const json& patient : list.at("patients"))
       if (patient["code"] == code) return patient["id"];
     return {};
   }
@@ -152,7 +153,8 @@ class UnitInRoom {
   /// How often the audit log has that action.
   [[nodiscard]] int NumLogged(const std::string& action) {
     int count = 0;
-    for (const json& entry : engineer_->Get("/api/v1/audit?limit=200").json()["entries"])
+    const json log = engineer_->Get("/api/v1/audit?limit=200").json();
+    for (const json& entry : log.at("entries"))
       count += entry["action"] == action ? 1 : 0;
     return count;
   }
