@@ -152,7 +152,8 @@ TEST_F(AuthenticatorTest, ARecoveryCodeLetsInOnceAndAnEngineerRemovesALostOne) {
   const json codes = SetOneUp(physicist);
   EXPECT_EQ(LogInWith("physicist", codes[0]).status, 200);
   EXPECT_EQ(LogInWith("physicist", codes[0]).status, 403);
-  for (const json& user : engineer.Get("/api/v1/users").json()["users"])
+  const json listed = engineer.Get("/api/v1/users").json();
+  for (const json& user : listed.at("users"))
     EXPECT_EQ(user["second_factor"], user["name"] == "physicist") << user["name"];
   const auto remove = [&](json body) {
     body["remove_second_factor"] = true;
