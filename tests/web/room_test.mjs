@@ -543,7 +543,7 @@ await h.step('a version that is approved meanwhile is a question, and changes no
   await anna.goto(`${h.url}#/scan`);
 });
 
-await h.step('that the patient is open in another unit, too, is said on page and display', async () => {
+await h.step('that the patient is open in another unit is said on page and display', async () => {
   for (const [what, words] of [['open', 'This patient is open in plumb-b.clinic.example:8080, too'],
     ['silent', 'Whether this patient is open in plumb-b.clinic.example:8080, too, is not known']]) {
     h.tell(`peers ${what}`);

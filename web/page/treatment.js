@@ -258,7 +258,8 @@ export function sessionLine(place, { mayClose }) {
         : text.fraction(session.fraction)),
       h('span', {}, text.scans(session.num_scans)),
       reference && h('span', {}, comparesWith(session)),
-      saidEach(status, 'peer_notes').map((one) => h('span', { class: 'caution', role: 'alert' }, one)),
+      saidEach(status, 'peer_notes').map(
+        (one) => h('span', { class: 'caution', role: 'alert' }, one)),
       newer && h('span', { class: 'caution' }, text.referenceNewer(newer.version)),
       newer && mayChoose && action(text.referenceUse(newer.version),
         () => useReference(session), {}),

@@ -150,7 +150,8 @@ export function monitorView() {
     }
     const text = S.monitor;
     const key = JSON.stringify([S.languageName, monitor?.advice, monitor?.state, monitor?.reason,
-      monitor?.is_old, monitor?.couch_moved, monitor?.since_zero, monitor?.against_reference, monitor?.ended]);
+      monitor?.is_old, monitor?.couch_moved, monitor?.since_zero,
+      monitor?.against_reference, monitor?.ended]);
     if (key === drawn) return;
     drawn = key;
     element.classList.toggle('is-old', Boolean(monitor?.active && monitor.is_old));

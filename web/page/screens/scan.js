@@ -159,8 +159,8 @@ export async function showScan(place, what) {
 
   const drawWho = (status) => {
     const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
-    const key = JSON.stringify([isCheck, status.session, status.peer_notes, status.state === 'scanning'
-      || status.state === 'working']);
+    const key = JSON.stringify([isCheck, status.session, status.peer_notes,
+      status.state === 'scanning' || status.state === 'working']);
     if (shown.who === key) return;
     shown.who = key;
     if (isCheck) {
