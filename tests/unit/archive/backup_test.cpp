@@ -17,6 +17,7 @@
 #include "tests/support/full_disk.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/archive/archive_content.hpp"
 #include "tests/unit/records/scan_folder.hpp"
 
 namespace plumb {
@@ -54,14 +55,7 @@ class BackupTest : public ::testing::Test {
   [[nodiscard]] fs::path restored() const { return folder_ / "restored"; }
 
   /// Without the database, whose pages a start changes, and the note of a restore.
-  static auto FilesOf(const fs::path& folder) {
-    auto files = FilesBelow(folder);
-    std::erase_if(files, [](const auto& entry) {
-      return entry.first.starts_with("plumb.db") || entry.first == "restored.json" ||
-             entry.first == "last-scan";
-    });
-    return files;
-  }
+  static auto FilesOf(const fs::path& folder) { return testing::FilesOfState(folder); }
 
   testing::TempFolder folder_;
   std::string patient_, reference_, scan_;
@@ -266,9 +260,11 @@ TEST_F(BackupTest, WhatARestoreReplacesIsMovedAsideAndWhole) {
   EXPECT_EQ(report.scans, 4U);
   EXPECT_EQ(report.replaced, state() / "before-restore-1");
   auto aside = FilesBelow(report.replaced);
-  EXPECT_EQ(aside.size() + 2, before.size());
+  EXPECT_EQ(aside.size() + 3, before.size());
+  EXPECT_FALSE(fs::exists(backup() / "rows.key"));
   aside["page-key.pem"] = "key";
   aside["page-authority.pem"] = "authority";
+  aside["rows.key"] = before.at("rows.key");
   EXPECT_EQ(aside, before) << "all but the keys, which stay";
   EXPECT_TRUE(fs::exists(state() / "page-key.pem"));
   EXPECT_FALSE(fs::exists(state() / "provisioned-display"));
@@ -280,7 +276,7 @@ TEST_F(BackupTest, WhatARestoreReplacesIsMovedAsideAndWhole) {
     EXPECT_EQ(store.recovery().lost_scans + store.recovery().foreign_folders, 0);
   }
   EXPECT_EQ(RestoreOver(backup(), state()).replaced, state() / "before-restore-2");
-  EXPECT_EQ(FilesBelow(report.replaced).size() + 2, before.size()) << "the first is as it was";
+  EXPECT_EQ(FilesBelow(report.replaced).size() + 3, before.size()) << "the first is as it was";
   auto now = FilesOf(state());
   std::erase_if(now, [](const auto& entry) {
     return entry.first.starts_with("before-restore") || entry.first.starts_with("page-");

@@ -9,6 +9,7 @@
 #include "daemon/archive/patient_transfer.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/archive/archive_content.hpp"
 #include "tests/unit/archive/old_cipher.hpp"
 #include "tests/unit/records/scan_folder.hpp"
 
@@ -45,14 +46,7 @@ class OldEncryptionTest : public ::testing::Test {
     return report;
   }
   /// Without the database, whose pages a start changes, and the note of a restore.
-  static auto FilesOf(const fs::path& folder) {
-    auto files = FilesBelow(folder);
-    std::erase_if(files, [](const auto& entry) {
-      return entry.first.starts_with("plumb.db") || entry.first == "restored.json" ||
-             entry.first == "last-scan";
-    });
-    return files;
-  }
+  static auto FilesOf(const fs::path& folder) { return testing::FilesOfState(folder); }
   /// A key file with this line.
   [[nodiscard]] fs::path KeyFile(const std::string& line, const std::string& name = "key") const {
     const fs::path file = folder_ / name;

@@ -407,7 +407,7 @@ TEST_F(PatientTransferTest, ARecordThatSaysWhatNoneCanIsRefused) {
   refused("patients.site", [](Json& rows) { rows["patients"][0]["site"] = 7; });
   refused("patients.site",
           [](Json& rows) { rows["patients"][0]["site"] = std::string(65537, 'x'); });
-  refused("patients.site: expected another value, found no plain text",
+  refused("patients.site no plain text",
           [](Json& rows) { rows["patients"][0]["site"] = "thorax\u202E"; });
   refused("does not know", [](Json& rows) { rows["patients"][0]["code) VALUES (1); --"] = 1; });
   refused("one patient", [](Json& rows) {
