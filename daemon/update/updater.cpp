@@ -359,6 +359,13 @@ struct Updater::Impl {
   /// RAUC has checked the bundle: its signature is valid, and these are its properties.
   static int OnInfo(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* impl = static_cast<Impl*>(self);
+    if (sd_bus_message_is_method_error(message, SD_BUS_ERROR_NO_REPLY) != 0) {
+      // Nobody has said anything of the bundle.
+      impl->Refuse(ChangeResult::kFailed, sd_bus_is_open(impl->bus.get()) > 0
+                                              ? say::update::InstallerSilent()
+                                              : say::update::InstallerLost());
+      return 0;
+    }
     if (sd_bus_message_is_method_error(message, nullptr) != 0) {
       impl->Refuse(ChangeResult::kInvalid, impl->WhyRefused(ErrorOf(message)));
       return 0;
