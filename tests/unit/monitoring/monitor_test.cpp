@@ -98,7 +98,9 @@ TEST_F(MonitorTest, ASlowMountIsMadeUpForWhereAWholeBreathIsSeen) {
   std::vector<MonitorLine> lines;
   for (; time_s_ < 110.2; time_s_ += kFrame_s) {
     Frame frame = sensors_[0]->At(time_s_);
-    if (time_s_ < 100.9) frame.color_rgb = cv::Mat::zeros(frame.color_rgb.size(), CV_8UC3);
+    // A new image: the sensor's own is shared by all frames.
+    if (time_s_ < 100.9)
+      frame.color_rgb = cv::Mat(frame.color_rgb.size(), CV_8UC3, cv::Scalar::all(0));
     if (const auto line = monitor_->Add(frame)) lines.push_back(*line);
   }
   ASSERT_EQ(lines.back().state, MonitorState::kMonitoring);
