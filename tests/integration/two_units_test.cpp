@@ -198,7 +198,7 @@ void ExpectTruth(const json& result, const Vector6d& truth) {
   ASSERT_TRUE(result["correction"].is_object()) << result["reasons"].dump();
   const json& numbers = result["correction"];
   const char* names[] = {"lateral_mm", "longitudinal_mm", "vertical_mm",
-                         "pitch_deg",  "roll_deg",        "rotation_deg"};
+                         "pitch_deg",  "roll_deg",        "yaw_deg"};
   for (int i = 0; i < 6; ++i) {
     const double value = numbers[names[i]].get<double>(),
                  u95 = numbers["uncertainty"][names[i]].get<double>(),
