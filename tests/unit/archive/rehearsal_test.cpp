@@ -72,8 +72,6 @@ class RehearsalTest : public ::testing::Test {
 TEST_F(RehearsalTest, UnpacksAndOpensWhatWouldBeRestored) {
   (void)BackUpStopped(state(), archive());
   Rehearse(archive());
-  // A backup has no key of the rows; a person may confirm them for one start.
-  WriteWholeFile(scratch() / "rows-are-right", std::string_view());
   Store opened(scratch());
   EXPECT_EQ(opened.scans.List("1", 9).size(), 2U);
   EXPECT_EQ(opened.recovery().lost_scans, 0);
