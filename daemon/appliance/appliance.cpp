@@ -390,7 +390,7 @@ void Appliance::OnTick() {
   TellPeers();
 }
 
-/// The demo's patient is nobody.
+/// Other units are not asked about the demo's patient, who does not exist.
 void Appliance::TellPeers() {
   if (!peers_.IsSetUp() || store_ == nullptr || session_.id() == peers_.session()) return;
   std::string code;

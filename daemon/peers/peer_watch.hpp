@@ -25,7 +25,7 @@ namespace plumb {
 class PeerWatch {
  public:
   /// The loop is borrowed.
-  /// @param secret  Of `settings.secret_file`; empty: nobody is asked.
+  /// @param secret  Of `settings.secret_file`; if empty, no unit is asked.
   /// @param changed  Called when notes() has changed. `found` is the new note that the patient is
   ///        open in another unit, or empty.
   PeerWatch(EventLoop& loop, const PeersSettings& settings, const std::string& secret,
@@ -36,7 +36,8 @@ class PeerWatch {
   PeerWatch& operator=(const PeerWatch&) = delete;
 
   [[nodiscard]] bool IsSetUp() const { return !peers_.empty(); }
-  /// The session that is open here and its patient's code; both empty: none, and nobody is asked.
+  /// The session that is open here and its patient's code; both are empty if none is
+  /// open, and then no unit is asked.
   void SetOpen(const std::string& session, const std::string& code);
   [[nodiscard]] const std::string& session() const { return session_; }
   /// Where the patient is open, too, and of which units that is not known.

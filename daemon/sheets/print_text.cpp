@@ -55,7 +55,7 @@ PrintText::PrintText(cairo_t* cairo) : cairo_(cairo), layout_(pango_cairo_create
   // A line of a report that begins with an Arabic name is still one of a report in English.
   pango_context_set_base_dir(context, PANGO_DIRECTION_LTR);
   pango_layout_set_auto_dir(layout_, FALSE);
-  // A hyphen that nobody wrote would be read as part of a code.
+  // A hyphen inserted at a line break would be read as part of a patient's code.
   const std::unique_ptr<PangoAttrList, decltype(&pango_attr_list_unref)> attributes(
       pango_attr_list_new(), &pango_attr_list_unref);
   pango_attr_list_insert(attributes.get(), pango_attr_insert_hyphens_new(FALSE));

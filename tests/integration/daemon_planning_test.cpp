@@ -15,6 +15,7 @@
 #include "drivers/simulator/suites/board_scenes.hpp"
 #include "drivers/simulator/suites/dicom_writer.hpp"
 #include "drivers/simulator/suites/planning_ct.hpp"
+#include "tests/support/calibrate_room.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 
@@ -89,20 +90,7 @@ class DaemonPlanningTest : public ::testing::Test {
                       first + DicomBytes(plan));
   }
 
-  void CalibrateRoom() {
-    for (int i = 0; i < 3; ++i) {
-      ASSERT_EQ(engineer_->Post("/api/v1/checks/open").status, 200);
-      plumbd_->ScanOnce();
-      ASSERT_EQ(plumbd_->Sim("next-scene")["ok"], true);
-    }
-    const json candidate = planner_->Get("/api/v1/room-calibration").json();
-    ASSERT_EQ(candidate["why_not_sign"], "");
-    ASSERT_EQ(planner_
-                  ->Post("/api/v1/room-calibration/sign",
-                         {{"digest", candidate["digest"]}, {"password", kPassword}})
-                  .status,
-              201);
-  }
+  void CalibrateRoom() { testing::CalibrateRoom(*plumbd_, *engineer_, *planner_); }
 
   /// Plans the draft as it is, has another person approve it, and opens a fraction.
   void Approve(const std::string& reference) {

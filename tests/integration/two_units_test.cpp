@@ -16,6 +16,7 @@
 #include "algo/comparison/correction.hpp"
 #include "drivers/simulator/suites/board_scenes.hpp"
 #include "tests/support/cable.hpp"
+#include "tests/support/calibrate_room.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
@@ -92,20 +93,7 @@ class UnitInRoom {
   }
   void Stop() { EXPECT_EQ(plumbd_->Stop(), 0); }
 
-  void CalibrateRoom() {
-    for (int i = 0; i < 3; ++i) {
-      ASSERT_EQ(engineer_->Post("/api/v1/checks/open").status, 200);
-      plumbd_->ScanOnce();
-      ASSERT_EQ(plumbd_->Sim("next-scene")["ok"], true);
-    }
-    const json candidate = planner_->Get("/api/v1/room-calibration").json();
-    ASSERT_EQ(candidate["why_not_sign"], "");
-    ASSERT_EQ(planner_
-                  ->Post("/api/v1/room-calibration/sign",
-                         {{"digest", candidate["digest"]}, {"password", kPassword}})
-                  .status,
-              201);
-  }
+  void CalibrateRoom() { testing::CalibrateRoom(*plumbd_, *engineer_, *planner_); }
   void CloseSession() {
     const json session = planner_->Get("/api/v1/status").json()["session"];
     if (session.is_null()) return;

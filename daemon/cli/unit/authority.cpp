@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `plumb authority`: the certificate by which tablets trust this unit, for whoever manages them.
+// `plumb authority`: prints the certificate that tablets need to trust this unit.
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -22,7 +22,7 @@ Command AddAuthority(CLI::App& app) {
     constexpr std::size_t kMaxBytes = 64 << 10;
     const std::filesystem::path file = *state / "page-authority.pem";
     const std::string end = "-----END CERTIFICATE-----\n";
-    // The key stands behind it and is nobody's business.
+    // The private key follows the certificate in this file and must not be printed.
     const std::string text =
         std::filesystem::exists(file) ? ReadTextFile(file, kMaxBytes) : std::string();
     const std::size_t last = text.find(end);
