@@ -62,6 +62,7 @@ Appliance::Appliance(SharedParts& shared)
       monitoring_(shared.monitoring),
       messages_(shared.messages),
       peers_(shared.peers),
+      not_archived_(shared.not_archived),
       sensors_(shared.sensors),
       button_(loop_, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }),
       rest_(loop_, sensors_, [this] { PublishState(); }) {

@@ -158,6 +158,7 @@ class Appliance : private StorageUser {
   LiveMonitoring& monitoring_;
   MessagesOut& messages_;
   PeerWatch& peers_;
+  const Message& not_archived_;
   SensorThread& sensors_;
   Message space_fault_;  ///< Why no scan can be stored although the store works.
   ScanState state_;

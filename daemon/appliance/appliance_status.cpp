@@ -255,6 +255,7 @@ Status Appliance::WebStatus() {
   status.peer_notes = peers_.notes();
   for (const MessageWay& way : status.messages)
     if (!way.failure.empty()) status.warnings.push_back(way.failure);
+  if (!not_archived_.empty()) status.warnings.push_back(not_archived_);
   room_.Report(status);
   ReadStoredOrFail(status);
   return status;

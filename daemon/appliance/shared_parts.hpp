@@ -34,6 +34,7 @@ struct SharedParts {
   std::function<void(const SensorEvent&)> sensor_changed;
   std::function<void()> session_unused;
   std::function<void(const Message& found)> peers_changed;
+  Message not_archived;  ///< Why accepted results wait for the archive; empty: none does.
   Notices notices;
   StorageWatch storage;       ///< Opened by the appliance.
   const CurrentStore& store;  ///< In safe mode a read-only one, or none. From any thread.

@@ -82,9 +82,11 @@ void CheckTogether(const DicomSettings& settings) {
                     static_cast<int>(!settings.tls_key.empty()) +
                     static_cast<int>(!settings.tls_trusted.empty());
   if (given != 0 && given != 3) throw DataError(say::config::DicomTls());
-  // The list names patients by their identifiers.
-  if (given == 0 && !settings.worklist.empty() && !IsPrivateAddress(HostOf(settings.worklist)))
-    throw DataError(say::config::WorklistInTheClear(HostOf(settings.worklist)));
+  // The list names patients by their identifiers, and results are theirs.
+  for (const auto& [key, node] :
+       {std::pair("worklist", &settings.worklist), std::pair("results_to", &settings.results_to)})
+    if (given == 0 && !node->empty() && !IsPrivateAddress(HostOf(*node)))
+      throw DataError(say::config::NodeInTheClear(key, HostOf(*node)));
   if (!settings.enabled) return;
   if (settings.address.empty()) throw DataError(say::config::DicomListen());
   if (settings.senders.empty()) throw DataError(say::config::DicomSenders());
@@ -130,6 +132,7 @@ DicomSettings ReadDicomSettings(Section section) {
   section.Take("worklist", settings.worklist, say::config::ExpectedDicomNode(), IsNode);
   section.Take("worklist_station", settings.worklist_station, say::config::ExpectedAeTitle(),
                [](const std::string& text) { return IsTitle(text); });
+  section.Take("results_to", settings.results_to, say::config::ExpectedDicomNode(), IsNode);
   section.TakeNumber("keep_days", settings.keep_days, 1, 365, say::config::Days());
   section.RejectUnknownKeys();
   CheckTogether(settings);

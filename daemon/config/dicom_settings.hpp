@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// [dicom] of the configuration: what plumb-dicomd may receive, and from whom; and whom plumbd asks
-// for the worklist.
+// [dicom] of the configuration: what plumb-dicomd may receive, and from whom; whom plumbd asks for
+// the worklist, and who gets its accepted results.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +28,7 @@ struct DicomSettings {
   double quota_mb = 2000.0, keep_days = 14.0;
   std::string worklist;          ///< Server to query, "AETITLE@HOST:PORT"; empty: none.
   std::string worklist_station;  ///< AE title of the station whose steps count; empty: all.
+  std::string results_to;        ///< Gets accepted results, "AETITLE@HOST:PORT"; empty: none.
 };
 
 /// @throws DataError naming the key; also if something is to be received in the clear on an address

@@ -262,6 +262,12 @@ CREATE TABLE bin (
   patient_id INTEGER NOT NULL,
   binned_at INTEGER NOT NULL
 ) STRICT;
+-- Accepted results that an archive has stored, and which one.
+CREATE TABLE archived (
+  scan_id INTEGER PRIMARY KEY REFERENCES scans(id) ON DELETE CASCADE,
+  archive TEXT NOT NULL,
+  stored_at INTEGER NOT NULL
+) STRICT;
 )sql";
 
 /// Schemas in between were never released.

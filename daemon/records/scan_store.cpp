@@ -305,4 +305,21 @@ void ScanStore::Accept(const Actor& actor, const std::string& id, const std::str
   change.Commit();
 }
 
+std::vector<std::string> ScanStore::ToArchive(WallClock::time_point since) {
+  return database_.ForRows()->All(
+      "SELECT id FROM scans WHERE accepted_by <> '' AND accepted_at >= ? AND has_folder = 1 AND id "
+      "NOT IN (SELECT scan_id FROM archived) ORDER BY accepted_at, id LIMIT 1000",
+      [](const Statement& row) { return ScanId(row.Integer(0)); }, ToStored(since));
+}
+
+void ScanStore::NoteArchived(const std::string& id, const std::string& archive) {
+  const std::optional<std::int64_t> number = ParseId(id);
+  StoreChange change(database_);
+  if (!change->Has("SELECT 1 FROM scans WHERE id = ?", number)) return;
+  change->Run("INSERT INTO archived (scan_id, archive, stored_at) VALUES (?, ?, ?)", number,
+              archive, StoredNow());
+  change.Log(kSelf, "scan.archived", id, say::store::LogArchived(archive));
+  change.Commit();
+}
+
 }  // namespace plumb

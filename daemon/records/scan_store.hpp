@@ -80,6 +80,11 @@ class ScanStore {
   /// running, and for a result that is not in tolerance without a reason.
   void Accept(const Actor& actor, const std::string& id, const std::string& reason = {});
 
+  /// Results that were accepted since then and are in no archive, oldest first.
+  [[nodiscard]] std::vector<std::string> ToArchive(WallClock::time_point since);
+  /// The archive has stored the result; logged.
+  void NoteArchived(const std::string& id, const std::string& archive);
+
   /// The scan that has begun and not ended. Stable while the caller holds the connection for
   /// changes.
   [[nodiscard]] std::optional<std::int64_t> running() const { return running_; }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -26,8 +27,12 @@ namespace {
 class WebScans final : public web::ScanService {
  public:
   WebScans(Appliance& appliance, const ReferenceGate& references, const RoomInUse& room,
-           StoreAccess& store)
-      : appliance_(appliance), references_(references), room_(room), store_(store) {}
+           StoreAccess& store, std::function<void()> accepted)
+      : appliance_(appliance),
+        references_(references),
+        room_(room),
+        store_(store),
+        accepted_(std::move(accepted)) {}
 
   std::vector<Scan> Scans(const std::string& patient_id, int limit) override {
     return store_.Read(&Store::scans,
@@ -54,8 +59,11 @@ class WebScans final : public web::ScanService {
     if (!scan->patient_id.empty() && (!open || open->id != scan->session_id))
       return done(AnswerOf(say::scan::AcceptInSession()));
     if (const Message why = QualityOf(id).why_not_accept; !why.empty()) return done(AnswerOf(why));
-    store_.Write(&Store::scans, std::move(done),
-                 [=](ScanStore& scans) { scans.Accept(actor, id, reason); });
+    const auto then = [accepted = accepted_, done = std::move(done)](const Change& change) {
+      if (change.result == ChangeResult::kDone) accepted();
+      done(change);
+    };
+    store_.Write(&Store::scans, then, [=](ScanStore& scans) { scans.Accept(actor, id, reason); });
   }
 
   void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
@@ -177,6 +185,7 @@ class WebScans final : public web::ScanService {
   const ReferenceGate& references_;
   const RoomInUse& room_;
   StoreAccess& store_;
+  const std::function<void()> accepted_;
   std::mutex drawn_mutex_;
   /// The newest ones: a page asks for both pictures at once, and the one without script every 10 s.
   std::deque<Drawn> drawn_;
@@ -189,8 +198,9 @@ class WebScans final : public web::ScanService {
 
 std::unique_ptr<web::ScanService> MakeWebScans(Appliance& appliance,
                                                const ReferenceGate& references,
-                                               const RoomInUse& room, StoreAccess& store) {
-  return std::make_unique<WebScans>(appliance, references, room, store);
+                                               const RoomInUse& room, StoreAccess& store,
+                                               std::function<void()> accepted) {
+  return std::make_unique<WebScans>(appliance, references, room, store, std::move(accepted));
 }
 
 }  // namespace plumb

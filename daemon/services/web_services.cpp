@@ -45,7 +45,8 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
       references_(
           MakeWebReferences(shared.references, shared.session, shared.room, store_, background_)),
       planning_(MakeWebPlanning(shared.loop, shared.given.config_file, *references_, store_)),
-      scans_(MakeWebScans(appliance, shared.references, shared.room, store_)),
+      scans_(MakeWebScans(appliance, shared.references, shared.room, store_,
+                          [this] { archive_.Wake(); })),
       monitoring_(MakeWebMonitoring(shared.monitoring, store_)),
       checks_(MakeWebChecks(appliance, shared.references, store_)),
       room_(MakeWebRoomCalibration(shared.room, store_)),
@@ -68,6 +69,15 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
            .changed = [&notices = shared.notices] { notices.TellPage(web::EventKind::kUpdate); },
            .log = [this](const Actor& actor, const char* action, const std::string& subject,
                          const Message& detail) { audit_->Log(actor, action, subject, detail); }}),
-      background_(shared.loop) {}
+      background_(shared.loop),
+      archive_(
+          shared.loop, shared.given.config_file, shared.given.config.messages.language, store_,
+          [this](const std::string& scan, const Catalogue& language) {
+            return scans_->ScanReport(scan, language);
+          },
+          [&shared](const Message& failure) {
+            if (std::exchange(shared.not_archived, failure) != failure)
+              shared.notices.TellPage(web::EventKind::kStatus);
+          }) {}
 
 }  // namespace plumb

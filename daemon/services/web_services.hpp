@@ -9,6 +9,7 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/shared_parts.hpp"
 #include "daemon/services/background_threads.hpp"
+#include "daemon/services/result_archive.hpp"
 #include "daemon/services/store_access.hpp"
 #include "daemon/services/updates.hpp"
 #include "web/service/services.hpp"
@@ -48,7 +49,8 @@ namespace plumb {
 [[nodiscard]] std::unique_ptr<web::ScanService> MakeWebScans(Appliance& appliance,
                                                              const ReferenceGate& references,
                                                              const RoomInUse& room,
-                                                             StoreAccess& store);
+                                                             StoreAccess& store,
+                                                             std::function<void()> accepted);
 [[nodiscard]] std::unique_ptr<web::SensorProfileService> MakeWebSensorProfiles(
     Appliance& appliance, SharedParts& shared, web::BackgroundWork& background, StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(const Notices& notices,
@@ -101,6 +103,7 @@ class WebServices {
   // Declared last, so destroyed first: their callbacks and their work use the members above.
   Updates updates_;
   BackgroundThreads background_;
+  ResultArchive archive_;
 };
 
 }  // namespace plumb

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What comes by DICOM, on the page of a real plumbd: received files, and the worklist of DCMTK's
 // own server.
-#include <arpa/inet.h>
-#include <sys/socket.h>
-
 #include <ctime>
 #include <filesystem>
 #include <fstream>
@@ -15,7 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/files/descriptor.hpp"
+#include "tests/support/free_port.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
@@ -33,18 +30,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kId = "KH-4711-SECRET";
 
-/// One that is free now.
-int FreePort() {
-  const Descriptor bound(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  EXPECT_EQ(::bind(bound.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  socklen_t size = sizeof address;
-  EXPECT_EQ(::getsockname(bound.get(), reinterpret_cast<sockaddr*>(&address), &size), 0);
-  return ntohs(address.sin_port);
-}
-
 std::string LocalDay(int days_from_now) {
   const std::time_t time = std::time(nullptr) + 24L * 3600 * days_from_now;
   std::tm local{};
@@ -56,7 +41,7 @@ class DaemonDicomTest : public ::testing::Test {
  protected:
   void SetUp() override {
     fs::create_directory(folder_ / "spool");
-    worklist_port_ = FreePort();
+    worklist_port_ = testing::FreePort();
     std::ofstream(folder_ / "plumb.toml") << fmt::format(
         "[dicom]\nenabled = true\nlisten = \"127.0.0.1:0\"\n"
         "senders = [\"TPS@127.0.0.1\"]\nspool = \"{}\"\n"

@@ -9,7 +9,9 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
@@ -59,13 +61,16 @@ class UnitInRoom {
  public:
   /// @param room  Seed of the room; not set: the demo's own.
   /// @param own  Leads to this unit, `other` to the other one. Both are borrowed.
-  UnitInRoom(const fs::path& folder, std::optional<unsigned> room, Cable& own, const Cable& other)
+  /// @param archive  Gets accepted results, as [dicom] results_to; empty: none does.
+  UnitInRoom(const fs::path& folder, std::optional<unsigned> room, Cable& own, const Cable& other,
+             const std::string& archive)
       : folder_(folder), room_(room), own_(own) {
     fs::create_directories(folder);
     std::ofstream(folder / "secret") << std::string(40, 's') << "\n";
     std::ofstream(folder / "plumb.toml")
         << "[peers]\nunits = [\"http://127.0.0.1:" << other.port() << "\"]\nsecret_file = \""
-        << (folder / "secret").string() << "\"\n";
+        << (folder / "secret").string() << "\"\n"
+        << (archive.empty() ? "" : "[dicom]\nresults_to = \"" + archive + "\"\n");
     Start();
     engineer_ = std::make_unique<HttpClient>(plumbd_->MakeFirstAccount());
     for (const char* name : {"planner", "approver"})
@@ -121,7 +126,7 @@ class UnitInRoom {
     EXPECT_TRUE(draft["approved_by"].is_null()) << draft.dump();
     const auto planned = planner_->Put(path + "/plan", {{"region_m", json::array()},
                                                         {"isocentre_m", isocentre_m},
-                                                        {"shift_tolerance_mm", 3},
+                                                        {"shift_tolerance_mm", 6},
                                                         {"rotation_tolerance_deg", 1},
                                                         {"posture", "HFS"},
                                                         {"couch_markers", false},
@@ -238,23 +243,22 @@ class TwoUnitsTest : public ::testing::Test {
     unit.PlanAndApprove(there_, kIsocentre);
   }
 
-  /// The export to Orthanc, after a try without a network, and from there to the second unit's
-  /// receiver. Without Orthanc it is received as it was written.
-  void SendThroughArchive(const fs::path& exported) {
-    received_ = exported;
+  /// Orthanc, which sends to a receiver of ours. False where it is not installed.
+  bool StartArchive() {
     const char* given = std::getenv("PLUMB_ORTHANC");
     const std::string program = given != nullptr ? given : "/usr/sbin/Orthanc";
-    has_archive_ = fs::exists(program);
-    if (!has_archive_) return;
-    const fs::path spool = folder_.path() / "spool";
-    fs::create_directory(spool);
+    if (!fs::exists(program)) return false;
+    spool_ = folder_.path() / "spool";
+    fs::create_directory(spool_);
     std::ofstream(folder_.path() / "dicom.toml")
         << "[dicom]\nenabled = true\nlisten = \"127.0.0.1:0\"\nsenders = "
            "[\"ORTHANC@127.0.0.1\"]\nspool = \""
-        << spool.string() << "\"\n";
-    Process dicomd({PLUMB_DICOMD_BINARY, "--config", folder_.path() / "dicom.toml"});
-    ASSERT_TRUE(dicomd.WaitForStderr(", ")) << dicomd.err();
-    const int port = std::stoi(dicomd.err().substr(dicomd.err().find(" port ") + 6));
+        << spool_.string() << "\"\n";
+    dicomd_ = std::make_unique<Process>(
+        std::vector<std::string>{PLUMB_DICOMD_BINARY, "--config", folder_.path() / "dicom.toml"});
+    EXPECT_TRUE(dicomd_->WaitForStderr(", ")) << dicomd_->err();
+    const std::string& said = dicomd_->err();
+    const int port = std::stoi(said.substr(said.find(" port ") + 6));
     std::ofstream(folder_.path() / "orthanc.json")
         << json{{"StorageDirectory", (folder_.path() / "orthanc").string()},
                 {"IndexDirectory", (folder_.path() / "orthanc").string()},
@@ -263,37 +267,73 @@ class TwoUnitsTest : public ::testing::Test {
                 {"DicomAet", "ORTHANC"},
                 {"AuthenticationEnabled", false},
                 {"DicomModalities", {{"b", {"PLUMB", "127.0.0.1", port}}}}};
-    Process orthanc({program, folder_.path() / "orthanc.json"});
-    ASSERT_TRUE(orthanc.WaitForStderr("Orthanc has started")) << orthanc.err();
-    Cable to_archive;
-    to_archive.LeadTo(kDicomPort);
-    const auto send = [&] {
-      return RunPlumb({"send-dicom", exported, "--to",
-                       "ORTHANC@127.0.0.1:" + std::to_string(to_archive.port())});
-    };
-    to_archive.Pull();
+    orthanc_ = std::make_unique<Process>(
+        std::vector<std::string>{program, folder_.path() / "orthanc.json"});
+    EXPECT_TRUE(orthanc_->WaitForStderr("Orthanc has started")) << orthanc_->err();
+    to_archive_.LeadTo(kDicomPort);
+    return true;
+  }
+  [[nodiscard]] std::string Archive() const {
+    return "ORTHANC@127.0.0.1:" + std::to_string(to_archive_.port());
+  }
+
+  /// The export to Orthanc, after a try without a network, and from there to the receiver: the file
+  /// there. Without Orthanc the one that was written.
+  fs::path SendThroughArchive(const fs::path& exported) {
+    if (!has_archive_) return exported;
+    const auto send = [&] { return RunPlumb({"send-dicom", exported, "--to", Archive()}); };
+    to_archive_.Pull();
     EXPECT_EQ(send().exit_code, 3) << "the cable is pulled";
-    to_archive.Plug();
+    to_archive_.Plug();
     const RunResult sent = send();
-    ASSERT_EQ(sent.exit_code, 0) << sent.err;
-    HttpClient web(kHttpPort);
-    const json instances = web.Get("/instances").json();
-    ASSERT_EQ(instances.size(), 1U) << instances;
-    const json pushed = web.Post("/modalities/b/store", {{"Resources", instances}}).json();
-    ASSERT_EQ(pushed.value("InstancesCount", 0), 1) << pushed << dicomd.err();
-    for (const fs::directory_entry& entry : fs::directory_iterator(spool))
-      if (entry.path().extension() == ".dcm") received_ = entry.path();
-    ASSERT_NE(received_, exported);
-    std::printf("%.1f MB through the archive\n",
-                static_cast<double>(fs::file_size(received_)) / 1e6);
+    EXPECT_EQ(sent.exit_code, 0) << sent.err;
+    const json instances = archive_.Get("/instances").json();
+    EXPECT_EQ(instances.size(), 1U) << instances;
+    const json pushed = archive_.Post("/modalities/b/store", {{"Resources", instances}}).json();
+    EXPECT_EQ(pushed.value("InstancesCount", 0), 1) << pushed << dicomd_->err();
+    fs::path received;
+    for (const fs::directory_entry& entry : fs::directory_iterator(spool_))
+      if (entry.path().extension() == ".dcm") received = entry.path();
+    EXPECT_FALSE(received.empty());
+    return received;
+  }
+
+  /// A result that is accepted while the archive is away waits there, over a restart, and is sent.
+  void AcceptedResultGoesToTheArchive(UnitInRoom& unit, const std::string& scan) {
+    if (!has_archive_) return;
+    to_archive_.Pull();
+    const auto accepted =
+        unit.planner().Post("/api/v1/scans/" + scan + "/accept-outside",
+                            {{"reason", "seen on the images"}, {"password", kPassword}});
+    ASSERT_EQ(accepted.status, 200) << accepted.body;
+    unit.plumbd().WaitFor("the word that it waits", [&](const json&) {
+      return unit.planner().Get("/api/v1/status").body.find("dicom.not_archived") !=
+             std::string::npos;
+    });
+    EXPECT_EQ(unit.NumLogged("scan.archived"), 0);
+    unit.Stop();
+    to_archive_.Plug();
+    unit.Start();
+    unit.LogIn();
+    unit.plumbd().WaitFor("the archive",
+                          [&](const json&) { return unit.NumLogged("scan.archived") == 1; });
+    EXPECT_EQ(unit.planner().Get("/api/v1/status").body.find("dicom.not_archived"),
+              std::string::npos);
+    std::set<std::string> kinds;
+    for (const json& series : archive_.Get("/series?expand").json())
+      kinds.insert(series["MainDicomTags"]["Modality"]);
+    EXPECT_THAT(kinds, ::testing::IsSupersetOf({"DOC", "OT", "REG", "M3D"}));
+    EXPECT_THAT(archive_.Get("/patients?expand").body, HasSubstr("GO-1"));
   }
 
   static constexpr int kHttpPort = 38'043, kDicomPort = 38'243;
-  fs::path received_;
-  bool has_archive_ = false;
   const json kIsocentre = {0.60, 0.25, 0.11};
   testing::TempFolder folder_;
-  Cable to_first_, to_second_;
+  fs::path spool_;
+  std::unique_ptr<Process> dicomd_, orthanc_;
+  HttpClient archive_{kHttpPort};
+  bool has_archive_ = false;
+  Cable to_first_, to_second_, to_archive_;
   std::string patient_, there_;  ///< In the first and the second unit.
 };
 
@@ -313,13 +353,14 @@ Vector6d TrueCorrection(const json& isocentre_m) {
 // The reference is scanned in one room and used in the other; the units tell each other that the
 // patient is open in both, work on without a network, and afterwards no one of them wins.
 TEST_F(TwoUnitsTest, AReferenceGoesWhereThePatientGoes) {
-  UnitInRoom first(folder_.path() / "a", std::nullopt, to_first_, to_second_),
-      second(folder_.path() / "b", kSecondRoom, to_second_, to_first_);
+  has_archive_ = StartArchive();
+  UnitInRoom first(folder_.path() / "a", std::nullopt, to_first_, to_second_, ""),
+      second(folder_.path() / "b", kSecondRoom, to_second_, to_first_,
+             has_archive_ ? Archive() : std::string());
   ScanReference(first);
   second.CalibrateRoom();
-  SendThroughArchive(first.Export("GO-1", "go-1.dcm"));
+  Import(second, SendThroughArchive(first.Export("GO-1", "go-1.dcm")));
   ASSERT_FALSE(HasFatalFailure());
-  Import(second, received_);
 
   first.Open(patient_, "fraction");
   first.WaitForNote("");
@@ -331,7 +372,8 @@ TEST_F(TwoUnitsTest, AReferenceGoesWhereThePatientGoes) {
   to_second_.Pull();
   first.WaitForNote("peers.not_known");
   second.WaitForNote("peers.not_known");
-  const json result = second.Scan();
+  const std::string scan = second.plumbd().ScanOnce()["last_result"]["scan"];
+  const json result = second.Result(scan);
   ExpectTruth(result, TrueCorrection(kIsocentre));
   EXPECT_THAT(result["warnings"].dump(), HasSubstr("scanned in the room of"));
   EXPECT_TRUE(first.Scan()["correction"].is_object()) << "the other one works on, too";
@@ -340,6 +382,7 @@ TEST_F(TwoUnitsTest, AReferenceGoesWhereThePatientGoes) {
   to_second_.Plug();
   first.WaitForNote("peers.open_elsewhere");
   second.WaitForNote("peers.open_elsewhere");
+  AcceptedResultGoesToTheArchive(second, scan);
   second.CloseSession();
   second.WaitForNote("");
   first.WaitForNote("");

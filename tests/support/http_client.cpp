@@ -113,6 +113,10 @@ HttpAnswer HttpConnection::Read(bool head_only) {
   const std::size_t end = received_.find("\r\n\r\n") + 4;
   HttpAnswer answer = ParseHead(received_.substr(0, end));
   received_.erase(0, end);
+  if (answer.Header("transfer-encoding") == "chunked" && !head_only) {
+    answer.body = ReadChunks();
+    return answer;
+  }
   const std::string length = answer.Header("content-length");
   const std::size_t size = length.empty() || head_only ? 0 : std::stoul(length);
   while (received_.size() < size) {
@@ -121,6 +125,18 @@ HttpAnswer HttpConnection::Read(bool head_only) {
   answer.body = received_.substr(0, size);
   received_.erase(0, size);
   return answer;
+}
+
+std::string HttpConnection::ReadChunks() {
+  std::string body;
+  for (;;) {
+    const std::size_t size = std::stoul(ReadUntil("\r\n"), nullptr, 16);
+    while (received_.size() < size + 2)
+      if (!Fill()) return {};
+    body += received_.substr(0, size);
+    received_.erase(0, size + 2);
+    if (size == 0) return body;
+  }
 }
 
 std::string HttpConnection::ReadUntil(const std::string& text) {

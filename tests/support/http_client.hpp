@@ -50,6 +50,7 @@ class HttpConnection {
 
  private:
   bool Fill();
+  std::string ReadChunks();
   int fd_ = -1;
   std::string received_;
 };

@@ -483,6 +483,24 @@ TEST(ConfigTest, ReceivingDicomNeedsKnownSendersAndTlsOrAPrivateAddress) {
   EXPECT_THAT(ErrorOf("[dicom]\nport = 104\n"), HasSubstr("port"));
 }
 
+TEST(ConfigTest, PatientsDataGoesToNodesWithTlsOrAtPrivateAddresses) {
+  for (const std::string key : {"worklist", "results_to"}) {
+    const auto error = [&](const std::string& node, const std::string& more = "") {
+      return ErrorOf(fmt::format("[dicom]\n{} = \"{}\"\n{}", key, node, more));
+    };
+    EXPECT_EQ(error("PACS@192.168.1.5:104"), "no error");
+    EXPECT_EQ(error("PACS@[fd00::5]:104"), "no error");
+    for (const char* open : {"PACS@8.8.8.8:104", "PACS@pacs.example:104"})
+      EXPECT_THAT(error(open), HasSubstr("dicom." + key)) << open;
+    EXPECT_EQ(error("PACS@pacs.example:2762",
+                    "tls_certificate = \"/c\"\ntls_key = \"/k\"\ntls_trusted = \"/t\"\n"),
+              "no error");
+    for (const char* wrong : {"PACS", "@10.0.0.1:104", "PACS@10.0.0.1", "PACS@10.0.0.1:0",
+                              "SEVENTEEN-LETTERS@10.0.0.1:104"})
+      EXPECT_THAT(error(wrong), HasSubstr("dicom." + key)) << wrong;
+  }
+}
+
 TEST(ConfigTest, MessagesGoToPlainAddressesAndBeyondThisMachineOnlyWithTls) {
   EXPECT_EQ(ErrorOf("[messages]\nmail_to = [\"a@b.example\"]\nmail_from = \"c@b.example\"\n"
                     "mail_server = \"smtp://mail.b.example:587\"\nlanguage = \"de\"\n"

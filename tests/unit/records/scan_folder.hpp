@@ -86,7 +86,8 @@ inline constexpr const char* kToSchema9 =
     "templates DROP COLUMN posture; ALTER TABLE templates DROP COLUMN hint; ALTER TABLE "
     "patients DROP COLUMN alert; ALTER TABLE patients DROP COLUMN photo; DROP TABLE "
     "backup_scans; DROP TABLE backups; DROP TABLE removals; DROP "
-    "TABLE bin; DROP TABLE second_factors; DROP TABLE pins; DROP TABLE IF EXISTS row_digests; "
+    "TABLE bin; DROP TABLE archived; DROP TABLE second_factors; DROP TABLE pins; DROP TABLE IF "
+    "EXISTS row_digests; "
     "PRAGMA "
     "user_version = 9";
 

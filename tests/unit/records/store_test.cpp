@@ -364,6 +364,27 @@ TEST_F(StoreTest, OnlyAScanWithAnAnswerIsAccepted) {
   EXPECT_EQ(store->scans.Find(fine)->accepted_by, "anna");
 }
 
+TEST_F(StoreTest, WhatWasAcceptedIsForTheArchiveUntilItHasIt) {
+  const auto store = Open();
+  const std::string patient = store->patients.Add(kAnna, "A", "");
+  const std::string reference = ApprovedReference(*store, patient);
+  const auto before = WallClock::now();
+  const auto in_tolerance = testing::ResultWith(R"({"verdict":"in_tolerance"})");
+  const std::string first = Scan(*store, patient, reference, in_tolerance);
+  EXPECT_THAT(store->scans.ToArchive(before), ::testing::IsEmpty()) << "nobody accepted it";
+  store->scans.Accept(kAnna, first);
+  const auto between = WallClock::now();
+  const std::string second = Scan(*store, patient, reference, in_tolerance);
+  store->scans.Accept(kAnna, second);
+  EXPECT_THAT(store->scans.ToArchive(before), ::testing::ElementsAre(first, second));
+  EXPECT_THAT(store->scans.ToArchive(between), ::testing::ElementsAre(second));
+  store->scans.NoteArchived(first, "PACS@10.0.0.5:104");
+  EXPECT_THAT(store->scans.ToArchive(before), ::testing::ElementsAre(second));
+  EXPECT_EQ(store->audit.Find({0, 1}).at(0).action, "scan.archived");
+  store->scans.NoteArchived("000999", "PACS@10.0.0.5:104");
+  EXPECT_EQ(store->audit.Find({0, 1}).at(0).subject, first) << "one that is not there any more";
+}
+
 TEST_F(StoreTest, AResultIsNotAcceptedAfterItsReferenceWasReplaced) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
