@@ -126,10 +126,10 @@ void WriteText(const fs::path& file, const std::string& text) {
 }
 
 void CommandLineTest::SetUp() {
-  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+  const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
   std::string name = std::string("plumb_") + test->test_suite_name() + "_" + test->name();
   std::replace(name.begin(), name.end(), '/', '_');
-  folder_ = fs::path(testing::TempDir()) / name;
+  folder_ = fs::path(::testing::TempDir()) / name;
   fs::remove_all(folder_);
   fs::create_directories(folder_);
 }

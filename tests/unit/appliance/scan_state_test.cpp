@@ -13,9 +13,9 @@
 namespace plumb {
 namespace {
 
-using testing::Contains;
-using testing::ElementsAre;
-using testing::IsEmpty;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 using enum ApplianceState;
 using E = ScanEvent;
 using A = ScanAction;
@@ -127,7 +127,7 @@ TEST(ScanStateTest, AScanIsToldToStopOnce) {
       EXPECT_TRUE(t.state.cancelling);
     }
     if (before.cancelling) {
-      EXPECT_THAT(t.actions, testing::Not(Contains(A::kEndSweep)));
+      EXPECT_THAT(t.actions, ::testing::Not(Contains(A::kEndSweep)));
     }
   });
 }

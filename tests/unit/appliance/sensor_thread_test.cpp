@@ -13,7 +13,7 @@ namespace {
 
 using testing::FakeBus;
 using testing::FakeProvider;
-using Kind = SensorEvent::Kind;
+using EventKindOfSensor = SensorEvent::Kind;
 using std::chrono::milliseconds;
 
 /// Collects the events of the sensor thread.
@@ -49,7 +49,7 @@ class SensorThreadTest : public ::testing::Test {
     thread_ = std::make_unique<SensorThread>(
         [this] { return std::make_unique<FakeProvider>(bus_); }, options,
         [this](const SensorEvent& event) { events_(event); });
-    EXPECT_EQ(events_.At(0).kind, Kind::kLost) << "nothing is attached yet";
+    EXPECT_EQ(events_.At(0).kind, EventKindOfSensor::kLost) << "nothing is attached yet";
   }
 
   FakeBus bus_;
@@ -63,7 +63,7 @@ TEST_F(SensorThreadTest, IsReadyWithTheFirstFrameAndNotBefore) {
   while (bus_.opened() == 0) std::this_thread::yield();
   EXPECT_FALSE(thread_->snapshot().present) << "open, but it has shown nothing yet";
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kReady);
   EXPECT_EQ(events_.At(1).sensor.serial, "A");
   EXPECT_TRUE(thread_->snapshot().present);
   EXPECT_EQ(thread_->latest()->index, 0);
@@ -74,7 +74,7 @@ TEST_F(SensorThreadTest, FramesGoToTheScanOnceItBeganAndNotAnyMoreOnceItEnded) {
   Start({.serial = {}, .before_scan = [&] { ++prepared; }});
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kReady);
   const auto feed = std::make_shared<LiveFeed>(10);
   thread_->BeginScan(feed);
   bus_.GiveFrame();  // may be on its way already: then it belongs to the time before the press
@@ -101,25 +101,25 @@ TEST_F(SensorThreadTest, FramesGoToTheScanOnceItBeganAndNotAnyMoreOnceItEnded) {
 
 TEST_F(SensorThreadTest, ASensorThatTheDriverDidNotReportIsFoundToo) {
   Start();
-  EXPECT_EQ(events_.At(0).kind, Kind::kLost);
+  EXPECT_EQ(events_.At(0).kind, EventKindOfSensor::kLost);
   bus_.PlugUnreported("A");
   while (bus_.opened() == 0) std::this_thread::yield();  // GiveFrame() would wake the listener
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kReady);
 }
 
 TEST_F(SensorThreadTest, AnUnpluggedSensorIsLostAndAnotherOneTakesItsPlace) {
   Start();
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kReady);
   bus_.Unplug();
-  EXPECT_EQ(events_.At(2).kind, Kind::kLost);
+  EXPECT_EQ(events_.At(2).kind, EventKindOfSensor::kLost);
   EXPECT_FALSE(thread_->snapshot().present);
   EXPECT_EQ(thread_->latest(), std::nullopt);
   bus_.Plug("B");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(3).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(3).kind, EventKindOfSensor::kReady);
   EXPECT_EQ(events_.At(3).sensor.serial, "B");
 }
 
@@ -127,7 +127,7 @@ TEST_F(SensorThreadTest, AScanGetsNoFrameOfTheSensorThatComesAfterItsOwnWasUnplu
   Start();
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kReady);
   const auto feed = std::make_shared<LiveFeed>(10);
   thread_->BeginScan(feed);
   bus_.GiveFrame();
@@ -135,7 +135,7 @@ TEST_F(SensorThreadTest, AScanGetsNoFrameOfTheSensorThatComesAfterItsOwnWasUnplu
   bus_.GiveFrame();
   while (feed->num_pushed() == 0) std::this_thread::yield();
   bus_.Unplug();
-  EXPECT_EQ(events_.At(2).kind, Kind::kLost);
+  EXPECT_EQ(events_.At(2).kind, EventKindOfSensor::kLost);
   const std::int64_t pushed = feed->num_pushed();
   bus_.Plug("B");
   bus_.GiveFrame();
@@ -156,7 +156,7 @@ TEST_F(SensorThreadTest, SensorsThatAreNotUsedAreToldWhenTheyComeAndNotWhileASca
   EXPECT_TRUE(events_.At(1).others.empty());
   bus_.Plug("B");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(2).kind, Kind::kOthers);
+  EXPECT_EQ(events_.At(2).kind, EventKindOfSensor::kOthers);
   EXPECT_EQ(events_.At(2).sensor.serial, "A");
   EXPECT_EQ(events_.At(2).others, std::vector<std::string>{"B"});
   thread_->BeginScan(std::make_shared<LiveFeed>(10));
@@ -175,20 +175,21 @@ TEST_F(SensorThreadTest, AFailureIsToldOnceAndTriedAgain) {
   Start();
   bus_.RefuseToOpen("no permission; see plumb doctor");
   bus_.Plug("A");
-  EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kFailed);
   EXPECT_EQ(events_.At(1).reason.English(), "no permission; see plumb doctor");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(2).kind, Kind::kReady) << "by itself, without anything being plugged in";
+  EXPECT_EQ(events_.At(2).kind, EventKindOfSensor::kReady)
+      << "by itself, without anything being plugged in";
   bus_.FailOnce("no pair for 2 s");
   EXPECT_EQ(events_.At(3).reason.English(), "no pair for 2 s");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(4).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(4).kind, EventKindOfSensor::kReady);
 }
 
 TEST_F(SensorThreadTest, OnlyTheConfiguredSensorIsUsed) {
   Start({.serial = "B", .before_scan = {}});
   bus_.Plug("A");
-  EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kFailed);
   EXPECT_THAT(events_.At(1).reason.English(),
               ::testing::AllOf(::testing::HasSubstr("B"), ::testing::HasSubstr("A")));
   bus_.Plug("B");
@@ -209,7 +210,8 @@ TEST_F(SensorThreadTest, ALibraryThatDoesNotStartIsAFailureThatIsTriedAgain) {
                           .last_retry = milliseconds(2)},
       [this](const SensorEvent& event) { events_(event); });
   EXPECT_EQ(events_.At(0).reason.English(), "the library is missing");
-  EXPECT_EQ(events_.At(1).kind, Kind::kLost) << "and then it works, and sees no sensor";
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kLost)
+      << "and then it works, and sees no sensor";
 }
 
 TEST_F(SensorThreadTest, WaitingForALibraryThatDoesNotStartTakesNoProcessor) {
@@ -234,7 +236,8 @@ TEST_F(SensorThreadTest, WaitingForALibraryThatDoesNotStartTakesNoProcessor) {
                           .first_retry = milliseconds(300),
                           .last_retry = milliseconds(300)},
       [this](const SensorEvent& event) { events_(event); });
-  EXPECT_EQ(events_.At(1).kind, Kind::kLost) << "the second attempt works, and sees no sensor";
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kLost)
+      << "the second attempt works, and sees no sensor";
   EXPECT_LT(waiting_s, 0.01) << "of 0.3 s";
 }
 
@@ -249,13 +252,13 @@ TEST_F(SensorThreadTest, AStalledProcessFailsTheScanAndKeepsTheSensor) {
   Start();
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kReady);
   const auto feed = std::make_shared<LiveFeed>(10);
   thread_->BeginScan(feed);
   bus_.GiveFrame();
   while (bus_.flushed() == 0) std::this_thread::yield();
   bus_.StallOnce("not run for 3 s");
-  EXPECT_EQ(events_.At(2).kind, Kind::kStalled);
+  EXPECT_EQ(events_.At(2).kind, EventKindOfSensor::kStalled);
   try {
     while (feed->Next({})) continue;
     FAIL() << "a sweep with a gap ended as a whole one";
@@ -278,7 +281,7 @@ TEST_F(SensorThreadTest, ASensorWhoseDepthNoiseIsImpossibleIsNotUsed) {
   Start();
   bus_.StateNoise({.constant_m = 1.2});
   bus_.Plug("A");
-  EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kFailed);
   EXPECT_THAT(events_.At(1).reason.English(),
               ::testing::AllOf(::testing::HasSubstr("sensor A"),
                                ::testing::HasSubstr("constant_m is 1.2, expected"),
@@ -286,7 +289,7 @@ TEST_F(SensorThreadTest, ASensorWhoseDepthNoiseIsImpossibleIsNotUsed) {
   const DepthNoise possible = {.constant_m = 0.004};
   bus_.StateNoise(possible);
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(2).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(2).kind, EventKindOfSensor::kReady);
   EXPECT_EQ(thread_->snapshot().info.depth_noise, possible);
 }
 

@@ -11,11 +11,11 @@
 namespace plumb::bundle {
 namespace {
 
-const Eigen::Vector3d kPoint(0.2, 0.35, 0.9);
+const Eigen::Vector3d kSeenPoint(0.2, 0.35, 0.9);
 
 // A reading near the point's own pixel and depth, off by `off` standard deviations or so.
 KeypointTerm SomeTerm(double off) {
-  const SeenPoint seen = See(SomeCamera(), kPoint, 0.0);
+  const SeenPoint seen = See(SomeCamera(), kSeenPoint, 0.0);
   KeypointTerm term;
   term.pixel = ProjectCorrected(kLens, SomeCalibration().lens, seen.p).pixel +
                Eigen::Vector2d(0.2 * off, -0.1 * off);
@@ -31,7 +31,7 @@ KeypointTerm SomeTerm(double off) {
 TEST(KeypointTerm, RowsGiveTheGradientOfTheCost) {
   for (const double off : {1.0, 20.0}) {  // Within the loss's scale and far outside.
     const KeypointTerm term = SomeTerm(off);
-    const auto rows = term.Linearise(kLens, SomeCalibration(), SomeCamera(), kPoint);
+    const auto rows = term.Linearise(kLens, SomeCalibration(), SomeCamera(), kSeenPoint);
     const auto cost = [&](const CalibrationModel& calibration, const CameraState& camera,
                           const Eigen::Vector3d& p_world) {
       return Eigen::Matrix<double, 1, 1>(term.Cost(kLens, calibration, camera, p_world));
@@ -44,18 +44,19 @@ TEST(KeypointTerm, RowsGiveTheGradientOfTheCost) {
     // Relative: the change of the depth image's offset with the pose is left out on purpose.
     EXPECT_LT((Mismatch<1, 3>(by_point,
                               [&](const Eigen::Vector3d& step) {
-                                return cost(SomeCalibration(), SomeCamera(), kPoint + step);
+                                return cost(SomeCalibration(), SomeCamera(), kSeenPoint + step);
                               })),
               0.01 * by_point.norm());
     EXPECT_LT((Mismatch<1, 6>(by_camera,
                               [&](const Vector6d& step) {
-                                return cost(SomeCalibration(), Moved(SomeCamera(), step), kPoint);
+                                return cost(SomeCalibration(), Moved(SomeCamera(), step),
+                                            kSeenPoint);
                               })),
               0.01 * by_camera.norm());
     EXPECT_LT((Mismatch<1, kCalibrationSize>(by_calibration,
                                              [&](const CalibrationVector& step) {
                                                return cost(Moved(SomeCalibration(), step),
-                                                           SomeCamera(), kPoint);
+                                                           SomeCamera(), kSeenPoint);
                                              })),
               0.01 * by_calibration.norm());
   }

@@ -91,14 +91,15 @@ const Scene& PerfectRepeat() {
 }
 
 TEST(ComparisonTest, FindsSmallAndLargeMotionsOfAPerfectScan) {
-  struct Case {
+  struct MotionCase {
     Eigen::Vector3d shift_m;
     double yaw_deg, pitch_deg, roll_deg;
   };
   const SyntheticOptions reference = ReferenceOptions();
   const Eigen::Vector3d centroid = CentroidOf(reference);
-  for (const Case& c : {Case{{0.01, -0.02, 0.005}, 3, 1, -1}, Case{{0.25, 0.2, 0}, -58, 2, -3},
-                        Case{{-0.2, -0.1, 0.02}, 60, -4, 2}}) {
+  for (const MotionCase& c :
+       {MotionCase{{0.01, -0.02, 0.005}, 3, 1, -1}, MotionCase{{0.25, 0.2, 0}, -58, 2, -3},
+        MotionCase{{-0.2, -0.1, 0.02}, 60, -4, 2}}) {
     const Pose T_motion = BodyMotionAbout(centroid, c.shift_m, c.yaw_deg, c.pitch_deg, c.roll_deg);
     const Comparison comparison =
         Compare(PerfectReference(), MakeSyntheticScene(MovedBy(T_motion, reference)));

@@ -12,7 +12,7 @@ namespace plumb {
 namespace {
 
 constexpr int kTerm = kDepthAt + kDepthShiftX;
-const Eigen::Vector3d kCentroid(0.5, 0.3, 0.1);
+const Eigen::Vector3d kBodyCentroid(0.5, 0.3, 0.1);
 
 // A body of patches between five markers on the floor. A pixel of depth shift moves the body by
 // 1.7 mm along y; the markers stay.
@@ -59,7 +59,7 @@ std::optional<SharedSensor> Join(const Scene& reference, const Scene& current,
                       .current = current,
                       .alignment = alignment,
                       .T_motion = T_motion,
-                      .centroid_m = kCentroid,
+                      .centroid_m = kBodyCentroid,
                       .in_region = [](const Eigen::Vector3d& p) { return p.z() > 0.05; }});
 }
 
@@ -93,7 +93,7 @@ TEST(SharedSensorTest, WhatBothScansShareIsNotUncertain) {
 
 TEST(SharedSensorTest, ATurnedBodyCarriesTheErrorOfItsReferenceWithIt) {
   // Turned by 90 degrees about the vertical, the reference's error along y becomes one along -x.
-  const Eigen::Vector3d c = kCentroid;
+  const Eigen::Vector3d c = kBodyCentroid;
   const Pose turned(Eigen::Translation3d(c) *
                     Eigen::AngleAxisd(90 * kDegree, Eigen::Vector3d::UnitZ()) *
                     Eigen::Translation3d(-c));

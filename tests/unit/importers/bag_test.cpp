@@ -33,7 +33,7 @@ using testing::MessageOf;
 using testing::TempFolder;
 using Packing = BagWriter::Packing;
 
-constexpr int kFrames = 5;
+constexpr int kFramesOfBag = 5;
 const BagStreamTruth kDepth = {.topic = "/device_0/sensor_0/Depth_0",
                                .width = 32,
                                .height = 24,
@@ -56,7 +56,7 @@ struct Bag {
   Packing packing = Packing::kLz4;
   BagStreamTruth depth = kDepth, color = kColor;
   bool unit = true, poses = true, metadata = true;
-  int frames = kFrames;
+  int frames = kFramesOfBag;
 };
 
 std::string Pixels(const BagStreamTruth& stream, int frame) {
@@ -146,8 +146,8 @@ TEST_P(BagTest, WhatIsInTheFileIsRecognised) {
   EXPECT_EQ(facts.firmware, "05.15.00.02");
   EXPECT_NEAR(facts.stereo_baseline_m.value(), 0.05, 1e-9);
   EXPECT_NEAR(facts.camera.depth_scale.value(), 10000.0, 0.01);
-  EXPECT_EQ(facts.color_images, kFrames);
-  ASSERT_EQ(facts.depth_s.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(facts.color_images, kFramesOfBag);
+  ASSERT_EQ(facts.depth_s.size(), static_cast<std::size_t>(kFramesOfBag));
   const Intrinsics& color = recording->info().intrinsics;
   EXPECT_EQ(color.width, 64);
   EXPECT_EQ(color.height, 48);
@@ -166,7 +166,7 @@ TEST_P(BagTest, FramesComeBackWithDepthRegisteredAndStampsOfTheExposure) {
   const TempFolder folder;
   WriteWholeFile(folder / "sweep.bag", Write({.packing = GetParam()}));
   const auto recording = OpenImported(folder / "sweep.bag");
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < kFramesOfBag; ++i) {
     const std::optional<Frame> frame = recording->Next();
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->index, i);

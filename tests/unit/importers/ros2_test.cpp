@@ -33,7 +33,7 @@ using ::testing::Not;
 using testing::Ros2Message;
 using testing::TempFolder;
 
-constexpr int kFrames = 4;
+constexpr int kFramesOfRos2 = 4;
 constexpr std::uint32_t kWidth = 64, kHeight = 48, kDepthWidth = 32, kDepthHeight = 24;
 
 /// What a test changes of the recording.
@@ -97,7 +97,7 @@ std::vector<Ros2Message> Messages(const Ros2& ros = {}) {
                              {"camera_depth_frame", "camera_depth_optical_frame", 0.0, 0.0, 0.0},
                              {"camera_link", "camera_color_frame", -0.015, 0.1, 0.0},
                              {"camera_color_frame", "camera_color_optical_frame", 0, 0, 0.001}})});
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < kFramesOfRos2; ++i) {
     messages.push_back(DepthMessage(ros, i));
     messages.push_back(ColorMessage(ros, i));
   }
@@ -128,8 +128,8 @@ TEST_P(Ros2Test, CamerasTransformsAndFramesComeBack) {
   EXPECT_EQ(depth.intrinsics.width, 32);
   EXPECT_EQ(depth.intrinsics.fx, 30.5);
   EXPECT_TRUE(depth.T_color_depth.translation().isApprox(Eigen::Vector3d(0.015, 0, -0.001)));
-  EXPECT_EQ(recording->info().num_frames, kFrames);
-  for (int i = 0; i < kFrames; ++i) {
+  EXPECT_EQ(recording->info().num_frames, kFramesOfRos2);
+  for (int i = 0; i < kFramesOfRos2; ++i) {
     const Frame frame = recording->Next().value();
     EXPECT_NEAR(frame.color_time_s, StampOf(i), 2e-6);
     EXPECT_NEAR(frame.depth_time_s, StampOf(i) + 0.004, 2e-6);
@@ -143,7 +143,7 @@ TEST_P(Ros2Test, PackedImagesAreUnpacked) {
   const std::vector<std::uint8_t> bytes =
       testing::InContainer(Messages({.packed = true}), GetParam());
   const auto file = OpenRecordedFile(InMemory(bytes));
-  ASSERT_EQ(file->facts().color_s.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_EQ(file->facts().color_s.size(), static_cast<std::size_t>(kFramesOfRos2));
   EXPECT_EQ(file->facts().camera["camera_matrix"][0], 60.25);
   EXPECT_EQ(file->facts().camera["depth_camera_matrix"][0], 30.5);
   EXPECT_NEAR(file->Color(2).at<cv::Vec3b>(20, 20)[0], 200, 6);
@@ -209,7 +209,7 @@ TEST(Ros2FactsTest, ImagesOfOneFrameAreOfOneCamera) {
 
 TEST(Ros2FactsTest, AlignedDepthIsPreferredAndNeedsNoTransforms) {
   std::vector<Ros2Message> messages = Messages({.frames = false});
-  for (int i = 0; i < kFrames; ++i)
+  for (int i = 0; i < kFramesOfRos2; ++i)
     messages.push_back(
         {"/camera/aligned_depth_to_color/image_raw", "sensor_msgs/msg/Image",
          testing::Ros2Image(StampOf(i), "camera_color_optical_frame", "16UC1", kWidth, kHeight,
@@ -218,15 +218,15 @@ TEST(Ros2FactsTest, AlignedDepthIsPreferredAndNeedsNoTransforms) {
                       testing::Ros2Camera(60.25, 31.5, 23.25, kWidth, kHeight, {})});
   const RecordedFacts facts = FactsOf(messages);
   EXPECT_EQ(facts.camera["depth_registered"], 1);
-  EXPECT_EQ(facts.depth_s.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(facts.depth_s.size(), static_cast<std::size_t>(kFramesOfRos2));
 }
 
 TEST(Ros2FactsTest, MessagesOutOfOrderAreSorted) {
   std::vector<Ros2Message> messages = Messages();
   std::swap(messages[messages.size() - 1], messages[messages.size() - 3]);
   const RecordedFacts facts = FactsOf(messages);
-  ASSERT_EQ(facts.color_s.size(), static_cast<std::size_t>(kFrames));
-  EXPECT_NEAR(facts.color_s.back(), StampOf(kFrames - 1), 1e-6);
+  ASSERT_EQ(facts.color_s.size(), static_cast<std::size_t>(kFramesOfRos2));
+  EXPECT_NEAR(facts.color_s.back(), StampOf(kFramesOfRos2 - 1), 1e-6);
 }
 
 TEST(Ros2FactsTest, ADatabaseWithALogOrPackedMessagesIsRead) {
@@ -242,7 +242,7 @@ TEST(Ros2RefusalTest, AFolderOfRosIsReadByItsOneFile) {
   EXPECT_FALSE(IsImportable(folder.path()));
   WriteWholeFile(folder / "sweep_0.db3", testing::AsDatabase(Messages()));
   ASSERT_TRUE(IsImportable(folder.path()));
-  EXPECT_EQ(OpenImported(folder.path())->info().num_frames, kFrames);
+  EXPECT_EQ(OpenImported(folder.path())->info().num_frames, kFramesOfRos2);
   WriteWholeFile(folder / "sweep_1.db3", testing::AsDatabase(Messages()));
   EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenImported(folder.path()); }),
               HasSubstr("ros2 bag convert"));

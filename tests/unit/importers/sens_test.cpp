@@ -28,7 +28,7 @@ using testing::MessageOf;
 using testing::Packed;
 using testing::TempFolder;
 
-constexpr int kFrames = 4;
+constexpr int kFramesOfSens = 4;
 
 struct Sens {
   std::int32_t color_packing = 2, depth_packing = 1;
@@ -36,7 +36,7 @@ struct Sens {
   std::uint64_t step_us = 33333;
 };
 
-std::vector<std::uint8_t> Write(const Sens& sens) {
+std::vector<std::uint8_t> WriteSens(const Sens& sens) {
   Packed file;
   const std::string name = "StructureSensor";
   file.Add(std::uint32_t{4}).Add(std::uint64_t{name.size()});
@@ -51,9 +51,9 @@ std::vector<std::uint8_t> Write(const Sens& sens) {
   matrix({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
   rest.Add(sens.color_packing).Add(sens.depth_packing);
   for (const std::uint32_t side : {64U, 48U, 32U, 24U}) rest.Add(side);
-  rest.Add(1000.0F).Add(std::uint64_t{kFrames});
+  rest.Add(1000.0F).Add(std::uint64_t{kFramesOfSens});
   bytes += rest.bytes();
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < kFramesOfSens; ++i) {
     const auto jpeg = EncodeJpeg(cv::Mat(48, 64, CV_8UC3, cv::Scalar(200, 20 * i, 10)), 95);
     const std::vector<std::uint16_t> units(std::size_t{32} * 24,
                                            static_cast<std::uint16_t>(1500 + i));
@@ -75,7 +75,7 @@ std::vector<std::uint8_t> Write(const Sens& sens) {
 
 TEST(SensTest, FramesComeBackWithBothCameras) {
   const TempFolder folder;
-  WriteWholeFile(folder / "scene.sens", Write({}));
+  WriteWholeFile(folder / "scene.sens", WriteSens({}));
   ASSERT_TRUE(IsImportable(folder / "scene.sens"));
   const auto recording = OpenImported(folder / "scene.sens");
   EXPECT_EQ(recording->facts().format, "ScanNet .sens");
@@ -83,7 +83,7 @@ TEST(SensTest, FramesComeBackWithBothCameras) {
   EXPECT_EQ(recording->facts().camera.depth_sensor, DepthSensor::kStructuredLight);
   EXPECT_EQ(recording->info().intrinsics.fy, 61);
   EXPECT_EQ(recording->facts().camera.depth_camera.value().intrinsics.fx, 30);
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < kFramesOfSens; ++i) {
     const Frame frame = recording->Next().value();
     EXPECT_NEAR(frame.depth_time_s, 0.033333 * i, 1e-6);
     EXPECT_NEAR(frame.depth_m.at<float>(24, 32), 1.5 + 1e-3 * i, 1e-5);
@@ -93,19 +93,19 @@ TEST(SensTest, FramesComeBackWithBothCameras) {
 }
 
 TEST(SensTest, WhatIsMissingIsSaid) {
-  const std::vector<std::uint8_t> moved = Write({.shift_x = 0.02F, .step_us = 0});
+  const std::vector<std::uint8_t> moved = WriteSens({.shift_x = 0.02F, .step_us = 0});
   const RecordedFacts facts = OpenRecordedFile(InMemory(moved))->facts();
   EXPECT_THAT(EnglishTexts(facts.warnings), Contains(HasSubstr("where the depth camera is")));
   EXPECT_THAT(EnglishTexts(facts.warnings), Contains(HasSubstr("30 Hz assumed")));
   EXPECT_NEAR(facts.color_s.at(3), 0.1, 1e-9);
-  const std::vector<std::uint8_t> occi = Write({.depth_packing = 2});
+  const std::vector<std::uint8_t> occi = WriteSens({.depth_packing = 2});
   EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenRecordedFile(InMemory(occi)); }),
               HasSubstr("zlib"));
 }
 
 TEST(SensTest, FiveHundredDamagedFilesAreReadOrRefused) {
   std::mt19937 random(11);
-  const std::vector<std::uint8_t> good = Write({});
+  const std::vector<std::uint8_t> good = WriteSens({});
   int num_refused = 0;
   for (int i = 0; i < 500; ++i) {
     std::vector<std::uint8_t> bytes = good;

@@ -23,9 +23,9 @@ using plumb::testing::TrueCorners;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr double kLength_m = 0.104;
+constexpr double kDetectedLength_m = 0.104;
 
-Intrinsics Camera() { return {640, 480, 527.0, 526.0, 318.3, 244.1, {}}; }
+Intrinsics DetectorCamera() { return {640, 480, 527.0, 526.0, 318.3, 244.1, {}}; }
 
 PlacedMarker FacingAt(int id, double x_m, double y_m, double z_m) {
   PlacedMarker marker{id};
@@ -62,7 +62,7 @@ TEST(MarkerDetectorTest, NearExpectedPlacesItFindsTheSameToTheLastBit) {
   std::mt19937 random(3);
   const std::vector<PlacedMarker> placed = {
       FacingAt(4, -0.4, -0.25, 1.2), FacingAt(9, 0.3, 0.2, 1.1), FacingAt(17, 0.0, 0.0, 1.0)};
-  const cv::Mat image = Render(dictionary, placed, Camera(), SceneLook(), random);
+  const cv::Mat image = Render(dictionary, placed, DetectorCamera(), SceneLook(), random);
   const MarkerDetection all = detector.Detect(image);
   ASSERT_THAT(Ids(all), ElementsAre(4, 9, 17));
 
@@ -70,7 +70,7 @@ TEST(MarkerDetectorTest, NearExpectedPlacesItFindsTheSameToTheLastBit) {
   const auto expected_off_by = [&](double pixels) {
     std::vector<ImageCorners> expected;
     for (const PlacedMarker& marker : {placed[1], placed[0]}) {
-      expected.push_back(TrueCorners(marker, kLength_m, Camera()));
+      expected.push_back(TrueCorners(marker, kDetectedLength_m, DetectorCamera()));
       for (Eigen::Vector2d& corner : expected.back()) corner.x() += pixels;
     }
     return expected;
@@ -116,12 +116,14 @@ TEST(MarkerDetectorTest, FindsMarkersOfEveryDictionary) {
     const MarkerDictionary dictionary = MarkerDictionary::ByName(name);
     const MarkerDetector detector(dictionary);
     const int id = std::uniform_int_distribution<int>(1, dictionary.size() - 1)(random);
-    const PlacedMarker marker = RandomMarker(id, 80, 40 * kDegree, kLength_m, Camera(), random);
+    const PlacedMarker marker =
+        RandomMarker(id, 80, 40 * kDegree, kDetectedLength_m, DetectorCamera(), random);
     const MarkerDetection found =
-        detector.Detect(Render(dictionary, {marker}, Camera(), {}, random));
+        detector.Detect(Render(dictionary, {marker}, DetectorCamera(), {}, random));
     ASSERT_THAT(Ids(found), ElementsAre(id)) << name;
     // Measured over 4 seeds x 22 families: at most 0.08 px.
-    EXPECT_LT(LargestError(found.markers[0].corners, TrueCorners(marker, kLength_m, Camera())),
+    EXPECT_LT(LargestError(found.markers[0].corners,
+                           TrueCorners(marker, kDetectedLength_m, DetectorCamera())),
               0.15)
         << name;
   }
@@ -135,18 +137,19 @@ TEST(MarkerDetectorTest, CornerOrderPutsTheCameraOnThePositiveSideOfThePrint) {
   const MarkerDetector detector(dictionary);
   std::mt19937 random(3);
   for (int trial = 0; trial < 10; ++trial) {
-    const PlacedMarker marker = RandomMarker(trial, 70, 50 * kDegree, kLength_m, Camera(), random);
+    const PlacedMarker marker =
+        RandomMarker(trial, 70, 50 * kDegree, kDetectedLength_m, DetectorCamera(), random);
     const MarkerDetection found =
-        detector.Detect(Render(dictionary, {marker}, Camera(), {}, random));
+        detector.Detect(Render(dictionary, {marker}, DetectorCamera(), {}, random));
     ASSERT_EQ(found.markers.size(), 1U);
     // Direct linear transform of the plane: pixel ~ H (x, y, 1) with the marker frame's own
     // corners.
-    const MarkerCorners own = CornersInMarkerFrame(kLength_m);
+    const MarkerCorners own = CornersInMarkerFrame(kDetectedLength_m);
     Eigen::Matrix<double, 8, 8> system;
     Eigen::Matrix<double, 8, 1> right;
     for (int k = 0; k < 4; ++k) {
       const Eigen::Vector2d ideal =
-          Undistort(Camera(), found.markers[0].corners[static_cast<std::size_t>(k)]);
+          Undistort(DetectorCamera(), found.markers[0].corners[static_cast<std::size_t>(k)]);
       const double x = own[static_cast<std::size_t>(k)].x();
       const double y = own[static_cast<std::size_t>(k)].y();
       system.row(2 * k) << x, y, 1, 0, 0, 0, -ideal.x() * x, -ideal.x() * y;
@@ -170,7 +173,7 @@ TEST(MarkerDetectorTest, ReportsIdsInOrderAndColourLikeGrey) {
   std::mt19937 random(1);
   const cv::Mat gray = Render(
       dictionary, {FacingAt(42, -0.3, -0.2, 1), FacingAt(7, 0, 0, 1), FacingAt(19, 0.3, 0.2, 1)},
-      Camera(), {}, random);
+      DetectorCamera(), {}, random);
   const MarkerDetection found = detector.Detect(gray);
   EXPECT_THAT(Ids(found), ElementsAre(7, 19, 42));
   cv::Mat rgb;
@@ -183,7 +186,7 @@ TEST(MarkerDetectorTest, DropsAndReportsAnIdThatIsThereTwice) {
   std::mt19937 random(2);
   const cv::Mat image =
       Render(dictionary, {FacingAt(7, -0.3, 0, 1), FacingAt(8, 0, 0, 1), FacingAt(7, 0.3, 0, 1)},
-             Camera(), {}, random);
+             DetectorCamera(), {}, random);
   const MarkerDetection found = MarkerDetector(dictionary).Detect(image);
   EXPECT_THAT(Ids(found), ElementsAre(8));
   EXPECT_THAT(found.duplicate_ids, ElementsAre(7));
@@ -195,7 +198,7 @@ TEST(MarkerDetectorTest, FindsNothingOfAnotherDictionary) {
   for (int k = 0; k < 12; ++k)
     markers.push_back(FacingAt(k, -0.36 + 0.24 * (k % 4), -0.24 + 0.24 * (k / 4), 1));
   const MarkerDictionary shown = MarkerDictionary::ByName("DICT_ARUCO_MIP_36h12");
-  const cv::Mat image = Render(shown, markers, Camera(), {}, random);
+  const cv::Mat image = Render(shown, markers, DetectorCamera(), {}, random);
   EXPECT_EQ(MarkerDetector(shown).Detect(image).markers.size(), 12U);
   for (const char* other : {"DICT_6X6_250", "DICT_APRILTAG_36h11", "DICT_5X5_1000"}) {
     EXPECT_THAT(MarkerDetector(MarkerDictionary::ByName(other)).Detect(image).markers, IsEmpty())
@@ -208,9 +211,10 @@ TEST(MarkerDetectorTest, LeavesOutMarkersThatAreCutOrCovered) {
   const MarkerDetector detector(dictionary);
   std::mt19937 random(6);
   EXPECT_THAT(
-      detector.Detect(Render(dictionary, {FacingAt(3, -0.6, 0, 1)}, Camera(), {}, random)).markers,
+      detector.Detect(Render(dictionary, {FacingAt(3, -0.6, 0, 1)}, DetectorCamera(), {}, random))
+          .markers,
       IsEmpty());
-  cv::Mat covered = Render(dictionary, {FacingAt(3, 0, 0, 1)}, Camera(), {}, random);
+  cv::Mat covered = Render(dictionary, {FacingAt(3, 0, 0, 1)}, DetectorCamera(), {}, random);
   ASSERT_EQ(detector.Detect(covered).markers.size(), 1U);
   cv::circle(covered, {345, 270}, 14, cv::Scalar(170), cv::FILLED);  // on the lower right corner
   EXPECT_THAT(detector.Detect(covered).markers, IsEmpty());
@@ -219,21 +223,22 @@ TEST(MarkerDetectorTest, LeavesOutMarkersThatAreCutOrCovered) {
 TEST(MarkerDetectorTest, WorksOnHalfResolutionAndSmallMarkers) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_6X6_250");
   const MarkerDetector detector(dictionary);
-  const Intrinsics half = Resized(Camera(), 320, 240);
+  const Intrinsics half = Resized(DetectorCamera(), 320, 240);
   std::mt19937 random(8);
   int found_20px = 0;
   for (int trial = 0; trial < 30; ++trial) {
-    const PlacedMarker near = RandomMarker(trial, 32, 35 * kDegree, kLength_m, half, random);
+    const PlacedMarker near =
+        RandomMarker(trial, 32, 35 * kDegree, kDetectedLength_m, half, random);
     const MarkerDetection seen = detector.Detect(Render(dictionary, {near}, half, {}, random));
     ASSERT_THAT(Ids(seen), ElementsAre(trial));
-    EXPECT_LT(LargestError(seen.markers[0].corners, TrueCorners(near, kLength_m, half)),
+    EXPECT_LT(LargestError(seen.markers[0].corners, TrueCorners(near, kDetectedLength_m, half)),
               0.3);  // measured over 4 seeds: at most 0.15
-    const PlacedMarker far = RandomMarker(trial, 20, 25 * kDegree, kLength_m, half, random);
+    const PlacedMarker far = RandomMarker(trial, 20, 25 * kDegree, kDetectedLength_m, half, random);
     const MarkerDetection small = detector.Detect(Render(dictionary, {far}, half, {}, random));
     if (small.markers.empty()) continue;
     ++found_20px;
     EXPECT_THAT(Ids(small), ElementsAre(trial));
-    EXPECT_LT(LargestError(small.markers[0].corners, TrueCorners(far, kLength_m, half)),
+    EXPECT_LT(LargestError(small.markers[0].corners, TrueCorners(far, kDetectedLength_m, half)),
               0.5);  // measured: at most 0.15
   }
   EXPECT_GE(found_20px, 26);  // measured: 28 to 30
@@ -275,7 +280,7 @@ TEST(MarkerDetectorTest, SameImageSameBits) {
   std::vector<PlacedMarker> markers;
   for (int k = 0; k < 6; ++k)
     markers.push_back(FacingAt(k, -0.24 + 0.24 * (k % 3), -0.12 + 0.24 * (k / 3), 1));
-  const cv::Mat image = Render(dictionary, markers, Camera(), {.motion_px = 3}, random);
+  const cv::Mat image = Render(dictionary, markers, DetectorCamera(), {.motion_px = 3}, random);
   const MarkerDetector detector(dictionary);
   const MarkerDetection first = detector.Detect(image);
   const MarkerDetection second = MarkerDetector(dictionary).Detect(image.clone());

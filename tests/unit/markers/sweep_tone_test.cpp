@@ -17,10 +17,10 @@
 namespace plumb {
 namespace {
 
-constexpr double kLength_m = 0.104;
+constexpr double kToneLength_m = 0.104;
 constexpr int kNumMarkers = 24;
 
-Intrinsics Camera() {
+Intrinsics ToneCamera() {
   Intrinsics camera;
   camera.width = 640;
   camera.height = 480;
@@ -57,14 +57,14 @@ Sweep MakeSweep(const Curve& curve, double blur_px) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_6X6_250");
   Sweep sweep;
   for (int id = 0; id < kNumMarkers; ++id) {
-    const testing::PlacedMarker marker =
-        testing::RandomMarker(id, 60, 40 * std::numbers::pi / 180, kLength_m, Camera(), random);
+    const testing::PlacedMarker marker = testing::RandomMarker(id, 60, 40 * std::numbers::pi / 180,
+                                                               kToneLength_m, ToneCamera(), random);
     testing::SceneLook look;
     look.blur_px = blur_px;
     look.noise = 1.0;
     const cv::Mat image =
-        Encoded(testing::Render(dictionary, {marker}, Camera(), look, random), curve);
-    sweep.truth.push_back(testing::TrueCorners(marker, kLength_m, Camera()));
+        Encoded(testing::Render(dictionary, {marker}, ToneCamera(), look, random), curve);
+    sweep.truth.push_back(testing::TrueCorners(marker, kToneLength_m, ToneCamera()));
     sweep.sightings.push_back({image, sweep.truth.back(), {dictionary.Code(id), 6}});
   }
   return sweep;

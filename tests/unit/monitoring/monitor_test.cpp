@@ -18,7 +18,7 @@ namespace {
 
 using test::RestFrames;
 
-constexpr double kFrame_s = 1.0 / RestFrames::kRate_hz;
+constexpr double kMonitoredFrame_s = 1.0 / RestFrames::kRate_hz;
 
 class MonitorTest : public testing::Test {
  protected:
@@ -36,10 +36,10 @@ class MonitorTest : public testing::Test {
   /// Until a time; the sensors take turns.
   std::vector<MonitorLine> RunUntil(double end_s) {
     std::vector<MonitorLine> lines;
-    for (; time_s_ < end_s; time_s_ += kFrame_s) {
+    for (; time_s_ < end_s; time_s_ += kMonitoredFrame_s) {
       for (std::size_t i = 0; i < sensors_.size(); ++i) {
-        const double at_s =
-            time_s_ + kFrame_s * static_cast<double>(i) / static_cast<double>(sensors_.size());
+        const double at_s = time_s_ + kMonitoredFrame_s * static_cast<double>(i) /
+                                          static_cast<double>(sensors_.size());
         const Frame frame = sensors_[i]->At(at_s, covered_ == i);
         const double begun_s = CpuOfThread_s();
         const auto line = monitor_->Add(frame, i);
@@ -96,7 +96,7 @@ TEST_F(MonitorTest, ASlowMountIsMadeUpForWhereAWholeBreathIsSeen) {
   Begin();
   // Something hides the markers at first: the first second is of no use.
   std::vector<MonitorLine> lines;
-  for (; time_s_ < 110.2; time_s_ += kFrame_s) {
+  for (; time_s_ < 110.2; time_s_ += kMonitoredFrame_s) {
     Frame frame = sensors_[0]->At(time_s_);
     // A new image: the sensor's own is shared by all frames.
     if (time_s_ < 100.9)
@@ -151,7 +151,7 @@ TEST_F(MonitorTest, OneThatIsNotMountedInTimeTakesNoPart) {
   Begin();
   // The second one sees no marker at all.
   std::vector<MonitorLine> lines;
-  for (; time_s_ < 112.0; time_s_ += kFrame_s) {
+  for (; time_s_ < 112.0; time_s_ += kMonitoredFrame_s) {
     if (const auto line = monitor_->Add(sensors_[0]->At(time_s_), 0)) lines.push_back(*line);
     Frame dark = sensors_[1]->At(time_s_ + 0.02);
     dark.color_rgb = cv::Mat::zeros(dark.color_rgb.size(), dark.color_rgb.type());

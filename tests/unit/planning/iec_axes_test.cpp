@@ -19,11 +19,11 @@ constexpr std::array kAllPostures = {
 
 // Least and largest X, Y, Z of a box in the patient's axes, after the isocentre was moved to the
 // origin and the patient was laid down.
-struct Box {
+struct IecBox {
   Eigen::Vector3d low, high;
 };
 
-Box BoxInIec(PatientPosture posture) {
+IecBox BoxInIec(PatientPosture posture) {
   // A real structure set: its body and its isocentre, mm.
   const Eigen::Vector3d low(-229.5, -419.4, -122.4), high(244.7, -109.0, 168.6);
   const Eigen::Vector3d isocentre(72.530, -304.345, -9.309);
@@ -33,7 +33,7 @@ Box BoxInIec(PatientPosture posture) {
 }
 
 void ExpectBox(PatientPosture posture, std::array<double, 6> expected) {
-  const Box box = BoxInIec(posture);
+  const IecBox box = BoxInIec(posture);
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_NEAR(box.low[axis], expected[static_cast<std::size_t>(2 * axis)], 0.06)
         << Name(posture) << " axis " << axis;

@@ -17,11 +17,11 @@
 namespace plumb {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr int kNumFrames = 16;
 
-class ReconstructorTest : public testing::Test {
+class ReconstructorTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { sweep_ = new BallSweep(MakeBallSweep(kNumFrames)); }
   static void TearDownTestSuite() { delete sweep_; }
@@ -303,7 +303,7 @@ TEST_F(ReconstructorTest, SensorOnATripodGetsTheReferenceMarkersFrame) {
   EXPECT_EQ(scene.keyframes.size(), 1U) << "else this tests nothing";
   ASSERT_EQ(scene.frame, SceneFrame::kReferenceMarker);
   ASSERT_TRUE(scene.height_map.has_value());
-  EXPECT_THAT(EnglishTexts(scene.warnings), testing::Contains(HasSubstr("from 1 place only")));
+  EXPECT_THAT(EnglishTexts(scene.warnings), ::testing::Contains(HasSubstr("from 1 place only")));
   // Measured: 0.78 mm, several times that of a sweep, from the covariance of this one view.
   EXPECT_GT(scene.markers.at(kReferenceBoard).sigma_m, 0.0004);
   EXPECT_LT(scene.markers.at(kReferenceBoard).sigma_m, 0.0016);
@@ -322,7 +322,7 @@ TEST_F(ReconstructorTest, AMarkerOfFewFramesIsNoFrameAndTheWarningSaysHowMany) {
   EXPECT_EQ(scene.frame, SceneFrame::kFirstKeyframe);
   EXPECT_THAT(
       EnglishTexts(scene.warnings),
-      testing::Contains(HasSubstr("in 1 keyframes and 4 tracked frames, 3 or 5 are needed")));
+      ::testing::Contains(HasSubstr("in 1 keyframes and 4 tracked frames, 3 or 5 are needed")));
 }
 
 TEST_F(ReconstructorTest, PaperPresetWarnsOfItsOwnFrameOnly) {
@@ -335,7 +335,7 @@ TEST_F(ReconstructorTest, PaperPresetWarnsOfItsOwnFrameOnly) {
   EXPECT_EQ(scene.frame, SceneFrame::kReferenceMarker)
       << "one keyframe is enough for the published means";
   EXPECT_THAT(EnglishTexts(scene.warnings),
-              testing::Not(testing::Contains(HasSubstr("first keyframe's frame"))));
+              ::testing::Not(::testing::Contains(HasSubstr("first keyframe's frame"))));
 }
 
 TEST_F(ReconstructorTest, TimesEveryStage) {
@@ -368,7 +368,7 @@ TEST_F(ReconstructorTest, ImagesThatNeverCameAreTold) {
   EXPECT_EQ(scene.frames_tracked, 12);
   EXPECT_NEAR(scene.longest_lost_s, 1.5 + 1 / 15.0, 1e-6);
   EXPECT_THAT(EnglishTexts(scene.warnings),
-              testing::Contains(HasSubstr("no image came for 1.57 s")));
+              ::testing::Contains(HasSubstr("no image came for 1.57 s")));
 }
 
 TEST_F(ReconstructorTest, StopsOnRequest) {

@@ -13,9 +13,9 @@
 namespace plumb {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 TEST(SceneAssemblyTest, WhatIsWrongWithASweepStaysWithItsScene) {
   Symptoms symptoms;

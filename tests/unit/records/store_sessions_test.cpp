@@ -18,10 +18,9 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::kAnna;
+using testing::kBert;
 using ::testing::SizeIs;
-
-const Actor kAnna{.user = "anna", .address = "::1"};
-const Actor kBert{.user = "bert", .address = "::1"};
 
 class StoreSessionsTest : public ::testing::Test {
  protected:

@@ -23,7 +23,7 @@ std::vector<IndexEntry> At(std::initializer_list<double> times_s) {
   return entries;
 }
 
-std::string Refusal(std::string_view text) {
+std::string RefusalOfIndex(std::string_view text) {
   return MessageOf<DataError>([&] { (void)ParseIndex(text, "rgb.txt"); });
 }
 
@@ -52,46 +52,48 @@ TEST(TumIndexTest, ReadsWhatEditorsAndOtherSystemsMakeOfAList) {
                        "rgb.txt")
                 .size(),
             1U);
-  EXPECT_THAT(Refusal(std::string("\xff\xfe"
-                                  "1\0.\0",
-                                  6)),
+  EXPECT_THAT(RefusalOfIndex(std::string("\xff\xfe"
+                                         "1\0.\0",
+                                         6)),
               HasSubstr("UTF-16"));
-  EXPECT_THAT(Refusal("1.0 ..\\..\\secret\n"), HasSubstr("leaves"));
-  EXPECT_THAT(Refusal("1.0 C:\\rgb\\a.png\n"), HasSubstr("leaves"));
-  EXPECT_THAT(Refusal("1.0 \"../a.png\"\n"), HasSubstr("leaves"));
+  EXPECT_THAT(RefusalOfIndex("1.0 ..\\..\\secret\n"), HasSubstr("leaves"));
+  EXPECT_THAT(RefusalOfIndex("1.0 C:\\rgb\\a.png\n"), HasSubstr("leaves"));
+  EXPECT_THAT(RefusalOfIndex("1.0 \"../a.png\"\n"), HasSubstr("leaves"));
 }
 
 TEST(TumIndexTest, NanAndGarbageStampsAreNamedWithTheirLine) {
-  EXPECT_THAT(Refusal("1.0 a\nnan b\n"),
+  EXPECT_THAT(RefusalOfIndex("1.0 a\nnan b\n"),
               AllOf(HasSubstr("rgb.txt line 2"), HasSubstr("\"nan\""), HasSubstr("seconds")));
-  EXPECT_THAT(Refusal("1.0 a\ninf b\n"), HasSubstr("\"inf\""));
-  EXPECT_THAT(Refusal("1.0x a\n"), HasSubstr("\"1.0x\""));
-  EXPECT_THAT(Refusal("-1.0 a\n"), HasSubstr("\"-1.0\""));
-  EXPECT_THAT(Refusal("hello a\n"), HasSubstr("line 1"));
-  EXPECT_THAT(Refusal(std::string("\x01\x02\xff a\n")), HasSubstr("\"???\""));
-  EXPECT_THAT(Refusal("1e999 a\n"), HasSubstr("1e999"));
-  EXPECT_THAT(Refusal("1403636579763555584 a\n"), HasSubstr("nanoseconds"));
+  EXPECT_THAT(RefusalOfIndex("1.0 a\ninf b\n"), HasSubstr("\"inf\""));
+  EXPECT_THAT(RefusalOfIndex("1.0x a\n"), HasSubstr("\"1.0x\""));
+  EXPECT_THAT(RefusalOfIndex("-1.0 a\n"), HasSubstr("\"-1.0\""));
+  EXPECT_THAT(RefusalOfIndex("hello a\n"), HasSubstr("line 1"));
+  EXPECT_THAT(RefusalOfIndex(std::string("\x01\x02\xff a\n")), HasSubstr("\"???\""));
+  EXPECT_THAT(RefusalOfIndex("1e999 a\n"), HasSubstr("1e999"));
+  EXPECT_THAT(RefusalOfIndex("1403636579763555584 a\n"), HasSubstr("nanoseconds"));
 }
 
 TEST(TumIndexTest, UnsortedAndRepeatedStampsAreNamed) {
-  EXPECT_THAT(Refusal("1.0 a\n3.0 b\n2.0 c\n"), AllOf(HasSubstr("line 3"), HasSubstr("earlier"),
-                                                      HasSubstr("3.000000"), HasSubstr("sort")));
-  EXPECT_THAT(Refusal("1.0 a\n1.0 b\n"), AllOf(HasSubstr("line 2"), HasSubstr("repeats")));
+  EXPECT_THAT(
+      RefusalOfIndex("1.0 a\n3.0 b\n2.0 c\n"),
+      AllOf(HasSubstr("line 3"), HasSubstr("earlier"), HasSubstr("3.000000"), HasSubstr("sort")));
+  EXPECT_THAT(RefusalOfIndex("1.0 a\n1.0 b\n"), AllOf(HasSubstr("line 2"), HasSubstr("repeats")));
 }
 
 TEST(TumIndexTest, PathsThatLeaveTheFolderAreNamed) {
-  EXPECT_THAT(Refusal("1.0 ../../etc/passwd\n"),
+  EXPECT_THAT(RefusalOfIndex("1.0 ../../etc/passwd\n"),
               AllOf(HasSubstr("line 1"), HasSubstr("leaves"), HasSubstr("../../etc/passwd")));
-  EXPECT_THAT(Refusal("1.0 /etc/passwd\n"), HasSubstr("leaves"));
-  EXPECT_THAT(Refusal("1.0 rgb/../../a.png\n"), HasSubstr("leaves"));
+  EXPECT_THAT(RefusalOfIndex("1.0 /etc/passwd\n"), HasSubstr("leaves"));
+  EXPECT_THAT(RefusalOfIndex("1.0 rgb/../../a.png\n"), HasSubstr("leaves"));
   EXPECT_EQ(ParseIndex("1.0 rgb/..a.png\n", "rgb.txt").size(),
             1U);  // dots in a name are no way out
 }
 
 TEST(TumIndexTest, MissingNamesAndEndlessLinesAreNamed) {
-  EXPECT_THAT(Refusal("1.0\n"), AllOf(HasSubstr("line 1"), HasSubstr("file name is missing")));
-  EXPECT_THAT(Refusal("1.0 " + std::string(5000, 'a')), HasSubstr("5004 characters"));
-  EXPECT_THAT(Refusal(std::string("1.0 a\0b\n", 8)), HasSubstr("zero byte"));
+  EXPECT_THAT(RefusalOfIndex("1.0\n"),
+              AllOf(HasSubstr("line 1"), HasSubstr("file name is missing")));
+  EXPECT_THAT(RefusalOfIndex("1.0 " + std::string(5000, 'a')), HasSubstr("5004 characters"));
+  EXPECT_THAT(RefusalOfIndex(std::string("1.0 a\0b\n", 8)), HasSubstr("zero byte"));
 }
 
 TEST(TumIndexTest, PairsNearestStamps) {

@@ -105,7 +105,7 @@ TEST(ProfileGate, TheLightsShiftOfMarkerEdgesTakesNoPart) {
 // (measured on simulated sweeps, on which a first one leaves 0.2 %). A warm-up changes it by up to
 // 0.6 %.
 constexpr double kScaleOfOneSweep = 0.00067;
-constexpr double kWarmUp = 0.006;
+constexpr double kScaleOfWarmUp = 0.006;
 
 SensorProfile LearnedCold(int num_sweeps) {
   SensorProfile profile = ProfileOfAnyUnit(Stated());
@@ -119,9 +119,11 @@ TEST(ProfileGate, AWarmUpDoesNotContradictAProfileOfTheColdUnitAndAWrongDepthSca
     const auto at = [&](double scale) {
       return Agreement(cold, After(cold, 0.0, scale, kScaleOfOneSweep));
     };
-    EXPECT_TRUE(at(kWarmUp).agrees()) << num_sweeps << " sweeps: " << at(kWarmUp).chi_square;
-    EXPECT_TRUE(at(-kWarmUp).agrees()) << num_sweeps;
-    EXPECT_FALSE(at(2 * kWarmUp).agrees()) << num_sweeps << ": " << at(2 * kWarmUp).chi_square;
+    EXPECT_TRUE(at(kScaleOfWarmUp).agrees())
+        << num_sweeps << " sweeps: " << at(kScaleOfWarmUp).chi_square;
+    EXPECT_TRUE(at(-kScaleOfWarmUp).agrees()) << num_sweeps;
+    EXPECT_FALSE(at(2 * kScaleOfWarmUp).agrees())
+        << num_sweeps << ": " << at(2 * kScaleOfWarmUp).chi_square;
   }
 }
 

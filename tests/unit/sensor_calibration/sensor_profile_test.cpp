@@ -11,10 +11,10 @@
 namespace plumb {
 namespace {
 
-constexpr int kFocal = kLensAt;
-constexpr int kScale = kDepthAt + kDepthScale;
+constexpr int kProfiledFocal = kLensAt;
+constexpr int kProfiledScale = kDepthAt + kDepthScale;
 
-Intrinsics Stated() {
+Intrinsics StatedForProfile() {
   Intrinsics k;
   k.width = 640;
   k.height = 480;
@@ -32,51 +32,53 @@ double Sigma(const SensorProfile& profile, int term) {
 // what a solver makes of it under the prior.
 SweepEvidence Sweep(const CalibrationPrior& prior, double focal, double scale, double sigma) {
   SweepEvidence evidence;
-  evidence.information(kFocal, kFocal) = evidence.information(kScale, kScale) =
-      1.0 / (sigma * sigma);
+  evidence.information(kProfiledFocal, kProfiledFocal) =
+      evidence.information(kProfiledScale, kProfiledScale) = 1.0 / (sigma * sigma);
   CalibrationVector own = CalibrationVector::Zero();
-  own[kFocal] = focal;
-  own[kScale] = scale;
+  own[kProfiledFocal] = focal;
+  own[kProfiledScale] = scale;
   const CalibrationMatrix both = evidence.information + prior.information;
   evidence.solution = both.llt().solve(evidence.information * own + prior.information * prior.mean);
   return evidence;
 }
 
 TEST(SensorProfile, AUnitThatNothingIsKnownOfHasThePriorOfAnyUnit) {
-  const SensorProfile profile = ProfileOfAnyUnit(Stated());
+  const SensorProfile profile = ProfileOfAnyUnit(StatedForProfile());
   const CalibrationPrior any = PriorOfAnyUnit();
   EXPECT_EQ(profile.num_sweeps, 0);
   EXPECT_TRUE(profile.mean.isZero());
-  EXPECT_NEAR(Sigma(profile, kFocal), CalibrationModel::kLensSigma[0], 1e-12);
-  EXPECT_NEAR(any.information(kFocal, kFocal) * profile.covariance(kFocal, kFocal), 1.0, 1e-9);
+  EXPECT_NEAR(Sigma(profile, kProfiledFocal), CalibrationModel::kLensSigma[0], 1e-12);
+  EXPECT_NEAR(any.information(kProfiledFocal, kProfiledFocal) *
+                  profile.covariance(kProfiledFocal, kProfiledFocal),
+              1.0, 1e-9);
 }
 
 TEST(SensorProfile, GoesToWhatSweepsAgreeOnAndGrowsSurer) {
-  SensorProfile profile = ProfileOfAnyUnit(Stated());
-  double last = Sigma(profile, kFocal);
+  SensorProfile profile = ProfileOfAnyUnit(StatedForProfile());
+  double last = Sigma(profile, kProfiledFocal);
   for (int sweep = 1; sweep <= 6; ++sweep) {
-    const CalibrationPrior prior = PriorOfNextSweep(profile, Stated(), 0.01);
+    const CalibrationPrior prior = PriorOfNextSweep(profile, StatedForProfile(), 0.01);
     profile = Learn(profile, prior, Sweep(prior, 0.0015, -0.008, 1e-4));
     EXPECT_EQ(profile.num_sweeps, sweep);
-    EXPECT_LT(Sigma(profile, kFocal), last) << sweep;
-    last =
-        Sigma(profile, kFocal) + 1e-5;  // It settles where what changes from sweep to sweep wins.
+    EXPECT_LT(Sigma(profile, kProfiledFocal), last) << sweep;
+    last = Sigma(profile, kProfiledFocal) +
+           1e-5;  // It settles where what changes from sweep to sweep wins.
   }
-  EXPECT_NEAR(profile.mean[kFocal], 0.0015, 2e-5);
-  EXPECT_NEAR(profile.mean[kScale], -0.008, 2e-4);
+  EXPECT_NEAR(profile.mean[kProfiledFocal], 0.0015, 2e-5);
+  EXPECT_NEAR(profile.mean[kProfiledScale], -0.008, 2e-4);
   // What no sweep showed stays as it was.
   EXPECT_EQ(profile.mean[kLensAt + 4], 0.0);
   EXPECT_GE(Sigma(profile, kLensAt + 4), CalibrationModel::kLensSigma[4]);
 }
 
 TEST(SensorProfile, SweepsThatContradictEachOtherMeetBetween) {
-  SensorProfile profile = ProfileOfAnyUnit(Stated());
+  SensorProfile profile = ProfileOfAnyUnit(StatedForProfile());
   for (const double focal : {0.001, 0.002}) {
-    const CalibrationPrior prior = PriorOfNextSweep(profile, Stated(), 0.01);
+    const CalibrationPrior prior = PriorOfNextSweep(profile, StatedForProfile(), 0.01);
     profile = Learn(profile, prior, Sweep(prior, focal, 0.0, 1e-4));
   }
-  EXPECT_GT(profile.mean[kFocal], 0.0012);
-  EXPECT_LT(profile.mean[kFocal], 0.0018);
+  EXPECT_GT(profile.mean[kProfiledFocal], 0.0012);
+  EXPECT_LT(profile.mean[kProfiledFocal], 0.0018);
 }
 
 // A profile of many sweeps of the cold unit states a small uncertainty of a depth scale that is
@@ -89,46 +91,49 @@ TEST(SensorProfile, AProfileOfTheColdUnitDoesNotFailTheWarmOnesInterval) {
     const SweepEvidence warm = Sweep(prior, 0.0, kWarmUp, kOwnSigma);
     const CalibrationMatrix posterior =
         (warm.information + prior.information).llt().solve(CalibrationMatrix::Identity());
-    return (kWarmUp - warm.solution[kScale]) / (1.96 * 3.0 * std::sqrt(posterior(kScale, kScale)));
+    return (kWarmUp - warm.solution[kProfiledScale]) /
+           (1.96 * 3.0 * std::sqrt(posterior(kProfiledScale, kProfiledScale)));
   };
-  SensorProfile cold = ProfileOfAnyUnit(Stated());
+  SensorProfile cold = ProfileOfAnyUnit(StatedForProfile());
   for (int sweep = 0; sweep < 200; ++sweep) {
-    const CalibrationPrior prior = PriorOfNextSweep(cold, Stated(), 0.01);
+    const CalibrationPrior prior = PriorOfNextSweep(cold, StatedForProfile(), 0.01);
     cold = Learn(cold, prior, Sweep(prior, 0.0, 0.0, kOwnSigma));
   }
-  EXPECT_LT(error_by_stated(PriorOfNextSweep(cold, Stated(), 0.01)), 0.5);
+  EXPECT_LT(error_by_stated(PriorOfNextSweep(cold, StatedForProfile(), 0.01)), 0.5);
   // Even if it stated none at all, because a prior has at least the variance between two sweeps.
-  cold.covariance(kScale, kScale) *= 1e-4;
-  const CalibrationPrior held = PriorOfNextSweep(cold, Stated(), 0.01);
+  cold.covariance(kProfiledScale, kProfiledScale) *= 1e-4;
+  const CalibrationPrior held = PriorOfNextSweep(cold, StatedForProfile(), 0.01);
   EXPECT_LT(error_by_stated(held), 0.6);
   EXPECT_GT(error_by_stated(held), 0.4);
   CalibrationPrior without = held;
-  without.information(kScale, kScale) = 1.0 / cold.covariance(kScale, kScale);
+  without.information(kProfiledScale, kProfiledScale) =
+      1.0 / cold.covariance(kProfiledScale, kProfiledScale);
   EXPECT_GT(error_by_stated(without), 1.0) << "that variance is needed";
 }
 
 TEST(SensorProfile, TheEdgeShiftIsNeverCarriedOver) {
-  SensorProfile profile = ProfileOfAnyUnit(Stated());
+  SensorProfile profile = ProfileOfAnyUnit(StatedForProfile());
   profile.mean[kEdgeBiasAt] = 0.3;
-  profile.covariance(kEdgeBiasAt, kFocal) = profile.covariance(kFocal, kEdgeBiasAt) = 1e-5;
-  const CalibrationPrior prior = PriorOfNextSweep(profile, Stated(), 0.02);
+  profile.covariance(kEdgeBiasAt, kProfiledFocal) =
+      profile.covariance(kProfiledFocal, kEdgeBiasAt) = 1e-5;
+  const CalibrationPrior prior = PriorOfNextSweep(profile, StatedForProfile(), 0.02);
   EXPECT_EQ(prior.mean[kEdgeBiasAt], 0.0);
   EXPECT_NEAR(prior.information(kEdgeBiasAt, kEdgeBiasAt), 1.0 / (0.02 * 0.02), 1e-6);
-  EXPECT_NEAR(prior.information(kEdgeBiasAt, kFocal), 0.0, 1e-9);
+  EXPECT_NEAR(prior.information(kEdgeBiasAt, kProfiledFocal), 0.0, 1e-9);
 }
 
 TEST(SensorProfile, IsRefusedForAnotherCamera) {
-  const SensorProfile profile = ProfileOfAnyUnit(Stated());
-  Intrinsics other = Stated();
+  const SensorProfile profile = ProfileOfAnyUnit(StatedForProfile());
+  Intrinsics other = StatedForProfile();
   other.fx += 0.01;
   EXPECT_THROW(static_cast<void>(PriorOfNextSweep(profile, other, 0.02)), DataError);
-  EXPECT_NO_THROW(static_cast<void>(PriorOfNextSweep(profile, Stated(), 0.02)));
+  EXPECT_NO_THROW(static_cast<void>(PriorOfNextSweep(profile, StatedForProfile(), 0.02)));
 }
 
 TEST(SensorProfile, IsRefusedWithoutAProperCovariance) {
-  SensorProfile profile = ProfileOfAnyUnit(Stated());
-  profile.covariance(kScale, kScale) = -1.0;
-  EXPECT_THROW(static_cast<void>(PriorOfNextSweep(profile, Stated(), 0.02)), DataError);
+  SensorProfile profile = ProfileOfAnyUnit(StatedForProfile());
+  profile.covariance(kProfiledScale, kProfiledScale) = -1.0;
+  EXPECT_THROW(static_cast<void>(PriorOfNextSweep(profile, StatedForProfile(), 0.02)), DataError);
 }
 
 }  // namespace

@@ -20,13 +20,13 @@
 namespace plumb::simulated {
 namespace {
 
-constexpr double kHeight = 0.80;
+constexpr double kAbove_m = 0.80;
 
 SensorUnit IdealWith(const FaultSet& faults, std::uint64_t unit = 3) {
   return MakeSensorUnit(NoiseLevel::kIdeal, unit, 160, 120, faults);
 }
 
-DepthShot LookDown(const SensorUnit& unit, double height = kHeight) {
+DepthShot LookDown(const SensorUnit& unit, double height = kAbove_m) {
   const World world = BallWorld({0, 0, -0.5});
   return DepthCamera(unit).Render(world, Trajectory(Standing(height)), 2.0, 7);
 }
@@ -202,7 +202,7 @@ TEST(FaultsTest, ToneCurvesOfUnitsDifferAndRise) {
 
 TEST(FaultsTest, TheImageIsTheLightThroughTheUnitsToneCurve) {
   const World world = BallWorld({0, 0, -0.5});
-  const Trajectory trajectory(Standing(kHeight));
+  const Trajectory trajectory(Standing(kAbove_m));
   SensorUnit unit = IdealWith({});
   unit.tone = {.kind = ToneCurve::Kind::kLinear};
   const cv::Mat light = ColorCamera(unit).Render(world, trajectory, 2.0, 1);

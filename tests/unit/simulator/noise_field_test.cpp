@@ -9,28 +9,28 @@
 namespace plumb::simulated {
 namespace {
 
-constexpr int kWidth = 640;
-constexpr int kHeight = 480;
+constexpr int kColumns = 640;
+constexpr int kRows = 480;
 
 double Correlation(const std::vector<float>& field, int lag) {
   double sum = 0;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      sum += field[static_cast<std::size_t>(y * kWidth + x)] *
-             field[static_cast<std::size_t>(y * kWidth + (x + lag) % kWidth)];
+  for (int y = 0; y < kRows; ++y) {
+    for (int x = 0; x < kColumns; ++x) {
+      sum += field[static_cast<std::size_t>(y * kColumns + x)] *
+             field[static_cast<std::size_t>(y * kColumns + (x + lag) % kColumns)];
     }
   }
-  return sum / (kWidth * kHeight);
+  return sum / (kColumns * kRows);
 }
 
 TEST(NoiseFieldTest, HasUnitVarianceAndTheGaussiansCorrelation) {
   const double sigma = FilterSigmaOfLag(9.0);
   // A field of 640 x 480 with this filter holds about 2700 independent values: the spread of a
   // second moment is sqrt(2 / 2700) = 0.027; limits are three times that.
-  const std::vector<float> field = CorrelatedNoise(5, kWidth, kHeight, sigma);
+  const std::vector<float> field = CorrelatedNoise(5, kColumns, kRows, sigma);
   double mean = 0;
   for (const float value : field) mean += value;
-  EXPECT_NEAR(mean / (kWidth * kHeight), 0.0, 0.06);
+  EXPECT_NEAR(mean / (kColumns * kRows), 0.0, 0.06);
   EXPECT_NEAR(Correlation(field, 0), 1.0, 0.08);
   EXPECT_NEAR(Correlation(field, 3), std::exp(-9.0 / (4 * sigma * sigma)), 0.08);
   EXPECT_NEAR(Correlation(field, 9), 0.10, 0.08);
@@ -39,7 +39,7 @@ TEST(NoiseFieldTest, HasUnitVarianceAndTheGaussiansCorrelation) {
 
 TEST(NoiseFieldTest, IsWhiteWithoutAFilter) {
   // 307,200 independent values: spread 0.0026.
-  const std::vector<float> field = CorrelatedNoise(6, kWidth, kHeight, 0.0);
+  const std::vector<float> field = CorrelatedNoise(6, kColumns, kRows, 0.0);
   EXPECT_NEAR(Correlation(field, 0), 1.0, 0.01);
   EXPECT_NEAR(Correlation(field, 1), 0.0, 0.01);
 }
