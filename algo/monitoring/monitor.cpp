@@ -33,6 +33,8 @@ constexpr double kMean_s = 0.4;
 constexpr double kAgree = 3.0;  // standard deviations
 // Sensors that are mounted within this time after the first one are zeroed with it.
 constexpr double kMountTogether_s = 1.0;
+constexpr double kAway_s = 1.0;     // without an image: it may have been moved meanwhile
+constexpr int kChecksOnReturn = 3;  // as many images as its place is judged by
 // The fits at rest are spread over about this time.
 constexpr double kFitting_s = 0.6;
 // A body may begin to move ten seconds after the first frame: from nine on a whole breath is
@@ -77,9 +79,23 @@ Vector6d Monitor::spread_at_zero() const {
   return largest == at_rest_.end() ? Vector6d(Vector6d::Zero()) : largest->second.spread;
 }
 
+SensorShare Monitor::share(std::size_t i) const {
+  const Sensor& sensor = sensors_.at(i);
+  if (!sensor.takes_part) return SensorShare::kLeftOut;
+  if (sensor.moved) return SensorShare::kMoved;
+  if (stage_ != Stage::kFollowing || !zero_time_s_) return SensorShare::kUsed;
+  // The first frames after the zero are not yet of all.
+  if (last_s_ - sensor.image_s.value_or(*zero_time_s_) > kLongestGap_s)
+    return SensorShare::kNoImage;
+  if (sensor.checks_due > 0) return SensorShare::kNoImage;  // none that is used yet
+  const bool is_used = std::ranges::find(used_, i) != used_.end();
+  return is_used || !sensor.image_s ? SensorShare::kUsed : SensorShare::kCovered;
+}
+
 std::optional<MonitorLine> Monitor::Add(const Frame& frame, std::size_t index) {
   Sensor& sensor = sensors_.at(index);
   if (!first_s_) first_s_ = frame.depth_time_s;
+  last_s_ = frame.depth_time_s;
   MonitorLine line{.time_s = frame.depth_time_s, .sensor = index};
   const bool any =
       std::ranges::any_of(sensors_, [](const Sensor& one) { return one.takes_part && !one.moved; });
@@ -224,7 +240,7 @@ SensorSet Monitor::SensorsThatMaySee(double time_s) const {
   SensorSet set;
   for (std::size_t i = 0; i < sensors_.size(); ++i) {
     const Sensor& sensor = sensors_[i];
-    if (sensor.takes_part && !sensor.moved && sensor.image_s &&
+    if (sensor.takes_part && !sensor.moved && sensor.checks_due == 0 && sensor.image_s &&
         time_s - *sensor.image_s <= kLongestGap_s)
       set.push_back(i);
   }
@@ -281,10 +297,17 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
     zero_time_s_ = frame.depth_time_s;
     for (Sensor& one : sensors_) one.markers_s = frame.depth_time_s;
   }
+  if (sensor.image_s && frame.depth_time_s - *sensor.image_s > kAway_s) {
+    sensor.at_rest.ForgetPlace();
+    sensor.checks_due = kChecksOnReturn;
+  }
+  const int checks_before = sensor.at_rest.num_checks();
   sensor.at_rest.See(frame);
   sensor.image_s = frame.depth_time_s;
   const PlaceCheck& check = sensor.at_rest.check();
   constexpr int kLeastMarkers = 3;
+  const bool was_checked = sensor.at_rest.num_checks() != checks_before;
+  if (sensor.checks_due > 0 && was_checked && check.num_seen >= kLeastMarkers) --sensor.checks_due;
   if (check.num_seen >= kLeastMarkers) sensor.markers_s = frame.depth_time_s;
   line.markers_seen = check.num_seen;
   line.couch_moved = check.couch_moved;
@@ -299,6 +322,7 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
   SensorSet set = SensorsThatMaySee(line.time_s);
   if (set.empty()) line.reason = BlindReason::kCovered;  // only the one that was just pushed
   const std::optional<MotionFit> fit = FitAll(set, line);
+  used_ = fit ? set : SensorSet();
   if (!fit) {
     line.state = MonitorState::kBlind;
     recent_.clear();

@@ -286,7 +286,14 @@ void SensorAtRest::See(const Frame& frame) {
   MeasureSupport();
 }
 
+void SensorAtRest::ForgetPlace() {
+  std::ranges::fill(recent_, 0.0F);
+  watch_->Forget();
+  check_time_s_.reset();
+}
+
 void SensorAtRest::CheckPlace(const Frame& frame) {
+  ++num_checks_;
   check_ = watch_->Check(
       Detect(frame), [this](const Pose& T_now_before) { return IsBackgroundStill(T_now_before); });
 }

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/monitoring/monitor_session.hpp"
 
+#include <algorithm>
+#include <ctime>
+#include <limits>
 #include <utility>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
 #include "algo/base/units.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/monitoring/common_clock.hpp"
 #include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/sweep/explain.hpp"
+#include "words/monitoring.hpp"
 #include "words/scan.hpp"
 
 namespace plumb {
@@ -16,12 +21,20 @@ namespace {
 
 constexpr double kTellEvery_s = 0.095;  // ten times a second, of frames at 30 Hz
 
+/// Of this thread.
+double CpuSeconds() {
+  timespec used{};
+  (void)::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+}
+
 }  // namespace
 
-MonitorSession::MonitorSession(MonitorJob job, MonitorCallbacks callbacks)
+MonitorSession::MonitorSession(MonitorJob job, std::shared_ptr<LiveFeed> feed,
+                               MonitorCallbacks callbacks)
     : job_(std::move(job)),
       callbacks_(std::move(callbacks)),
-      feed_(std::make_shared<LiveFeed>(job_.queue_capacity)),
+      feed_(std::move(feed)),
       thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
 MonitorSession::~MonitorSession() { End(); }
@@ -125,17 +138,49 @@ void MonitorSession::Watch(const std::stop_token& stop) {
     warnings.push_back(room->why_not_used);
   const MonitorOptions options =
       MonitorOptionsOf(compare, reference ? &*reference : nullptr, scene, warnings);
-  Monitor monitor(scene, job_.info, options);
+  const std::vector<StreamInfo> sensors = Sensors(warnings, stop);
+  Monitor monitor(scene, sensors, options);
   BeginRecord(options);
   callbacks_.begun(warnings, options.judges_reference);
+  Follow(monitor, options, stop);
+}
+
+std::vector<StreamInfo> MonitorSession::Sensors(std::vector<Message>& warnings,
+                                                const std::stop_token& stop) const {
+  std::vector<StreamInfo> sensors = {job_.info};
+  if (!job_.second) return sensors;
+  if (const auto second = job_.second->await(stop))
+    sensors.push_back(*second);
+  else
+    warnings.push_back(say::monitoring::SecondMissing(job_.second->serial));
+  return sensors;
+}
+
+void MonitorSession::Follow(Monitor& monitor, const MonitorOptions& options,
+                            const std::stop_token& stop) {
   (void)feed_->TakeDropped();  // those that came before
   MonitorUpdate told;
   std::optional<double> told_s;
   std::int64_t frames = 0, dropped = 0;
   bool is_zeroed = false;
-  while (const std::optional<Frame> frame = feed_->Next(stop)) {
-    MonitorLine line = monitor.Add(*frame).value();
+  std::vector<CommonClock> clocks(monitor.num_sensors());
+  const double cpu_before_s = CpuSeconds();
+  double newest_s = -std::numeric_limits<double>::infinity();
+  while (std::optional<Frame> frame = feed_->Next(stop)) {
+    const std::size_t sensor = feed_->taken_sensor();
+    if (sensor >= clocks.size()) continue;  // it came too late to be zeroed with the other one
+    if (clocks.size() > 1) {
+      const double stamp_s = frame->depth_time_s;
+      newest_s = std::max(newest_s, clocks[sensor].SteadyStamp(stamp_s, feed_->taken_arrived_s()));
+      frame->depth_time_s = newest_s;
+      frame->color_time_s += newest_s - stamp_s;
+    }
+    const std::optional<MonitorLine> judged = monitor.Add(*frame, sensor);
+    if (!judged) continue;
+    MonitorLine line = *judged;
     MonitorUpdate next;
+    for (std::size_t i = 0; i < clocks.size(); ++i) next.shares.push_back(monitor.share(i));
+    if (next.shares != told.shares) NoteShares(next.shares);
     JudgeBreath(line, next);
     ++frames;
     dropped += feed_->TakeDropped();
@@ -146,7 +191,7 @@ void MonitorSession::Watch(const std::stop_token& stop) {
     }
     const double now_s = SteadySeconds();
     const bool changed = line.state != told.line.state || line.advice != told.line.advice ||
-                         line.reason != told.line.reason;
+                         line.reason != told.line.reason || next.shares != told.shares;
     if (told_s && !changed && now_s - *told_s < kTellEvery_s) continue;
     told_s = now_s;
     next.line = line;
@@ -155,9 +200,18 @@ void MonitorSession::Watch(const std::stop_token& stop) {
     next.has_breathing = monitor.sensor().breathing().has_value();
     next.frames = frames;
     next.frames_dropped = dropped;
+    next.cpu_ms = 1e3 * (CpuSeconds() - cpu_before_s) / static_cast<double>(frames);
     told = next;
     callbacks_.update(told);
   }
+}
+
+void MonitorSession::NoteShares(const std::vector<SensorShare>& shares) {
+  if (shares.size() < 2) return;
+  AddEvent({{"event", "sensors"},
+            {"time", MonitoringTime()},
+            {job_.serial, Name(shares[0])},
+            {job_.second->serial, Name(shares[1])}});
 }
 
 void MonitorSession::Note(const MonitorLine& line) {

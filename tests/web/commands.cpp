@@ -13,6 +13,7 @@
 #include "drivers/files/image_file.hpp"
 #include "words/check.hpp"
 #include "words/dicom.hpp"
+#include "words/monitoring.hpp"
 #include "words/peers.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
@@ -234,6 +235,13 @@ void ObeyMonitor(FakeAppliance& service, const std::string& name, std::istream& 
     service.monitor.breathing_mm = height_mm;
     service.monitor.age_s = 0.03;
     if (service.monitor.breath_hold) service.monitor.breath_hold->advice = advice;
+    service.Notify(web::EventKind::kMonitor);
+  }
+  if (name == "alone") {  // [OTHER]: no image comes from that one of two sensors
+    std::string other;
+    words >> other;
+    service.monitor.one_sensor =
+        other.empty() ? Message() : say::monitoring::SensorSilent("VIRTUAL-0001", other);
     service.Notify(web::EventKind::kMonitor);
   }
   if (name == "recorded") {  // SCAN: it was monitored, and a power cut ended that

@@ -75,6 +75,20 @@ await h.step('the room shows the same, larger', async () => {
   await h.look(room, 'monitor-room-in', { fullPage: false });
 });
 
+await h.step('one of two sensors fails: page and room say which one goes on alone', async () => {
+  h.tell('alone VIRTUAL-0002');
+  for (const page of [tech, room]) {
+    await page.locator('.live-view .caution', { hasText: 'VIRTUAL-0001 goes on alone' }).waitFor();
+  }
+  await h.look(tech, 'monitor-phone-alone');
+  await h.look(room, 'monitor-room-alone');
+  h.tell('alone');
+  for (const page of [tech, room]) {
+    await page.locator('.live-view .caution', { hasText: 'goes on alone' })
+      .waitFor({ state: 'hidden' });
+  }
+});
+
 await h.step('an unknown state says why', async () => {
   keepSaying('blind unknown covered 0');
   await tech.getByText('? UNKNOWN: HOLD').waitFor();

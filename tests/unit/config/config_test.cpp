@@ -267,6 +267,20 @@ TEST_F(GateTest, TheDailyCheckOfARealSensorMayBeStricterOnly) {
   }
 }
 
+TEST(ConfigTest, ASecondSensorIsAnotherOneThanTheFirstWhichHasToBeNamed) {
+  const auto read = [](const std::string& first, const std::string& second) {
+    return ParseConfig("[appliance]\n" + first + "second_sensor_serial = \"" + second + "\"\n",
+                       "plumb.toml", ConfigUse::kAppliance)
+        .appliance.second_sensor_serial;
+  };
+  EXPECT_EQ(read("sensor_serial = \"A\"\n", "B"), "B");
+  EXPECT_EQ(read("", ""), "");
+  for (const auto& [first, second] :
+       {std::pair{"sensor_serial = \"A\"\n", "A"}, std::pair{"", "B"}})
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)read(first, second); }),
+                ::testing::HasSubstr("second_sensor_serial"));
+}
+
 TEST(ConfigTest, TheFirstSettingsMayBeGiven) {
   const ApplianceConfig none = ParseConfig("[appliance]\n", "t").appliance;
   EXPECT_FALSE(none.auto_stop_s || none.scan_limit_s || none.keep_recordings);

@@ -145,6 +145,30 @@ TEST_F(MonitorTest, TwoSensorsGoOnWhileOneIsBlindAndAfterOneWasPushed) {
   EXPECT_EQ(RunUntil(119.0).back().state, MonitorState::kMovedSensor);
 }
 
+TEST_F(MonitorTest, OneThatWasAwayIsUsedAgainOnlyWhereItStood) {
+  AddSensor(1.0);
+  AddSensor(-1.0);
+  Begin();
+  ASSERT_EQ(RunUntil(112.0).back().sensors_used, 2);
+  const auto second_alone_until = [&](double end_s) {
+    for (; time_s_ < end_s; time_s_ += kFrame_s)
+      EXPECT_TRUE(monitor_->Add(sensors_[1]->At(time_s_), 1));
+  };
+  second_alone_until(114.0);
+  EXPECT_EQ(monitor_->share(0), SensorShare::kNoImage);
+  EXPECT_EQ(monitor_->share(1), SensorShare::kUsed);
+  // Its place is judged by three images, five of which are looked at in a second.
+  const std::vector<MonitorLine> back = RunUntil(115.5);
+  EXPECT_EQ(back.front().sensors_used, 1);
+  EXPECT_EQ(back.back().sensors_used, 2);
+  EXPECT_EQ(monitor_->share(0), SensorShare::kUsed);
+
+  second_alone_until(117.5);
+  sensors_[0]->Push({0.002, 0.001, 0.0});
+  for (const MonitorLine& line : RunUntil(119.0)) EXPECT_EQ(line.sensors_used, 1) << line.time_s;
+  EXPECT_EQ(monitor_->share(0), SensorShare::kMoved);
+}
+
 TEST_F(MonitorTest, OneThatIsNotMountedInTimeTakesNoPart) {
   AddSensor(1.0);
   AddSensor(-1.0);

@@ -126,8 +126,9 @@ export async function askMonitor() {
 export function monitorView() {
   const headline = h('p', { class: 'live-advice' });
   const reason = h('p', { class: 'live-why' });
+  const oneSensor = h('p', { class: 'caution', hidden: true });
   const head = h('div', {}, h('div', { class: 'live-head' }, headline,
-    h('p', { class: 'caution' }, S.monitor.notBeam)), reason);
+    h('p', { class: 'caution' }, S.monitor.notBeam)), reason, oneSensor);
   const tell = (tone, words, why) => {
     headline.className = `live-advice ${tone}`;
     headline.textContent = words;
@@ -151,15 +152,19 @@ export function monitorView() {
     const text = S.monitor;
     const key = JSON.stringify([S.languageName, monitor?.advice, monitor?.state, monitor?.reason,
       monitor?.is_old, monitor?.couch_moved, monitor?.since_zero,
-      monitor?.against_reference, monitor?.ended]);
+      monitor?.against_reference, monitor?.ended, monitor?.one_sensor_message]);
     if (key === drawn) return;
     drawn = key;
     element.classList.toggle('is-old', Boolean(monitor?.active && monitor.is_old));
     if (!monitor?.active) {
       tell('unknown', text.off, monitor?.ended ? said(monitor, 'ended') : '');
       clear(numbers);
+      oneSensor.hidden = true;
       return;
     }
+    const alone = monitor.one_sensor_message ? sentence(said(monitor, 'one_sensor')) : '';
+    oneSensor.hidden = !alone;
+    oneSensor.textContent = alone;
     const { state, advice } = monitor;
     const isStarting = state === 'mounting' || state === 'zeroing';
     const word = isStarting ? text.states[state] : text.advice[advice];
@@ -175,7 +180,7 @@ export function monitorView() {
     clear(numbers,
       judgesReference && six(text.againstReference, monitor.against_reference, monitor, true),
       six(text.sinceZero, monitor.since_zero, monitor, !judgesReference));
-    const words = `${word} ${why}`;
+    const words = [word, why, alone].filter(Boolean).join(' ');
     if (words !== saidLast) say(words);
     saidLast = words;
   };
