@@ -301,14 +301,14 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
     sensor.at_rest.ForgetPlace();
     sensor.checks_due = kChecksOnReturn;
   }
-  const int checks_before = sensor.at_rest.num_checks();
-  sensor.at_rest.See(frame);
+  const bool was_checked = sensor.at_rest.See(frame);
   sensor.image_s = frame.depth_time_s;
   const PlaceCheck& check = sensor.at_rest.check();
   constexpr int kLeastMarkers = 3;
-  const bool was_checked = sensor.at_rest.num_checks() != checks_before;
-  if (sensor.checks_due > 0 && was_checked && check.num_seen >= kLeastMarkers) --sensor.checks_due;
-  if (check.num_seen >= kLeastMarkers) sensor.markers_s = frame.depth_time_s;
+  if (check.num_seen >= kLeastMarkers) {
+    sensor.markers_s = frame.depth_time_s;
+    if (was_checked && sensor.checks_due > 0) --sensor.checks_due;
+  }
   line.markers_seen = check.num_seen;
   line.couch_moved = check.couch_moved;
   line.drift = sensor.at_rest.drift();
@@ -320,7 +320,9 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
     return;
   }
   SensorSet set = SensorsThatMaySee(line.time_s);
-  if (set.empty()) line.reason = BlindReason::kCovered;  // only the one that was just pushed
+  // Only one that was just pushed, or whose place is not known again.
+  if (set.empty())
+    line.reason = sensor.checks_due > 0 ? BlindReason::kUnguarded : BlindReason::kCovered;
   const std::optional<MotionFit> fit = FitAll(set, line);
   used_ = fit ? set : SensorSet();
   if (!fit) {

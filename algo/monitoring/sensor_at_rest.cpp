@@ -271,19 +271,21 @@ void SensorAtRest::FindFaces() {
   }
 }
 
-void SensorAtRest::See(const Frame& frame) {
+bool SensorAtRest::See(const Frame& frame) {
   image_ = AverageBlocks(frame.depth_m, grid_, info_.usable_depth);
   for (std::size_t b = 0; b < recent_.size(); ++b) {
     const float now = image_.inverse_depth[b];
     if (now <= 0) continue;
     recent_[b] = recent_[b] > 0 ? recent_[b] + kRecent * (now - recent_[b]) : now;
   }
-  if (!check_time_s_ || frame.depth_time_s - *check_time_s_ >= kCheckInterval_s) {
+  const bool is_due = !check_time_s_ || frame.depth_time_s - *check_time_s_ >= kCheckInterval_s;
+  if (is_due) {
     check_time_s_ = frame.depth_time_s;
     CheckPlace(frame);
   }
   FollowDrift(frame.depth_time_s);
   MeasureSupport();
+  return is_due;
 }
 
 void SensorAtRest::ForgetPlace() {
@@ -293,7 +295,6 @@ void SensorAtRest::ForgetPlace() {
 }
 
 void SensorAtRest::CheckPlace(const Frame& frame) {
-  ++num_checks_;
   check_ = watch_->Check(
       Detect(frame), [this](const Pose& T_now_before) { return IsBackgroundStill(T_now_before); });
 }

@@ -62,8 +62,8 @@ class SensorAtRest {
   [[nodiscard]] bool Zero(ZeroKind kind = ZeroKind::kAny);
 
   /// Of a frame after the zero: averages it, follows the drift, checks the place some times a
-  /// second.
-  void See(const Frame& frame);
+  /// second. @return Whether this frame's place was checked.
+  bool See(const Frame& frame);
   /// It was away: what it saw of its place before that proves nothing any more.
   void ForgetPlace();
   /// What See() saw, for a fit that starts at these sizes of the breathing's patterns.
@@ -88,8 +88,6 @@ class SensorAtRest {
   [[nodiscard]] double static_error_m() const { return static_error_m_; }
   [[nodiscard]] std::size_t frames_in_zero() const { return frames_in_zero_; }
   [[nodiscard]] const PlaceCheck& check() const { return check_; }
-  /// How often the place was checked.
-  [[nodiscard]] int num_checks() const { return num_checks_; }
   /// Depth now over depth at the zero, of surfaces that stayed where they were.
   [[nodiscard]] double drift() const { return 1.0 / drift_; }
   /// Rise of the support along its normal since the zero, metres; nothing if it is not seen.
@@ -140,7 +138,6 @@ class SensorAtRest {
   std::optional<double> drift_time_s_, check_time_s_;
   std::optional<PlaceWatch> watch_;
   PlaceCheck check_;
-  int num_checks_ = 0;
   std::optional<double> support_rise_m_;
 };
 

@@ -44,12 +44,12 @@ Message OneSensor(const std::vector<MonitorSensor>& sensors) {
   const MonitorSensor& other = sensors[is_first ? 1 : 0];
   const std::string& left = sensors[is_first ? 0 : 1].serial;
   if (other.share == Name(SensorShare::kCovered))
-    return say::monitoring::SensorCovered(left, other.serial);
+    return say::monitoring::SensorCovered(other.serial, left);
   if (other.share == Name(SensorShare::kMoved))
-    return say::monitoring::SensorPushed(left, other.serial);
+    return say::monitoring::SensorPushed(other.serial, left);
   if (other.share == Name(SensorShare::kLeftOut))
-    return say::monitoring::SensorLeftOut(left, other.serial);
-  return say::monitoring::SensorSilent(left, other.serial);
+    return say::monitoring::SensorLeftOut(other.serial, left);
+  return say::monitoring::SensorSilent(other.serial, left);
 }
 
 }  // namespace

@@ -169,7 +169,7 @@ void MonitorSession::Follow(Monitor& monitor, const MonitorOptions& options,
   while (std::optional<Frame> frame = feed_->Next(stop)) {
     const std::size_t sensor = feed_->taken_sensor();
     if (sensor >= clocks.size()) continue;  // it came too late to be zeroed with the other one
-    if (clocks.size() > 1) {
+    if (job_.second) {  // each has a clock of its own, and another one after it was unplugged
       const double stamp_s = frame->depth_time_s;
       newest_s = std::max(newest_s, clocks[sensor].SteadyStamp(stamp_s, feed_->taken_arrived_s()));
       frame->depth_time_s = newest_s;
@@ -197,7 +197,8 @@ void MonitorSession::Follow(Monitor& monitor, const MonitorOptions& options,
     next.line = line;
     next.arrived_s = feed_->taken_arrived_s();
     next.done_s = now_s;
-    next.has_breathing = monitor.sensor().breathing().has_value();
+    for (std::size_t i = 0; i < clocks.size(); ++i)
+      next.has_breathing |= monitor.takes_part(i) && monitor.sensor(i).breathing().has_value();
     next.frames = frames;
     next.frames_dropped = dropped;
     next.cpu_ms = 1e3 * (CpuSeconds() - cpu_before_s) / static_cast<double>(frames);
@@ -210,8 +211,7 @@ void MonitorSession::NoteShares(const std::vector<SensorShare>& shares) {
   if (shares.size() < 2) return;
   AddEvent({{"event", "sensors"},
             {"time", MonitoringTime()},
-            {job_.serial, Name(shares[0])},
-            {job_.second->serial, Name(shares[1])}});
+            {"shares", {Name(shares[0]), Name(shares[1])}}});
 }
 
 void MonitorSession::Note(const MonitorLine& line) {

@@ -241,7 +241,7 @@ void ObeyMonitor(FakeAppliance& service, const std::string& name, std::istream& 
     std::string other;
     words >> other;
     service.monitor.one_sensor =
-        other.empty() ? Message() : say::monitoring::SensorSilent("VIRTUAL-0001", other);
+        other.empty() ? Message() : say::monitoring::SensorSilent(other, "VIRTUAL-0001");
     service.Notify(web::EventKind::kMonitor);
   }
   if (name == "recorded") {  // SCAN: it was monitored, and a power cut ended that
