@@ -35,7 +35,7 @@ constexpr double kAgree = 3.0;  // standard deviations
 constexpr double kMountTogether_s = 1.0;
 constexpr double kAway_s = 1.0;     // without an image: it may have been moved meanwhile
 constexpr int kChecksOnReturn = 3;  // as many images as its place is judged by
-// The fits at rest are spread over about this time.
+// The fits at rest are spread over about this time for each sensor: each set of them is fitted.
 constexpr double kFitting_s = 0.6;
 // A body may begin to move ten seconds after the first frame: from nine on a whole breath is
 // enough, after this time of zeroing. It is looked for that often.
@@ -90,6 +90,14 @@ SensorShare Monitor::share(std::size_t i) const {
   if (sensor.checks_due > 0) return SensorShare::kNoImage;  // none that is used yet
   const bool is_used = std::ranges::find(used_, i) != used_.end();
   return is_used || !sensor.image_s ? SensorShare::kUsed : SensorShare::kCovered;
+}
+
+std::optional<LiveMap> Monitor::Map() const {
+  std::vector<FitView> views;
+  for (const std::size_t i : SensorsThatMaySee(last_s_))
+    views.push_back(sensors_[i].at_rest.view(sensors_[i].modes_m));
+  if (views.empty()) return std::nullopt;
+  return MakeLiveMap(views);
 }
 
 std::optional<MonitorLine> Monitor::Add(const Frame& frame, std::size_t index) {
@@ -183,11 +191,12 @@ void Monitor::TakeZeros(bool last) {
     zeroed.emplace_back(i, &sensor.at_rest);
     frames += sensor.at_rest.still_times_s().size();
   }
+  const std::size_t num_zeroed = zeroed.size();
   if (!zeroed.empty()) rest_fits_.emplace(std::move(zeroed), scene_.centroid_m);
   no_zero_ = !rest_fits_ || rest_fits_->size() == 0;
   if (no_zero_) return;
   const double frames_of_fitting =
-      std::max(1.0, static_cast<double>(frames) * kFitting_s /
+      std::max(1.0, static_cast<double>(frames * num_zeroed) * kFitting_s /
                         std::max(kFirstTry_s, *zero_tried_s_ - *zeroing_since_s_));
   fits_at_a_time_ = static_cast<std::size_t>(
       std::ceil(static_cast<double>(rest_fits_->size()) / frames_of_fitting));

@@ -18,6 +18,7 @@
 #include "algo/base/pose.hpp"
 #include "algo/comparison/comparison.hpp"
 #include "algo/monitoring/advice.hpp"
+#include "algo/monitoring/live_map.hpp"
 #include "algo/monitoring/rest_statistics.hpp"
 #include "algo/monitoring/sensor_at_rest.hpp"
 #include "algo/types/frame.hpp"
@@ -132,6 +133,9 @@ class Monitor {
   [[nodiscard]] bool takes_part(std::size_t i) const { return sensors_[i].takes_part; }
   /// As of the last frame.
   [[nodiscard]] SensorShare share(std::size_t i) const;
+  /// Of the newest image of each sensor that may be used, whether or not they give numbers; nothing
+  /// before the zero, and where there is none.
+  [[nodiscard]] std::optional<LiveMap> Map() const;
   /// Standard deviations of a single frame's motion while zeroing, about the centroid, by all
   /// sensors together: rotation vector, translation.
   [[nodiscard]] Vector6d spread_at_zero() const;

@@ -213,6 +213,11 @@ MonitorStatus LiveMonitoring::status() const {
   return status;
 }
 
+std::shared_ptr<const std::string> LiveMonitoring::Map() const {
+  const bool is_new = last_ && SteadySeconds() - last_->map_s <= kGone_s;
+  return is_new ? last_->map : nullptr;
+}
+
 IndicatorPattern LiveMonitoring::Pattern() const {
   const MonitorStatus now = status();
   if (now.state == Name(MonitorState::kMounting) || now.state == Name(MonitorState::kZeroing))

@@ -66,6 +66,8 @@ class LiveMonitoring {
 
   [[nodiscard]] bool IsActive() const { return session_ != nullptr; }
   [[nodiscard]] MonitorStatus status() const;
+  /// As MonitoringService::MonitorMap().
+  [[nodiscard]] std::shared_ptr<const std::string> Map() const;
   [[nodiscard]] IndicatorPattern Pattern() const;
   /// Of this or the last session; null without one. From any thread.
   [[nodiscard]] std::shared_ptr<const MonitorSession> Record() const;

@@ -9,6 +9,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
 #include "algo/base/units.hpp"
+#include "daemon/files/compact_map.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/monitoring/common_clock.hpp"
 #include "daemon/monitoring_files/monitoring_file.hpp"
@@ -20,6 +21,7 @@ namespace plumb {
 namespace {
 
 constexpr double kTellEvery_s = 0.095;  // ten times a second, of frames at 30 Hz
+constexpr double kMapEvery_s = 0.45;    // two of them a second
 
 /// Of this thread.
 double CpuSeconds() {
@@ -202,9 +204,20 @@ void MonitorSession::Follow(Monitor& monitor, const MonitorOptions& options,
     next.frames = frames;
     next.frames_dropped = dropped;
     next.cpu_ms = 1e3 * (CpuSeconds() - cpu_before_s) / static_cast<double>(frames);
+    next.map = told.map;
+    next.map_s = told.map_s;
+    AddMap(monitor, next);
     told = next;
     callbacks_.update(told);
   }
+}
+
+void MonitorSession::AddMap(const Monitor& monitor, MonitorUpdate& update) const {
+  if (update.map && update.arrived_s - update.map_s < kMapEvery_s) return;
+  const std::optional<LiveMap> map = monitor.Map();
+  update.map = map ? std::make_shared<const std::string>(CompactHeights(map->rise_m, map->missing))
+                   : nullptr;
+  update.map_s = update.arrived_s;
 }
 
 void MonitorSession::NoteShares(const std::vector<SensorShare>& shares) {

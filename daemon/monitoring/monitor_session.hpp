@@ -57,8 +57,10 @@ struct MonitorUpdate {
   std::optional<BreathWindow> breath_window = {};
   LiveAdvice breath = LiveAdvice::kUnknown;  ///< With a window; the line's advice holds it.
   std::int64_t frames = 0, frames_dropped = 0;
-  std::vector<SensorShare> shares = {};  ///< Of each sensor.
-  double cpu_ms = 0.0;                   ///< Of the thread for each frame, in the mean.
+  std::vector<SensorShare> shares = {};         ///< Of each sensor.
+  double cpu_ms = 0.0;                          ///< Of the thread for each frame, in the mean.
+  std::shared_ptr<const std::string> map = {};  ///< As CompactHeights() has it; may be null.
+  double map_s = 0.0;                           ///< Steady time at which its images arrived.
 };
 
 /// Called on the thread; they post to the loop.
@@ -104,6 +106,7 @@ class MonitorSession {
   void Follow(Monitor& monitor, const MonitorOptions& options, const std::stop_token& stop);
   [[nodiscard]] std::vector<StreamInfo> Sensors(std::vector<Message>& warnings,
                                                 const std::stop_token& stop) const;
+  void AddMap(const Monitor& monitor, MonitorUpdate& update) const;
   void Note(const MonitorLine& line);
   void NoteShares(const std::vector<SensorShare>& shares);
   void JudgeBreath(MonitorLine& line, MonitorUpdate& update);

@@ -142,6 +142,7 @@ TEST_F(DaemonTwoSensorsTest, OneGoesOnAloneAndSaysSoAndTheOtherComesBack) {
   plumbd.WaitFor("the motion, seen by both", [](const json& status) {
     return Used("used", "used")(status) && IsWithin(status, 5.0) && !IsWithin(status, 0.0);
   });
+  EXPECT_EQ(engineer.Get("/api/v1/monitor/map").body.substr(0, 4), "PLM1");
   // The first one, which the appliance otherwise waits for.
   plumbd.Sim("unplug", kFirst);
   const json second = plumbd.WaitFor("the second one alone", [](const json& status) {
@@ -166,6 +167,7 @@ TEST_F(DaemonTwoSensorsTest, OneGoesOnAloneAndSaysSoAndTheOtherComesBack) {
     return now["advice"] == "unknown" && now["since_zero"].is_null() &&
            now["reason"] == "no_image" && Shares(status) == json{"no_image", "no_image"};
   });
+  EXPECT_EQ(engineer.Get("/api/v1/monitor/map").status, 404) << "none is newer than a second";
   plumbd.Sim("resume", kSecond);
   plumbd.WaitFor("the second one again", Used("no_image", "used"));
   plumbd.Press();

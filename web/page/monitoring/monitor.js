@@ -13,6 +13,7 @@ import { kAxes, signed, toleranceBar, withUnit } from '../numbers.js';
 import { signedForm } from '../signed_form.js';
 import { S, said, saidEach } from '../words.js';
 import { follow, sentence } from '../screens/common.js';
+import { liveMap } from './live_map.js';
 
 const kGrey_s = 0.2;
 const kUnknown_s = 0.15;
@@ -136,7 +137,9 @@ export function monitorView() {
   };
   const numbers = h('div', { class: 'live-both' });
   const breath = trace();
-  const element = h('div', { class: 'live-view' }, head, numbers, breath.element);
+  const map = liveMap();
+  const element = h('div', { class: 'live-view' }, head, numbers,
+    h('div', { class: 'live-pictures' }, breath.element, map.element));
   let saidLast = '';
   let drawn = '';
   let heard = null;
@@ -199,6 +202,7 @@ export function monitorView() {
     stop() {
       clearInterval(timer);
       unlisten();
+      map.stop();
     },
   };
 }
