@@ -128,8 +128,9 @@ export function monitorView() {
   const headline = h('p', { class: 'live-advice' });
   const reason = h('p', { class: 'live-why' });
   const oneSensor = h('p', { class: 'caution', hidden: true });
-  const head = h('div', {}, h('div', { class: 'live-head' }, headline,
-    h('p', { class: 'caution' }, S.monitor.notBeam)), reason, oneSensor);
+  const cautions = h('div', { class: 'live-cautions' },
+    h('p', { class: 'caution' }, S.monitor.notBeam), oneSensor);
+  const head = h('div', {}, h('div', { class: 'live-head' }, headline, cautions), reason);
   const tell = (tone, words, why) => {
     headline.className = `live-advice ${tone}`;
     headline.textContent = words;
