@@ -75,7 +75,7 @@ await h.step('the room shows the same, larger', async () => {
   await h.look(room, 'monitor-room-in', { fullPage: false });
 });
 
-await h.step('the map shows how the body lies now, twice a second, and what is not seen', async () => {
+await h.step('the map shows how the body lies now, and what of it is not seen', async () => {
   const map = (page) => page.locator('.live-map canvas');
   equal(await map(room).isVisible(), false, 'none is known yet');
   h.tell('lies 12');
