@@ -34,6 +34,8 @@ MonitorJob Appliance::MakeMonitorJob() {
   job.serial = last_serial_;
   const std::string& second = parts_.config.appliance.second_sensor_serial;
   if (!second.empty()) job.second.emplace().serial = second;
+  const ApplianceConfig& appliance = parts_.config.appliance;
+  job.fixed = {.serials = appliance.fixed_sensors, .file = appliance.state / "fixed-sensors.json"};
   job.compare = parts_.config.compare;
   job.room = room_.OfJob();
   const std::filesystem::path scan = store_->folders.Scan(last_result_->id);

@@ -72,6 +72,11 @@ MonitorCallbacks LiveMonitoring::CallbacksOf(std::uint64_t epoch) {
       judges_reference_ = judges;
     });
   };
+  callbacks.warned = [this, epoch](const std::vector<Message>& warnings) {
+    loop_.Post("monitoring warns", [this, epoch, warnings] {
+      if (epoch == epoch_) warnings_.insert(warnings_.end(), warnings.begin(), warnings.end());
+    });
+  };
   callbacks.update = [this, epoch](const MonitorUpdate& update) {
     loop_.Post("monitoring", [this, epoch, update] {
       if (epoch == epoch_ && session_) OnUpdate(update);

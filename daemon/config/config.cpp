@@ -226,6 +226,10 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
                say::config::ExpectedSecondSerial(), [&first](const std::string& s) {
                  return s.empty() || (s.size() <= 64 && !first.empty() && s != first);
                });
+  constexpr std::size_t kMostFixed = 2;
+  section.TakeNames("fixed_sensors", appliance.fixed_sensors,
+                    say::config::ExpectedFixedSensors(kMostFixed), kMostFixed,
+                    [](const std::string& s) { return s.size() <= 64; });
   section.TakeFlag("sensor_profiles", appliance.sensor_profiles);
   section.Take("quota_gb", appliance.quota_gb,
                say::config::ExpectedRange(say::config::Gigabytes(), 1, 100000),

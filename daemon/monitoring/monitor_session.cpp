@@ -12,6 +12,7 @@
 #include "daemon/files/compact_map.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/monitoring/common_clock.hpp"
+#include "daemon/monitoring/fixed_places.hpp"
 #include "daemon/monitoring_files/monitoring_file.hpp"
 #include "daemon/sweep/explain.hpp"
 #include "words/monitoring.hpp"
@@ -119,6 +120,31 @@ void MonitorSession::NoteZero(const Monitor& monitor, const MonitorOptions& opti
   AddEvent(event);
 }
 
+void MonitorSession::CheckPlaces(const Monitor& monitor, const MonitorOptions& options) {
+  std::vector<Message> found;
+  for (std::size_t i = 0; i < monitor.num_sensors(); ++i) {
+    const std::string& serial = i == 0 ? job_.serial : job_.second->serial;
+    if (!monitor.takes_part(i) || std::ranges::count(job_.fixed.serials, serial) == 0) continue;
+    if (!options.T_iec_reference) {
+      found.push_back(say::monitoring::PlaceUnchecked(serial, say::monitoring::RoomUnknown()));
+      continue;
+    }
+    const Pose T_reference_scene =
+        options.accepted ? options.accepted->T_reference_current : Pose::Identity();
+    const Message what = CheckFixedPlace(job_.fixed.file, serial,
+                                         *options.T_iec_reference * T_reference_scene *
+                                             monitor.sensor(i).place().T_camera_scene.inverse());
+    if (!what.empty()) found.push_back(what);
+  }
+  if (found.empty()) return;
+  for (const Message& what : found)
+    AddEvent({{"event", "fixed_sensor"},
+              {"time", MonitoringTime()},
+              {"what", what.English()},
+              {"what_message", MessageJson(what)}});
+  callbacks_.warned(found);
+}
+
 void MonitorSession::Watch(const std::stop_token& stop) {
   const Scene scene = ReadScene(job_.scene);
   std::optional<Scene> reference;
@@ -190,6 +216,7 @@ void MonitorSession::Follow(Monitor& monitor, const MonitorOptions& options,
     if (!is_zeroed && monitor.zero_time_s()) {
       is_zeroed = true;
       NoteZero(monitor, options);
+      CheckPlaces(monitor, options);
     }
     const double now_s = SteadySeconds();
     const bool changed = line.state != told.line.state || line.advice != told.line.advice ||

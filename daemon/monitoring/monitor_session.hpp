@@ -32,10 +32,17 @@ struct SecondOfMonitoring {
   std::function<std::optional<StreamInfo>(const std::stop_token&)> await;
 };
 
+/// Units that are fixed in the room for good, as CheckFixedPlace() has it.
+struct FixedSensors {
+  std::vector<std::string> serials = {};
+  std::filesystem::path file = {};
+};
+
 struct MonitorJob {
   StreamInfo info;  ///< From the sensor.
   std::string serial = {};
   std::optional<SecondOfMonitoring> second = {};  ///< Its frames are the feed's, of sensor 1.
+  FixedSensors fixed = {};
   CompareOptions compare;
   std::optional<RoomAxes> room;           ///< As ScanJob has it.
   std::filesystem::path scene;            ///< Of the body as it lies.
@@ -68,6 +75,8 @@ struct MonitorCallbacks {
   /// Once scene and reference are read.
   std::function<void(const std::vector<Message>& warnings, bool judges_reference)> begun;
   /// Ten times a second, and at once where state or advice change.
+  /// More of them, once it is zeroed.
+  std::function<void(const std::vector<Message>& warnings)> warned;
   std::function<void(const MonitorUpdate&)> update;
   std::function<void(const Message& why)> failed;
   /// The record on the disk ends although the session goes on.
@@ -111,6 +120,7 @@ class MonitorSession {
   void NoteShares(const std::vector<SensorShare>& shares);
   void JudgeBreath(MonitorLine& line, MonitorUpdate& update);
   void NoteZero(const Monitor& monitor, const MonitorOptions& options);
+  void CheckPlaces(const Monitor& monitor, const MonitorOptions& options);
 
   const MonitorJob job_;
   const MonitorCallbacks callbacks_;

@@ -202,6 +202,38 @@ TEST_F(DaemonTwoSensorsTest, WithoutTheSecondOneTheFirstMonitorsAloneAndSaysSo) 
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 
+TEST_F(DaemonMonitorTest, ThePlaceOfAFixedSensorIsLearnedByTheRoomsMarkersAndCheckedEachTime) {
+  const std::filesystem::path config = folder_ / "plumb.toml";
+  std::ofstream(config) << "[appliance]\nfixed_sensors = [\"VIRTUAL-0001\"]\n[iec]\n"
+                           "T_iec_reference = [[0, 1, 0, 0.1], [-1, 0, 0, 0.2], [0, 0, 1, -0.3], "
+                           "[0, 0, 0, 1]]\n";
+  Plumbd plumbd(folder_.path(),
+                {.arguments = {"--sim-rest", "--config", config.string()}, .scenes = 2});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("next-scene");
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("mount");
+  const auto warning = [&] {
+    EXPECT_TRUE(Monitor(plumbd, "start").value("ok", false));
+    const json now = plumbd.WaitFor(
+        "numbers", [](const json& status) { return status["monitor"]["since_zero"].is_object(); });
+    EXPECT_TRUE(Monitor(plumbd, "stop").value("ok", false));
+    plumbd.WaitForState("ready");
+    const json& warnings = now["monitor"]["warning_messages"];
+    return warnings.empty() ? std::string() : warnings[0]["id"].get<std::string>();
+  };
+  EXPECT_EQ(warning(), "monitoring.place_learned");
+  EXPECT_EQ(warning(), "") << "it stands where it did";
+  // As if it had been moved by 20 mm since it was learned.
+  const std::filesystem::path file = folder_ / "state" / "fixed-sensors.json";
+  json places = json::parse(std::ifstream(file));
+  places["VIRTUAL-0001"][3] = places["VIRTUAL-0001"][3].get<double>() + 0.02;
+  std::ofstream(file) << places;
+  EXPECT_EQ(warning(), "monitoring.place_other");
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
 TEST_F(DaemonMonitorTest, ALivePositionIsSignedOnlyWhereTheSettingSaysSo) {
   Plumbd plumbd(folder_.path(), {.arguments = {"--sim-rest"}, .scenes = 2});
   ASSERT_TRUE(plumbd.WaitUntilUp());

@@ -278,6 +278,14 @@ TEST(ConfigTest, ASecondSensorIsAnotherOneThanTheFirstWhichHasToBeNamed) {
     EXPECT_THAT(ErrorOf(text), HasSubstr("second_sensor_serial"));
 }
 
+TEST(ConfigTest, FixedSensorsAreTwoSerialsAtMost) {
+  const std::string key = "[appliance]\nfixed_sensors = ";
+  EXPECT_THAT(ParseConfig(key + "[\"A\", \"B\"]\n", "t").appliance.fixed_sensors,
+              ::testing::ElementsAre("A", "B"));
+  for (const char* bad : {"\"A\"", "[\"A\", \"B\", \"C\"]", "[1]", "[\"\"]"})
+    EXPECT_THAT(ErrorOf(key + bad + "\n"), HasSubstr("fixed_sensors")) << bad;
+}
+
 TEST(ConfigTest, TheFirstSettingsMayBeGiven) {
   const ApplianceConfig none = ParseConfig("[appliance]\n", "t").appliance;
   EXPECT_FALSE(none.auto_stop_s || none.scan_limit_s || none.keep_recordings);
