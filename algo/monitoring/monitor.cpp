@@ -33,7 +33,9 @@ constexpr double kMean_s = 0.4;
 constexpr double kAgree = 3.0;  // standard deviations
 // Sensors that are mounted within this time after the first one are zeroed with it.
 constexpr double kMountTogether_s = 1.0;
-// The fits at rest are spread over about this time.
+constexpr double kAway_s = 1.0;     // without an image: it may have been moved meanwhile
+constexpr int kChecksOnReturn = 3;  // as many images as its place is judged by
+// The fits at rest are spread over about this time for each sensor: each set of them is fitted.
 constexpr double kFitting_s = 0.6;
 // A body may begin to move ten seconds after the first frame: from nine on a whole breath is
 // enough, after this time of zeroing. It is looked for that often.
@@ -77,9 +79,31 @@ Vector6d Monitor::spread_at_zero() const {
   return largest == at_rest_.end() ? Vector6d(Vector6d::Zero()) : largest->second.spread;
 }
 
+SensorShare Monitor::share(std::size_t i) const {
+  const Sensor& sensor = sensors_.at(i);
+  if (!sensor.takes_part) return SensorShare::kLeftOut;
+  if (sensor.moved) return SensorShare::kMoved;
+  if (stage_ != Stage::kFollowing || !zero_time_s_) return SensorShare::kUsed;
+  // The first frames after the zero are not yet of all.
+  if (last_s_ - sensor.image_s.value_or(*zero_time_s_) > kLongestGap_s)
+    return SensorShare::kNoImage;
+  if (sensor.checks_due > 0) return SensorShare::kNoImage;  // none that is used yet
+  const bool is_used = std::ranges::find(used_, i) != used_.end();
+  return is_used || !sensor.image_s ? SensorShare::kUsed : SensorShare::kCovered;
+}
+
+std::optional<LiveMap> Monitor::Map() const {
+  std::vector<FitView> views;
+  for (const std::size_t i : SensorsThatMaySee(last_s_))
+    views.push_back(sensors_[i].at_rest.view(sensors_[i].modes_m));
+  if (views.empty()) return std::nullopt;
+  return MakeLiveMap(views);
+}
+
 std::optional<MonitorLine> Monitor::Add(const Frame& frame, std::size_t index) {
   Sensor& sensor = sensors_.at(index);
   if (!first_s_) first_s_ = frame.depth_time_s;
+  last_s_ = frame.depth_time_s;
   MonitorLine line{.time_s = frame.depth_time_s, .sensor = index};
   const bool any =
       std::ranges::any_of(sensors_, [](const Sensor& one) { return one.takes_part && !one.moved; });
@@ -167,11 +191,12 @@ void Monitor::TakeZeros(bool last) {
     zeroed.emplace_back(i, &sensor.at_rest);
     frames += sensor.at_rest.still_times_s().size();
   }
+  const std::size_t num_zeroed = zeroed.size();
   if (!zeroed.empty()) rest_fits_.emplace(std::move(zeroed), scene_.centroid_m);
   no_zero_ = !rest_fits_ || rest_fits_->size() == 0;
   if (no_zero_) return;
   const double frames_of_fitting =
-      std::max(1.0, static_cast<double>(frames) * kFitting_s /
+      std::max(1.0, static_cast<double>(frames * num_zeroed) * kFitting_s /
                         std::max(kFirstTry_s, *zero_tried_s_ - *zeroing_since_s_));
   fits_at_a_time_ = static_cast<std::size_t>(
       std::ceil(static_cast<double>(rest_fits_->size()) / frames_of_fitting));
@@ -224,7 +249,7 @@ SensorSet Monitor::SensorsThatMaySee(double time_s) const {
   SensorSet set;
   for (std::size_t i = 0; i < sensors_.size(); ++i) {
     const Sensor& sensor = sensors_[i];
-    if (sensor.takes_part && !sensor.moved && sensor.image_s &&
+    if (sensor.takes_part && !sensor.moved && sensor.checks_due == 0 && sensor.image_s &&
         time_s - *sensor.image_s <= kLongestGap_s)
       set.push_back(i);
   }
@@ -281,11 +306,18 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
     zero_time_s_ = frame.depth_time_s;
     for (Sensor& one : sensors_) one.markers_s = frame.depth_time_s;
   }
-  sensor.at_rest.See(frame);
+  if (sensor.image_s && frame.depth_time_s - *sensor.image_s > kAway_s) {
+    sensor.at_rest.ForgetPlace();
+    sensor.checks_due = kChecksOnReturn;
+  }
+  const bool was_checked = sensor.at_rest.See(frame);
   sensor.image_s = frame.depth_time_s;
   const PlaceCheck& check = sensor.at_rest.check();
   constexpr int kLeastMarkers = 3;
-  if (check.num_seen >= kLeastMarkers) sensor.markers_s = frame.depth_time_s;
+  if (check.num_seen >= kLeastMarkers) {
+    sensor.markers_s = frame.depth_time_s;
+    if (was_checked && sensor.checks_due > 0) --sensor.checks_due;
+  }
   line.markers_seen = check.num_seen;
   line.couch_moved = check.couch_moved;
   line.drift = sensor.at_rest.drift();
@@ -297,8 +329,11 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
     return;
   }
   SensorSet set = SensorsThatMaySee(line.time_s);
-  if (set.empty()) line.reason = BlindReason::kCovered;  // only the one that was just pushed
+  // Only one that was just pushed, or whose place is not known again.
+  if (set.empty())
+    line.reason = sensor.checks_due > 0 ? BlindReason::kUnguarded : BlindReason::kCovered;
   const std::optional<MotionFit> fit = FitAll(set, line);
+  used_ = fit ? set : SensorSet();
   if (!fit) {
     line.state = MonitorState::kBlind;
     recent_.clear();

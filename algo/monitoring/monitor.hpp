@@ -18,6 +18,7 @@
 #include "algo/base/pose.hpp"
 #include "algo/comparison/comparison.hpp"
 #include "algo/monitoring/advice.hpp"
+#include "algo/monitoring/live_map.hpp"
 #include "algo/monitoring/rest_statistics.hpp"
 #include "algo/monitoring/sensor_at_rest.hpp"
 #include "algo/types/frame.hpp"
@@ -41,6 +42,18 @@ enum class BlindReason : std::uint8_t {
 template <>
 inline constexpr auto kNamesOf<BlindReason> =
     NamesUpTo<BlindReason::kNoZero>({"none", "covered", "weak", "misfit", "unguarded", "no_zero"});
+
+/// What one of several sensors does for the numbers.
+enum class SensorShare : std::uint8_t {
+  kUsed,     ///< They rest on its images; or it is being mounted or zeroed.
+  kCovered,  ///< It sees too little of the body, or something else.
+  kNoImage,  ///< None for 150 ms.
+  kMoved,    ///< It was pushed, and takes no part any more.
+  kLeftOut,  ///< It was not zeroed with the others, and takes no part.
+};
+template <>
+inline constexpr auto kNamesOf<SensorShare> =
+    NamesUpTo<SensorShare::kLeftOut>({"used", "covered", "no_image", "moved", "left_out"});
 
 /// The accepted result of the scan that is monitored, against its reference.
 struct AcceptedMotion {
@@ -118,6 +131,11 @@ class Monitor {
   [[nodiscard]] const SensorAtRest& sensor(std::size_t i = 0) const { return sensors_[i].at_rest; }
   /// Whether it was zeroed.
   [[nodiscard]] bool takes_part(std::size_t i) const { return sensors_[i].takes_part; }
+  /// As of the last frame.
+  [[nodiscard]] SensorShare share(std::size_t i) const;
+  /// Of the newest image of each sensor that may be used, whether or not they give numbers; nothing
+  /// before the zero, and where there is none.
+  [[nodiscard]] std::optional<LiveMap> Map() const;
   /// Standard deviations of a single frame's motion while zeroing, about the centroid, by all
   /// sensors together: rotation vector, translation.
   [[nodiscard]] Vector6d spread_at_zero() const;
@@ -130,6 +148,7 @@ class Monitor {
     bool takes_part = true;
     bool moved = false;  ///< It was pushed and has lost its zero for good.
     std::optional<double> image_s = {}, markers_s = {};  ///< Last image, last one with markers.
+    int checks_due = 0;  ///< Of its place, since it was away: only then it is used again.
     Eigen::Vector2d modes_m = Eigen::Vector2d::Zero();
   };
   enum class Stage : std::uint8_t { kMounting, kZeroing, kFitting, kFollowing };
@@ -166,6 +185,8 @@ class Monitor {
 
   Pose T_last_ = Pose::Identity();
   SensorSet last_set_;
+  SensorSet used_;  ///< Of the last frame.
+  double last_s_ = 0.0;
   std::vector<std::pair<double, Vector6d>> recent_;  ///< Times and twists since zero.
 };
 

@@ -55,12 +55,7 @@ struct Equations {
 std::vector<Vector3d> MeasuredBy(const FitView& view) {
   std::vector<Vector3d> measured;
   for (std::size_t i = 0; i < view.grid.size(); ++i) {
-    float inverse = view.image.inverse_depth[i];
-    if (view.correction != nullptr) inverse *= (*view.correction)[i];
-    if (inverse <= 0) continue;
-    const double z = 1.0 / (static_cast<double>(inverse) * view.drift);
-    measured.push_back(view.T_scene_camera *
-                       Vector3d(view.image.ray[i].x() * z, view.image.ray[i].y() * z, z));
+    if (const auto point = MeasuredPoint(view, i)) measured.push_back(*point);
   }
   return measured;
 }
@@ -100,6 +95,15 @@ Equations EquationsOf(const FitView& view, const std::vector<Vector3d>& measured
 }
 
 }  // namespace
+
+std::optional<Vector3d> MeasuredPoint(const FitView& view, std::size_t block) {
+  float inverse = view.image.inverse_depth[block];
+  if (view.correction != nullptr) inverse *= (*view.correction)[block];
+  if (inverse <= 0) return std::nullopt;
+  const double z = 1.0 / (static_cast<double>(inverse) * view.drift);
+  const Eigen::Vector2f& ray = view.image.ray[block];
+  return view.T_scene_camera * Vector3d(ray.x() * z, ray.y() * z, z);
+}
 
 double MotionFit::visible() const {
   double used = 0, expected = 0;

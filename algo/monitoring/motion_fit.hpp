@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -31,6 +32,9 @@ struct FitView {
   /// Standard deviations assumed of the two patterns, about 0.
   Eigen::Vector2d mode_sigmas_m = Eigen::Vector2d::Constant(0.02);
 };
+
+/// What a block measured, scene frame; nothing where it measured nothing.
+[[nodiscard]] std::optional<Eigen::Vector3d> MeasuredPoint(const FitView& view, std::size_t block);
 
 /// What one sensor contributed to a fit.
 struct ViewFit {

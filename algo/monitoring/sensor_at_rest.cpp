@@ -271,19 +271,27 @@ void SensorAtRest::FindFaces() {
   }
 }
 
-void SensorAtRest::See(const Frame& frame) {
+bool SensorAtRest::See(const Frame& frame) {
   image_ = AverageBlocks(frame.depth_m, grid_, info_.usable_depth);
   for (std::size_t b = 0; b < recent_.size(); ++b) {
     const float now = image_.inverse_depth[b];
     if (now <= 0) continue;
     recent_[b] = recent_[b] > 0 ? recent_[b] + kRecent * (now - recent_[b]) : now;
   }
-  if (!check_time_s_ || frame.depth_time_s - *check_time_s_ >= kCheckInterval_s) {
+  const bool is_due = !check_time_s_ || frame.depth_time_s - *check_time_s_ >= kCheckInterval_s;
+  if (is_due) {
     check_time_s_ = frame.depth_time_s;
     CheckPlace(frame);
   }
   FollowDrift(frame.depth_time_s);
   MeasureSupport();
+  return is_due;
+}
+
+void SensorAtRest::ForgetPlace() {
+  std::ranges::fill(recent_, 0.0F);
+  watch_->Forget();
+  check_time_s_.reset();
 }
 
 void SensorAtRest::CheckPlace(const Frame& frame) {

@@ -62,8 +62,10 @@ class SensorAtRest {
   [[nodiscard]] bool Zero(ZeroKind kind = ZeroKind::kAny);
 
   /// Of a frame after the zero: averages it, follows the drift, checks the place some times a
-  /// second.
-  void See(const Frame& frame);
+  /// second. @return Whether this frame's place was checked.
+  bool See(const Frame& frame);
+  /// It was away: what it saw of its place before that proves nothing any more.
+  void ForgetPlace();
   /// What See() saw, for a fit that starts at these sizes of the breathing's patterns.
   [[nodiscard]] FitView view(const Eigen::Vector2d& modes_m) const {
     return ViewOf(image_, modes_m);

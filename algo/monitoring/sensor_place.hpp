@@ -77,6 +77,9 @@ class PlaceWatch {
       const SeenCorners& seen,
       const std::function<std::optional<bool>(const Pose& T_now_before)>& background_still);
 
+  /// The next image is judged without those before it: the sensor was away.
+  void Forget() { recent_.clear(); }
+
   /// Corners near which to search.
   [[nodiscard]] std::vector<ImageCorners> Expected() const;
   [[nodiscard]] const SeenCorners& at_start() const { return start_; }

@@ -271,6 +271,16 @@ void Appliance::OnSensor(const SensorEvent& event) {
   notices_.TellWatchers(SensorChanged(event));
   notices_.TellPage(web::EventKind::kStatus);
   if (event.kind == SensorEvent::Kind::kOthers || event.kind == SensorEvent::Kind::kStalled) return;
+  // Monitoring by two sensors goes on without the first one, and says so itself.
+  if (state_.phase == ApplianceState::kMonitoring &&
+      !parts_.config.appliance.second_sensor_serial.empty()) {
+    sensor_while_two_ = event;
+    return;
+  }
+  NoteSensor(event);
+}
+
+void Appliance::NoteSensor(const SensorEvent& event) {
   sensor_fault_ = event.reason;
   (void)Handle(event.kind == SensorEvent::Kind::kReady  ? ScanEvent::kSensorReady
                : event.kind == SensorEvent::Kind::kLost ? ScanEvent::kSensorLost

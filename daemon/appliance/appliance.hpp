@@ -123,6 +123,7 @@ class Appliance : private StorageUser {
   void AddListeners(ScanCallbacks& callbacks);
   [[nodiscard]] ScanCallbacks MakeCallbacks(const NewScan& scan);
   void OnSensor(const SensorEvent& event);
+  void NoteSensor(const SensorEvent& event);
   void LogSensor(const SensorEvent& event);
   void OnUpdate(const ScanUpdate& update);
   void OnEnded(const EndedScan& outcome);
@@ -165,8 +166,9 @@ class Appliance : private StorageUser {
   Message sensor_fault_, scan_fault_, rolled_back_;
   CurrentScan scan_;
   std::optional<CurrentScan> last_result_;
-  ScanCounts counts_;        ///< Since the start.
-  std::string last_serial_;  ///< Serial of the last used sensor.
+  ScanCounts counts_;                            ///< Since the start.
+  std::string last_serial_;                      ///< Serial of the last used sensor.
+  std::optional<SensorEvent> sensor_while_two_;  ///< The first one's, of two that monitor.
   PageNotes page_;
   int ticks_to_messages_ = 0;  ///< Until what needs a person is looked for.
   IndicatorPattern shown_ = IndicatorPattern::kOff;

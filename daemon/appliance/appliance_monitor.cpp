@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Live monitoring of the body that was scanned last.
+#include <chrono>
+#include <memory>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +13,11 @@
 #include "words/monitoring.hpp"
 
 namespace plumb {
+namespace {
+
+constexpr std::chrono::seconds kSecondOpens{8};
+
+}  // namespace
 
 Appliance::Answer Appliance::WhyNotMonitor() const {
   if (Message why = WhyNotScan(); !why.empty()) return why;
@@ -24,6 +31,11 @@ Appliance::Answer Appliance::WhyNotMonitor() const {
 MonitorJob Appliance::MakeMonitorJob() {
   MonitorJob job;
   job.info = sensors_.snapshot().info;
+  job.serial = last_serial_;
+  const std::string& second = parts_.config.appliance.second_sensor_serial;
+  if (!second.empty()) job.second.emplace().serial = second;
+  const ApplianceConfig& appliance = parts_.config.appliance;
+  job.fixed = {.serials = appliance.fixed_sensors, .file = appliance.state / "fixed-sensors.json"};
   job.compare = parts_.config.compare;
   job.room = room_.OfJob();
   const std::filesystem::path scan = store_->folders.Scan(last_result_->id);
@@ -31,6 +43,7 @@ MonitorJob Appliance::MakeMonitorJob() {
   if (WhyNoRecord().empty())
     job.record = {.scan = scan,
                   .head = {{"scan", last_result_->id}, {"sensor_serial", last_serial_}}};
+  if (job.record && job.second) job.record->head["second_sensor_serial"] = second;
   if (last_result_->reference_id.empty()) return job;
   const std::optional<Reference> reference = store_->references.Approved(last_result_->patient_id);
   // Another one than the scan was compared with is another question.
@@ -84,8 +97,13 @@ bool Appliance::PressMonitors() const {
 void Appliance::StartMonitor() {
   monitor_end_ = {};
   try {
-    const std::shared_ptr<LiveFeed> feed = monitoring_.Begin(
-        MakeMonitorJob(), last_result_->id, last_result_->patient_id, WhyNoRecord());
+    MonitorJob job = MakeMonitorJob();
+    const auto feed = std::make_shared<LiveFeed>(job.queue_capacity * (job.second ? 2 : 1));
+    if (job.second)
+      job.second->await = [this, feed](const std::stop_token& stop) {
+        return sensors_.AwaitSecond(feed, kSecondOpens, stop);
+      };
+    monitoring_.Begin(std::move(job), feed, *last_result_, WhyNoRecord());
     sensors_.BeginScan(feed, /*is_sweep=*/false);
   } catch (const std::exception& error) {
     loop_.Post("monitoring failed", [this, why = MessageOf(error)] { OnMonitorFailed(why); });
@@ -96,6 +114,9 @@ void Appliance::EndMonitor() {
   monitored_ = monitoring_.End(std::exchange(monitor_end_, {}));
   sensors_.EndScan();
   session_.ArmTimer();
+  // What the first of two sensors did meanwhile counts now.
+  if (const auto event = std::exchange(sensor_while_two_, std::nullopt))
+    loop_.Post("sensor", [this, event = *event] { NoteSensor(event); });
 }
 
 void Appliance::OnMonitorFailed(const Message& why) {

@@ -35,6 +35,23 @@ MotionNumbers NumbersOf(const LiveNumbers& numbers) {
   return shown;
 }
 
+// Of two sensors, one alone is used.
+Message OneSensor(const std::vector<MonitorSensor>& sensors) {
+  if (sensors.size() != 2) return {};
+  const std::string used(Name(SensorShare::kUsed));
+  if ((sensors[0].share == used) == (sensors[1].share == used)) return {};
+  const bool is_first = sensors[0].share == used;
+  const MonitorSensor& other = sensors[is_first ? 1 : 0];
+  const std::string& left = sensors[is_first ? 0 : 1].serial;
+  if (other.share == Name(SensorShare::kCovered))
+    return say::monitoring::SensorCovered(other.serial, left);
+  if (other.share == Name(SensorShare::kMoved))
+    return say::monitoring::SensorPushed(other.serial, left);
+  if (other.share == Name(SensorShare::kLeftOut))
+    return say::monitoring::SensorLeftOut(other.serial, left);
+  return say::monitoring::SensorSilent(other.serial, left);
+}
+
 }  // namespace
 
 LiveMonitoring::LiveMonitoring(EventLoop& loop, const Notices& notices, WorkThread& store_thread)
@@ -53,6 +70,11 @@ MonitorCallbacks LiveMonitoring::CallbacksOf(std::uint64_t epoch) {
       if (epoch != epoch_) return;
       warnings_.insert(warnings_.end(), warnings.begin(), warnings.end());
       judges_reference_ = judges;
+    });
+  };
+  callbacks.warned = [this, epoch](const std::vector<Message>& warnings) {
+    loop_.Post("monitoring warns", [this, epoch, warnings] {
+      if (epoch == epoch_) warnings_.insert(warnings_.end(), warnings.begin(), warnings.end());
     });
   };
   callbacks.update = [this, epoch](const MonitorUpdate& update) {
@@ -82,13 +104,14 @@ MonitorCallbacks LiveMonitoring::CallbacksOf(std::uint64_t epoch) {
   return callbacks;
 }
 
-std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::string& scan_id,
-                                                const std::string& patient_id,
-                                                const Message& why_no_record) {
-  scan_id_ = scan_id;
-  patient_id_ = patient_id;
+void LiveMonitoring::Begin(MonitorJob job, const std::shared_ptr<LiveFeed>& feed,
+                           const CurrentScan& scan, const Message& why_no_record) {
+  scan_id_ = scan.id;
+  patient_id_ = scan.patient_id;
   limits_ = job.compare.limits;
   judges_reference_ = !job.reference_scene.empty();
+  serials_.clear();
+  if (job.second) serials_ = {job.serial, job.second->serial};
   warnings_.clear();
   accepted_.reset();
   ended_ = {};
@@ -98,7 +121,7 @@ std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::strin
   began_s_ = SteadySeconds();
   is_recorded_ = job.record.has_value();
   if (!why_no_record.empty()) warnings_.push_back(why_no_record);
-  session_ = std::make_shared<MonitorSession>(std::move(job), CallbacksOf(++epoch_));
+  session_ = std::make_shared<MonitorSession>(std::move(job), feed, CallbacksOf(++epoch_));
   std::shared_ptr<MonitorSession> before = session_;
   {
     const std::lock_guard lock(record_mutex_);
@@ -107,7 +130,6 @@ std::shared_ptr<LiveFeed> LiveMonitoring::Begin(MonitorJob job, const std::strin
   // The thread of the session before may still be ending; the loop does not wait for it.
   (void)store_thread_.Post([ended = std::move(before)]() mutable { ended.reset(); });
   tick_.ArmAfter(kLookAtAge);
-  return session_->feed();
 }
 
 Message LiveMonitoring::End(const Message& why) {
@@ -163,6 +185,15 @@ MonitorStatus LiveMonitoring::status() const {
   status.frames_dropped = last_->frames_dropped;
   status.has_breathing = last_->has_breathing;
   status.couch_moved = line.couch_moved;
+  status.cpu_ms = last_->cpu_ms;
+  if (last_->shares.size() == serials_.size()) {
+    for (std::size_t i = 0; i < serials_.size(); ++i)
+      status.sensors.push_back(
+          {.serial = serials_[i],
+           .share = std::string(
+               Name(age_s > kLongestGap_s ? SensorShare::kNoImage : last_->shares[i]))});
+  }
+  status.one_sensor = OneSensor(status.sensors);
   if (!latencies_s_.empty()) {
     std::vector<double> latencies(latencies_s_.begin(), latencies_s_.end());
     status.latency_ms = 1e3 * TakeQuantile(latencies, 0.95);
@@ -185,6 +216,11 @@ MonitorStatus LiveMonitoring::status() const {
   if (line.against_reference) status.against_reference = NumbersOf(*line.against_reference);
   if (line.breathing_m) status.breathing_mm = *line.breathing_m / kMillimetre;
   return status;
+}
+
+std::shared_ptr<const std::string> LiveMonitoring::Map() const {
+  const bool is_new = last_ && SteadySeconds() - last_->map_s <= kGone_s;
+  return is_new ? last_->map : nullptr;
 }
 
 IndicatorPattern LiveMonitoring::Pattern() const {

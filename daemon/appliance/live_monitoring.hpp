@@ -14,6 +14,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "algo/base/message.hpp"
+#include "daemon/appliance/current_scan.hpp"
 #include "daemon/appliance/notices.hpp"
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/work_thread.hpp"
@@ -57,15 +58,16 @@ class LiveMonitoring {
   void NoteAccepted(const AcceptedLive& accepted, const std::string& advice);
 
   /// For the appliance: frames go to the feed from now on.
-  /// @param why_no_record  Why the job names no place for one; shown.
-  [[nodiscard]] std::shared_ptr<LiveFeed> Begin(MonitorJob job, const std::string& scan_id,
-                                                const std::string& patient_id,
-                                                const Message& why_no_record = {});
+  /// @param scan  Of the body. @param why_no_record  Why the job names no place for one; shown.
+  void Begin(MonitorJob job, const std::shared_ptr<LiveFeed>& feed, const CurrentScan& scan,
+             const Message& why_no_record = {});
   /// @param why  It could not go on; empty: it was ended. @return For the audit log.
   Message End(const Message& why);
 
   [[nodiscard]] bool IsActive() const { return session_ != nullptr; }
   [[nodiscard]] MonitorStatus status() const;
+  /// As MonitoringService::MonitorMap().
+  [[nodiscard]] std::shared_ptr<const std::string> Map() const;
   [[nodiscard]] IndicatorPattern Pattern() const;
   /// Of this or the last session; null without one. From any thread.
   [[nodiscard]] std::shared_ptr<const MonitorSession> Record() const;
@@ -84,6 +86,7 @@ class LiveMonitoring {
   std::string scan_id_, patient_id_;
   AcceptanceLimits limits_;
   bool judges_reference_ = false, is_recorded_ = false;
+  std::vector<std::string> serials_;  ///< Of two sensors; empty with one.
   std::vector<Message> warnings_;
   std::optional<AcceptedLive> accepted_;
   Message ended_;

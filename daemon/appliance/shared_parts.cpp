@@ -43,6 +43,7 @@ SharedParts::SharedParts(EventLoop& its_loop, ApplianceParts its_parts)
             [this](const Message& found) { peers_changed(found); }),
       sensors(given.make_provider,
               SensorThreadOptions{.serial = given.config.appliance.sensor_serial,
+                                  .second_serial = given.config.appliance.second_sensor_serial,
                                   .before_scan = given.before_scan},
               [this](const SensorEvent& event) {
                 loop.Post("sensor", [this, event] { sensor_changed(event); });

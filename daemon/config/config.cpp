@@ -221,6 +221,15 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
   section.TakePath("calibration", appliance.calibration);
   section.Take("sensor_serial", appliance.sensor_serial, say::config::ExpectedSensorSerial(),
                [](const std::string& s) { return s.size() <= 64; });
+  const std::string& first = appliance.sensor_serial;
+  section.Take("second_sensor_serial", appliance.second_sensor_serial,
+               say::config::ExpectedSecondSerial(), [&first](const std::string& s) {
+                 return s.empty() || (s.size() <= 64 && !first.empty() && s != first);
+               });
+  constexpr std::size_t kMostFixed = 2;
+  section.TakeNames("fixed_sensors", appliance.fixed_sensors,
+                    say::config::ExpectedFixedSensors(kMostFixed), kMostFixed,
+                    [](const std::string& s) { return s.size() <= 64; });
   section.TakeFlag("sensor_profiles", appliance.sensor_profiles);
   section.Take("quota_gb", appliance.quota_gb,
                say::config::ExpectedRange(say::config::Gigabytes(), 1, 100000),
@@ -441,6 +450,8 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("appliance.keep_recordings", in_use.appliance.keep_recordings,
        next.appliance.keep_recordings);
   keep("appliance.sensor_serial", in_use.appliance.sensor_serial, next.appliance.sensor_serial);
+  keep("appliance.second_sensor_serial", in_use.appliance.second_sensor_serial,
+       next.appliance.second_sensor_serial);
   keep("sensor.driver", in_use.appliance.sensor_driver, next.appliance.sensor_driver);
   keep("sensor.socket", in_use.appliance.sensor_socket, next.appliance.sensor_socket);
   keep("sensor.library", in_use.appliance.sensor_library, next.appliance.sensor_library);

@@ -26,9 +26,11 @@ struct ApplianceConfig {
   std::filesystem::path state = "/var/lib/plumb";
   std::filesystem::path control = "/run/plumb/control.sock";
   std::filesystem::path calibration =
-      "/var/lib/plumb/calibration";  ///< Contains SERIAL.yaml for each calibrated sensor.
-  std::string sensor_serial;         ///< Use only this sensor; empty: the first one.
-  std::string sensor_driver;         ///< Driver of the sensors; empty: the first of the build.
+      "/var/lib/plumb/calibration";       ///< Contains SERIAL.yaml for each calibrated sensor.
+  std::string sensor_serial;              ///< Use only this sensor; empty: the first one.
+  std::string second_sensor_serial = {};  ///< For live monitoring; empty: there is one alone.
+  std::vector<std::string> fixed_sensors = {};  ///< Serials of units that stand for good.
+  std::string sensor_driver;  ///< Driver of the sensors; empty: the first of the build.
   std::filesystem::path sensor_socket =
       "/run/plumb/sensor.sock";          ///< Where the driver "stream" listens.
   std::filesystem::path sensor_library;  ///< A maker's; empty: the newest found.
@@ -150,9 +152,9 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to IEC fixed frame,
 ///                    u95_mm, u95_deg, markers (folder of a scene of the same room)
 ///     [storage]      backup_folder, backup_hours, backup_recipients, backup_key_file
-///     [appliance]    state, control, calibration, sensor_serial, sensor_profiles, quota_gb,
-///                    auto_stop_s, scan_limit_s, keep_recordings, warm_up_min, session_idle_min,
-///                    room_max_age_days
+///     [appliance]    state, control, calibration, sensor_serial, second_sensor_serial,
+///                    fixed_sensors, sensor_profiles, quota_gb, auto_stop_s, scan_limit_s,
+///                    keep_recordings, warm_up_min, session_idle_min, room_max_age_days
 ///     [sensor]       driver, socket
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low

@@ -25,8 +25,24 @@
 
 namespace plumb {
 
+/// A second sensor at rest beside the first one.
+struct SecondOfMonitoring {
+  std::string serial;
+  /// Waits until it is open; nothing if it is not in time. Called on the session's thread.
+  std::function<std::optional<StreamInfo>(const std::stop_token&)> await;
+};
+
+/// Units that are fixed in the room for good, as CheckFixedPlace() has it.
+struct FixedSensors {
+  std::vector<std::string> serials = {};
+  std::filesystem::path file = {};
+};
+
 struct MonitorJob {
   StreamInfo info;  ///< From the sensor.
+  std::string serial = {};
+  std::optional<SecondOfMonitoring> second = {};  ///< Its frames are the feed's, of sensor 1.
+  FixedSensors fixed = {};
   CompareOptions compare;
   std::optional<RoomAxes> room;           ///< As ScanJob has it.
   std::filesystem::path scene;            ///< Of the body as it lies.
@@ -34,7 +50,8 @@ struct MonitorJob {
   /// As ScanJob has it.
   std::function<Message(const std::stop_token&)> check_reference;
   std::optional<MonitorRecordPlace> record = {};  ///< Nothing: it is kept in memory only.
-  std::size_t queue_capacity = 4;    ///< Frames that may wait: an old number is of no use.
+  /// Frames of each sensor that may wait: an old number is of no use.
+  std::size_t queue_capacity = 4;
   std::size_t most_lines = 108'000;  ///< Of the record: an hour at 30 Hz; the oldest leave.
 };
 
@@ -47,6 +64,10 @@ struct MonitorUpdate {
   std::optional<BreathWindow> breath_window = {};
   LiveAdvice breath = LiveAdvice::kUnknown;  ///< With a window; the line's advice holds it.
   std::int64_t frames = 0, frames_dropped = 0;
+  std::vector<SensorShare> shares = {};         ///< Of each sensor.
+  double cpu_ms = 0.0;                          ///< Of the thread for each frame, in the mean.
+  std::shared_ptr<const std::string> map = {};  ///< As CompactHeights() has it; may be null.
+  double map_s = 0.0;                           ///< Steady time at which its images arrived.
 };
 
 /// Called on the thread; they post to the loop.
@@ -54,6 +75,8 @@ struct MonitorCallbacks {
   /// Once scene and reference are read.
   std::function<void(const std::vector<Message>& warnings, bool judges_reference)> begun;
   /// Ten times a second, and at once where state or advice change.
+  /// More of them, once it is zeroed.
+  std::function<void(const std::vector<Message>& warnings)> warned;
   std::function<void(const MonitorUpdate&)> update;
   std::function<void(const Message& why)> failed;
   /// The record on the disk ends although the session goes on.
@@ -65,12 +88,12 @@ struct MonitorCallbacks {
 /// All functions but the constructor are thread-safe.
 class MonitorSession {
  public:
-  MonitorSession(MonitorJob job, MonitorCallbacks callbacks);
+  /// @param feed  Of the sensors' frames.
+  MonitorSession(MonitorJob job, std::shared_ptr<LiveFeed> feed, MonitorCallbacks callbacks);
   ~MonitorSession();
   MonitorSession(const MonitorSession&) = delete;
   MonitorSession& operator=(const MonitorSession&) = delete;
 
-  [[nodiscard]] const std::shared_ptr<LiveFeed>& feed() const { return feed_; }
   /// Ends the thread soon; the destructor waits for that.
   void End();
   /// As BreathGate has it; the next frame is judged by it.
@@ -89,9 +112,15 @@ class MonitorSession {
   void BeginRecord(const MonitorOptions& options);
   void EndRecord(const Message& why);
   void Watch(const std::stop_token& stop);
+  void Follow(Monitor& monitor, const MonitorOptions& options, const std::stop_token& stop);
+  [[nodiscard]] std::vector<StreamInfo> Sensors(std::vector<Message>& warnings,
+                                                const std::stop_token& stop) const;
+  void AddMap(const Monitor& monitor, MonitorUpdate& update) const;
   void Note(const MonitorLine& line);
+  void NoteShares(const std::vector<SensorShare>& shares);
   void JudgeBreath(MonitorLine& line, MonitorUpdate& update);
   void NoteZero(const Monitor& monitor, const MonitorOptions& options);
+  void CheckPlaces(const Monitor& monitor, const MonitorOptions& options);
 
   const MonitorJob job_;
   const MonitorCallbacks callbacks_;

@@ -21,13 +21,14 @@ class LiveFeed : public FrameFeed {
  public:
   explicit LiveFeed(std::size_t capacity) : queue_(capacity) {}
 
-  /// Called on the sensor thread; never waits.
-  void Push(Frame frame) {
+  /// Called on the sensor's thread; never waits.
+  /// @param sensor  Which of several.
+  void Push(Frame frame, std::size_t sensor = 0) {
     const std::lock_guard lock(mutex_);
     // arrived after the end of the sweep, so it does not belong to it and is not lost
     if (closed_) return;
     last_frame_s_ = SteadySeconds();
-    dropped_ += queue_.PushDroppingOldest({std::move(frame), last_frame_s_});
+    dropped_ += queue_.PushDroppingOldest({std::move(frame), last_frame_s_, sensor});
     ++num_pushed_;
   }
   /// No more frames follow; waiting ones are still delivered.
@@ -50,6 +51,8 @@ class LiveFeed : public FrameFeed {
   [[nodiscard]] std::int64_t num_pushed() const { return num_pushed_; }
   /// Steady time at which the frame that Next() returned last arrived.
   [[nodiscard]] double taken_arrived_s() const { return taken_arrived_s_; }
+  /// Which sensor it is of; only for who calls Next().
+  [[nodiscard]] std::size_t taken_sensor() const { return taken_sensor_; }
 
   /// @throws DeviceError after Fail().
   std::optional<Frame> Next(const std::stop_token& stop) override {
@@ -59,6 +62,7 @@ class LiveFeed : public FrameFeed {
       return std::nullopt;
     }
     taken_arrived_s_ = arrived->time_s;
+    taken_sensor_ = arrived->sensor;
     return std::move(arrived->frame);
   }
   int TakeDropped() override { return dropped_.exchange(0); }
@@ -74,11 +78,13 @@ class LiveFeed : public FrameFeed {
   struct Arrived {
     Frame frame;
     double time_s = 0.0;
+    std::size_t sensor = 0;
   };
   BoundedQueue<Arrived> queue_;
   std::mutex mutex_;  // guards pushing and closing
   bool closed_ = false;
   Message failure_;
+  std::size_t taken_sensor_ = 0;
   std::atomic<int> dropped_ = 0;
   std::atomic<std::int64_t> num_pushed_ = 0;
   std::atomic<double> last_frame_s_ = 0.0, taken_arrived_s_ = 0.0;

@@ -81,6 +81,7 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const PlumbdOptions& options, co
                          .height = is_small ? 240 : 480,
                          .max_scenes = static_cast<std::size_t>(options.sim_scenes),
                          .at_rest = options.sim_rest,
+                         .second_serial = config.appliance.second_sensor_serial,
                          .plugged = !options.sim_unplugged,
                          .room = options.sim_room};
   if (options.sim_board) {

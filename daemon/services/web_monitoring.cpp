@@ -32,6 +32,7 @@ class WebMonitoring final : public web::MonitoringService {
       : monitoring_(monitoring), store_(store) {}
 
   MonitorStatus GetMonitor() override { return monitoring_.status(); }
+  std::shared_ptr<const std::string> MonitorMap() override { return monitoring_.Map(); }
 
   void StartMonitor(const Actor& actor, Done done) override {
     done(AnswerOf(monitoring_.Start(actor)));

@@ -11,6 +11,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/sweep/explain.hpp"
+#include "daemon/sweep/second_sensor.hpp"
 #include "drivers/live/sensor_driver.hpp"
 #include "words/scan.hpp"
 
@@ -56,6 +57,7 @@ struct SensorThread::Impl {
   std::atomic<double> heartbeat = SteadySeconds();
 
   std::unique_ptr<SensorProvider> provider;
+  SecondSensor second{options.second_serial};
   std::shared_ptr<LiveFeed> feed;  // destination of the frames
   std::weak_ptr<LiveFeed>
       spoiled;         // its sensor was unplugged: frames of the next one do not belong to it
@@ -72,6 +74,7 @@ struct SensorThread::Impl {
       heartbeat = SteadySeconds();
       try {
         if (!provider) MakeProvider();
+        TendSecond();
         if (!sensor) Find();
         // The destructor asks to stop before it looks for a sensor to interrupt: one that has been
         // opened since then would wait for a frame for good.
@@ -96,7 +99,17 @@ struct SensorThread::Impl {
       }
     }
     Drop();
+    second.Close();
     provider.reset();
+  }
+
+  void TendSecond() {
+    std::shared_ptr<LiveFeed> to;
+    {
+      const std::lock_guard lock(mutex);
+      if (!is_sweep) to = wanted;
+    }
+    second.Tend(provider.get(), to);
   }
 
   void MakeProvider() {
@@ -129,11 +142,13 @@ struct SensorThread::Impl {
     if (match == attached.end()) {
       retry_at.reset();
       retry = options.first_retry;
-      if (attached.empty() || options.serial.empty()) {
+      const auto wrong = std::ranges::find_if(
+          attached, [&](const SensorDescription& one) { return one.serial != second.serial(); });
+      if (wrong == attached.end() || options.serial.empty()) {
         NotifyOnce(SensorEvent::Kind::kLost, {});
       } else {
         NotifyOnce(SensorEvent::Kind::kFailed,
-                   say::scan::WrongSensor(options.serial, attached.front().serial));
+                   say::scan::WrongSensor(options.serial, wrong->serial));
       }
       return;
     }
@@ -149,11 +164,11 @@ struct SensorThread::Impl {
                .others = Others(attached, sensor->description())};
   }
 
-  static std::vector<std::string> Others(const std::vector<SensorDescription>& attached,
-                                         const SensorDescription& used) {
+  [[nodiscard]] std::vector<std::string> Others(const std::vector<SensorDescription>& attached,
+                                                const SensorDescription& used) const {
     std::vector<std::string> others;
     for (const SensorDescription& one : attached) {
-      if (one.uri != used.uri) others.push_back(one.serial);
+      if (one.uri != used.uri && one.serial != second.serial()) others.push_back(one.serial);
     }
     return others;
   }
@@ -167,7 +182,9 @@ struct SensorThread::Impl {
     const std::vector<SensorDescription> attached = provider->List();
     std::vector<std::string> others = Others(attached, sensor->description());
     // the one in use was unplugged: Next() will report it
-    if (others.size() == attached.size()) return;
+    if (std::ranges::find(attached, sensor->description().uri, &SensorDescription::uri) ==
+        attached.end())
+      return;
     {
       const std::lock_guard lock(mutex);
       if (others == current.others) return;
@@ -246,7 +263,8 @@ struct SensorThread::Impl {
   }
 
   void Drop() {
-    if (feed) spoiled = std::exchange(feed, nullptr);
+    const std::shared_ptr<LiveFeed> left = std::exchange(feed, nullptr);
+    if (left && (is_sweep || options.second_serial.empty())) spoiled = left;
     std::shared_ptr<LiveSensor> gone;
     const std::lock_guard lock(mutex);
     gone = std::move(sensor);
@@ -297,6 +315,12 @@ void SensorThread::EndScan() {
     feed = std::exchange(impl_->wanted, nullptr);
   }
   if (feed) feed->Close();
+}
+
+std::optional<StreamInfo> SensorThread::AwaitSecond(const std::shared_ptr<LiveFeed>& feed,
+                                                    std::chrono::milliseconds patience,
+                                                    const std::stop_token& stop) const {
+  return impl_->second.AwaitInfo(feed, patience, stop);
 }
 
 SensorSnapshot SensorThread::snapshot() const {

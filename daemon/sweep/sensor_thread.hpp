@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,9 @@ namespace plumb {
 
 struct SensorThreadOptions {
   std::string serial;  ///< Use only this unit; empty: the first one.
+  /// Of another unit, which delivers to the feeds that are of no sweep, too. With it, the first one
+  /// delivers to such a feed again after it was unplugged.
+  std::string second_serial = {};
   /// Called on the sensor thread when a scan begins, just before waiting for its first frame. May
   /// throw DeviceError.
   std::function<void()> before_scan;
@@ -67,6 +71,10 @@ class SensorThread {
   /// Closes the feed.
   void EndScan();
 
+  /// As SecondSensor has it. From any thread.
+  [[nodiscard]] std::optional<StreamInfo> AwaitSecond(const std::shared_ptr<LiveFeed>& feed,
+                                                      std::chrono::milliseconds patience,
+                                                      const std::stop_token& stop) const;
   [[nodiscard]] SensorSnapshot snapshot() const;
   /// The newest frame; none without a sensor.
   [[nodiscard]] std::optional<Frame> latest() const;

@@ -52,6 +52,8 @@ struct SimulatedSweeps {
   /// Also what a sensor at rest sees of the body of the last scene, while it breathes, and after it
   /// was moved by 5 mm.
   bool at_rest = false;
+  /// With `at_rest`: of a second unit, which sees the same body from its other side; empty: none.
+  std::string second_serial = {};
   bool plugged = true;  ///< Whether the unit is attached at the start.
   /// Centres of the room calibration board's markers on its sheet, by id. If set, three scenes of
   /// the board come first.

@@ -2,8 +2,10 @@
 // Live monitoring by the whole plumbd: two sweeps, then the sensor at rest over the body, which is
 // moved while it is watched.
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <string>
 #include <thread>
@@ -78,6 +80,157 @@ TEST_F(DaemonMonitorTest, WatchesTheBodyAfterASweepAndHoldsWhenItMoves) {
   EXPECT_EQ(ended["active"], false);
   EXPECT_TRUE(ended["since_zero"].is_null());
   EXPECT_NE(ended["ended"], "");
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+/// Two sensors on both sides of the body.
+class DaemonTwoSensorsTest : public DaemonMonitorTest {
+ protected:
+  static constexpr const char* kFirst = "VIRTUAL-0001";
+  static constexpr const char* kSecond = "VIRTUAL-0002";
+
+  DaemonTwoSensorsTest() {
+    std::ofstream(folder_ / "plumb.toml") << "[appliance]\nsensor_serial = \"" << kFirst
+                                          << "\"\nsecond_sensor_serial = \"" << kSecond << "\"\n";
+  }
+  static json Shares(const json& status) {
+    json shares = json::array();
+    for (const json& sensor : status["monitor"]["sensors"]) shares.push_back(sensor["share"]);
+    return shares;
+  }
+  static auto Used(const char* first, const char* second) {
+    return [=](const json& status) {
+      return status["monitor"]["state"] == "monitoring" && Shares(status) == json{first, second} &&
+             status["monitor"]["since_zero"].is_object();
+    };
+  }
+  /// Of the motion that `move` makes, 3 and 4 mm; of none before it.
+  static bool IsWithin(const json& status, double mm) {
+    const json& numbers = status["monitor"]["since_zero"];
+    double square = 0, variance = 0;
+    for (const char* axis : {"lateral", "longitudinal", "vertical"}) {
+      const std::string name(axis);
+      square += std::pow(numbers[name + "_mm"].get<double>(), 2);
+      variance += std::pow(numbers[name + "_u95_mm"].get<double>(), 2);
+    }
+    return std::abs(std::sqrt(square) - mm) <= std::sqrt(variance);
+  }
+  static double U95(const json& status) {
+    return status["monitor"]["since_zero"]["lateral_u95_mm"].get<double>() +
+           status["monitor"]["since_zero"]["longitudinal_u95_mm"].get<double>();
+  }
+};
+
+TEST_F(DaemonTwoSensorsTest, OneGoesOnAloneAndSaysSoAndTheOtherComesBack) {
+  Plumbd plumbd(
+      folder_.path(),
+      {.arguments = {"--sim-rest", "--config", (folder_ / "plumb.toml").string()}, .scenes = 2});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  EXPECT_EQ(plumbd.Status()["sensor"]["others"], json::array()) << "the second one has its use";
+  test::HttpClient engineer = plumbd.MakeFirstAccount();
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("next-scene");
+  const std::string scan = plumbd.ScanOnce()["last_result"]["scan"];
+  plumbd.Sim("mount");
+  ASSERT_TRUE(Monitor(plumbd, "start").value("ok", false));
+  const json both = plumbd.WaitFor("both sensors", Used("used", "used"));
+  EXPECT_EQ(both["monitor"]["sensors"][0]["serial"], kFirst);
+  EXPECT_EQ(both["monitor"]["sensors"][1]["serial"], kSecond);
+  EXPECT_EQ(both["monitor"]["one_sensor"], "");
+
+  plumbd.Sim("move");
+  plumbd.WaitFor("the motion, seen by both", [](const json& status) {
+    return Used("used", "used")(status) && IsWithin(status, 5.0) && !IsWithin(status, 0.0);
+  });
+  EXPECT_EQ(engineer.Get("/api/v1/monitor/map").body.substr(0, 4), "PLM1");
+  // The first one, which the appliance otherwise waits for.
+  plumbd.Sim("unplug", kFirst);
+  const json second = plumbd.WaitFor("the second one alone", [](const json& status) {
+    return Used("no_image", "used")(status) && IsWithin(status, 5.0);
+  });
+  EXPECT_EQ(second["monitor"]["one_sensor"],
+            "no image comes from sensor VIRTUAL-0001: VIRTUAL-0002 goes on alone, with wider "
+            "intervals");
+  EXPECT_EQ(second["monitor"]["one_sensor_message"]["id"], "monitoring.sensor_silent");
+  EXPECT_EQ(second["state"], "monitoring");
+  plumbd.Sim("plug", kFirst);
+  const json again = plumbd.WaitFor("both again", [](const json& status) {
+    return Used("used", "used")(status) && IsWithin(status, 5.0);
+  });
+  EXPECT_EQ(again["monitor"]["one_sensor"], "");
+  EXPECT_GT(U95(second), 0.9 * U95(again)) << "one alone knows less";
+  plumbd.Sim("stall", kSecond);
+  plumbd.WaitFor("the first one alone", Used("used", "no_image"));
+  plumbd.Sim("unplug", kFirst);
+  plumbd.WaitFor("nothing known", [](const json& status) {
+    const json& now = status["monitor"];
+    return now["advice"] == "unknown" && now["since_zero"].is_null() &&
+           now["reason"] == "no_image" && Shares(status) == json{"no_image", "no_image"};
+  });
+  EXPECT_EQ(engineer.Get("/api/v1/monitor/map").status, 404) << "none is newer than a second";
+  plumbd.Sim("resume", kSecond);
+  plumbd.WaitFor("the second one again", Used("no_image", "used"));
+  plumbd.Press();
+  plumbd.WaitForState("no_sensor");
+  const std::string place = "/api/v1/scans/" + scan + "/monitoring";
+  json records;
+  plumbd.WaitFor("the record", [&](const json&) {
+    records = engineer.Get(place).json()["records"];
+    return records.size() == 1;
+  });
+  EXPECT_EQ(records[0]["head"]["sensor_serial"], kFirst);
+  EXPECT_EQ(records[0]["head"]["second_sensor_serial"], kSecond);
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonTwoSensorsTest, WithoutTheSecondOneTheFirstMonitorsAloneAndSaysSo) {
+  Plumbd plumbd(
+      folder_.path(),
+      {.arguments = {"--sim-rest", "--config", (folder_ / "plumb.toml").string()}, .scenes = 2});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("next-scene");
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("unplug", kSecond);
+  plumbd.Sim("mount");
+  ASSERT_TRUE(Monitor(plumbd, "start").value("ok", false));
+  const json alone = plumbd.WaitFor("numbers", [](const json& status) {
+    return status["monitor"]["state"] == "monitoring" &&
+           status["monitor"]["since_zero"].is_object();
+  });
+  EXPECT_EQ(alone["monitor"]["warning_messages"][0]["id"], "monitoring.second_missing");
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonMonitorTest, ThePlaceOfAFixedSensorIsLearnedByTheRoomsMarkersAndCheckedEachTime) {
+  const std::filesystem::path config = folder_ / "plumb.toml";
+  std::ofstream(config) << "[appliance]\nfixed_sensors = [\"VIRTUAL-0001\"]\n[iec]\n"
+                           "T_iec_reference = [[0, 1, 0, 0.1], [-1, 0, 0, 0.2], [0, 0, 1, -0.3], "
+                           "[0, 0, 0, 1]]\n";
+  Plumbd plumbd(folder_.path(),
+                {.arguments = {"--sim-rest", "--config", config.string()}, .scenes = 2});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("next-scene");
+  (void)plumbd.ScanOnce();
+  plumbd.Sim("mount");
+  const auto warning = [&] {
+    EXPECT_TRUE(Monitor(plumbd, "start").value("ok", false));
+    const json now = plumbd.WaitFor(
+        "numbers", [](const json& status) { return status["monitor"]["since_zero"].is_object(); });
+    EXPECT_TRUE(Monitor(plumbd, "stop").value("ok", false));
+    plumbd.WaitForState("ready");
+    const json& warnings = now["monitor"]["warning_messages"];
+    return warnings.empty() ? std::string() : warnings[0]["id"].get<std::string>();
+  };
+  EXPECT_EQ(warning(), "monitoring.place_learned");
+  EXPECT_EQ(warning(), "") << "it stands where it did";
+  // As if it had been moved by 20 mm since it was learned.
+  const std::filesystem::path file = folder_ / "state" / "fixed-sensors.json";
+  json places = json::parse(std::ifstream(file));
+  places["VIRTUAL-0001"][3] = places["VIRTUAL-0001"][3].get<double>() + 0.02;
+  std::ofstream(file) << places;
+  EXPECT_EQ(warning(), "monitoring.place_other");
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 

@@ -119,6 +119,7 @@ class FakeAppliance : public web::BackgroundWork,
   void EndSweep(const Actor& actor, Done done) override;
   void Cancel(const Actor& actor, Done done) override;
   MonitorStatus GetMonitor() override { return monitor; }
+  std::shared_ptr<const std::string> MonitorMap() override { return monitor_map; }
   void StartMonitor(const Actor& actor, Done done) override;
   void StopMonitor(const Actor& actor, Done done) override;
   void AcceptLive(const Actor& actor, const std::string& reason, Done done) override;
@@ -133,6 +134,7 @@ class FakeAppliance : public web::BackgroundWork,
         number == 0 ? monitor.has_record : number == 1 && scan_id == monitored_scan;
     return is_there ? "time_s,state,advice\n" : std::string();
   }
+  std::shared_ptr<const std::string> monitor_map;
   MonitorStatus monitor;
   std::string monitored_scan;             ///< That has one record.
   nlohmann::ordered_json monitor_report;  ///< Of that.

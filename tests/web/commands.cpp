@@ -10,9 +10,11 @@
 #include <sstream>
 
 #include "algo/base/units.hpp"
+#include "daemon/files/compact_map.hpp"
 #include "drivers/files/image_file.hpp"
 #include "words/check.hpp"
 #include "words/dicom.hpp"
+#include "words/monitoring.hpp"
 #include "words/peers.hpp"
 #include "words/scan.hpp"
 #include "words/store.hpp"
@@ -225,6 +227,20 @@ void ObeyRoom(FakeAppliance& service, const std::string& name, std::istream& wor
   if (name == "checked") service.SetOverdue({});
 }
 
+/// A body of 40 by 80 cm that lies higher at its head by this, and lower at its other end.
+std::string PackedRise(double rise_mm) {
+  constexpr int kCells = 160;
+  HeightMap rise({.x_min = -1.6, .y_min = -1.6, .step = 0.02, .width = kCells, .height = kCells});
+  std::vector<std::uint8_t> missing(rise.z.size(), 0);
+  for (int row = 60; row < 100; ++row) {
+    for (int column = 70; column < 90; ++column) {
+      rise.at(row, column) = static_cast<float>(rise_mm / 1000 * (row - 80) / 20);
+      missing[rise.grid.index(row, column)] = row < 66 ? 1 : 0;
+    }
+  }
+  return CompactHeights(rise, missing);
+}
+
 /// Of live monitoring.
 void ObeyMonitor(FakeAppliance& service, const std::string& name, std::istream& words) {
   if (name == "breathe") {  // HEIGHT_MM ADVICE: of the breath, while a level is taught
@@ -235,6 +251,18 @@ void ObeyMonitor(FakeAppliance& service, const std::string& name, std::istream& 
     service.monitor.age_s = 0.03;
     if (service.monitor.breath_hold) service.monitor.breath_hold->advice = advice;
     service.Notify(web::EventKind::kMonitor);
+  }
+  if (name == "alone") {  // [OTHER]: no image comes from that one of two sensors
+    std::string other;
+    words >> other;
+    service.monitor.one_sensor =
+        other.empty() ? Message() : say::monitoring::SensorSilent(other, "VIRTUAL-0001");
+    service.Notify(web::EventKind::kMonitor);
+  }
+  if (name == "lies") {  // RISE_MM: how the body lies against its scan; its feet are not seen
+    double rise_mm = 0;
+    words >> rise_mm;
+    service.monitor_map = std::make_shared<const std::string>(PackedRise(rise_mm));
   }
   if (name == "recorded") {  // SCAN: it was monitored, and a power cut ended that
     words >> service.monitored_scan;

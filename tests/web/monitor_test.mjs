@@ -75,6 +75,49 @@ await h.step('the room shows the same, larger', async () => {
   await h.look(room, 'monitor-room-in', { fullPage: false });
 });
 
+await h.step('the map shows how the body lies now, and what of it is not seen', async () => {
+  const map = (page) => page.locator('.live-map canvas');
+  equal(await map(room).isVisible(), false, 'none is known yet');
+  h.tell('lies 12');
+  const colours = (page) => map(page).evaluate((canvas) => {
+    const pixel = (x, y) => Array.from(canvas.getContext('2d').getImageData(
+      Math.floor(x * canvas.width), Math.floor(y * canvas.height), 1, 1).data.slice(0, 3));
+    return { head: pixel(0.5, 0.15), feet: pixel(0.5, 0.7), hidden: pixel(0.5, 0.85) };
+  });
+  for (const page of [tech, room]) {
+    await map(page).waitFor();
+    const { head, feet, hidden } = await colours(page);
+    check(head[0] > head[2] + 40, `orange where it is higher: ${head}`);
+    check(feet[2] > feet[0] + 40, `blue where it is lower: ${feet}`);
+    check(hidden[2] > hidden[1] + 40 && hidden[0] > hidden[1], `hatched: ${hidden}`);
+  }
+  await room.waitForFunction(() =>
+    document.documentElement.scrollHeight <= window.innerHeight + 1);
+  await h.look(tech, 'monitor-phone-map');
+  await h.look(room, 'monitor-room-map', { fullPage: false });
+  h.tell('lies -12');
+  await room.waitForFunction(() => {
+    const canvas = document.querySelector('.live-map canvas');
+    const [r, , b] = canvas.getContext('2d').getImageData(
+      canvas.width >> 1, Math.floor(0.15 * canvas.height), 1, 1).data;
+    return b > r + 40;
+  });
+});
+
+await h.step('one of two sensors fails: page and room say which one goes on alone', async () => {
+  h.tell('alone VIRTUAL-0002');
+  for (const page of [tech, room]) {
+    await page.locator('.live-view .caution', { hasText: 'VIRTUAL-0001 goes on alone' }).waitFor();
+  }
+  await h.look(tech, 'monitor-phone-alone');
+  await h.look(room, 'monitor-room-alone');
+  h.tell('alone');
+  for (const page of [tech, room]) {
+    await page.locator('.live-view .caution', { hasText: 'goes on alone' })
+      .waitFor({ state: 'hidden' });
+  }
+});
+
 await h.step('an unknown state says why', async () => {
   keepSaying('blind unknown covered 0');
   await tech.getByText('? UNKNOWN: HOLD').waitFor();

@@ -45,6 +45,14 @@ void AddMonitorApi(Routes& routes, const Services& services) {
   routes.Read("/api/v1/monitor", Permission::kRoom, [&monitoring](const Request&) {
     return JsonResponse(MonitorJson(monitoring.GetMonitor()));
   });
+  routes
+      .Read("/api/v1/monitor/map", Permission::kRoom,
+            [&monitoring](const Request&) {
+              const auto map = monitoring.MonitorMap();
+              if (!map) return ErrorResponse(404, say::web::NoSurface());
+              return BodyResponse("application/octet-stream", *map);
+            })
+      .Discloses("view.camera");
   routes.Write("POST", "/api/v1/monitor/start", Permission::kScan, BodyKind::kNone,
                [&monitoring](const Request& request, const Done& done) {
                  monitoring.StartMonitor(request.actor(), done);

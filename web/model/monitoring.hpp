@@ -34,6 +34,11 @@ struct AcceptedLive {
   MotionNumbers against_reference = {};
 };
 
+/// One of two sensors.
+struct MonitorSensor {
+  std::string serial, share;  ///< Share: used, covered, no_image, moved, left_out.
+};
+
 /// Numbers are never older than a second, and not judged after 150 ms: then state, advice and
 /// reason say so.
 struct MonitorStatus {
@@ -56,6 +61,9 @@ struct MonitorStatus {
   double elapsed_s = 0.0;
   /// From an image's arrival to its numbers: 95th percentile of the last seconds.
   std::optional<double> latency_ms = {};
+  std::optional<double> cpu_ms = {};        ///< Of one processor for each image, in the mean.
+  std::vector<MonitorSensor> sensors = {};  ///< Empty with one.
+  Message one_sensor = {};                  ///< Of two, one alone is used, and why.
   std::vector<Message> warnings = {};
   Message ended = {};  ///< Not active: why it could not go on; empty if it was ended.
   bool has_record = false;
@@ -87,6 +95,13 @@ inline nlohmann::json AcceptedJson(const std::optional<AcceptedLive>& accepted) 
           {"numbers", MotionJson(accepted->against_reference)}};
 }
 
+inline nlohmann::json SensorsJson(const std::vector<MonitorSensor>& sensors) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const MonitorSensor& sensor : sensors)
+    json.push_back({{"serial", sensor.serial}, {"share", sensor.share}});
+  return json;
+}
+
 inline nlohmann::json MonitorJson(const MonitorStatus& status) {
   const auto or_null = [](const std::optional<double>& value) {
     return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
@@ -112,6 +127,12 @@ inline nlohmann::json MonitorJson(const MonitorStatus& status) {
           {"frames_dropped", status.frames_dropped},
           {"elapsed_s", status.elapsed_s},
           {"latency_p95_ms", or_null(status.latency_ms)},
+          {"cpu_ms_per_frame", or_null(status.cpu_ms)},
+          {"sensors", SensorsJson(status.sensors)},
+          {"one_sensor", status.one_sensor.English()},
+          {"one_sensor_message", status.one_sensor.empty()
+                                     ? nlohmann::json(nullptr)
+                                     : nlohmann::json(MessageJson(status.one_sensor))},
           {"has_record", status.has_record},
           {"is_recorded", status.is_recorded},
           {"warnings", EnglishTexts(status.warnings)},

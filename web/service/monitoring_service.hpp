@@ -2,6 +2,7 @@
 // Live monitoring and the records of its sessions.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -19,6 +20,10 @@ class MonitoringService {
 
   /// Also where none goes on.
   [[nodiscard]] virtual MonitorStatus GetMonitor() = 0;
+  /// How much higher the body lies now than it was scanned, from above, in the encoding of
+  /// ApplianceService::SweptSurface(): 32767 where a sensor should see it and does not. Twice a
+  /// second a new one; null where none is newer than a second.
+  [[nodiscard]] virtual std::shared_ptr<const std::string> MonitorMap() = 0;
   /// Begins or ends it: kConflict where it cannot.
   virtual void StartMonitor(const Actor& actor, Done done) = 0;
   virtual void StopMonitor(const Actor& actor, Done done) = 0;

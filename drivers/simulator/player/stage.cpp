@@ -5,11 +5,14 @@
 
 namespace plumb::simulated {
 
-Stage::Stage(const std::vector<std::string>& files, const std::vector<std::string>& at_rest) {
+Stage::Stage(const std::vector<std::string>& files, const std::vector<std::string>& at_rest,
+             const std::vector<std::string>& second_at_rest) {
   for (const std::string& file : files)
     scenes_.push_back(std::make_shared<const FrameCacheReader>(file));
   for (const std::string& file : at_rest)
     at_rest_.push_back(std::make_shared<const FrameCacheReader>(file));
+  for (const std::string& file : second_at_rest)
+    second_at_rest_.push_back(std::make_shared<const FrameCacheReader>(file));
   if (scenes_.empty()) throw std::runtime_error("the virtual sensor's session names no scene");
   for (const auto& scene : scenes_) {
     const FrameCacheShape& a = scene->shape();
@@ -19,9 +22,14 @@ Stage::Stage(const std::vector<std::string>& files, const std::vector<std::strin
   view_.scene = scenes_.front();
 }
 
-Stage::View Stage::Now() const {
+Stage::View Stage::Now(bool is_second) const {
   const std::lock_guard lock(mutex_);
-  return view_;
+  View view = view_;
+  if (is_second && loop_ < second_at_rest_.size()) {
+    view.scene = second_at_rest_[loop_];
+    view.motion = Motion::kLoop;
+  }
+  return view;
 }
 
 void Stage::Show(std::size_t scene, Motion motion, std::optional<std::int64_t> origin_us) {
@@ -36,6 +44,8 @@ void Stage::Show(std::size_t scene, Motion motion, std::optional<std::int64_t> o
 bool Stage::ShowAtRest(std::size_t loop) {
   const std::lock_guard lock(mutex_);
   if (loop >= at_rest_.size()) return false;
+  if (view_.motion != Motion::kLoop) view_.loops_since = std::chrono::steady_clock::now();
+  loop_ = loop;
   view_.scene = at_rest_[loop];
   view_.motion = Motion::kLoop;
   view_.origin_us.reset();

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <memory>
@@ -32,27 +33,32 @@ class Stage {
     Motion motion = Motion::kStill;
     std::uint64_t epoch = 0;  ///< Changes with every command: playing restarts.
     double speed = 1.0;       ///< 0: as fast as possible.
+    /// kLoop: when it began. All units are at the same place of it.
+    std::chrono::steady_clock::time_point loops_since = {};
     /// Stamp at the sweep's time 0; nothing: the time at which it starts.
     std::optional<std::int64_t> origin_us;
   };
 
   /// @throws std::runtime_error unless there are scenes, all of the same size and rate.
   /// @param at_rest  Loops that a sensor at rest sees; may be none.
+  /// @param second_at_rest  Those of a second unit, which sees nothing else.
   explicit Stage(const std::vector<std::string>& files,
-                 const std::vector<std::string>& at_rest = {});
+                 const std::vector<std::string>& at_rest = {},
+                 const std::vector<std::string>& second_at_rest = {});
 
   [[nodiscard]] const FrameCacheShape& shape() const { return scenes_.front()->shape(); }
   [[nodiscard]] std::size_t size() const { return scenes_.size(); }
-  [[nodiscard]] View Now() const;
+  [[nodiscard]] View Now(bool is_second = false) const;
   void Show(std::size_t scene, Motion motion, std::optional<std::int64_t> origin_us = {});
   /// One of the loops, until something else is shown; false if there is none.
   [[nodiscard]] bool ShowAtRest(std::size_t loop);
   void SetSpeed(double speed);
 
  private:
-  std::vector<std::shared_ptr<const FrameCacheReader>> scenes_, at_rest_;
+  std::vector<std::shared_ptr<const FrameCacheReader>> scenes_, at_rest_, second_at_rest_;
   mutable std::mutex mutex_;
   View view_;
+  std::size_t loop_ = 0;  ///< Shown last.
 };
 
 /// Faults of the next frames, each as a real sensor or its driver may have it.
@@ -62,6 +68,7 @@ enum class Glitch { kNone, kLate, kDouble, kOld, kSize, kLone };
 struct Unit {
   std::string serial;
   std::string uri;
+  bool is_second = false;  ///< Sees the body from its other side.
   std::atomic<bool> gone{false};
   std::atomic<bool> stalled{false};
   std::atomic<bool> failed{false};

@@ -2,6 +2,7 @@
 #include "drivers/simulator/player/sweep_player.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <utility>
 
@@ -65,14 +66,21 @@ void SweepPlayer::Run(const std::stop_token& stop) {
   }
 }
 
+std::uint32_t SweepPlayer::FrameOfLoop() const {
+  const std::chrono::duration<double, std::micro> since = Clock::now() - view_.loops_since;
+  const double frames = view_.speed * since.count() / stage_->shape().period_us;
+  return static_cast<std::uint32_t>(std::fmod(frames, view_.scene->shape().num_frames));
+}
+
 void SweepPlayer::Tick(const std::stop_token& stop) {
   std::unique_lock delivering(unit_->delivering);
   if (!unit_->changes_applied.wait(delivering, stop, [&] { return unit_->changes_pending == 0; }))
     return;
-  if (Stage::View now = stage_->Now(); now.epoch != view_.epoch) {
-    const bool goes_on = view_.motion == Stage::Motion::kLoop && now.motion == view_.motion;
+  if (Stage::View now = stage_->Now(unit_->is_second); now.epoch != view_.epoch) {
+    const bool loops_on = view_.motion == Stage::Motion::kLoop && now.motion == view_.motion &&
+                          now.loops_since == view_.loops_since;
     view_ = std::move(now);
-    if (!goes_on) next_ = 0;
+    if (!loops_on) next_ = view_.motion == Stage::Motion::kLoop ? FrameOfLoop() : 0;
     loaded_frame_.reset();
     const bool sweeps =
         view_.motion != Stage::Motion::kStill && view_.motion != Stage::Motion::kLoop;

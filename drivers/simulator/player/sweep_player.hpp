@@ -42,6 +42,7 @@ class SweepPlayer {
   using Clock = std::chrono::steady_clock;
   void Run(const std::stop_token& stop);
   void Tick(const std::stop_token& stop);
+  [[nodiscard]] std::uint32_t FrameOfLoop() const;
   void Give(PlayedPair pair, const std::stop_token& stop);
   void Load(std::uint32_t frame);
   void SleepUntil(Clock::time_point time, const std::stop_token& stop);

@@ -23,8 +23,10 @@ Glitch ParseGlitch(const std::string& name) {
 
 }  // namespace
 
-VirtualBus::VirtualBus(std::shared_ptr<Stage> stage, std::string serial)
-    : stage_(std::move(stage)), default_serial_(std::move(serial)) {}
+VirtualBus::VirtualBus(std::shared_ptr<Stage> stage, std::string serial, std::string second)
+    : stage_(std::move(stage)),
+      default_serial_(std::move(serial)),
+      second_serial_(std::move(second)) {}
 
 void VirtualBus::SetListener(Listener listener) {
   const std::lock_guard lock(mutex_);
@@ -118,6 +120,7 @@ std::string VirtualBus::Plug(const std::string& serial) {
     const std::lock_guard lock(mutex_);
     if (Find(serial)) return "ok already plugged";
     unit->serial = serial;
+    unit->is_second = !second_serial_.empty() && serial == second_serial_;
     unit->uri = "plumb-virtual/" + std::to_string(++num_plugs_);
     units_.push_back(unit);
   }

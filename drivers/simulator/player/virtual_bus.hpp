@@ -28,7 +28,8 @@ class VirtualBus {
   using Listener = std::function<void(const Unit& unit, Event event)>;
 
   /// @param serial  Used by `plug` without a serial.
-  VirtualBus(std::shared_ptr<Stage> stage, std::string serial);
+  /// @param second  Of the unit that sees the stage's second loops; empty: none.
+  VirtualBus(std::shared_ptr<Stage> stage, std::string serial, std::string second = {});
 
   void SetListener(Listener listener);
 
@@ -55,7 +56,7 @@ class VirtualBus {
   void Report(const Unit& unit, Event event) const;
 
   const std::shared_ptr<Stage> stage_;
-  const std::string default_serial_;
+  const std::string default_serial_, second_serial_;
   mutable std::mutex mutex_;
   Listener listener_;
   std::list<std::shared_ptr<Unit>> units_;

@@ -26,6 +26,12 @@ using simulated::VirtualBus;
 constexpr std::chrono::microseconds kMaxGap{16000};  // between the stamps of a pair
 constexpr double kNominalFov_rad = 1.0226;           // as stated by the plug-in of OpenNI2
 
+std::vector<std::string> Texts(const std::vector<std::filesystem::path>& paths) {
+  std::vector<std::string> texts;
+  for (const std::filesystem::path& path : paths) texts.push_back(path.string());
+  return texts;
+}
+
 /// One open unit.
 class VirtualLiveSensor : public BoxedSensor {
  public:
@@ -33,8 +39,9 @@ class VirtualLiveSensor : public BoxedSensor {
                     const VirtualUnits& units, std::shared_ptr<FrameBox> box)
       : BoxedSensor(description, std::move(box)), shape_(units.bus->stage()->shape()) {
     const int width = static_cast<int>(shape_.width), height = static_cast<int>(shape_.height);
-    SetInfo(unit->serial == units.serial
-                ? CalibratedStreamInfo(units.settings, units.calibration, unit->serial + ".yaml",
+    const auto own = units.calibrations.find(unit->serial);
+    SetInfo(own != units.calibrations.end()
+                ? CalibratedStreamInfo(units.settings, own->second, unit->serial + ".yaml",
                                        unit->serial, width, height)
                 : LiveStreamInfo(units.settings, unit->serial, width, height, kNominalFov_rad));
     this->box().Begin(0);
@@ -78,15 +85,16 @@ class VirtualSetup : public SensorSetup {
     const RenderedScenes scenes = RenderScenes(options, stop, progress);
     settings.calibration_folder.clear();  // it belongs to real sensors
     settings.markers_are_the_rooms = false;
-    std::vector<std::string> caches, at_rest;
-    for (const std::filesystem::path& cache : scenes.caches) caches.push_back(cache.string());
-    for (const std::filesystem::path& cache : scenes.at_rest) at_rest.push_back(cache.string());
-    units_ = {.bus = std::make_shared<VirtualBus>(std::make_shared<Stage>(caches, at_rest),
-                                                  options.serial),
+    const auto stage = std::make_shared<Stage>(Texts(scenes.caches), Texts(scenes.at_rest),
+                                               Texts(scenes.second_at_rest));
+    const std::string& second = options.second_serial;
+    units_ = {.bus = std::make_shared<VirtualBus>(stage, options.serial, second),
               .settings = std::move(settings),
-              .serial = options.serial,
-              .calibration = CameraFileText(scenes.camera, 1000.0)};
+              .calibrations = {{options.serial, CameraFileText(scenes.camera, 1000.0)}}};
     if (options.plugged) (void)Command("plug");
+    if (scenes.second_at_rest.empty()) return;
+    units_.calibrations[second] = CameraFileText(scenes.second_camera, 1000.0);
+    (void)Command("plug " + second);
   }
 
   [[nodiscard]] std::unique_ptr<SensorProvider> MakeProvider() const override {

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,8 +19,9 @@ namespace plumb {
 struct VirtualUnits {
   std::shared_ptr<simulated::VirtualBus> bus;
   SensorSettings settings;
-  std::string serial;       ///< Serial of the calibrated unit; others get nominal intrinsics.
-  std::string calibration;  ///< Text of its calibration file, as recordings have it.
+  /// Text of the calibration file, as recordings have it, by serial; other units get nominal
+  /// intrinsics.
+  std::map<std::string, std::string> calibrations;
   std::chrono::milliseconds stall_time{2000};  ///< Next() fails after this time without a pair.
 };
 

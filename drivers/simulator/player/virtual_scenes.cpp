@@ -77,7 +77,8 @@ class Renderer {
       simulated::AddBoardScenes(plan_, options_.board_centres_m, kBoardScenes);
     num_sweeps_ = plan_.scenes.size();
     if (options_.max_scenes > 0) num_sweeps_ = std::min(num_sweeps_, options_.max_scenes);
-    if (options_.at_rest) simulated::AddRestLoops(plan_, simulate, num_sweeps_ - 1);
+    if (options_.at_rest)
+      simulated::AddRestLoops(plan_, simulate, num_sweeps_ - 1, !options_.second_serial.empty());
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) throw IoError(DescribeWriteError(folder_, error.value()));
@@ -161,7 +162,9 @@ RenderedScenes RenderScenes(const VirtualSensorOptions& options, const std::stop
   std::vector<std::size_t> wanted;
   for (std::size_t i = 0; i < renderer.num_sweeps(); ++i) wanted.push_back(i);
   const std::size_t total = renderer.plan().scenes.size();
-  if (options.at_rest) wanted.insert(wanted.end(), {total - 2, total - 1});
+  const bool has_second = options.at_rest && !options.second_serial.empty();
+  const std::size_t loops = has_second ? 4 : options.at_rest ? 2 : 0;
+  for (std::size_t i = total - loops; i < total; ++i) wanted.push_back(i);
   RenderedScenes scenes;
   for (std::size_t k = 0; k < wanted.size(); ++k) {
     const std::string& name = renderer.plan().scenes[wanted[k]].name;
@@ -170,13 +173,15 @@ RenderedScenes RenderScenes(const VirtualSensorOptions& options, const std::stop
         progress((static_cast<double>(k) + fraction) / static_cast<double>(wanted.size()), name);
     });
     if (k >= renderer.num_sweeps()) {
-      scenes.at_rest.push_back(std::move(cache));
+      (scenes.at_rest.size() < 2 ? scenes.at_rest : scenes.second_at_rest)
+          .push_back(std::move(cache));
       continue;
     }
     scenes.names.push_back(name);
     scenes.caches.push_back(std::move(cache));
   }
   scenes.camera = simulated::MakeSource(renderer.plan(), 0)->info();
+  if (has_second) scenes.second_camera = simulated::MakeSource(renderer.plan(), total - 1)->info();
   return scenes;
 }
 

@@ -44,7 +44,9 @@ struct RenderedScenes {
   std::vector<std::string> names;                   ///< In the order in which they are shown.
   std::vector<std::filesystem::path> caches;        ///< Files as frame_cache.hpp describes them.
   std::vector<std::filesystem::path> at_rest = {};  ///< Caches of the loops, if they were wanted.
-  StreamInfo camera;                                ///< Camera of the unit that shows them.
+  std::vector<std::filesystem::path> second_at_rest = {};  ///< Those of the second unit.
+  StreamInfo camera;                                       ///< Camera of the unit that shows them.
+  StreamInfo second_camera;                                ///< Of the second unit, if there is one.
 };
 
 /// Renders what is not in the cache yet.

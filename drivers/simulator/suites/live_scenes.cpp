@@ -192,7 +192,8 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
   }
 }
 
-void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t sweep) {
+void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t sweep,
+                  bool with_second) {
   constexpr double kBreath_s = 4.0;
   const ScenePlan swept = plan.scenes.at(sweep);
   BodyShape chest = swept.body->shape, belly = swept.body->shape;
@@ -207,19 +208,31 @@ void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t s
   script.T_world_body = swept.T_world_body;
   script.centre = swept.T_world_body * swept.body->centroid;
   const double side = OneSide(random);
-  const SensorAtPlace place{.T_world_camera = PlaceOfSensor(script.centre, side, random)};
-  for (const bool moved : {false, true}) {
-    if (moved) script.steps = {{-2.0, -1.0, Shift(3.0, 4.0, 0.0)}};
+  const auto still = std::make_shared<const LiveScript>(script);
+  script.steps = {{-2.0, -1.0, Shift(3.0, 4.0, 0.0)}};
+  const auto moved = std::make_shared<const LiveScript>(std::move(script));
+  const auto add = [&](const char* name, const SensorAtPlace& place,
+                       const std::shared_ptr<const LiveScript>& seen,
+                       const std::shared_ptr<const SensorUnit>& unit, std::uint64_t number) {
     ScenePlan& scene = plan.scenes.emplace_back(swept);
-    scene.name = moved ? "rest_moved" : "rest";
+    scene.name = name;
     scene.sweep.motion.at_rest = place;
     scene.sweep.num_frames = static_cast<int>(std::lround(kBreath_s * options.rate_hz));
     scene.sweep.on_before_s += kLiveInterval_s;
-    scene.sweep.seed = Hash(options.seed, 135, moved ? 1 : 0);
+    scene.sweep.seed = Hash(options.seed, 135, number);
     scene.sweep.color_every = std::max(1, static_cast<int>(options.rate_hz / kColorRate_hz));
     scene.sweep.events = {};
-    scene.sweep.events.live = std::make_shared<const LiveScript>(script);
-  }
+    scene.sweep.events.live = seen;
+    if (unit) scene.other_unit = unit;
+  };
+  const SensorAtPlace first{.T_world_camera = PlaceOfSensor(still->centre, side, random)};
+  add("rest", first, still, nullptr, 0);
+  add("rest_moved", first, moved, nullptr, 1);
+  if (!with_second) return;
+  const SensorAtPlace second{.T_world_camera = PlaceOfSensor(still->centre, -side, random)};
+  const auto unit = AnotherUnit(options);
+  add("rest_second", second, still, unit, 2);
+  add("rest_second_moved", second, moved, unit, 3);
 }
 
 }  // namespace plumb::simulated

@@ -25,6 +25,9 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options);
 
 /// Adds `rest`, one breath of four seconds before a sensor at rest over the body of a sweep, which
 /// can be repeated for ever, and `rest_moved`, the same after the body was moved by 5 mm.
-void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t sweep);
+/// @param with_second  Also `rest_second` and `rest_second_moved`: at the same time, what another
+///        unit sees from the other side.
+void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t sweep,
+                  bool with_second = false);
 
 }  // namespace plumb::simulated

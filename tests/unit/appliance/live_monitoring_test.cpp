@@ -77,15 +77,18 @@ class LiveMonitoringTest : public ::testing::Test {
   }
   void Begin(std::optional<MonitorRecordPlace> record = {}, const Message& why_no_record = {}) {
     On([&] {
-      feed_ = monitoring_.Begin({.info = frames_.info(),
-                                 .compare = {},
-                                 .room = {},
-                                 .scene = folder_ / "scene",
-                                 .reference_scene = {},
-                                 .check_reference = {},
-                                 .record = std::move(record),
-                                 .queue_capacity = 1000},
-                                "scan-1", "patient-1", why_no_record);
+      feed_ = std::make_shared<LiveFeed>(1000);
+      CurrentScan scan;
+      scan.id = "scan-1";
+      scan.patient_id = "patient-1";
+      monitoring_.Begin({.info = frames_.info(),
+                         .compare = {},
+                         .room = {},
+                         .scene = folder_ / "scene",
+                         .reference_scene = {},
+                         .check_reference = {},
+                         .record = std::move(record)},
+                        feed_, scan, why_no_record);
     });
   }
   void Push(double until_s) {

@@ -6,6 +6,8 @@
 
 #include <time.h>
 
+#include <set>
+
 #include "tests/support/fake_sensor.hpp"
 
 namespace plumb {
@@ -195,6 +197,43 @@ TEST_F(SensorThreadTest, OnlyTheConfiguredSensorIsUsed) {
   bus_.Plug("B");
   bus_.GiveFrame();
   EXPECT_EQ(events_.At(2).sensor.serial, "B");
+}
+
+TEST_F(SensorThreadTest, ASecondSensorIsReadForFeedsOfNoSweepAlsoAfterBothWereUnplugged) {
+  Start({.serial = "A", .second_serial = "B", .before_scan = {}});
+  bus_.Plug("A");
+  bus_.Plug("B");
+  bus_.GiveFrame();
+  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_TRUE(events_.At(1).others.empty()) << "the second one has its use";
+  const auto sweep = std::make_shared<LiveFeed>(10);
+  thread_->BeginScan(sweep);
+  while (sweep->num_pushed() == 0) {
+    bus_.GiveFrame();
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(bus_.opened(), 1) << "a sweep is of one sensor";
+  thread_->EndScan();
+
+  const auto feed = std::make_shared<LiveFeed>(1000);
+  thread_->BeginScan(feed, /*is_sweep=*/false);
+  std::int64_t taken = 0;
+  const auto wait_for_both = [&] {
+    for (std::set<std::size_t> seen; seen.size() < 2; std::this_thread::yield()) {
+      bus_.GiveFrame();
+      if (feed->num_pushed() == taken) continue;
+      ++taken;
+      ASSERT_TRUE(feed->Next({}));
+      seen.insert(feed->taken_sensor());
+    }
+  };
+  wait_for_both();
+  EXPECT_TRUE(thread_->AwaitSecond(feed, std::chrono::seconds(20), {}));
+  EXPECT_FALSE(thread_->AwaitSecond(sweep, milliseconds(1), {})) << "it was not open for a sweep";
+  bus_.Unplug();
+  bus_.Plug("A");
+  bus_.Plug("B");
+  wait_for_both();
 }
 
 TEST_F(SensorThreadTest, ALibraryThatDoesNotStartIsAFailureThatIsTriedAgain) {

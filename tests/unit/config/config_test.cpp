@@ -267,6 +267,25 @@ TEST_F(GateTest, TheDailyCheckOfARealSensorMayBeStricterOnly) {
   }
 }
 
+TEST(ConfigTest, ASecondSensorIsAnotherOneThanTheFirstWhichHasToBeNamed) {
+  const std::string first = "[appliance]\nsensor_serial = \"A\"\n";
+  EXPECT_EQ(
+      ParseConfig(first + "second_sensor_serial = \"B\"\n", "t").appliance.second_sensor_serial,
+      "B");
+  EXPECT_EQ(ErrorOf("[appliance]\nsecond_sensor_serial = \"\"\n"), "no error");
+  for (const std::string& text : {first + "second_sensor_serial = \"A\"\n",
+                                  std::string("[appliance]\nsecond_sensor_serial = \"B\"\n")})
+    EXPECT_THAT(ErrorOf(text), HasSubstr("second_sensor_serial"));
+}
+
+TEST(ConfigTest, FixedSensorsAreTwoSerialsAtMost) {
+  const std::string key = "[appliance]\nfixed_sensors = ";
+  EXPECT_THAT(ParseConfig(key + "[\"A\", \"B\"]\n", "t").appliance.fixed_sensors,
+              ::testing::ElementsAre("A", "B"));
+  for (const char* bad : {"\"A\"", "[\"A\", \"B\", \"C\"]", "[1]", "[\"\"]"})
+    EXPECT_THAT(ErrorOf(key + bad + "\n"), HasSubstr("fixed_sensors")) << bad;
+}
+
 TEST(ConfigTest, TheFirstSettingsMayBeGiven) {
   const ApplianceConfig none = ParseConfig("[appliance]\n", "t").appliance;
   EXPECT_FALSE(none.auto_stop_s || none.scan_limit_s || none.keep_recordings);

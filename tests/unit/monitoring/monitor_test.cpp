@@ -4,12 +4,15 @@
 
 #include <time.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
 #include "tests/support/rest_frames.hpp"
 
@@ -143,6 +146,53 @@ TEST_F(MonitorTest, TwoSensorsGoOnWhileOneIsBlindAndAfterOneWasPushed) {
 
   sensors_[1]->Push({0.002, 0.001, 0.0});
   EXPECT_EQ(RunUntil(119.0).back().state, MonitorState::kMovedSensor);
+}
+
+TEST_F(MonitorTest, OneThatWasAwayIsUsedAgainOnlyWhereItStood) {
+  AddSensor(1.0);
+  AddSensor(-1.0);
+  Begin();
+  ASSERT_EQ(RunUntil(112.0).back().sensors_used, 2);
+  const auto second_alone_until = [&](double end_s) {
+    for (; time_s_ < end_s; time_s_ += kFrame_s)
+      EXPECT_TRUE(monitor_->Add(sensors_[1]->At(time_s_), 1));
+  };
+  second_alone_until(114.0);
+  EXPECT_EQ(monitor_->share(0), SensorShare::kNoImage);
+  EXPECT_EQ(monitor_->share(1), SensorShare::kUsed);
+  // Its place is judged by three images, five of which are looked at in a second.
+  const std::vector<MonitorLine> back = RunUntil(115.5);
+  EXPECT_EQ(back.front().sensors_used, 1);
+  EXPECT_EQ(back.back().sensors_used, 2);
+  EXPECT_EQ(monitor_->share(0), SensorShare::kUsed);
+
+  second_alone_until(117.5);
+  sensors_[0]->Push({0.002, 0.001, 0.0});
+  for (const MonitorLine& line : RunUntil(119.0)) EXPECT_EQ(line.sensors_used, 1) << line.time_s;
+  EXPECT_EQ(monitor_->share(0), SensorShare::kMoved);
+}
+
+TEST_F(MonitorTest, TheMapShowsHowTheBodyLiesNowAndWhatIsNotSeen) {
+  AddSensor(1.0);
+  Begin();
+  EXPECT_FALSE(monitor_->Map());
+  ASSERT_EQ(RunUntil(112.0).back().state, MonitorState::kMonitoring);
+  const LiveMap before = monitor_->Map().value();
+  const auto hidden = [](const LiveMap& map) { return std::ranges::count(map.missing, 1); };
+  EXPECT_LT(hidden(before), 5);
+  Move({0.0, 0.0, 0.004});
+  (void)RunUntil(112.0 + RestFrames::kBreath_s);  // at the same place of a breath
+  const LiveMap risen = monitor_->Map().value();
+  std::vector<float> rises_m;
+  for (std::size_t i = 0; i < risen.rise_m.z.size(); ++i) {
+    const float rise_m = risen.rise_m.z[i] - before.rise_m.z[i];
+    if (std::isfinite(rise_m)) rises_m.push_back(rise_m);
+  }
+  ASSERT_GT(rises_m.size(), 200U) << "cells of 2 cm";
+  EXPECT_NEAR(TakeMedian(rises_m), 0.004, 0.0005);
+  covered_ = 0;
+  (void)RunUntil(116.5);
+  EXPECT_GT(hidden(monitor_->Map().value()), 200) << "something lies before the body";
 }
 
 TEST_F(MonitorTest, OneThatIsNotMountedInTimeTakesNoPart) {

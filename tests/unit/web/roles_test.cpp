@@ -36,6 +36,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"GET /api/v1/scan/surface", "TPED"},
     {"POST /api/v1/press", "TPE"},
     {"GET /api/v1/monitor", "TPED"},
+    {"GET /api/v1/monitor/map", "TPED"},
     {"POST /api/v1/monitor/start", "TPE"},
     {"POST /api/v1/monitor/stop", "TPE"},
     {"GET /api/v1/monitor/record.csv", "TPE"},

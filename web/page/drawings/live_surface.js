@@ -10,9 +10,9 @@ const kEvery_ms = 500;
 const kStep_m = 0.02;
 const kMissing = 32767;
 
-/// Heights in metres, and where the region was not seen yet: 1, else NaN.
-async function fetchSurface() {
-  const response = await fetchPicture('scan/surface');
+/// Heights in metres, and where the region is not seen: 1, else NaN. Null where there is no map.
+export async function fetchSurface(path) {
+  const response = await fetchPicture(path);
   if (!response.ok) return null;
   const { width, height, values } = await readPacked(await response.arrayBuffer(), 1);
   const missing = values.map((value) => (value === kMissing ? 1 : NaN));
@@ -68,7 +68,7 @@ export function liveSurface() {
   const element = h('figure', { class: 'live-surface' }, box, marksPlace, note, keys);
   let stopped = false;
   const end = repeat(async () => {
-    const surface = await fetchSurface().catch(() => null);
+    const surface = await fetchSurface('scan/surface').catch(() => null);
     if (surface && !stopped) draw(surface);
     return kEvery_ms;
   });

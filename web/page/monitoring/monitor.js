@@ -13,6 +13,7 @@ import { kAxes, signed, toleranceBar, withUnit } from '../numbers.js';
 import { signedForm } from '../signed_form.js';
 import { S, said, saidEach } from '../words.js';
 import { follow, sentence } from '../screens/common.js';
+import { liveMap } from './live_map.js';
 
 const kGrey_s = 0.2;
 const kUnknown_s = 0.15;
@@ -126,8 +127,10 @@ export async function askMonitor() {
 export function monitorView() {
   const headline = h('p', { class: 'live-advice' });
   const reason = h('p', { class: 'live-why' });
-  const head = h('div', {}, h('div', { class: 'live-head' }, headline,
-    h('p', { class: 'caution' }, S.monitor.notBeam)), reason);
+  const oneSensor = h('p', { class: 'caution', hidden: true });
+  const cautions = h('div', { class: 'live-cautions' },
+    h('p', { class: 'caution' }, S.monitor.notBeam), oneSensor);
+  const head = h('div', {}, h('div', { class: 'live-head' }, headline, cautions), reason);
   const tell = (tone, words, why) => {
     headline.className = `live-advice ${tone}`;
     headline.textContent = words;
@@ -135,7 +138,9 @@ export function monitorView() {
   };
   const numbers = h('div', { class: 'live-both' });
   const breath = trace();
-  const element = h('div', { class: 'live-view' }, head, numbers, breath.element);
+  const map = liveMap();
+  const element = h('div', { class: 'live-view' }, head, numbers,
+    h('div', { class: 'live-pictures' }, breath.element, map.element));
   let saidLast = '';
   let drawn = '';
   let heard = null;
@@ -151,15 +156,19 @@ export function monitorView() {
     const text = S.monitor;
     const key = JSON.stringify([S.languageName, monitor?.advice, monitor?.state, monitor?.reason,
       monitor?.is_old, monitor?.couch_moved, monitor?.since_zero,
-      monitor?.against_reference, monitor?.ended]);
+      monitor?.against_reference, monitor?.ended, monitor?.one_sensor_message]);
     if (key === drawn) return;
     drawn = key;
     element.classList.toggle('is-old', Boolean(monitor?.active && monitor.is_old));
     if (!monitor?.active) {
       tell('unknown', text.off, monitor?.ended ? said(monitor, 'ended') : '');
       clear(numbers);
+      oneSensor.hidden = true;
       return;
     }
+    const alone = monitor.one_sensor_message ? sentence(said(monitor, 'one_sensor')) : '';
+    oneSensor.hidden = !alone;
+    oneSensor.textContent = alone;
     const { state, advice } = monitor;
     const isStarting = state === 'mounting' || state === 'zeroing';
     const word = isStarting ? text.states[state] : text.advice[advice];
@@ -175,7 +184,7 @@ export function monitorView() {
     clear(numbers,
       judgesReference && six(text.againstReference, monitor.against_reference, monitor, true),
       six(text.sinceZero, monitor.since_zero, monitor, !judgesReference));
-    const words = `${word} ${why}`;
+    const words = [word, why, alone].filter(Boolean).join(' ');
     if (words !== saidLast) say(words);
     saidLast = words;
   };
@@ -194,6 +203,7 @@ export function monitorView() {
     stop() {
       clearInterval(timer);
       unlisten();
+      map.stop();
     },
   };
 }
