@@ -33,6 +33,12 @@ constexpr double kOutOfRangeToReport = 0.2, kOutOfRangeToRefuse = 0.6;
 // Chi-square for each term: a prior that holds gives 1 at most, since the sweep does not determine
 // every term.
 constexpr double kChi2ToReport = 2.0, kChi2ToRefuse = 4.0;
+// Of assumed cameras, which err by more than stated ones. Where they led to lengths within 0.4 %
+// the sweeps of eight units gave up to 4.5; where depth was not registered, or lengths were wrong
+// by 11 to 17 %, 7.0 and more.
+constexpr double kChi2OfAssumedToRefuse = 5.5;
+// Lengths that are wrong by more because of a camera or a size that nobody stated are no result.
+constexpr double kAssumedScale = 0.03;
 // Units of depth for a metre that recordings have, beside the usual 1000: 5000 (TUM), 10000 and
 // 4000 (RealSense), 256 (KITTI), 100.
 constexpr std::array kDepthUnits = {5000.0, 10000.0, 4000.0, 256.0, 100.0};
@@ -70,10 +76,17 @@ std::vector<MarkerDepth> WellMeasured(const Symptoms& symptoms) {
   return markers;
 }
 
+bool AssumedCamerasUnfit(const CalibrationFit& fit) {
+  return fit.num_terms > 0 && fit.chi2 / fit.num_terms > kChi2OfAssumedToRefuse;
+}
+
 // @return whether the units are wrong, so that nothing else can be judged.
 bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings) {
   const std::vector<MarkerDepth> markers = WellMeasured(symptoms);
   if (markers.empty()) {
+    // Without markers, a wrong focal length passes for another motion: chi-square may be below 1.
+    if (symptoms.cameras_assumed && !AssumedCamerasUnfit(symptoms.calibration))
+      findings.push_back({FindingLevel::kRefusal, say::diagnosis::CamerasUnconfirmed()});
     if (symptoms.depth_unit_assumed)
       findings.push_back({FindingLevel::kRefusal, say::diagnosis::DepthUnitUnknown()});
     return false;
@@ -96,6 +109,13 @@ bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings)
     findings.push_back({level, say::diagnosis::MarkersApart(count, std::move(apart))});
   }
   if (std::abs(common - 1) <= kUsualScale) return false;
+  if (symptoms.cameras_assumed && !IsFactorOfUnits(common)) {
+    const bool refused = std::abs(common - 1) > kAssumedScale;
+    findings.push_back(
+        {refused ? FindingLevel::kRefusal : FindingLevel::kWarning,
+         say::diagnosis::CamerasOrSize(common, symptoms.focal_px, common * symptoms.focal_px)});
+    return refused;
+  }
   const double side_mm = symptoms.marker_length_m * common / kMillimetre;
   if (std::abs(common - 1) <= kWrongNumber) {
     findings.push_back({FindingLevel::kWarning,
@@ -154,14 +174,15 @@ void JudgeCalibration(const Symptoms& symptoms, std::vector<Finding>& findings) 
   const CalibrationFit& fit = symptoms.calibration;
   if (fit.num_terms == 0) return;
   const double chi2_per_term = fit.chi2 / fit.num_terms;
+  if (symptoms.cameras_assumed) {  // Their single terms mean nothing.
+    if (AssumedCamerasUnfit(fit))
+      findings.push_back({FindingLevel::kRefusal,
+                          say::diagnosis::CamerasUnstated(chi2_per_term, kChi2OfAssumedToRefuse)});
+    return;
+  }
   if (!(chi2_per_term > kChi2ToReport)) return;
   const FindingLevel level =
       chi2_per_term > kChi2ToRefuse ? FindingLevel::kRefusal : FindingLevel::kWarning;
-  // Of assumed cameras, single terms mean nothing.
-  if (symptoms.cameras_assumed) {
-    findings.push_back({level, say::diagnosis::CamerasUnstated(chi2_per_term)});
-    return;
-  }
   findings.push_back({level, say::diagnosis::Calibration(chi2_per_term, fit.worst_term,
                                                          fit.worst_value, fit.worst_sigma)});
 }
@@ -173,6 +194,11 @@ double ScaleDoubt(const Symptoms& symptoms) {
   if (markers.empty()) return 0.0;
   const double off = std::abs(CommonRatio(markers) - 1);
   return off > kUsualScale ? off + kSensorScale : 0.0;
+}
+
+bool IsOfAssumedCameras(const Message& refusal) {
+  return refusal.id() == say::diagnosis::CamerasUnstated(0, 0).id() ||
+         refusal.id() == say::diagnosis::CamerasOrSize(0, 0, 0).id();
 }
 
 std::vector<Finding> Diagnose(const Symptoms& symptoms) {

@@ -31,6 +31,7 @@ struct Symptoms {
   double marker_length_m = 0.0;            ///< As stated.
   bool depth_unit_assumed = false;         ///< Nothing states the unit of the depth images.
   bool cameras_assumed = false;            ///< Nothing states the intrinsics.
+  double focal_px = 0.0;                   ///< Of the colour camera, as stated or assumed.
   std::optional<StreamOffset> stream_offset;
   std::int64_t num_frames = 0;
   std::int64_t num_repeated_depth = 0;  ///< Depth images with every pixel of the one before.
@@ -58,6 +59,10 @@ struct Finding {
 /// markers disagree by more than such sensors usually do: the disagreement, and 1 % that the sensor
 /// may be off in the other direction. 0 if they agree or nothing was measured.
 [[nodiscard]] double ScaleDoubt(const Symptoms& symptoms);
+
+/// Whether a refusal says that cameras which nobody stated do not fit: lengths are then wrong by
+/// some per cent at least, and a recording has no scene.
+[[nodiscard]] bool IsOfAssumedCameras(const Message& refusal);
 
 /// The causes, the most serious first. A pure function of its input.
 ///

@@ -82,6 +82,7 @@ Symptoms SweepWatch::Finish(const StreamInfo& info, bool any_decoded) const {
   symptoms.marker_length_m = info.room_markers.length_m;
   symptoms.depth_unit_assumed = info.depth_unit_assumed;
   symptoms.cameras_assumed = info.intrinsics_assumed;
+  symptoms.focal_px = info.intrinsics.fx;
   symptoms.stream_offset = EstimateStreamOffset(color_motion_.rates(), depth_motion_.rates());
   symptoms.num_frames = num_frames_;
   symptoms.num_repeated_depth = repeated_depth_;

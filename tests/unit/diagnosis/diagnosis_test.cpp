@@ -166,13 +166,56 @@ TEST(DiagnosisTest, NamesTheCauseOfEachFaultAndNothingElse) {
       {"chi-square above 2", [](Symptoms& s) { s.calibration.chi2 = 105; }, {"calibration"}},
       {"chi-square 4", [](Symptoms& s) { s.calibration.chi2 = 208; }, {"calibration"}},
       {"chi-square above 4", [](Symptoms& s) { s.calibration.chi2 = 209; }, {"calibration!"}},
-      {"chi-square above 4 with assumed cameras",
+      {"chi-square 5.5 with assumed cameras",
        [](Symptoms& s) {
-         s.calibration.chi2 = 209;
+         s.calibration.chi2 = 5.5 * 52;
+         s.cameras_assumed = true;
+       },
+       {}},
+      {"chi-square above 5.5 with assumed cameras",
+       [](Symptoms& s) {
+         s.calibration.chi2 = 5.6 * 52;
          s.cameras_assumed = true;
        },
        {"cameras_unstated!"}},
       {"assumed cameras that fit", [](Symptoms& s) { s.cameras_assumed = true; }, {}},
+      {"assumed cameras that fit, which no marker confirms",
+       [](Symptoms& s) {
+         s.cameras_assumed = true;
+         s.marker_depths.clear();
+       },
+       {"cameras_unconfirmed!"}},
+      {"assumed cameras and units, which no marker confirms",
+       [](Symptoms& s) {
+         s.cameras_assumed = s.depth_unit_assumed = true;
+         s.marker_depths.clear();
+       },
+       {"cameras_unconfirmed!", "depth_unit_unknown!"}},
+      {"assumed cameras that do not fit, without markers",
+       [](Symptoms& s) {
+         s.cameras_assumed = true;
+         s.marker_depths.clear();
+         s.calibration.chi2 = 9 * 52;
+       },
+       {"cameras_unstated!"}},
+      {"an assumed focal length 2.5 % off",
+       [](Symptoms& s) {
+         s.cameras_assumed = true;
+         ScaleAll(s, 1.025);
+       },
+       {"cameras_or_size"}},
+      {"an assumed focal length 15 % off",
+       [](Symptoms& s) {
+         s.cameras_assumed = true;
+         ScaleAll(s, 1.15);
+       },
+       {"cameras_or_size!"}},
+      {"1000 for 5000 with assumed cameras",
+       [](Symptoms& s) {
+         s.cameras_assumed = true;
+         ScaleAll(s, 5.0);
+       },
+       {"depth_unit!"}},
       {"wrong units, which the calibration cannot take up",
        [](Symptoms& s) {
          ScaleAll(s, 5.0);
