@@ -25,6 +25,10 @@ constexpr double kSameSize = 0.05;
 // differ by a frame scatter by 1 to 4 %, depth in reverse order by 9 %, those of two different
 // sweeps by 20 % and more.
 constexpr double kNotTogether = 0.06;
+// A print of another size is that in every view. So many markers whose ratio is not the common one
+// and scatters more do not have the depth that is on them.
+constexpr double kUnsteady = 0.03;
+constexpr int kUnsteadyMarkers = 3;
 constexpr int kViewsForRatio = 3;
 // Below, an offset does no harm: 15 ms moved a result by less than its interval, 33 ms by 6 mm.
 constexpr double kHarmfulOffset_s = 0.020;
@@ -91,6 +95,31 @@ bool AssumedCamerasUnfit(const CalibrationFit& fit) {
   return fit.num_terms > 0 && fit.chi2 / fit.num_terms > kChi2OfAssumedToRefuse;
 }
 
+// Markers that are not of the common size.
+// @return whether depth is not that of the markers.
+bool JudgeSizes(const std::vector<MarkerDepth>& markers, double common,
+                std::vector<Finding>& findings) {
+  std::vector<std::int64_t> apart;
+  int num_unsteady = 0;
+  for (const MarkerDepth& marker : markers) {
+    if (std::abs(marker.ratio / common - 1) < kSameSize) continue;
+    apart.push_back(marker.id);
+    if (marker.scatter > kUnsteady * marker.ratio) ++num_unsteady;
+  }
+  if (num_unsteady >= kUnsteadyMarkers) {
+    findings.push_back({FindingLevel::kRefusal, say::diagnosis::ImagesApart()});
+    return true;
+  }
+  if (!apart.empty()) {
+    // A few of them do no harm, since the solve weighs each against the others.
+    const FindingLevel level =
+        3 * apart.size() >= markers.size() ? FindingLevel::kRefusal : FindingLevel::kWarning;
+    const auto count = static_cast<std::int64_t>(apart.size());
+    findings.push_back({level, say::diagnosis::MarkersApart(count, std::move(apart))});
+  }
+  return false;
+}
+
 // @return whether the units are wrong, so that nothing else can be judged.
 bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings) {
   const std::vector<MarkerDepth> markers = WellMeasured(symptoms);
@@ -114,16 +143,7 @@ bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings)
     return true;
   }
   const double common = CommonRatio(markers);
-  std::vector<std::int64_t> apart;
-  for (const MarkerDepth& marker : markers)
-    if (std::abs(marker.ratio / common - 1) >= kSameSize) apart.push_back(marker.id);
-  if (!apart.empty()) {
-    // A few of them do no harm, since the solve weighs each against the others.
-    const FindingLevel level =
-        3 * apart.size() >= markers.size() ? FindingLevel::kRefusal : FindingLevel::kWarning;
-    const auto count = static_cast<std::int64_t>(apart.size());
-    findings.push_back({level, say::diagnosis::MarkersApart(count, std::move(apart))});
-  }
+  if (JudgeSizes(markers, common, findings)) return true;
   if (std::abs(common - 1) <= kUsualScale) return false;
   if (symptoms.cameras_assumed && !IsFactorOfUnits(common)) {
     const bool refused = std::abs(common - 1) > kAssumedScale;

@@ -237,5 +237,69 @@ TEST_F(RecordingTest, WithoutCamerasIsReadOrRefusedByWhetherTheAssumedOnesFit) {
   EXPECT_THAT(LeftBehind({"recording", "fits"}), IsEmpty());
 }
 
+/// A fault that no reader sees, and what reconstruct says of it.
+struct PlantedFault {
+  const char* name;
+  std::function<void(const fs::path& recording)> apply;
+  const char* message;
+};
+
+[[maybe_unused]] void PrintTo(const PlantedFault& fault, std::ostream* out) { *out << fault.name; }
+
+std::vector<PlantedFault> PlantedFaults() {
+  const auto flip_depth = [](int how) {
+    return [how](const fs::path& recording) {
+      for (std::size_t i = 0; i < Lines(recording / "depth.txt").size(); ++i) {
+        const fs::path file = ImageOf(recording, "depth.txt", i);
+        cv::Mat turned;
+        cv::flip(ReadDepthImage(file), turned, how);
+        WritePng(file, turned);
+      }
+    };
+  };
+  return {
+      {"DepthMirrored", flip_depth(1), "refused    the depth images are mirrored left to right"},
+      {"DepthTurned", flip_depth(-1), "refused    the depth images are turned by half a turn"},
+      {"EveryThirdDepthImageRepeated",
+       [](const fs::path& recording) {
+         for (std::size_t i = 2; i < Lines(recording / "depth.txt").size(); i += 3)
+           fs::copy_file(ImageOf(recording, "depth.txt", i - 1), ImageOf(recording, "depth.txt", i),
+                         fs::copy_options::overwrite_existing);
+       },
+       "10 of 30 depth images repeat the one before and were left out"},
+      {"ImagesOfAnotherSizeCalibrated",
+       [](const fs::path& recording) {
+         std::string text = ReadText(recording / "camera.yaml");
+         const std::size_t from = text.find('[', text.find("camera_matrix")) + 1;
+         text.replace(from, text.find(']', from) - from,
+                      "392., 0., 200., 0., 392., 150., 0., 0., 1.");
+         WriteText(recording / "camera.yaml", text);
+       },
+       "or camera_matrix is of images of another size (by the depth, the focal length is 26"},
+      {"Dark",
+       [](const fs::path& recording) {
+         for (std::size_t i = 0; i < Lines(recording / "rgb.txt").size(); ++i) {
+           const fs::path file = ImageOf(recording, "rgb.txt", i);
+           WritePng(file, ReadColorImage(file) * 0.1);
+         }
+       },
+       "the colour images are dark"},
+  };
+}
+
+class PlantedFaultTest : public CommandLineTest,
+                         public testing::WithParamInterface<PlantedFault> {};
+
+TEST_P(PlantedFaultTest, IsNamed) {
+  const fs::path recording = Copy(SmallRecording(SmallNames()[0]), "recording");
+  GetParam().apply(recording);
+  const RunResult result = Plumb({"reconstruct", recording, "--out", folder_ / "scene"});
+  EXPECT_THAT(result.out + result.err, HasSubstr(GetParam().message));
+  EXPECT_THAT(result.out, testing::Not(HasSubstr("print them at the size")));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, PlantedFaultTest, testing::ValuesIn(PlantedFaults()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
 }  // namespace
 }  // namespace plumb

@@ -240,6 +240,23 @@ TEST(DiagnosisTest, NamesTheCauseOfEachFaultAndNothingElse) {
          s.calibration.chi2 = 19 * 52;
        },
        {"images_apart!"}},
+      {"depth in reverse order over a flat floor, which most markers do not show",
+       [](Symptoms& s) {
+         for (const std::size_t i : {0U, 1U, 2U}) {
+           s.marker_depths[i].ratio = 0.85;
+           s.marker_depths[i].scatter = 0.04;
+         }
+         s.calibration.chi2 = 4.8 * 52;
+       },
+       {"images_apart!"}},
+      {"two small markers, on which a hand lay",
+       [](Symptoms& s) {
+         for (const std::size_t i : {0U, 1U}) {
+           s.marker_depths[i].ratio = 0.85;
+           s.marker_depths[i].scatter = 0.04;
+         }
+       },
+       {"markers_apart"}},
       {"depth mirrored",
        [](Symptoms& s) {
          s.depth_layout = DepthLayout::kMirrored;
