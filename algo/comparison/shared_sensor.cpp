@@ -133,6 +133,26 @@ Matrix6d CovarianceOf(const Effect& effect, const SensorSensitivity& sensor) {
   return kSharedErrors * kSharedErrors * G * sensor.covariance(free, free) * G.transpose();
 }
 
+// Scans that state the same unit and contradict each other: what moved the estimates apart, such as
+// depth that one program registered otherwise, is in neither model, and the errors are as large as
+// the contradiction. A delay may differ: the model has all of it.
+// @param S  Covariance of the difference of the free terms.
+// @return the factor for the covariance, at least 1.
+double Contradiction(const SensorSensitivity& r, const SensorSensitivity& c,
+                     const std::vector<Eigen::Index>& free, const Eigen::MatrixXd& S) {
+  std::vector<Eigen::Index> terms, at;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    if (free[i] == kDepthAt + kDepthDelay) continue;
+    terms.push_back(free[i]);
+    at.push_back(static_cast<Eigen::Index>(i));
+  }
+  if (terms.empty()) return 1.0;
+  const Eigen::VectorXd difference = (c.estimate - r.estimate)(terms);
+  const double chi2 = difference.dot(Eigen::MatrixXd(S(at, at)).llt().solve(difference));
+  const auto num_terms = static_cast<int>(terms.size());
+  return chi2 > ChiSquareLimit(num_terms) ? std::max(1.0, chi2 / num_terms) : 1.0;
+}
+
 }  // namespace
 
 std::optional<Matrix6d> SensorAlone(const SharedSensorInput& input) {
@@ -183,7 +203,10 @@ std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input) {
   if (solver.info() != Eigen::Success) return result;
   const Eigen::VectorXd difference = (c.estimate - r.estimate)(free);
   const Eigen::VectorXd weighted = solver.solve(difference);
-  if (!(difference.dot(weighted) <= ChiSquareLimit(static_cast<int>(free.size())))) return result;
+  if (!(difference.dot(weighted) <= ChiSquareLimit(static_cast<int>(free.size())))) {
+    result.covariance *= Contradiction(r, c, free, S);
+    return result;
+  }
   result.one_unit = true;
   result.correction = G_r * (P_r * weighted) - G_c * (P_c * weighted);
   // Effect of both estimates on the motion; joining them removes part of its covariance.

@@ -22,17 +22,32 @@ constexpr double kWrongNumber = 0.1;
 // is seen well scatters by less than 1 %.
 constexpr double kSameSize = 0.05;
 // Scatter of the ratios of one marker from view to view. The two images of a sweep whose clocks
-// differ by a frame scatter by 2 to 4 %, those of two different sweeps by 20 % and more.
-constexpr double kNotTogether = 0.15;
+// differ by a frame scatter by 1 to 4 %, depth in reverse order by 9 %, those of two different
+// sweeps by 20 % and more.
+constexpr double kNotTogether = 0.06;
+// A print of another size is that in every view. So many markers whose ratio is not the common one
+// and scatters more do not have the depth that is on them.
+constexpr double kUnsteady = 0.03;
+constexpr int kUnsteadyMarkers = 3;
 constexpr int kViewsForRatio = 3;
 // Below, an offset does no harm: 15 ms moved a result by less than its interval, 33 ms by 6 mm.
 constexpr double kHarmfulOffset_s = 0.020;
 constexpr double kOffsetSigmas = 4.0;
 constexpr double kRepeatedToReport = 0.05;
 constexpr double kOutOfRangeToReport = 0.2, kOutOfRangeToRefuse = 0.6;
+// Colour images of usual rooms have a mean of 100 to 160, and 0 to 5 % of white pixels.
+constexpr double kDark = 25, kWhite = 0.4, kFlickers = 0.1;
+// Sweeps of 10 s have 0.1 to 0.5; at 1, an exposure of 20 ms smears over a fiftieth of the image.
+constexpr double kFast_widths_per_s = 1.0;
 // Chi-square for each term: a prior that holds gives 1 at most, since the sweep does not determine
 // every term.
 constexpr double kChi2ToReport = 2.0, kChi2ToRefuse = 4.0;
+// Of assumed cameras, which err by more than stated ones. Where they led to lengths within 0.4 %
+// the sweeps of eight units gave up to 4.5; where depth was not registered, or lengths were wrong
+// by 11 to 17 %, 7.0 and more.
+constexpr double kChi2OfAssumedToRefuse = 5.5;
+// Lengths that are wrong by more because of a camera or a size that nobody stated are no result.
+constexpr double kAssumedScale = 0.03;
 // Units of depth for a metre that recordings have, beside the usual 1000: 5000 (TUM), 10000 and
 // 4000 (RealSense), 256 (KITTI), 100.
 constexpr std::array kDepthUnits = {5000.0, 10000.0, 4000.0, 256.0, 100.0};
@@ -70,13 +85,56 @@ std::vector<MarkerDepth> WellMeasured(const Symptoms& symptoms) {
   return markers;
 }
 
+Message NameOf(DepthLayout layout) {
+  if (layout == DepthLayout::kMirrored) return say::diagnosis::LayoutMirrored();
+  if (layout == DepthLayout::kUpsideDown) return say::diagnosis::LayoutUpsideDown();
+  return say::diagnosis::LayoutTurned();
+}
+
+bool AssumedCamerasUnfit(const CalibrationFit& fit) {
+  return fit.num_terms > 0 && fit.chi2 / fit.num_terms > kChi2OfAssumedToRefuse;
+}
+
+// Markers that are not of the common size.
+// @return whether depth is not that of the markers.
+bool JudgeSizes(const std::vector<MarkerDepth>& markers, double common,
+                std::vector<Finding>& findings) {
+  std::vector<std::int64_t> apart;
+  int num_unsteady = 0;
+  for (const MarkerDepth& marker : markers) {
+    if (std::abs(marker.ratio / common - 1) < kSameSize) continue;
+    apart.push_back(marker.id);
+    if (marker.scatter > kUnsteady * marker.ratio) ++num_unsteady;
+  }
+  if (num_unsteady >= kUnsteadyMarkers) {
+    findings.push_back({FindingLevel::kRefusal, say::diagnosis::ImagesApart()});
+    return true;
+  }
+  if (!apart.empty()) {
+    // A few of them do no harm, since the solve weighs each against the others.
+    const FindingLevel level =
+        3 * apart.size() >= markers.size() ? FindingLevel::kRefusal : FindingLevel::kWarning;
+    const auto count = static_cast<std::int64_t>(apart.size());
+    findings.push_back({level, say::diagnosis::MarkersApart(count, std::move(apart))});
+  }
+  return false;
+}
+
 // @return whether the units are wrong, so that nothing else can be judged.
 bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings) {
   const std::vector<MarkerDepth> markers = WellMeasured(symptoms);
   if (markers.empty()) {
+    // Without markers, a wrong focal length passes for another motion: chi-square may be below 1.
+    if (symptoms.cameras_assumed && !AssumedCamerasUnfit(symptoms.calibration))
+      findings.push_back({FindingLevel::kRefusal, say::diagnosis::CamerasUnconfirmed()});
     if (symptoms.depth_unit_assumed)
       findings.push_back({FindingLevel::kRefusal, say::diagnosis::DepthUnitUnknown()});
     return false;
+  }
+  if (symptoms.depth_layout != DepthLayout::kAsStated) {
+    findings.push_back(
+        {FindingLevel::kRefusal, say::diagnosis::DepthLayout(NameOf(symptoms.depth_layout))});
+    return true;
   }
   std::vector<double> scatter;
   for (const MarkerDepth& marker : markers) scatter.push_back(marker.scatter / marker.ratio);
@@ -85,26 +143,28 @@ bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings)
     return true;
   }
   const double common = CommonRatio(markers);
-  std::vector<std::int64_t> apart;
-  for (const MarkerDepth& marker : markers)
-    if (std::abs(marker.ratio / common - 1) >= kSameSize) apart.push_back(marker.id);
-  if (!apart.empty()) {
-    // A few of them do no harm, since the solve weighs each against the others.
-    const FindingLevel level =
-        3 * apart.size() >= markers.size() ? FindingLevel::kRefusal : FindingLevel::kWarning;
-    const auto count = static_cast<std::int64_t>(apart.size());
-    findings.push_back({level, say::diagnosis::MarkersApart(count, std::move(apart))});
-  }
+  if (JudgeSizes(markers, common, findings)) return true;
   if (std::abs(common - 1) <= kUsualScale) return false;
+  if (symptoms.cameras_assumed && !IsFactorOfUnits(common)) {
+    const bool refused = std::abs(common - 1) > kAssumedScale;
+    findings.push_back(
+        {refused ? FindingLevel::kRefusal : FindingLevel::kWarning,
+         say::diagnosis::CamerasOrSize(common, symptoms.focal_px, common * symptoms.focal_px)});
+    return refused;
+  }
   const double side_mm = symptoms.marker_length_m * common / kMillimetre;
   if (std::abs(common - 1) <= kWrongNumber) {
-    findings.push_back({FindingLevel::kWarning,
-                        say::diagnosis::PrintOrSensor(100 * std::abs(common - 1), side_mm)});
+    // Of dark images the markers' edges are found elsewhere: light first.
+    if (symptoms.median_gray < kDark) return false;
+    findings.push_back(
+        {FindingLevel::kWarning, say::diagnosis::PrintOrSensor(100 * std::abs(common - 1), side_mm,
+                                                               common * symptoms.focal_px)});
     return false;
   }
-  findings.push_back({FindingLevel::kRefusal, IsFactorOfUnits(common)
-                                                  ? say::diagnosis::DepthUnit(common)
-                                                  : say::diagnosis::UnitOrSide(common, side_mm)});
+  findings.push_back({FindingLevel::kRefusal,
+                      IsFactorOfUnits(common) ? say::diagnosis::DepthUnit(common)
+                                              : say::diagnosis::UnitOrSide(
+                                                    common, side_mm, common * symptoms.focal_px)});
   return true;
 }
 
@@ -136,6 +196,17 @@ void JudgeRange(const Symptoms& symptoms, std::vector<Finding>& findings) {
                                  : say::diagnosis::TooFar(100 * outside, symptoms.farthest_m)});
 }
 
+void JudgeExposure(const Symptoms& symptoms, std::vector<Finding>& findings) {
+  const auto warn = [&](bool seen, const Message& cause) {
+    if (seen) findings.push_back({FindingLevel::kWarning, cause});
+  };
+  warn(symptoms.median_gray < kDark, say::diagnosis::TooDark(symptoms.median_gray));
+  warn(symptoms.share_white > kWhite, say::diagnosis::TooBright(100 * symptoms.share_white));
+  warn(symptoms.share_flickers > kFlickers,
+       say::diagnosis::Flickers(100 * symptoms.share_flickers));
+  warn(symptoms.widths_per_s > kFast_widths_per_s, say::diagnosis::TooFast(symptoms.widths_per_s));
+}
+
 void JudgeForeignMarkers(const Symptoms& symptoms, std::vector<Finding>& findings) {
   if (!symptoms.foreign_markers) return;
   const ForeignMarkers& foreign = *symptoms.foreign_markers;
@@ -154,14 +225,20 @@ void JudgeCalibration(const Symptoms& symptoms, std::vector<Finding>& findings) 
   const CalibrationFit& fit = symptoms.calibration;
   if (fit.num_terms == 0) return;
   const double chi2_per_term = fit.chi2 / fit.num_terms;
+  if (symptoms.cameras_assumed) {  // Their single terms mean nothing.
+    if (AssumedCamerasUnfit(fit))
+      findings.push_back({FindingLevel::kRefusal,
+                          say::diagnosis::CamerasUnstated(chi2_per_term, kChi2OfAssumedToRefuse)});
+    return;
+  }
+  // Sound sweeps gave -12 to 12 ms, a filter over time -23 to -52.
+  if (fit.delay_s < -kHarmfulOffset_s) {
+    findings.push_back({FindingLevel::kRefusal, say::diagnosis::DepthLags(-fit.delay_s)});
+    return;
+  }
   if (!(chi2_per_term > kChi2ToReport)) return;
   const FindingLevel level =
       chi2_per_term > kChi2ToRefuse ? FindingLevel::kRefusal : FindingLevel::kWarning;
-  // Of assumed cameras, single terms mean nothing.
-  if (symptoms.cameras_assumed) {
-    findings.push_back({level, say::diagnosis::CamerasUnstated(chi2_per_term)});
-    return;
-  }
   findings.push_back({level, say::diagnosis::Calibration(chi2_per_term, fit.worst_term,
                                                          fit.worst_value, fit.worst_sigma)});
 }
@@ -175,6 +252,11 @@ double ScaleDoubt(const Symptoms& symptoms) {
   return off > kUsualScale ? off + kSensorScale : 0.0;
 }
 
+bool IsOfAssumedCameras(const Message& refusal) {
+  return refusal.id() == say::diagnosis::CamerasUnstated(0, 0).id() ||
+         refusal.id() == say::diagnosis::CamerasOrSize(0, 0, 0).id();
+}
+
 std::vector<Finding> Diagnose(const Symptoms& symptoms) {
   std::vector<Finding> findings;
   JudgeForeignMarkers(symptoms, findings);
@@ -185,7 +267,11 @@ std::vector<Finding> Diagnose(const Symptoms& symptoms) {
   // Depth of another moment disagrees with the markers because of its time.
   const bool wrong_numbers = !clocks_differ && JudgeMarkerDepths(symptoms, findings);
   if (!wrong_numbers) JudgeRange(symptoms, findings);
-  if (!clocks_differ && !wrong_numbers) JudgeCalibration(symptoms, findings);
+  // Colour images that are mirrored do not fit depth, so the solve finds no calibration.
+  const bool mirrored =
+      symptoms.foreign_markers && symptoms.foreign_markers->kind == ForeignMarkers::Kind::kMirrored;
+  if (!clocks_differ && !wrong_numbers && !mirrored) JudgeCalibration(symptoms, findings);
+  JudgeExposure(symptoms, findings);
   std::ranges::stable_sort(findings,
                            [](const Finding& a, const Finding& b) { return a.level > b.level; });
   return findings;

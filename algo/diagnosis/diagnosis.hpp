@@ -22,22 +22,29 @@ struct CalibrationFit {
   std::string worst_term;  ///< As in CalibrationNames(), with its unit.
   double worst_value = 0.0;
   double worst_sigma = 0.0;  ///< Of the prior.
+  double delay_s = 0.0;      ///< Of depth, from its prior; < 0: depth lags behind colour.
 };
 
 /// What one sweep shows. A quantity that was not measured stays absent or zero, and no finding is
 /// made of it.
 struct Symptoms {
   std::vector<MarkerDepth> marker_depths;  ///< By id.
-  double marker_length_m = 0.0;            ///< As stated.
-  bool depth_unit_assumed = false;         ///< Nothing states the unit of the depth images.
-  bool cameras_assumed = false;            ///< Nothing states the intrinsics.
+  DepthLayout depth_layout = DepthLayout::kAsStated;
+  double marker_length_m = 0.0;     ///< As stated.
+  bool depth_unit_assumed = false;  ///< Nothing states the unit of the depth images.
+  bool cameras_assumed = false;     ///< Nothing states the intrinsics.
+  double focal_px = 0.0;            ///< Of the colour camera, as stated or assumed.
   std::optional<StreamOffset> stream_offset;
   std::int64_t num_frames = 0;
   std::int64_t num_repeated_depth = 0;  ///< Depth images with every pixel of the one before.
   std::int64_t num_repeated_color = 0;
-  double share_near = 0.0;  ///< Fraction of the measured depth that is nearer than usable.
-  double share_far = 0.0;   ///< Fraction of the measured depth that is farther than usable.
-  double nearest_m = 0.0;   ///< The usable range.
+  double share_near = 0.0;      ///< Fraction of the measured depth that is nearer than usable.
+  double share_far = 0.0;       ///< Fraction of the measured depth that is farther than usable.
+  double median_gray = 128;     ///< Of the images' mean values, 0 to 255.
+  double share_white = 0.0;     ///< Fraction of the colour images' pixels that are saturated.
+  double share_flickers = 0.0;  ///< Fraction of the images that differ in brightness from the last.
+  double widths_per_s = 0.0;    ///< Median speed of what the colour images show.
+  double nearest_m = 0.0;       ///< The usable range.
   double farthest_m = 0.0;
   std::optional<ForeignMarkers> foreign_markers;  ///< Only where no marker was decoded.
   CalibrationFit calibration;
@@ -58,6 +65,10 @@ struct Finding {
 /// markers disagree by more than such sensors usually do: the disagreement, and 1 % that the sensor
 /// may be off in the other direction. 0 if they agree or nothing was measured.
 [[nodiscard]] double ScaleDoubt(const Symptoms& symptoms);
+
+/// Whether a refusal says that cameras which nobody stated do not fit: lengths are then wrong by
+/// some per cent at least, and a recording has no scene.
+[[nodiscard]] bool IsOfAssumedCameras(const Message& refusal);
 
 /// The causes, the most serious first. A pure function of its input.
 ///

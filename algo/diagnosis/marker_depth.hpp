@@ -19,6 +19,9 @@ struct MarkerDepth {
   int num_views = 0;     ///< Keyframes with depth on the marker's face.
 };
 
+/// How the depth image lies on the colour image.
+enum class DepthLayout { kAsStated, kMirrored, kUpsideDown, kTurned /*by half a turn*/ };
+
 /// The markers in the keyframes that still have their depth image, by ascending id.
 /// @param known  Errors of the sensor's depth that are known before the sweep.
 /// @param length_m  Stated side of the black square, positive.
@@ -26,5 +29,11 @@ struct MarkerDepth {
                                                            const Intrinsics& intrinsics,
                                                            const CalibrationModel& known,
                                                            double length_m);
+
+/// The layout in which depth agrees with the markers' size from view to view, where as stated it
+/// does not, and another one does clearly better.
+/// @return kAsStated also if no layout explains the disagreement.
+[[nodiscard]] DepthLayout FindDepthLayout(const TrackingMap& map, const Intrinsics& intrinsics,
+                                          const CalibrationModel& known, double length_m);
 
 }  // namespace plumb

@@ -113,6 +113,12 @@ void ImageMotion::Add(const cv::Mat& small, double time_s) {
   previous_time_s_ = time_s;
 }
 
+double ImageMotion::MedianWidthsPerSecond() const {
+  std::vector<double> speeds;
+  for (const Rate& rate : rates_) speeds.push_back(rate.px_per_s.norm() / kSmallWidth);
+  return speeds.empty() ? 0.0 : TakeMedian(speeds);
+}
+
 std::optional<StreamOffset> EstimateStreamOffset(const std::vector<ImageMotion::Rate>& color,
                                                  const std::vector<ImageMotion::Rate>& depth) {
   if (color.size() < kLeastRates || depth.size() < kLeastRates) return std::nullopt;

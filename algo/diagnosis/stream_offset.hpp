@@ -31,6 +31,8 @@ class ImageMotion {
   void AddDepth(const cv::Mat& depth_m, double time_s);
 
   [[nodiscard]] const std::vector<Rate>& rates() const { return rates_; }
+  /// Median speed in widths of the image for a second; 0 for less than two images.
+  [[nodiscard]] double MedianWidthsPerSecond() const;
 
  private:
   void Add(const cv::Mat& small, double time_s);

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algo/diagnosis/sweep_watch.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 
 #include <opencv2/core.hpp>
+
+#include "algo/base/statistics.hpp"
 
 namespace plumb {
 namespace {
@@ -33,21 +37,48 @@ bool IsRepeated(const cv::Mat& image, std::optional<std::uint64_t>& last) {
   return repeated;
 }
 
+using Rates = std::vector<ImageMotion::Rate>;
+
+// Of the whole sweep or of one of its halves, that which is the least compatible with none: the
+// stamps of one stream may jump within a sweep.
+std::optional<StreamOffset> WorstOffset(const Rates& color, const Rates& depth) {
+  std::optional<StreamOffset> worst = EstimateStreamOffset(color, depth);
+  const auto size_of = [](const std::optional<StreamOffset>& offset) {
+    constexpr double kSigmas = 4.0;
+    return offset ? std::abs(offset->offset_s) - kSigmas * offset->sigma_s : -1.0;
+  };
+  const auto half = static_cast<std::ptrdiff_t>(color.size() / 2);
+  for (const Rates& part :
+       {Rates(color.begin(), color.begin() + half), Rates(color.begin() + half, color.end())})
+    if (const auto offset = EstimateStreamOffset(part, depth); size_of(offset) > size_of(worst))
+      worst = offset;
+  return worst;
+}
+
 }  // namespace
 
-void SweepWatch::Add(const Frame& frame, bool shows_marker) {
+bool SweepWatch::IsRepetition(const Frame& frame) {
   const bool color_again = IsRepeated(frame.color_rgb, color_digest_);
   const bool depth_again = IsRepeated(frame.depth_m, depth_digest_);
-  if (!color_again) color_motion_.AddColor(frame.color_rgb, frame.color_time_s);
-  if (!depth_again) depth_motion_.AddDepth(frame.depth_m, frame.depth_time_s);
+  // Without depth nothing was measured that could be repeated: a covered sensor.
+  if (cv::countNonZero(frame.depth_m) == 0) return false;
   // Where both stand still for longer, a player waits before its sweep begins or after it ended.
   const bool both_again = color_again && depth_again;
-  const bool waits = both_again && both_again_;
-  both_again_ = both_again;
-  if (color_again && !waits) ++repeated_color_;
-  // An empty image is no measurement that could be repeated.
-  if (depth_again && !waits && cv::countNonZero(frame.depth_m) > 0) ++repeated_depth_;
+  const bool waits = both_again && at_rest_;
+  at_rest_ = both_again || num_frames_ == 0;
+  if (waits) return false;
+  if (color_again) ++repeated_color_;
+  if (depth_again) ++repeated_depth_;
+  if (!color_again && !depth_again) return false;
+  ++num_frames_;
+  return true;
+}
+
+void SweepWatch::Add(const Frame& frame, bool shows_marker) {
+  color_motion_.AddColor(frame.color_rgb, frame.color_time_s);
+  depth_motion_.AddDepth(frame.depth_m, frame.depth_time_s);
   CountRange(frame.depth_m);
+  MeasureExposure(frame.color_rgb);
   markers_seen_ = markers_seen_ || shows_marker;
   if (markers_seen_) {
     without_marker_.clear();
@@ -77,17 +108,46 @@ void SweepWatch::CountRange(const cv::Mat& depth_m) {
   }
 }
 
+// Likewise.
+void SweepWatch::MeasureExposure(const cv::Mat& color_rgb) {
+  constexpr int kWhiteFrom = 250;
+  constexpr double kFlicker = 0.1;  // Sweeps over a room change by 0 to 2 % from image to image.
+  std::int64_t sum = 0, count = 0;
+  for (int r = 4; r < color_rgb.rows; r += 8) {
+    for (int c = 4; c < color_rgb.cols; c += 8) {
+      const auto& pixel = color_rgb.at<cv::Vec3b>(r, c);
+      sum += pixel[0] + pixel[1] + pixel[2];
+      ++count;
+      if (std::min({pixel[0], pixel[1], pixel[2]}) >= kWhiteFrom) ++color_white_;
+    }
+  }
+  if (count == 0) return;
+  color_pixels_ += count;
+  const double gray = static_cast<double>(sum) / (3.0 * static_cast<double>(count));
+  if (!grays_.empty() && std::abs(gray - grays_.back()) > kFlicker * std::min(gray, grays_.back()))
+    ++flickers_;
+  grays_.push_back(gray);
+}
+
 Symptoms SweepWatch::Finish(const StreamInfo& info, bool any_decoded) const {
   Symptoms symptoms;
   symptoms.marker_length_m = info.room_markers.length_m;
   symptoms.depth_unit_assumed = info.depth_unit_assumed;
   symptoms.cameras_assumed = info.intrinsics_assumed;
-  symptoms.stream_offset = EstimateStreamOffset(color_motion_.rates(), depth_motion_.rates());
+  symptoms.focal_px = info.intrinsics.fx;
+  symptoms.stream_offset = WorstOffset(color_motion_.rates(), depth_motion_.rates());
   symptoms.num_frames = num_frames_;
   symptoms.num_repeated_depth = repeated_depth_;
   symptoms.num_repeated_color = repeated_color_;
   symptoms.nearest_m = range_.nearest_m;
   symptoms.farthest_m = range_.farthest_m;
+  if (!grays_.empty()) {
+    std::vector<double> grays = grays_;
+    symptoms.median_gray = TakeMedian(grays);
+    symptoms.share_white = static_cast<double>(color_white_) / static_cast<double>(color_pixels_);
+    symptoms.share_flickers = static_cast<double>(flickers_) / static_cast<double>(grays_.size());
+  }
+  symptoms.widths_per_s = color_motion_.MedianWidthsPerSecond();
   if (depth_measured_ > 0) {
     const auto measured = static_cast<double>(depth_measured_);
     symptoms.share_near = static_cast<double>(depth_near_) / measured;

@@ -48,6 +48,7 @@ struct Reconstructor::Impl {
   std::vector<double> median_depths_m;  // One per frame that has valid depth.
   std::vector<double> tracking_times_s;
   SweepWatch watch;
+  TrackingReport last_report;
 
   Impl(const StreamInfo& stream, const ReconstructorOptions& reconstructor_options)
       : info(stream),
@@ -64,6 +65,10 @@ struct Reconstructor::Impl {
       throw DataError(say::reconstruction::ImageSize(
           frame.index, frame.color_rgb.cols, frame.color_rgb.rows, frame.depth_m.cols,
           frame.depth_m.rows, info.intrinsics.width, info.intrinsics.height));
+    if (watch.IsRepetition(frame)) {  // What is shown is what was shown.
+      last_report.is_keyframe = false;
+      return last_report;
+    }
     TrackingReport report;
     DepthStatistics(frame.depth_m, report);
     const double start = Now();
@@ -80,6 +85,7 @@ struct Reconstructor::Impl {
     }
     if (HasReferenceMarker(info, tracker.map()))
       report.T_scene_world = SceneFromWorld(info, tracker.map());
+    last_report = report;
     return report;
   }
 

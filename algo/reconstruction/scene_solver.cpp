@@ -100,6 +100,8 @@ CalibrationFit FitOf(const CalibrationVector& solved, const CalibrationPrior& pr
   fit.worst_term = CalibrationNames()[static_cast<std::size_t>(worst)];
   fit.worst_value = solved[worst] - prior.mean[worst];
   fit.worst_sigma = (*sigmas)[worst];
+  constexpr int kDelayAt = kDepthAt + kDepthDelay;
+  fit.delay_s = solved[kDelayAt] - prior.mean[kDelayAt];
   return fit;
 }
 
@@ -234,6 +236,8 @@ class SceneSolver {
     MoveCalibration(prior.mean, known);
     symptoms.marker_depths =
         MeasureMarkerDepths(map, sweep_.info.intrinsics, known, sweep_.info.room_markers.length_m);
+    symptoms.depth_layout =
+        FindDepthLayout(map, sweep_.info.intrinsics, known, sweep_.info.room_markers.length_m);
     return symptoms;
   }
 
@@ -360,7 +364,8 @@ class SceneSolver {
     scene.timings_s["clouds"] = Now() - stage;
 
     stage = Now();
-    scene.breathing = BreathingOf(surfaces, joint, map, scene, stop);
+    // Of a sweep whose numbers are wrong, what rises and falls need not be a breath.
+    if (scene.refusals.empty()) scene.breathing = BreathingOf(surfaces, joint, map, scene, stop);
     WarnOfBreathing(scene);
     scene.timings_s["breathing"] = Now() - stage;
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <memory>
 
@@ -68,8 +69,10 @@ std::string Summary(const Scene& scene, const std::filesystem::path& out,
                                       static_cast<std::int64_t>(scene.mesh.triangles.size()))));
   if (const auto after = scene.timings_s.find("after_last_frame"); after != scene.timings_s.end())
     line(say::cli::TimeLabel(), context.Said(say::cli::TimeAfter(after->second)));
-  for (const Message& warning : scene.warnings)
-    line(say::cli::WarningLabel(), context.Said(warning));
+  for (const Message& warning : scene.warnings) {
+    const bool refused = std::ranges::find(scene.refusals, warning) != scene.refusals.end();
+    line(refused ? say::cli::RefusedLabel() : say::cli::WarningLabel(), context.Said(warning));
+  }
   return text;
 }
 

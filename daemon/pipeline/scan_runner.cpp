@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "algo/base/errors.hpp"
+#include "algo/diagnosis/diagnosis.hpp"
 #include "daemon/loop/bounded_queue.hpp"
 #include "daemon/pipeline/frame_thinning.hpp"
 #include "words/progress.hpp"
@@ -95,6 +96,13 @@ class FrameReader : public FrameFeed {
   std::jthread thread_;  // last: starts when the members above are initialised
 };
 
+/// Of a recording, somebody can still state the cameras. A live sweep keeps its scene, and the
+/// comparison refuses it with the same words.
+void RefuseUnfitCameras(const Scene& scene) {
+  const auto unfit = std::ranges::find_if(scene.refusals, IsOfAssumedCameras);
+  if (unfit != scene.refusals.end()) throw DataError(*unfit);
+}
+
 }  // namespace
 
 Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOptions& options,
@@ -149,10 +157,14 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
 Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::stop_token& stop,
               const std::function<void(const ScanProgress&)>& progress) {
   FrameReader reader(source, options.realtime, options.queue_capacity);
-  if (!options.realtime)
-    return RunScan(reader, source.info(), options.reconstructor, stop, progress);
+  if (!options.realtime) {
+    Scene scene = RunScan(reader, source.info(), options.reconstructor, stop, progress);
+    RefuseUnfitCameras(scene);
+    return scene;
+  }
   ThinnedFeed thinned(reader);
   Scene scene = RunScan(thinned, source.info(), options.reconstructor, stop, progress);
+  RefuseUnfitCameras(scene);
   if (const Message warning = thinned.Warning(); !warning.empty())
     scene.warnings.push_back(warning);
   return scene;

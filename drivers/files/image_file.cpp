@@ -90,6 +90,10 @@ cv::Mat ReadDepthImage(const std::filesystem::path& path) {
   return DecodeDepthImage(ReadWholeFile(path, kMaxImageBytes), path.string());
 }
 
+cv::Mat ReadExrDepth(const std::filesystem::path& path) {
+  return DecodeExrDepth(ReadWholeFile(path, kMaxImageBytes), path.string());
+}
+
 cv::Mat ReadFloatTiff(const std::filesystem::path& path) {
   return DecodeFloatTiff(ReadWholeFile(path, kMaxTiffBytes), path.string());
 }

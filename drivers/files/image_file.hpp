@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image files through libpng, libjpeg and libtiff directly: strict (a damaged image is never partly
-// accepted) and with limited sizes.
+// Image files through libpng, libjpeg and libtiff directly, OpenEXR by own code: strict (a damaged
+// image is never partly accepted) and with limited sizes.
 //
 // Decoders take bytes and a name for messages. All functions are thread-safe and deterministic.
 #pragma once
@@ -36,6 +36,13 @@ inline constexpr int kMaxGridSide = 16384;
 [[nodiscard]] cv::Mat ReadDepthImage(const std::filesystem::path& path);
 [[nodiscard]] cv::Mat DecodeDepthImage(std::span<const std::uint8_t> bytes,
                                        const std::string& name);
+
+/// A depth image as OpenEXR, in metres, as phones' apps write it: scan lines without compression,
+/// by runs or by zlib; the channel Z, else R, else Y, else the only one; 16- or 32-bit floats.
+/// @return CV_32FC1; 0 where the value is not finite or not positive.
+/// @throws DataError as above, and for any other kind of OpenEXR.
+[[nodiscard]] cv::Mat ReadExrDepth(const std::filesystem::path& path);
+[[nodiscard]] cv::Mat DecodeExrDepth(std::span<const std::uint8_t> file, const std::string& name);
 
 /// CV_8UC1 (grey), CV_8UC3 (RGB) or CV_16UC1 (depth) as PNG, compressed fast rather than small.
 /// @throws std::invalid_argument on another type or an empty image; IoError if the file cannot be

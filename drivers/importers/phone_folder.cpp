@@ -52,7 +52,8 @@ bool HasEnding(const fs::path& folder, const char* ending) {
 }
 
 /// The images, or the command that makes some that can be read.
-std::pair<Numbered, Numbered> PhoneImages(const fs::path& folder, const std::string& format) {
+std::pair<Numbered, Numbered> PhoneImages(const fs::path& folder, const std::string& format,
+                                          bool is_exr) {
   std::error_code error;
   const bool has_color = fs::is_directory(folder / "rgb", error);
   if (!has_color && HasFile(folder / "rgb.mp4"))
@@ -60,12 +61,8 @@ std::pair<Numbered, Numbered> PhoneImages(const fs::path& folder, const std::str
         folder.string(), format + ", rgb.mp4",
         "mkdir rgb && ffmpeg -noautorotate -i rgb.mp4 -vsync 0 -start_number 0 -q:v 2 "
         "rgb/%06d.jpg"));
-  if (HasEnding(folder / "depth", ".exr") && !HasEnding(folder / "depth", ".png"))
-    throw DataError(say::foreign::NotReadYet(
-        folder.string(), format + ", depth/*.exr",
-        "for f in depth/*.exr; do oiiotool \"$f\" --ch 0 --mulc 0.015259022 -d uint16 -o "
-        "\"${f%.exr}.png\"; done"));
-  return {NumberedImages(folder, "rgb", {}, false), NumberedImages(folder, "depth", {}, true)};
+  return {NumberedImages(folder, "rgb", {}, false),
+          NumberedImages(folder, "depth", is_exr ? ".exr" : "", true)};
 }
 
 /// The camera for images of these sizes.
@@ -124,10 +121,12 @@ std::unique_ptr<ImportedRecording> OpenPhoneFolder(const fs::path& folder,
                                                    const RecordingDefaults& defaults) {
   const std::optional<FoundPhone> phone = FindPhone(folder);
   if (!phone) throw DataError(say::foreign::NoCalibration(folder.string()));
-  const auto [color, depth] = PhoneImages(phone->folder, phone->format);
+  ImageFolder contents;
+  contents.depth_is_exr =
+      HasEnding(phone->folder / "depth", ".exr") && !HasEnding(phone->folder / "depth", ".png");
+  const auto [color, depth] = PhoneImages(phone->folder, phone->format, contents.depth_is_exr);
   if (color.empty() || depth.empty())
     throw DataError(say::foreign::NoSameNumber(phone->folder.string()));
-  ImageFolder contents;
   contents.folder = phone->folder;
   contents.color_list = contents.depth_list = phone->folder / phone->file;
   constexpr double kUsualPhoneRate_hz = 60.0;
@@ -136,8 +135,10 @@ std::unique_ptr<ImportedRecording> OpenPhoneFolder(const fs::path& folder,
   if (phone->metadata.stamps_s.empty())
     contents.warnings.push_back(say::foreign::RateAssumed(rate_hz));
   ListPairs(*phone, color, depth, rate_hz, contents);
-  contents.camera = PhoneCamera(*phone, ReadColorImage(phone->folder / color.begin()->second),
-                                ReadDepthImage(phone->folder / depth.begin()->second));
+  const fs::path first_depth = phone->folder / depth.begin()->second;
+  contents.camera =
+      PhoneCamera(*phone, ReadColorImage(phone->folder / color.begin()->second),
+                  contents.depth_is_exr ? ReadExrDepth(first_depth) : ReadDepthImage(first_depth));
   return OpenListedFolder(std::move(contents),
                           {.format = phone->format, .calibration = phone->file}, defaults);
 }

@@ -15,8 +15,9 @@ namespace plumb {
 
 /// Depth keeps its own resolution; its camera is the colour camera, smaller. Images belong together
 /// by the numbers in their names, which also choose their stamps.
-/// @throws DataError for depth as EXR and for colour as a film, with the command that converts it;
-///         and as OpenTumRecording().
+/// Depth is PNG in millimetres or OpenEXR in metres.
+/// @throws DataError for colour as a film, with the command that converts it; and as
+///         OpenTumRecording().
 [[nodiscard]] std::unique_ptr<ImportedRecording> OpenPhoneFolder(
     const std::filesystem::path& folder, const RecordingDefaults& defaults = {});
 

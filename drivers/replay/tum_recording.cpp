@@ -187,6 +187,7 @@ class TumRecording : public FrameSource {
   StreamInfo info_;
   std::vector<FramePlan> plans_;
   double depth_scale_ = 0.0;  ///< Units per metre.
+  bool depth_is_exr_ = false;
   Intrinsics depth_intrinsics_;
   std::optional<DepthRegistration> registration_;
 
@@ -290,9 +291,10 @@ Decoded TumRecording::Decode(std::size_t i) const {
   decoded.frame.color_rgb = ReadColorImage(plan.color_file);
   CheckImageSize(plan.color_file, decoded.frame.color_rgb, info_.intrinsics,
                  say::recording::Colour());
-  const cv::Mat depth_units = ReadDepthImage(plan.depth_file);
-  CheckImageSize(plan.depth_file, depth_units, depth_intrinsics_, say::recording::Depth());
-  decoded.frame.depth_m = ToMetres(depth_units, depth_scale_);
+  const cv::Mat depth =
+      depth_is_exr_ ? ReadExrDepth(plan.depth_file) : ReadDepthImage(plan.depth_file);
+  CheckImageSize(plan.depth_file, depth, depth_intrinsics_, say::recording::Depth());
+  decoded.frame.depth_m = depth_is_exr_ ? depth : ToMetres(depth, depth_scale_);
   if (registration_) decoded.frame.depth_m = registration_->Register(decoded.frame.depth_m);
   return decoded;
 }
@@ -339,6 +341,7 @@ TumRecording::TumRecording(const fs::path& folder, const RecordingDefaults& defa
 TumRecording::TumRecording(const ImageFolder& contents, const RecordingDefaults& defaults) try {
   info_.warnings = contents.warnings;
   info_.intrinsics_assumed = contents.intrinsics_assumed;
+  depth_is_exr_ = contents.depth_is_exr;
   FindFrames(contents, defaults.max_stamp_gap_s);
   SetCamera(contents.camera, defaults);
 } catch (const fs::filesystem_error& failure) {

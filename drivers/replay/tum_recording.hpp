@@ -54,6 +54,7 @@ struct ImageFolder {
   std::vector<IndexEntry> fewer_keypoints;  ///< Of `depth`, see kFewerKeypointsFile.
   CameraFile camera;
   bool intrinsics_assumed = false;
+  bool depth_is_exr = false;  ///< Depth images are OpenEXR in metres, not PNG in units.
   std::vector<Message> warnings;
 };
 

@@ -13,6 +13,7 @@
 #include "drivers/replay/tum_writer.hpp"
 #include "tests/support/result_with.hpp"
 #include "tests/unit/importers/bag_writer.hpp"
+#include "tests/unit/importers/exr_writer.hpp"
 #include "tests/unit/importers/mkv_writer.hpp"
 #include "tests/unit/importers/ros2_writer.hpp"
 #ifdef PLUMB_WITH_DICOM
@@ -41,6 +42,11 @@ void WriteImages(const fs::path& root) {
   const fs::path jpeg = Folder(root / "jpeg");
   WriteWholeFile(jpeg / "fine", EncodeJpeg(rgb, 95));
   WriteWholeFile(jpeg / "coarse", EncodeJpeg(rgb, 5));
+  const cv::Mat depth_m(20, 7, CV_32FC1, cv::Scalar(0.5));
+  for (const std::uint8_t compression : {0, 1, 2, 3}) {
+    const std::vector<std::uint8_t> file = testing::ExrFile(depth_m, {.compression = compression});
+    WriteWholeFile(Folder(root / "exr") / std::to_string(compression), file);
+  }
   WriteFloatTiff(Folder(root / "tiff") / "map", cv::Mat(5, 4, CV_32FC1, cv::Scalar(0.5)));
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Damaged and contradictory recordings: exit 3, a message that names the trouble, nothing left
 // behind.
+#include <cmath>
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -196,6 +198,108 @@ TEST_F(RecordingTest, ThatIsAnEmptyFolderIsBadInput) {
   EXPECT_EQ(Plumb({"info", folder_ / "empty"}).exit_code, 3);
   EXPECT_THAT(LeftBehind({"empty"}), IsEmpty());
 }
+
+/// The depth images as a RealSense delivers them: of a camera 15 mm beside the colour camera, with
+/// five eighths of its focal length.
+void TakeFromDepthCamera(const fs::path& recording) {
+  constexpr double kZoom = 0.625, kOffset_m = 0.015, kFocal_px = 262.5, kUnits = 5000;
+  for (std::size_t i = 0; i < Lines(recording / "depth.txt").size(); ++i) {
+    const fs::path file = ImageOf(recording, "depth.txt", i);
+    const cv::Mat registered = ReadDepthImage(file);
+    cv::Mat own = cv::Mat::zeros(registered.size(), CV_16UC1);
+    for (int r = 0; r < registered.rows; ++r) {
+      for (int c = 0; c < registered.cols; ++c) {
+        const std::uint16_t z = registered.at<std::uint16_t>(r, c);
+        if (z == 0) continue;
+        const double moved_px = kFocal_px * kOffset_m / (z / kUnits);
+        const auto x = static_cast<int>(std::lround(kZoom * (c - 159.5 - moved_px) + 160.5));
+        const auto y = static_cast<int>(std::lround(kZoom * (r - 119.5) + 118.25));
+        if (x < 0) continue;
+        std::uint16_t& nearest = own.at<std::uint16_t>(y, x);
+        if (nearest == 0 || z < nearest) nearest = z;
+      }
+    }
+    WritePng(file, own);
+  }
+}
+
+TEST_F(RecordingTest, WithoutCamerasIsReadOrRefusedByWhetherTheAssumedOnesFit) {
+  const fs::path recording = Copy(SmallRecording(SmallNames()[0]), "recording");
+  fs::remove(recording / "camera.yaml");
+  const RunResult fits = Plumb({"reconstruct", recording, "--out", folder_ / "fits", "--json"});
+  ASSERT_EQ(fits.exit_code, 0) << fits.err;
+  EXPECT_THAT(fits.out, testing::Not(HasSubstr("nothing states")));
+  TakeFromDepthCamera(recording);
+  const RunResult unfit = Plumb({"reconstruct", recording, "--out", folder_ / "unfit"});
+  EXPECT_EQ(unfit.exit_code, 3);
+  EXPECT_THAT(unfit.err, HasSubstr("nothing states the sensor's cameras"));
+  EXPECT_THAT(unfit.err, HasSubstr("depth is not registered to colour"));
+  EXPECT_THAT(LeftBehind({"recording", "fits"}), IsEmpty());
+}
+
+/// A fault that no reader sees, and what reconstruct says of it.
+struct PlantedFault {
+  const char* name;
+  std::function<void(const fs::path& recording)> apply;
+  const char* message;
+};
+
+[[maybe_unused]] void PrintTo(const PlantedFault& fault, std::ostream* out) { *out << fault.name; }
+
+std::vector<PlantedFault> PlantedFaults() {
+  const auto flip_depth = [](int how) {
+    return [how](const fs::path& recording) {
+      for (std::size_t i = 0; i < Lines(recording / "depth.txt").size(); ++i) {
+        const fs::path file = ImageOf(recording, "depth.txt", i);
+        cv::Mat turned;
+        cv::flip(ReadDepthImage(file), turned, how);
+        WritePng(file, turned);
+      }
+    };
+  };
+  return {
+      {"DepthMirrored", flip_depth(1), "refused    the depth images are mirrored left to right"},
+      {"DepthTurned", flip_depth(-1), "refused    the depth images are turned by half a turn"},
+      {"EveryThirdDepthImageRepeated",
+       [](const fs::path& recording) {
+         for (std::size_t i = 2; i < Lines(recording / "depth.txt").size(); i += 3)
+           fs::copy_file(ImageOf(recording, "depth.txt", i - 1), ImageOf(recording, "depth.txt", i),
+                         fs::copy_options::overwrite_existing);
+       },
+       "10 of 30 depth images repeat the one before and were left out"},
+      {"ImagesOfAnotherSizeCalibrated",
+       [](const fs::path& recording) {
+         std::string text = ReadText(recording / "camera.yaml");
+         const std::size_t from = text.find('[', text.find("camera_matrix")) + 1;
+         text.replace(from, text.find(']', from) - from,
+                      "392., 0., 200., 0., 392., 150., 0., 0., 1.");
+         WriteText(recording / "camera.yaml", text);
+       },
+       "or camera_matrix is of images of another size (by the depth, the focal length is 26"},
+      {"Dark",
+       [](const fs::path& recording) {
+         for (std::size_t i = 0; i < Lines(recording / "rgb.txt").size(); ++i) {
+           const fs::path file = ImageOf(recording, "rgb.txt", i);
+           WritePng(file, ReadColorImage(file) * 0.1);
+         }
+       },
+       "the colour images are dark"},
+  };
+}
+
+class PlantedFaultTest : public CommandLineTest,
+                         public testing::WithParamInterface<PlantedFault> {};
+
+TEST_P(PlantedFaultTest, IsNamed) {
+  const fs::path recording = Copy(SmallRecording(SmallNames()[0]), "recording");
+  GetParam().apply(recording);
+  const RunResult result = Plumb({"reconstruct", recording, "--out", folder_ / "scene"});
+  EXPECT_THAT(result.out + result.err, HasSubstr(GetParam().message));
+  EXPECT_THAT(result.out, testing::Not(HasSubstr("print them at the size")));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, PlantedFaultTest, testing::ValuesIn(PlantedFaults()),
+                         [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
 }  // namespace plumb

@@ -2,8 +2,10 @@
 #include "algo/diagnosis/marker_depth.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
 #include "tests/unit/markers/marker_scene.hpp"
 
@@ -55,6 +57,59 @@ TEST(MarkerDepthTest, WhatIsKnownOfTheSensorIsTakenOut) {
       MeasureMarkerDepths(MapWithDepth(1.0 / 1.04, camera), camera, known, kLength_m);
   ASSERT_EQ(measured.size(), 2U);
   EXPECT_NEAR(measured[0].ratio, 1.0, 1e-3);
+}
+
+// Six views of two markers at 0.8 and 1 m, in opposite quarters of the image; the other quarters
+// have depths of their own.
+TrackingMap MapOfQuarters(const Intrinsics& camera) {
+  cv::Mat depth_m(camera.height, camera.width, CV_32FC1);
+  const cv::Rect quarter(0, 0, camera.width / 2, camera.height / 2);
+  const cv::Point across(quarter.width, 0), down(0, quarter.height);
+  depth_m(quarter).setTo(0.8);
+  depth_m(quarter + across).setTo(1.3);
+  depth_m(quarter + down).setTo(0.5);
+  depth_m(quarter + across + down).setTo(1.0);
+  TrackingMap map;
+  for (int view = 0; view < 6; ++view) {
+    MapKeyframe& keyframe = map.keyframes.emplace_back();
+    keyframe.data.view.depth_m = depth_m.clone();
+    for (const int id : {4, 9}) {
+      const double side = id == 4 ? -1 : 1;
+      testing::PlacedMarker placed{id};
+      placed.T_camera_marker.linear() = RotationFromVector(Eigen::Vector3d(M_PI, 0, 0));
+      placed.T_camera_marker.translation() =
+          Eigen::Vector3d(0.2 * side, 0.15 * side, 0.9 + 0.1 * side);
+      keyframe.data.markers.push_back(
+          {.id = id, .corners = testing::TrueCorners(placed, kLength_m, camera)});
+    }
+  }
+  return map;
+}
+
+TEST(MarkerDepthTest, AMirroredOrTurnedDepthImageIsRecognised) {
+  const Intrinsics camera{640, 480, 527.0, 526.0, 319.5, 239.5, {}};
+  using Turn = std::pair<DepthLayout, int>;
+  for (const auto& [layout, flip] :
+       {Turn{DepthLayout::kMirrored, 1}, Turn{DepthLayout::kUpsideDown, 0},
+        Turn{DepthLayout::kTurned, -1}}) {
+    TrackingMap map = MapOfQuarters(camera);
+    EXPECT_EQ(FindDepthLayout(map, camera, {}, kLength_m), DepthLayout::kAsStated);
+    for (MapKeyframe& keyframe : map.keyframes) {
+      cv::Mat& depth_m = keyframe.data.view.depth_m;
+      cv::flip(depth_m.clone(), depth_m, flip);
+    }
+    EXPECT_EQ(FindDepthLayout(map, camera, {}, kLength_m), layout);
+    map.keyframes.resize(5);  // Ten views are too few to say it.
+    EXPECT_EQ(FindDepthLayout(map, camera, {}, kLength_m), DepthLayout::kAsStated);
+  }
+}
+
+TEST(MarkerDepthTest, DepthThatFitsInNoLayoutIsNotCalledMirrored) {
+  const Intrinsics camera{640, 480, 527.0, 526.0, 319.5, 239.5, {}};
+  TrackingMap map = MapOfQuarters(camera);
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k)
+    map.keyframes[k].data.view.depth_m *= 0.7 + 0.1 * static_cast<double>(k);
+  EXPECT_EQ(FindDepthLayout(map, camera, {}, kLength_m), DepthLayout::kAsStated);
 }
 
 }  // namespace

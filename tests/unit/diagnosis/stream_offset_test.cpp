@@ -66,5 +66,15 @@ TEST(StreamOffsetTest, ASteadyOrShortSweepShowsNone) {
   EXPECT_FALSE(EstimateStreamOffset({}, {}));
 }
 
+TEST(StreamOffsetTest, TheSpeedIsInWidthsOfTheImage) {
+  cv::Mat wall(72, 200, CV_8UC3);
+  cv::RNG random(3);
+  random.fill(wall, cv::RNG::UNIFORM, 0, 255);
+  ImageMotion motion;
+  EXPECT_EQ(motion.MedianWidthsPerSecond(), 0.0);
+  for (int i = 0; i < 20; ++i) motion.AddColor(wall(cv::Rect(3 * i, 0, 96, 72)).clone(), 0.1 * i);
+  EXPECT_NEAR(motion.MedianWidthsPerSecond(), 30.0 / 96, 0.01);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <random>
 
 #include <fmt/format.h>
@@ -16,6 +18,7 @@
 #include "drivers/importers/phone_metadata.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/importers/exr_writer.hpp"
 
 namespace plumb {
 namespace {
@@ -23,6 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::Contains;
+using testing::ExrFile;
 using ::testing::HasSubstr;
 using testing::MessageOf;
 using testing::TempFolder;
@@ -115,8 +119,37 @@ TEST(PhoneFolderTest, WhatCannotBeReadIsNamedWithTheCommandThatConvertsIt) {
   EXPECT_THAT(refusal(), HasSubstr("48x48")) << "not the colour camera's view";
   fs::remove_all(folder / "depth");
   fs::create_directories(folder / "depth");
-  WriteWholeFile(folder / "depth/0.exr", std::string_view("exr"));
-  EXPECT_THAT(refusal(), HasSubstr("oiiotool"));
+  std::vector<std::uint8_t> exr = ExrFile(cv::Mat(32, 48, CV_32FC1, cv::Scalar(0.8)));
+  const std::string_view key("compression\0compression\0\1\0\0\0", 28);
+  const auto at = std::search(exr.begin(), exr.end(), key.begin(), key.end());
+  ASSERT_NE(at, exr.end());
+  *(at + 28) = 4;  // PIZ
+  WriteWholeFile(folder / "depth/000000.exr", exr);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("000000.exr"), HasSubstr("oiiotool FILE --comp")));
+  WriteWholeFile(folder / "depth/000000.exr", std::string_view("exr"));
+  EXPECT_THAT(refusal(), HasSubstr("it is shorter than it states"));
+}
+
+TEST(PhoneFolderTest, DepthAsOpenExrIsReadInMetres) {
+  const TempFolder folder;
+  WriteImages(folder / "EXR_RGBD", "{}", {360, 480}, {48, 64});
+  WriteWholeFile(folder / "EXR_RGBD/metadata.json", kRecord3d);
+  fs::remove_all(folder / "EXR_RGBD/depth");
+  fs::create_directories(folder / "EXR_RGBD/depth");
+  for (int i = 0; i < 4; ++i) {
+    cv::Mat depth_m(64, 48, CV_32FC1, cv::Scalar(0.80037 + 0.001 * i));
+    depth_m.row(0).setTo(std::numeric_limits<float>::quiet_NaN());
+    WriteWholeFile(folder / fmt::format("EXR_RGBD/depth/{}.exr", i), ExrFile(depth_m));
+  }
+  const auto recording = OpenImported(folder.path());
+  EXPECT_EQ(recording->facts().format, "Record3D");
+  EXPECT_EQ(recording->facts().camera.depth_camera.value().intrinsics.width, 48);
+  EXPECT_FALSE(recording->info().depth_unit_assumed);
+  (void)recording->Next();
+  const Frame second = recording->Next().value();
+  EXPECT_NEAR(second.depth_m.at<float>(240, 180), 0.80137, 1e-6) << "not rounded to millimetres";
+  EXPECT_EQ(second.depth_m.at<float>(1, 180), 0.0F);
+  EXPECT_NEAR(second.depth_time_s, 0.0167, 1e-9);
 }
 
 TEST(PhoneFolderTest, FiveHundredDamagedTextsAreReadOrRefused) {
