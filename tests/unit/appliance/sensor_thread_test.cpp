@@ -204,7 +204,7 @@ TEST_F(SensorThreadTest, ASecondSensorIsReadForFeedsOfNoSweepAlsoAfterBothWereUn
   bus_.Plug("A");
   bus_.Plug("B");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, EventKindOfSensor::kReady);
   EXPECT_TRUE(events_.At(1).others.empty()) << "the second one has its use";
   const auto sweep = std::make_shared<LiveFeed>(10);
   thread_->BeginScan(sweep);

@@ -53,8 +53,7 @@ class VirtualProviderTest : public ::testing::Test {
   [[nodiscard]] VirtualProvider Provider(std::chrono::milliseconds stall_time) const {
     return VirtualProvider({.bus = bus_,
                             .settings = {.calibration_folder = {}, .markers_are_the_rooms = false},
-                            .serial = "VIRTUAL-0001",
-                            .calibration = CameraFileText(camera_, 1000.0),
+                            .calibrations = {{"VIRTUAL-0001", CameraFileText(camera_, 1000.0)}},
                             .stall_time = stall_time});
   }
 
