@@ -37,27 +37,6 @@ bool IsRepeated(const cv::Mat& image, std::optional<std::uint64_t>& last) {
   return repeated;
 }
 
-using Rates = std::vector<ImageMotion::Rate>;
-
-// Stamps that jump within a sweep do so by tenths of a second. Halves of 30 images were off by up
-// to 0.04 s where the streams belong together.
-constexpr double kJump_s = 0.1;
-
-// Of the whole sweep, or of a half of it if the stamps of one stream jump within the sweep.
-std::optional<StreamOffset> WorstOffset(const Rates& color, const Rates& depth) {
-  std::optional<StreamOffset> worst = EstimateStreamOffset(color, depth);
-  const auto size_of = [](const std::optional<StreamOffset>& offset) {
-    return offset ? std::abs(offset->offset_s) : 0.0;
-  };
-  const auto half = static_cast<std::ptrdiff_t>(color.size() / 2);
-  for (const Rates& part :
-       {Rates(color.begin(), color.begin() + half), Rates(color.begin() + half, color.end())}) {
-    const auto offset = EstimateStreamOffset(part, depth);
-    if (size_of(offset) > std::max(kJump_s, size_of(worst))) worst = offset;
-  }
-  return worst;
-}
-
 }  // namespace
 
 bool SweepWatch::IsRepetition(const Frame& frame) {
@@ -138,7 +117,7 @@ Symptoms SweepWatch::Finish(const StreamInfo& info, bool any_decoded) const {
   symptoms.depth_unit_assumed = info.depth_unit_assumed;
   symptoms.cameras_assumed = info.intrinsics_assumed;
   symptoms.focal_px = info.intrinsics.fx;
-  symptoms.stream_offset = WorstOffset(color_motion_.rates(), depth_motion_.rates());
+  symptoms.stream_offset = EstimateStreamOffset(color_motion_.rates(), depth_motion_.rates());
   symptoms.num_frames = num_frames_;
   symptoms.num_repeated_depth = repeated_depth_;
   symptoms.num_repeated_color = repeated_color_;

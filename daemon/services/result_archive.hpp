@@ -23,7 +23,8 @@ namespace plumb {
 
 /// A thread of its own, so that nothing waits for a network, and at the lowest priority. What waits
 /// is what the store says: accepted results of the last 30 days that the archive has not stored.
-/// So neither a restart nor a power cut loses one; one that was sent just before a cut is sent twice.
+/// So neither a restart nor a power cut loses one; one that was sent just before a cut is sent
+/// twice.
 class ResultArchive {
  public:
   /// The report of a scan, as PDF.
@@ -63,7 +64,7 @@ class ResultArchive {
   std::mutex mutex_;
   std::condition_variable_any woken_;
   bool is_woken_ = true;  ///< Guarded by the mutex; at the start there may be earlier results.
-  std::jthread thread_;  // last: it uses the members above
+  std::jthread thread_;   // last: it uses the members above
 };
 
 }  // namespace plumb
