@@ -113,7 +113,9 @@ HttpAnswer HttpConnection::Read(bool head_only) {
   const std::size_t end = received_.find("\r\n\r\n") + 4;
   HttpAnswer answer = ParseHead(received_.substr(0, end));
   received_.erase(0, end);
-  if (answer.Header("transfer-encoding") == "chunked" && !head_only) {
+  // A stream of events never ends.
+  if (answer.Header("transfer-encoding") == "chunked" && !head_only &&
+      !answer.Header("content-type").starts_with("text/event-stream")) {
     answer.body = ReadChunks();
     return answer;
   }
