@@ -12,6 +12,7 @@
 #include "daemon/dicom/result_export.hpp"
 #include "daemon/loop/give_way.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/services/dicom_tls.hpp"
 #include "drivers/dicom/dicom_send.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/temporary.hpp"
@@ -124,9 +125,7 @@ void ResultArchive::SendOne(const Scan& scan, const DicomSettings& settings) {
   WriteResultExport(exported, folder.path() / "dicom");
   DicomSendRequest sending{.peer = ParseDicomPeer(settings.results_to).value(),
                            .own_ae_title = settings.ae_title,
-                           .tls = {.certificate = settings.tls_certificate.string(),
-                                   .key = settings.tls_key.string(),
-                                   .trusted = settings.tls_trusted.string()}};
+                           .tls = TlsFilesOf(settings)};
   for (const NamedExport& one : exported.objects)
     sending.files.push_back((folder.path() / "dicom" / one.file_name).string());
   try {

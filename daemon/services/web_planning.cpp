@@ -15,6 +15,7 @@
 #include "daemon/loop/alive_flag.hpp"
 #include "daemon/received/received_files.hpp"
 #include "daemon/received/todays_list.hpp"
+#include "daemon/services/dicom_tls.hpp"
 #include "daemon/services/patient_key.hpp"
 #include "drivers/dicom/dicom_find.hpp"
 #include "drivers/files/file_io.hpp"
@@ -212,9 +213,7 @@ class WebPlanning final : public web::PlanningService {
                                    .own_ae_title = settings.ae_title,
                                    .station_ae_title = settings.worklist_station,
                                    .date = TodayAsDicom(),
-                                   .tls = {.certificate = settings.tls_certificate.string(),
-                                           .key = settings.tls_key.string(),
-                                           .trusted = settings.tls_trusted.string()}}),
+                                   .tls = TlsFilesOf(settings)}),
                      PatientKey(store.folders.state()), PatientsByHash(store));
   }
 
