@@ -25,8 +25,8 @@ constexpr double kSameSize = 0.05;
 // differ by a frame scatter by 1 to 4 %, depth in reverse order by 9 %, those of two different
 // sweeps by 20 % and more.
 constexpr double kNotTogether = 0.06;
-// A print of another size is that in every view. So many markers whose ratio is not the common one
-// and scatters more do not have the depth that is on them.
+// A print of the wrong size is wrong by the same amount in every view. If this many markers deviate
+// from the common ratio and scatter by more than this, the depth image does not belong to them.
 constexpr double kUnsteady = 0.03;
 constexpr int kUnsteadyMarkers = 3;
 constexpr int kViewsForRatio = 3;
@@ -42,11 +42,11 @@ constexpr double kFast_widths_per_s = 1.0;
 // Chi-square for each term: a prior that holds gives 1 at most, since the sweep does not determine
 // every term.
 constexpr double kChi2ToReport = 2.0, kChi2ToRefuse = 4.0;
-// Of assumed cameras, which err by more than stated ones. Where they led to lengths within 0.4 %
-// the sweeps of eight units gave up to 4.5; where depth was not registered, or lengths were wrong
-// by 11 to 17 %, 7.0 and more.
+// For assumed cameras, which are less accurate than stated ones. Where they led to lengths within
+// 0.4 % the sweeps of eight units gave up to 4.5; where depth was not registered, or lengths were
+// wrong by 11 to 17 %, 7.0 and more.
 constexpr double kChi2OfAssumedToRefuse = 5.5;
-// Lengths that are wrong by more because of a camera or a size that nobody stated are no result.
+// A result that rests on an assumed camera is refused if its lengths are off by more than this.
 constexpr double kAssumedScale = 0.03;
 // Units of depth for a metre that recordings have, beside the usual 1000: 5000 (TUM), 10000 and
 // 4000 (RealSense), 256 (KITTI), 100.
@@ -154,7 +154,7 @@ bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings)
   }
   const double side_mm = symptoms.marker_length_m * common / kMillimetre;
   if (std::abs(common - 1) <= kWrongNumber) {
-    // Of dark images the markers' edges are found elsewhere: light first.
+    // In dark images marker edges are found in the wrong place, so the light comes first.
     if (symptoms.median_gray < kDark) return false;
     findings.push_back(
         {FindingLevel::kWarning, say::diagnosis::PrintOrSensor(100 * std::abs(common - 1), side_mm,

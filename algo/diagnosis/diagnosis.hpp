@@ -66,8 +66,8 @@ struct Finding {
 /// may be off in the other direction. 0 if they agree or nothing was measured.
 [[nodiscard]] double ScaleDoubt(const Symptoms& symptoms);
 
-/// Whether a refusal says that cameras which nobody stated do not fit: lengths are then wrong by
-/// some per cent at least, and a recording has no scene.
+/// Whether a refusal says that the assumed cameras do not fit. Lengths are then off by several per
+/// cent, so no scene is made of a recording.
 [[nodiscard]] bool IsOfAssumedCameras(const Message& refusal);
 
 /// The causes, the most serious first. A pure function of its input.

@@ -83,8 +83,8 @@ std::map<int, std::vector<double>> RatiosOf(const TrackingMap& map, DepthLayout 
   return ratios;
 }
 
-// Mean deviation of the ratios of all views from their median, by it. Not a median: upside down,
-// four markers of five of a flat floor agree.
+// Mean relative deviation of all views' ratios from their median. The mean, because with the depth
+// image upside down four of five markers on a flat floor still agree.
 std::optional<double> DeviationOf(const std::map<int, std::vector<double>>& ratios) {
   std::vector<double> all;
   for (const auto& [id, values] : ratios) all.insert(all.end(), values.begin(), values.end());

@@ -84,7 +84,7 @@ SensorShare Monitor::share(std::size_t i) const {
   if (!sensor.takes_part) return SensorShare::kLeftOut;
   if (sensor.moved) return SensorShare::kMoved;
   if (stage_ != Stage::kFollowing || !zero_time_s_) return SensorShare::kUsed;
-  // The first frames after the zero are not yet of all.
+  // Right after the zero, not every sensor has sent a frame.
   if (last_s_ - sensor.image_s.value_or(*zero_time_s_) > kLongestGap_s)
     return SensorShare::kNoImage;
   if (sensor.checks_due > 0) return SensorShare::kNoImage;  // none that is used yet

@@ -43,7 +43,7 @@ template <>
 inline constexpr auto kNamesOf<BlindReason> =
     NamesUpTo<BlindReason::kNoZero>({"none", "covered", "weak", "misfit", "unguarded", "no_zero"});
 
-/// What one of several sensors does for the numbers.
+/// How one of several sensors contributes to the numbers.
 enum class SensorShare : std::uint8_t {
   kUsed,     ///< They rest on its images; or it is being mounted or zeroed.
   kCovered,  ///< It sees too little of the body, or something else.

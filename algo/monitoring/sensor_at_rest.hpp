@@ -64,7 +64,7 @@ class SensorAtRest {
   /// Of a frame after the zero: averages it, follows the drift, checks the place some times a
   /// second. @return Whether this frame's place was checked.
   bool See(const Frame& frame);
-  /// It was away: what it saw of its place before that proves nothing any more.
+  /// Call after the sensor was away: what it saw of its place before no longer counts.
   void ForgetPlace();
   /// What See() saw, for a fit that starts at these sizes of the breathing's patterns.
   [[nodiscard]] FitView view(const Eigen::Vector2d& modes_m) const {

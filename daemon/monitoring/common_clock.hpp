@@ -8,17 +8,17 @@
 
 namespace plumb {
 
-/// Of one sensor: its stamps in steady time. An image is never earlier than its stamp, so the
-/// shortest way that one took says how the clocks differ; the same constant rest is left in all
-/// sensors of a kind. Not thread-safe.
+/// Converts the stamps of one sensor to steady time. An image never arrives before it was taken, so
+/// the shortest delay seen gives the difference of the clocks; the constant delay that remains in
+/// it is the same for all sensors of a kind. Not thread-safe.
 class CommonClock {
  public:
   /// @param arrived_s  Steady time. @return The stamp in steady time; it never goes back.
   double SteadyStamp(double stamp_s, double arrived_s) {
     const double offset_s = arrived_s - stamp_s;
-    // Another start of the sensor: its clock has begun anew.
+    // The sensor was restarted, so its clock has a new origin.
     const bool is_new = !offset_s_ || std::abs(offset_s - *offset_s_) > kOtherClock_s;
-    // Clocks run apart slowly: what was the shortest way once must not hold for ever.
+    // Clocks drift, so the shortest delay seen so far must not hold for ever.
     offset_s_ =
         is_new ? offset_s : std::min(offset_s, *offset_s_ + kDrift * (arrived_s - arrived_s_));
     arrived_s_ = arrived_s;

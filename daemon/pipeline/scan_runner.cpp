@@ -96,7 +96,7 @@ class FrameReader : public FrameFeed {
   std::jthread thread_;  // last: starts when the members above are initialised
 };
 
-/// Of a recording, somebody can still state the cameras. A live sweep keeps its scene, and the
+/// For a recording, the cameras can still be stated. A live sweep keeps its scene, and the
 /// comparison refuses it with the same words.
 void RefuseUnfitCameras(const Scene& scene) {
   const auto unfit = std::ranges::find_if(scene.refusals, IsOfAssumedCameras);

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 /// Longer than a holiday; what was accepted before is not sent when an archive is first configured.
 constexpr std::chrono::hours kWaitAtMost{30 * 24};
 
-/// The node does not answer or refuses: the other results wait, too.
+/// The node does not answer or refuses, so the other results wait, too.
 class NotTaken : public DataError {
  public:
   using DataError::DataError;
@@ -36,14 +36,14 @@ class NotTaken : public DataError {
 
 ResultArchive::ResultArchive(EventLoop& loop, std::optional<fs::path> config_file,
                              std::string language, StoreAccess& store, MakeReport report,
-                             std::function<void(const Message&)> tell, Pauses pauses)
+                             std::function<void(const Message&)> set_warning, Pauses pauses)
     : loop_(loop),
       config_file_(std::move(config_file)),
       language_(std::move(language)),
       store_(store),
       report_(std::move(report)),
       pauses_(std::move(pauses)),
-      tell_(alive_.WhileAlive(std::move(tell))) {
+      set_warning_(alive_.WhileAlive(std::move(set_warning))) {
   if (config_file_) thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
 
@@ -61,7 +61,7 @@ void ResultArchive::Run(const std::stop_token& stop) {
     is_woken_ = false;
     lock.unlock();
     const Message failure = SendAll(stop);
-    Tell(failure);
+    ShowWarning(failure);
     lock.lock();
     const auto is_woken = [this] { return is_woken_; };
     if (failure.empty()) {
@@ -91,7 +91,7 @@ Message ResultArchive::SendAll(const std::stop_token& stop) {
       } catch (const NotTaken& error) {
         return say::dicom::NotArchived(still_wait, settings.results_to, error.message());
       } catch (const std::exception& error) {
-        // Its files cannot be read or made into objects: the other results go on.
+        // Its files cannot be read or exported; the other results are still sent.
         failure = say::dicom::ResultNotArchived(waiting[i], MessageOf(error));
       }
     }
@@ -141,9 +141,9 @@ void ResultArchive::SendOne(const Scan& scan, const DicomSettings& settings) {
       fmt::format("the result of scan {} is stored by {}", scan.id, settings.results_to));
 }
 
-void ResultArchive::Tell(const Message& failure) {
+void ResultArchive::ShowWarning(const Message& failure) {
   if (!failure.empty()) Log(LogLevel::kWarning, failure.English());
-  loop_.Post("archive", [tell = tell_, failure] { tell(failure); });
+  loop_.Post("archive", [set_warning = set_warning_, failure] { set_warning(failure); });
 }
 
 }  // namespace plumb

@@ -35,11 +35,12 @@ class ResultArchive {
 
   /// Everything is borrowed and outlives this object.
   /// @param config_file  Read for each attempt; without one nothing is sent.
-  /// @param language  Code of that of the reports. @param tell  Called on the loop with why results
-  /// wait, or with an empty message.
+  /// @param language  Language code of the reports.
+  /// @param set_warning  Called on the loop with the reason why results wait, or with an empty
+  ///        message.
   ResultArchive(EventLoop& loop, std::optional<std::filesystem::path> config_file,
                 std::string language, StoreAccess& store, MakeReport report,
-                std::function<void(const Message& failure)> tell,
+                std::function<void(const Message& failure)> set_warning,
                 Pauses pauses = {std::chrono::seconds(30), std::chrono::minutes(5),
                                  std::chrono::minutes(30)});
 
@@ -51,16 +52,16 @@ class ResultArchive {
   /// Sends what waits, oldest first. @return why a result still waits; empty: none does.
   Message SendAll(const std::stop_token& stop);
   void SendOne(const Scan& scan, const DicomSettings& settings);
-  void Tell(const Message& failure);
+  void ShowWarning(const Message& failure);
 
   EventLoop& loop_;
-  const AliveFlag alive_;  // before `tell_`, which it ends
+  const AliveFlag alive_;  // before `set_warning_`, which it ends
   const std::optional<std::filesystem::path> config_file_;
   const std::string language_;
   StoreAccess& store_;
   const MakeReport report_;
   const Pauses pauses_;
-  std::function<void(const Message&)> tell_;
+  std::function<void(const Message&)> set_warning_;
   std::mutex mutex_;
   std::condition_variable_any woken_;
   bool is_woken_ = true;  ///< Guarded by the mutex; at the start there may be earlier results.

@@ -360,7 +360,7 @@ struct Updater::Impl {
   static int OnInfo(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* impl = static_cast<Impl*>(self);
     if (sd_bus_message_is_method_error(message, SD_BUS_ERROR_NO_REPLY) != 0) {
-      // Nobody has said anything of the bundle.
+      // No answer about the bundle has come yet.
       impl->Refuse(ChangeResult::kFailed, sd_bus_is_open(impl->bus.get()) > 0
                                               ? say::update::InstallerSilent()
                                               : say::update::InstallerLost());

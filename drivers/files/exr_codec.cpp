@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // OpenEXR as phones' apps write depth: one part of scan lines, without compression, by runs (RLE)
-// or by zlib (ZIPS, ZIP). Own code, since a few hundred lines of format are needed of a library
-// that reads everything; the bytes come from anywhere, so each of them is taken by a bounded
-// reader.
+// or by zlib (ZIPS, ZIP). Own code, because only a small part of a large format is needed. The
+// bytes are not trusted, so all of them are read through a bounded reader.
 #include <zlib.h>
 
 #include <bit>

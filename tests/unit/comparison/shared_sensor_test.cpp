@@ -142,7 +142,7 @@ TEST(SharedSensorTest, EstimatesThatContradictEachOtherAreOfTwoUnits) {
   const double limit = std::sqrt(ChiSquareLimit(1)) * sigma;
   EXPECT_TRUE(Join(SceneWith(0.0, 0.5), SceneWith(0.99 * limit, 0.5))->one_unit);
   EXPECT_FALSE(Join(SceneWith(0.0, 0.5), SceneWith(1.01 * limit, 0.5))->one_unit);
-  // One of them is wrong by as much, and nobody knows which.
+  // One of the two is off by that much, and there is no telling which.
   const Matrix6d twice = Join(SceneWith(0.0, 0.5), SceneWith(2 * limit, 0.5))->covariance,
                  thrice = Join(SceneWith(0.0, 0.5), SceneWith(3 * limit, 0.5))->covariance;
   EXPECT_NEAR(thrice(4, 4) / twice(4, 4), 9.0 / 4, 1e-6);
