@@ -373,7 +373,7 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
   RejectUnknownTables(
       root, name,
       {"markers", "reconstruct", "compare", "check", "iec", "appliance", "storage", "sensor",
-       "button", "light", "monitor", "web", "update", "messages", "peers", "dicom"});
+       "button", "light", "monitor", "web", "update", "messages", "peers", "directory", "dicom"});
   Config config;
   config.given = GivenIn(root);
   ReadMarkers(Section(root, "markers", name), config.markers);
@@ -390,6 +390,7 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
   ReadUpdate(Section(root, "update", name), config.update);
   config.messages = ReadMessagesSettings(Section(root, "messages", name));
   config.peers = ReadPeersSettings(Section(root, "peers", name));
+  config.directory = ReadDirectorySettings(Section(root, "directory", name));
   (void)ReadDicomSettings(Section(root, "dicom", name));  // of plumb-dicomd: only checked
   return config;
 }
@@ -477,6 +478,7 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("web.metrics_token_file", in_use.web.metrics_token_file, next.web.metrics_token_file);
   keep("messages", in_use.messages, next.messages);
   keep("peers", in_use.peers, next.peers);
+  keep("directory", in_use.directory, next.directory);
   keep("update.folder", in_use.update.folder, next.update.folder);
   keep("update.channel", in_use.update.channel, next.update.channel);
   keep("update.channel_name", in_use.update.channel_name, next.update.channel_name);

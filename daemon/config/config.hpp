@@ -15,6 +15,7 @@
 #include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "algo/types/marker.hpp"
+#include "daemon/config/directory_settings.hpp"
 #include "daemon/config/messages_settings.hpp"
 #include "daemon/config/peers_settings.hpp"
 #include "daemon/files/age_recipients.hpp"
@@ -122,6 +123,7 @@ struct Config {
   UpdateConfig update;
   MessagesSettings messages;
   PeersSettings peers;
+  DirectorySettings directory;
   std::optional<std::filesystem::path>
       region_file;  ///< Absolute, or relative to the configuration file's folder.
   /// A scene whose markers are the taught ones of the room; absolute, or relative in the same way.
@@ -163,6 +165,7 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///     [update]       folder, max_bundle_mb, channel, channel_name, channel_key, trusted
 ///     [messages]     (messages_settings.hpp)
 ///     [peers]        (peers_settings.hpp)
+///     [directory]    (directory_settings.hpp)
 ///     [dicom]        (checked only; dicom_settings.hpp)
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed

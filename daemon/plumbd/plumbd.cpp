@@ -31,6 +31,7 @@
 #include "daemon/config/sensor_settings.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/control/control_server.hpp"
+#include "daemon/directory/directory.hpp"
 #include "daemon/loop/end_guard.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/loop/loop_report.hpp"
@@ -217,6 +218,10 @@ class Plumbd {
           "the page's certificate was replaced; its SHA-256 now: " + page_.certificate);
       NotePage();
     };
+    if (!config.directory.url.empty()) {
+      directory_.emplace(loop_, config.directory);
+      options.ask_directory = std::bind_front(&Directory::Ask, &*directory_);
+    }
     options.on_guesses = [this](bool are_running) {
       page_.are_guesses_running = are_running;
       Log(LogLevel::kWarning, are_running ? say::web::GuessesRunning().English()
@@ -322,6 +327,7 @@ class Plumbd {
   std::vector<Message> certificate_warnings_;
   fs::path own_socket_;  ///< Path of the control socket if this process created it.
   WebServices services_;
+  std::optional<Directory> directory_;  ///< Before the server that asks it.
   web::HttpServer http_;
   ControlDesk desk_;
   ControlServer control_;

@@ -280,6 +280,7 @@ Response Accounts::DescribeSession(const Request& request) {
        {"csrf_token", request.session->csrf_token},
        {"password_change_required", request.session->must_change_password},
        {"second_factor", user && user->has_second_factor},
+       {"in_directory", user && IsInDirectory(user->password_hash)},
        {"is_quick", request.session->is_quick},
        {"has_pin", user && users_.FindPin(user->name)},
        {"idle_logout_min",
@@ -314,6 +315,26 @@ OwnProof Accounts::ReadProof(Fields& fields, const char* password) {
           .second_factor = OptionalCode(fields, "second_factor")};
 }
 
+void Accounts::VerifyPassword(const User& user, std::string password, const Respond& respond,
+                              std::function<void(bool)> done) {
+  if (!IsInDirectory(user.password_hash)) {
+    const bool accepted =
+        worker_.Verify(std::move(password), HashIn(user.password_hash), /*trusted=*/true, done);
+    if (!accepted) respond(BusyWithPasswords());
+    return;
+  }
+  if (!options_.ask_directory)
+    return respond(ErrorResponse(503, say::web::DirectoryNotConfigured()));
+  AskDirectoryOf(user.name, std::move(password), respond,
+                 [user, done, respond](const DirectoryAnswer& answer) {
+                   if (!answer.failure.empty())
+                     return respond(ErrorResponse(503, say::web::DirectoryAway(answer.failure)));
+                   if (answer.matches && answer.role != user.role)
+                     return respond(ErrorResponse(403, say::web::RoleChangedInDirectory()));
+                   done(answer.matches);
+                 });
+}
+
 void Accounts::VerifyOwn(const Request& request, OwnProof proof, const Message& wrong,
                          const Respond& respond, std::function<void(const User&)> then) {
   const auto user = users_.FindUser(request.session->user);
@@ -321,22 +342,22 @@ void Accounts::VerifyOwn(const Request& request, OwnProof proof, const Message& 
   // A separate counter, so that guesses at the login do not keep logged-in users from signing.
   const std::vector<std::string> counters = {"own " + user->name};
   if (auto refusal = CountGuess(counters)) return respond(std::move(*refusal));
-  const bool accepted = worker_.Verify(
-      std::move(proof.password), HashIn(user->password_hash), /*trusted=*/true,
-      [this, user = *user, wrong, counters, second_factor = proof.second_factor,
-       actor = request.actor(), session = request.session, respond,
-       then = std::move(then)](bool matches) {
-        if (!matches) return respond(ErrorResponse(403, wrong));
-        const auto signed_by = [this, user, counters, session, respond, then] {
-          limiter_.Succeeded(counters.front());
-          if (session->ended) return respond(ErrorResponse(401, say::web::SessionEnded()));
-          then(user);
-        };
-        RespondGuarded(
-            "signature", [&] { PassSecondFactor(actor, user, second_factor, respond, signed_by); },
-            respond);
-      });
-  if (!accepted) respond(BusyWithPasswords());
+  VerifyPassword(*user, std::move(proof.password), respond,
+                 [this, user = *user, wrong, counters, second_factor = proof.second_factor,
+                  actor = request.actor(), session = request.session, respond,
+                  then = std::move(then)](bool matches) {
+                   if (!matches) return respond(ErrorResponse(403, wrong));
+                   const auto signed_by = [this, user, counters, session, respond, then] {
+                     limiter_.Succeeded(counters.front());
+                     if (session->ended)
+                       return respond(ErrorResponse(401, say::web::SessionEnded()));
+                     then(user);
+                   };
+                   RespondGuarded(
+                       "signature",
+                       [&] { PassSecondFactor(actor, user, second_factor, respond, signed_by); },
+                       respond);
+                 });
 }
 
 void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond) {
@@ -345,6 +366,9 @@ void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond)
   const std::string password = ReadNewPassword(fields, request.session->user);
   fields.Finish();
   if (password == proof.password) throw DataError(say::web::PasswordIsOldOne());
+  if (const auto user = users_.FindUser(request.session->user);
+      user && IsInDirectory(user->password_hash))
+    throw DataError(say::web::AccountOfDirectory());
   VerifyOwn(
       request, std::move(proof), say::web::WrongOldPassword(), respond,
       [this, password, actor = request.actor(), session = request.session,
@@ -397,8 +421,8 @@ void Accounts::AddUser(const Request& request, const Respond& respond) {
 
 void Accounts::ChangeUser(const Request& request, const Respond& respond) {
   Fields fields(request.body);
-  if (!users_.FindUser(request.arguments.at(0)))
-    return respond(ErrorResponse(404, say::web::NoAccount()));
+  const std::optional<User> user = users_.FindUser(request.arguments.at(0));
+  if (!user) return respond(ErrorResponse(404, say::web::NoAccount()));
   UserChange change{.name = request.arguments.at(0),
                     .role = {},
                     .disabled = {},
@@ -410,6 +434,8 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
                                                 : std::string();  // empty: unchanged
   if (const Message why = WhyNotPassword(password, change.name); !password.empty() && !why.empty())
     throw DataError(why);
+  if (IsInDirectory(user->password_hash) && (change.role || !password.empty()))
+    throw DataError(say::web::AccountOfDirectory());
   // An authenticator that was lost, with its recovery codes, is removed by an engineer.
   const bool removes_second_factor =
       fields.Has("remove_second_factor") && fields.Flag("remove_second_factor");

@@ -83,6 +83,10 @@ class Accounts : public SessionLookup {
   void LookForAccounts();
   void SetUp(const Request& request, const Respond& respond);
   void LogIn(const Request& request, LogInForm form, const Respond& respond);
+  /// Of a person whom the clinic's directory knows: the account and its role follow from it.
+  void FinishDirectoryLogIn(const Actor& actor, const DirectoryAnswer& answer,
+                            const LogInForm& form, const std::vector<std::string>& counters,
+                            const Respond& respond);
   void FinishLogIn(const Actor& actor, const std::string& stored, const LogInForm& form,
                    const std::vector<std::string>& counters, const Respond& respond);
   struct Counters {
@@ -124,6 +128,12 @@ class Accounts : public SessionLookup {
   [[nodiscard]] Response ListSessions(const Request& request);
   void EndSession(const Request& request, const Respond& respond);
   void EndOtherSessions(const Request& request, const Respond& respond);
+  /// Calls `done` unless this object is destroyed, and answers if that throws or the queue is full.
+  void AskDirectoryOf(const std::string& name, std::string password, const Respond& respond,
+                      std::function<void(const DirectoryAnswer&)> done);
+  /// Of a logged-in user; calls `done`, or answers that it cannot be told.
+  void VerifyPassword(const User& user, std::string password, const Respond& respond,
+                      std::function<void(bool matches)> done);
   /// Checks the password of a logged-in user, and the second factor of one who has it; calls `then`
   /// if they are correct.
   void VerifyOwn(const Request& request, OwnProof proof, const Message& wrong,

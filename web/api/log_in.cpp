@@ -125,9 +125,26 @@ std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& cou
   return std::nullopt;
 }
 
+void Accounts::AskDirectoryOf(const std::string& name, std::string password, const Respond& respond,
+                              std::function<void(const DirectoryAnswer&)> done) {
+  const bool asked =
+      options_.ask_directory(name, std::move(password),
+                             [alive = std::weak_ptr(alive_), respond,
+                              done = std::move(done)](const DirectoryAnswer& answer) {
+                               if (!alive.expired())
+                                 RespondGuarded(
+                                     "directory", [&] { done(answer); }, respond);
+                             });
+  if (!asked) respond(BusyWithPasswords());
+}
+
 void Accounts::LogIn(const Request& request, LogInForm form, const Respond& respond) {
   // It is wiped by the worker, and no other copy is kept.
   std::string password = std::exchange(form.password, {});
+  // A directory knows no difference between capital and small letters; accounts have small ones.
+  if (options_.ask_directory)
+    std::ranges::transform(form.name, form.name.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   const auto user = users_.FindUser(form.name);
   const std::string stored = user && !user->disabled ? user->password_hash : std::string();
   const auto [counters, is_known] = CountersOf(request, form, stored);
@@ -139,16 +156,56 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
     if (const Message why = users_.WhyUnreadable(); !why.empty())
       return respond(ErrorResponse(503, say::web::NobodyCanLogIn(why)));
   }
+  const Actor actor{form.name, request.address};
+  if (options_.ask_directory && IsName(form.name) && (!user || IsInDirectory(stored)))
+    return AskDirectoryOf(form.name, std::move(password), respond,
+                          [=, this, counters = counters](const DirectoryAnswer& answer) {
+                            FinishDirectoryLogIn(actor, answer, form, counters, respond);
+                          });
   const bool accepted = worker_.Verify(
       std::move(password), HashIn(stored), is_known,
-      [this, actor = Actor{form.name, request.address}, stored, form, counters = counters,
-       respond](bool matches) {
+      [this, actor, stored, form, counters = counters, respond](bool matches) {
         RespondGuarded(
             "login",
             [&] { FinishLogIn(actor, matches ? stored : std::string(), form, counters, respond); },
             respond);
       });
   if (!accepted) respond(BusyWithPasswords());
+}
+
+void Accounts::FinishDirectoryLogIn(const Actor& actor, const DirectoryAnswer& answer,
+                                    const LogInForm& form, const std::vector<std::string>& counters,
+                                    const Respond& respond) {
+  if (!answer.failure.empty())
+    return respond(ErrorResponse(503, say::web::DirectoryAway(answer.failure)));
+  if (!answer.matches) return FinishLogIn(actor, {}, form, counters, respond);
+  if (!answer.role) {
+    audit_.Log(actor, "login.failed", "", say::audit::NoRoleInDirectory());
+    return respond(ErrorResponse(403, say::web::NoRoleInDirectory()));
+  }
+  const std::optional<User> known = users_.FindUser(actor.user);
+  if (known && known->role == *answer.role)
+    return FinishLogIn(actor, kInDirectory, form, counters, respond);
+  const Done done = WhileAlive([=, this](const Change& change) {
+    if (change.result != ChangeResult::kDone) return respond(ChangeResponse(change));
+    // The permissions of sessions are those of their log-in.
+    sessions_.EndAllOf(actor.user, nullptr);
+    quick_.EndAllOf(actor.user);
+    FinishLogIn(actor, kInDirectory, form, counters, respond);
+  });
+  if (known) {
+    UserChange change;
+    change.name = actor.user;
+    change.role = answer.role;
+    change.expected_hash = kInDirectory;
+    return users_.ChangeUser(actor, change, done);
+  }
+  User user;
+  user.name = actor.user;
+  user.role = *answer.role;
+  user.password_hash = kInDirectory;
+  user.created_at = WallClock::now();
+  users_.AddUser(actor, user, done);
 }
 
 void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, const LogInForm& form,

@@ -426,6 +426,7 @@ void to_json(Json& json, const User& user) {
           {"role", Name(user.role)},
           {"disabled", user.disabled},
           {"second_factor", user.has_second_factor},
+          {"in_directory", IsInDirectory(user.password_hash)},
           {"created_at", user.created_at}};
 }
 

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "web/security/directory_answer.hpp"
 #include "web/security/tls_identity.hpp"
 
 namespace plumb::web {
@@ -33,6 +34,9 @@ struct HttpServerOptions {
   /// Called when strangers begin to guess passwords faster than permitted, and again when none has
   /// done so for ten minutes. May be empty.
   std::function<void(bool are_running)> on_guesses;
+  /// Asks the clinic's directory about people without an account of this unit's own. Empty: there
+  /// is none.
+  AskDirectory ask_directory;
   /// 32 random bytes that outlive a restart, for the cookies of browsers that logged in before.
   /// Empty: new ones are created, so that a restart forgets those browsers.
   std::string device_key;

@@ -39,11 +39,18 @@ struct SecondFactor {
   bool operator==(const SecondFactor&) const = default;
 };
 
+/// In place of the hash of a password: the clinic's directory knows it.
+inline constexpr const char* kInDirectory = "directory";
+
+[[nodiscard]] inline bool IsInDirectory(const std::string& password_hash) {
+  return password_hash == kInDirectory;
+}
+
 struct User {
   std::string name;
   Role role = Role::kTechnician;
   std::string
-      password_hash;  ///< libsodium's argon2id string; leaves the service only for the login.
+      password_hash;  ///< libsodium's argon2id string, or kInDirectory; for the log-in only.
   bool disabled = false;
   WallClock::time_point created_at;
   bool has_second_factor = false;  ///< Read only.

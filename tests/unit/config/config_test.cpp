@@ -564,6 +564,27 @@ TEST(ConfigTest, OtherUnitsNeedASecretAndTls) {
   EXPECT_THAT(ErrorOf("[peers]\nsecret = \"x\"\n"), HasSubstr("secret"));
 }
 
+TEST(ConfigTest, ADirectoryNeedsWhoAsksWhereAndWhichGroups) {
+  const std::string url = "[directory]\nurl = \"ldaps://directory.example\"\n";
+  const std::string person = "person = \"uid={name},ou=people,dc=example\"\n";
+  const std::string base = "groups_base = \"ou=groups,dc=example\"\n";
+  const std::string groups = "physicists = [\"cn=physicists,ou=groups,dc=example\"]\n";
+  EXPECT_EQ(ErrorOf(url + person + base + groups), "no error");
+  EXPECT_EQ(ErrorOf("[directory]\n" + person), "no error") << "without a url there is none";
+  for (const std::string& missing : {person + base, person + groups, base + groups})
+    EXPECT_THAT(ErrorOf(url + missing), HasSubstr("directory.url needs")) << missing;
+  for (const char* wrong : {"https://d.example", "ldaps://", "ldap://u@d.example",
+                            "ldaps://d.example/dc=example", "ldaps://d.example?uid"})
+    EXPECT_THAT(ErrorOf(fmt::format("[directory]\nurl = \"{}\"\n", wrong)),
+                HasSubstr("directory.url"))
+        << wrong;
+  EXPECT_THAT(ErrorOf("[directory]\nperson = \"uid=anna\"\n"), HasSubstr("a text with {name}"));
+  EXPECT_THAT(ErrorOf("[directory]\ngroups_filter = \"member={person}\"\n"),
+              HasSubstr("(member={person})"));
+  EXPECT_THAT(ErrorOf(url + person + base + groups + "people_base = \"dc=example\"\n"),
+              HasSubstr("belong together"));
+}
+
 TEST(ConfigTest, AChannelOfUpdatesNeedsItsKeyAndTls) {
   const std::string key = "channel_key = \"2RxgFSNjDpGISHQmSN0earBA6NTyA+BYzefuXmYB5ew=\"\n";
   EXPECT_EQ(ErrorOf("[update]\nchannel = \"https://u.example/plumb\"\n" + key), "no error");

@@ -51,6 +51,7 @@ function displays() {
 
 function ownPassword() {
   const text = S.users;
+  if (currentSession().in_directory) return card(text.own, hint(text.ownInDirectory));
   const old = ownProof('old_password', text.oldPassword);
   const fresh = passwordInput('new-password', { required: true, ...kNewPassword });
   const change = async () => {
@@ -84,13 +85,13 @@ function userRow(user, reload) {
   };
   const editor = h('details', {},
     h('summary', { 'aria-label': `${text.change} ${user.name}` }, text.change),
-    form({ class: 'form' }, change, field(text.role, role), disabled.element,
-      user.name !== currentSession()?.user && field(text.newPassword, fresh),
+    form({ class: 'form' }, change, !user.in_directory && field(text.role, role), disabled.element,
+      !user.in_directory && user.name !== currentSession()?.user && field(text.newPassword, fresh),
       user.second_factor && withoutFactor.element, proof.fields,
       h('button', { class: 'primary' }, S.save)));
-  const roleWords = user.second_factor ? `${S.roles[user.role]}, ${text.hasSecondFactor}`
-    : S.roles[user.role];
-  return row(user.name, roleWords, user.disabled ? text.disabled : `✓ ${text.active}`,
+  const roleWords = [S.roles[user.role], user.in_directory && text.inDirectory,
+    user.second_factor && text.hasSecondFactor].filter(Boolean);
+  return row(user.name, roleWords.join(', '), user.disabled ? text.disabled : `✓ ${text.active}`,
     localTime(user.created_at), editor);
 }
 

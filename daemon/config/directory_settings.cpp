@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/config/directory_settings.hpp"
+
+#include <algorithm>
+#include <cctype>
+
+namespace plumb {
+namespace {
+
+constexpr std::size_t kMostGroups = 32;  // Of each role.
+constexpr std::string_view kPlaceOfName = "{name}";
+
+// Scheme and host only: a path, a filter or a name of a user has no place there.
+bool IsDirectoryUrl(const std::string& text) {
+  const auto is_of_host = [](unsigned char c) {
+    return std::isalnum(c) != 0 ||
+           std::string_view(".-_:[]%").find(static_cast<char>(c)) != std::string_view::npos;
+  };
+  for (const std::string_view scheme : {"ldaps://", "ldap://", "ldapi://"})
+    if (text.starts_with(scheme) && text.size() > scheme.size() && text.size() < 256)
+      return std::all_of(text.begin() + static_cast<std::ptrdiff_t>(scheme.size()), text.end(),
+                         is_of_host);
+  return false;
+}
+
+bool IsShortText(const std::string& text) { return !text.empty() && text.size() < 1024; }
+
+bool HasName(const std::string& text) {
+  return IsShortText(text) && text.find(kPlaceOfName) != std::string::npos;
+}
+
+bool IsFilter(const std::string& text) {
+  return IsShortText(text) && text.front() == '(' && text.back() == ')';
+}
+
+}  // namespace
+
+DirectorySettings ReadDirectorySettings(Section section) {
+  DirectorySettings settings;
+  section.Take("url", settings.url, say::config::ExpectedDirectoryUrl(), IsDirectoryUrl);
+  section.TakePath("trusted", settings.trusted);
+  section.Take("person", settings.person,
+               say::config::ExpectedPlaceOfName(std::string(kPlaceOfName)), HasName);
+  section.Take("people_base", settings.people_base, say::config::ExpectedEntry(), IsShortText);
+  section.Take("people_filter", settings.people_filter,
+               say::config::ExpectedPersonFilter(std::string(kPlaceOfName)),
+               [](const std::string& text) { return IsFilter(text) && HasName(text); });
+  section.Take("groups_base", settings.groups_base, say::config::ExpectedEntry(), IsShortText);
+  section.Take("groups_filter", settings.groups_filter, say::config::ExpectedFilter("{person}"),
+               IsFilter);
+  section.TakeNames("engineers", settings.engineers, say::config::ExpectedGroups(), kMostGroups);
+  section.TakeNames("physicists", settings.physicists, say::config::ExpectedGroups(), kMostGroups);
+  section.TakeNames("technicians", settings.technicians, say::config::ExpectedGroups(),
+                    kMostGroups);
+  section.RejectUnknownKeys();
+  if (settings.url.empty()) return settings;
+  const bool has_groups =
+      !settings.engineers.empty() || !settings.physicists.empty() || !settings.technicians.empty();
+  if (settings.person.empty() || settings.groups_base.empty() || !has_groups)
+    throw DataError(say::config::DirectoryIncomplete());
+  if (settings.people_base.empty() != settings.people_filter.empty())
+    throw DataError(say::config::DirectoryPeopleIncomplete());
+  return settings;
+}
+
+}  // namespace plumb

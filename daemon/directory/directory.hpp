@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Asks the clinic's directory beside the loop.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "daemon/config/directory_settings.hpp"
+#include "daemon/loop/alive_flag.hpp"
+#include "daemon/loop/event_loop.hpp"
+#include "daemon/loop/work_thread.hpp"
+#include "web/security/directory_answer.hpp"
+
+namespace plumb {
+
+/// Used on the loop's thread. One question at a time: those who log in wait for each other, nobody
+/// else does. On destruction it waits for the question that is open.
+class Directory {
+ public:
+  /// @param loop  Outlives this object.
+  Directory(EventLoop& loop, DirectorySettings settings);
+
+  /// As web::AskDirectory.
+  [[nodiscard]] bool Ask(const std::string& name, std::string password,
+                         std::function<void(const web::DirectoryAnswer&)> done);
+
+ private:
+  EventLoop& loop_;
+  DirectorySettings settings_;
+  AliveFlag alive_;
+  WorkThread questions_{8};
+};
+
+}  // namespace plumb

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/directory/ldap_directory.hpp"
+
+#include <fcntl.h>
+#include <ldap.h>
+#include <netdb.h>
+#include <openldap.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "algo/base/plain_text.hpp"
+#include "drivers/files/descriptor.hpp"
+#include "words/directory.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr timeval kLongest = {.tv_sec = 5, .tv_usec = 0};  // Of one step.
+constexpr std::chrono::seconds kLongestInAll{10};
+constexpr int kMostGroups = 500;  // Of one person.
+
+// Ends a question that takes too long by shutting its connection down. The library has no limit for
+// a TLS handshake in which the server says nothing: with its own for the network it asks the socket
+// again and again, which takes a whole processor, and without one it waits for ever.
+class Watchdog {
+ public:
+  // The descriptor stays open until this object is gone.
+  explicit Watchdog(int fd)
+      : thread_([this, fd](const std::stop_token& stop) {
+          std::unique_lock lock(mutex_);
+          wake_.wait_for(lock, stop, kLongestInAll, [] { return false; });
+          if (!stop.stop_requested()) ::shutdown(fd, SHUT_RDWR);
+        }) {}
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::jthread thread_;  // last: it uses the others
+};
+
+struct Unbind {
+  void operator()(LDAP* connection) const { ldap_unbind_ext_s(connection, nullptr, nullptr); }
+};
+using Connection = std::unique_ptr<LDAP, Unbind>;
+
+// A step of the question that the server did not answer.
+struct Unanswered {
+  std::string why;
+};
+
+// @param connection  Knows more about a certificate that is refused; may be null.
+void Check(LDAP* connection, int code) {
+  if (code == LDAP_SUCCESS) return;
+  std::string why = ldap_err2string(code);
+  char* given = nullptr;
+  if (connection != nullptr &&
+      ldap_get_option(connection, LDAP_OPT_DIAGNOSTIC_MESSAGE, &given) == LDAP_OPT_SUCCESS &&
+      given != nullptr) {
+    const std::unique_ptr<char, decltype(&ldap_memfree)> held(given, ldap_memfree);
+    if (*given != '\0') why += fmt::format(" ({})", AsPlainText(given));
+  }
+  throw Unanswered{why};
+}
+
+// Waits kLongest for an address to answer. @return no descriptor if it does not.
+Descriptor Dialled(const sockaddr* address, socklen_t size) {
+  Descriptor socket(::socket(address->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const int fd = socket.get();
+  if (::connect(fd, address, size) != 0) {
+    pollfd waiting{.fd = fd, .events = POLLOUT, .revents = 0};
+    int error = 0;
+    socklen_t length = sizeof error;
+    if (errno != EINPROGRESS || ::poll(&waiting, 1, kLongest.tv_sec * 1000) != 1 ||
+        ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &length) != 0 || error != 0)
+      return Descriptor(-1);
+  }
+  if (::fcntl(fd, F_SETFL, 0) != 0) return Descriptor(-1);
+  return socket;
+}
+
+// A connection to the server, before anything is said. The library's own would wait for minutes
+// where nobody answers.
+Descriptor Dial(const std::string& url) {
+  LDAPURLDesc* given = nullptr;
+  if (ldap_url_parse(url.c_str(), &given) != LDAP_URL_SUCCESS) Check(nullptr, LDAP_PARAM_ERROR);
+  const std::unique_ptr<LDAPURLDesc, decltype(&ldap_free_urldesc)> parts(given, ldap_free_urldesc);
+  const std::string host = parts->lud_host == nullptr ? "" : parts->lud_host;
+  if (url.starts_with("ldapi://")) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    if (host.size() >= sizeof address.sun_path) Check(nullptr, LDAP_PARAM_ERROR);
+    host.copy(address.sun_path, host.size());
+    Descriptor socket = Dialled(reinterpret_cast<const sockaddr*>(&address), sizeof address);
+    if (socket.get() >= 0) return socket;
+  } else {
+    addrinfo wanted{}, *found = nullptr;
+    wanted.ai_socktype = SOCK_STREAM;
+    if (::getaddrinfo(host.c_str(), fmt::format("{}", parts->lud_port).c_str(), &wanted, &found) !=
+        0)
+      Check(nullptr, LDAP_SERVER_DOWN);
+    const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> held(found, ::freeaddrinfo);
+    for (const addrinfo* one = found; one != nullptr; one = one->ai_next)
+      if (Descriptor socket = Dialled(one->ai_addr, one->ai_addrlen); socket.get() >= 0)
+        return socket;
+  }
+  throw Unanswered{ldap_err2string(LDAP_SERVER_DOWN)};
+}
+
+std::string Replaced(std::string text, std::string_view place, const std::string& by) {
+  for (std::size_t at = text.find(place); at != std::string::npos;
+       at = text.find(place, at + by.size()))
+    text.replace(at, place.size(), by);
+  return text;
+}
+
+std::string Escaped(std::string_view text, std::string_view special, const char* format) {
+  std::string escaped;
+  for (const char c : text) {
+    if (special.find(c) == std::string_view::npos && c != '\0')
+      escaped += c;
+    else
+      escaped += fmt::format(fmt::runtime(format), static_cast<unsigned char>(c));
+  }
+  return escaped;
+}
+
+// Within a distinguished name (RFC 4514) and within a filter (RFC 4515). Names of accounts have
+// neither blanks nor '#' at their ends.
+std::string InName(const std::string& text) { return Escaped(text, "\"+,;<>\\=/", "\\{:02x}"); }
+std::string InFilter(const std::string& text) { return Escaped(text, "*()\\", "\\{:02x}"); }
+
+// As other writings of the same distinguished name are, too.
+std::string Normalised(const std::string& name) {
+  char* given = nullptr;
+  if (ldap_dn_normalize(name.c_str(), LDAP_DN_FORMAT_LDAPV3, &given,
+                        LDAP_DN_FORMAT_LDAPV3 | LDAP_DN_PEDANTIC) != LDAP_SUCCESS ||
+      given == nullptr)
+    return name;
+  const std::unique_ptr<char, decltype(&ldap_memfree)> held(given, ldap_memfree);
+  std::string normalised = given;
+  std::ranges::transform(normalised, normalised.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return normalised;
+}
+
+// @param fd  Connected; it belongs to this connection from now on.
+Connection Connect(const DirectorySettings& settings, int fd) {
+  LDAP* made = nullptr;
+  const bool is_local = settings.url.starts_with("ldapi://");
+  const int code =
+      ldap_init_fd(fd, is_local ? LDAP_PROTO_IPC : LDAP_PROTO_TCP, settings.url.c_str(), &made);
+  if (code != LDAP_SUCCESS) ::close(fd);
+  Check(nullptr, code);
+  Connection connection(made);
+  const auto set = [&](int option, const void* value) {
+    if (ldap_set_option(made, option, value) != LDAP_OPT_SUCCESS) Check(nullptr, LDAP_PARAM_ERROR);
+  };
+  const int version = LDAP_VERSION3, demand = LDAP_OPT_X_TLS_DEMAND, client = 0,
+            least = LDAP_OPT_X_TLS_PROTOCOL_TLS1_2;
+  set(LDAP_OPT_PROTOCOL_VERSION, &version);
+  set(LDAP_OPT_REFERRALS, LDAP_OPT_OFF);  // The password goes to this server only.
+  set(LDAP_OPT_TIMEOUT, &kLongest);
+  if (is_local) return connection;
+  set(LDAP_OPT_X_TLS_REQUIRE_CERT, &demand);
+  set(LDAP_OPT_X_TLS_PROTOCOL_MIN, &least);
+  const std::string trusted =
+      settings.trusted.empty() ? "/etc/ssl/certs/ca-certificates.crt" : settings.trusted.string();
+  set(LDAP_OPT_X_TLS_CACERTFILE, trusted.c_str());
+  set(LDAP_OPT_X_TLS_NEWCTX, &client);
+  Check(made, settings.url.starts_with("ldap://") ? ldap_start_tls_s(made, nullptr, nullptr)
+                                                  : ldap_install_tls(made));
+  return connection;
+}
+
+// False: name and password do not belong together.
+bool LogsIn(LDAP* connection, const std::string& person, const std::string& password) {
+  berval secret{};
+  secret.bv_len = password.size();
+  secret.bv_val = const_cast<char*>(password.data());  // NOLINT: the library only reads it
+  const int code = ldap_sasl_bind_s(connection, person.c_str(), LDAP_SASL_SIMPLE, &secret, nullptr,
+                                    nullptr, nullptr);
+  if (code == LDAP_INVALID_CREDENTIALS || code == LDAP_INVALID_DN_SYNTAX ||
+      code == LDAP_NO_SUCH_OBJECT || code == LDAP_INAPPROPRIATE_AUTH)
+    return false;
+  Check(connection, code);
+  return true;
+}
+
+// Names of the entries that a filter finds.
+std::vector<std::string> Find(LDAP* connection, const std::string& base,
+                              const std::string& filter) {
+  std::string no_attributes = LDAP_NO_ATTRS;
+  std::array<char*, 2> attributes = {no_attributes.data(), nullptr};
+  timeval longest = kLongest;
+  LDAPMessage* found = nullptr;
+  const int code = ldap_search_ext_s(connection, base.c_str(), LDAP_SCOPE_SUBTREE, filter.c_str(),
+                                     attributes.data(), /*attrsonly=*/1, nullptr, nullptr, &longest,
+                                     kMostGroups, &found);
+  const std::unique_ptr<LDAPMessage, decltype(&ldap_msgfree)> held(found, ldap_msgfree);
+  Check(connection, code);
+  std::vector<std::string> names;
+  for (LDAPMessage* entry = ldap_first_entry(connection, found); entry != nullptr;
+       entry = ldap_next_entry(connection, entry)) {
+    const std::unique_ptr<char, decltype(&ldap_memfree)> name(ldap_get_dn(connection, entry),
+                                                              ldap_memfree);
+    if (name) names.emplace_back(name.get());
+  }
+  return names;
+}
+
+// The role of the first list, in this order, that has one of the groups.
+std::optional<Role> RoleOf(const DirectorySettings& settings, std::vector<std::string> groups) {
+  for (std::string& group : groups) group = Normalised(group);
+  for (const auto& [role, names] : {std::pair(Role::kEngineer, &settings.engineers),
+                                    std::pair(Role::kPhysicist, &settings.physicists),
+                                    std::pair(Role::kTechnician, &settings.technicians)})
+    for (const std::string& name : *names)
+      if (std::ranges::find(groups, Normalised(name)) != groups.end()) return role;
+  return std::nullopt;
+}
+
+}  // namespace
+
+web::DirectoryAnswer AskLdap(const DirectorySettings& settings, const std::string& name,
+                             const std::string& password) {
+  web::DirectoryAnswer answer;
+  if (name.empty() || password.empty()) return answer;
+  try {
+    // It stays open until the end, so that the watchdog never shuts another one down.
+    const Descriptor socket = Dial(settings.url);
+    const Watchdog watchdog(socket.get());
+    const Connection connection = Connect(settings, ::dup(socket.get()));
+    std::string person = Replaced(settings.person, "{name}", InName(name));
+    if (!LogsIn(connection.get(), person, password)) return answer;
+    if (!settings.people_filter.empty()) {
+      const std::vector<std::string> found =
+          Find(connection.get(), settings.people_base,
+               Replaced(settings.people_filter, "{name}", InFilter(name)));
+      // Two entries of that name: whose groups count is not known.
+      if (found.size() != 1) {
+        answer.failure = say::directory::PersonNotFound(found.size());
+        return answer;
+      }
+      person = found.front();
+    }
+    const std::string groups = Replaced(
+        Replaced(settings.groups_filter, "{person}", InFilter(person)), "{name}", InFilter(name));
+    answer.role = RoleOf(settings, Find(connection.get(), settings.groups_base, groups));
+    answer.matches = true;
+  } catch (const Unanswered& unanswered) {
+    answer.failure = say::directory::NoAnswer(unanswered.why);
+  }
+  return answer;
+}
+
+}  // namespace plumb

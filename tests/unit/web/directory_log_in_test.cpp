@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// People of the clinic's directory on the page: accounts and roles follow from it, the unit's own
+// accounts do without it.
+#include <gmock/gmock.h>
+
+#include <map>
+#include <mutex>
+
+#include "tests/unit/web/web_fixture.hpp"
+#include "words/web.hpp"
+
+namespace plumb::test {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class DirectoryLogInTest : public WebTest {
+ protected:
+  void SetUp() override {
+    Start([this](web::HttpServerOptions& options) {
+      options.ask_directory = [this](const std::string& name, const std::string& password,
+                                     const auto& done) {
+        const std::scoped_lock lock(mutex_);
+        ++asked_[name];
+        if (is_full_) return false;
+        web::DirectoryAnswer answer;
+        answer.failure = failure_;
+        answer.matches = failure_.empty() && roles_.contains(name) && password == kPassword;
+        if (answer.matches) answer.role = roles_[name];
+        done(answer);
+        return true;
+      };
+    });
+    SetUpAccounts();
+    SetRole("anna", Role::kTechnician);
+    SetRole("marie", Role::kPhysicist);
+    SetRole("visitor", std::nullopt);
+  }
+  void SetRole(const std::string& name, std::optional<Role> role) {
+    const std::scoped_lock lock(mutex_);
+    roles_[name] = role;
+  }
+  void SetFailure(const Message& failure) {
+    const std::scoped_lock lock(mutex_);
+    failure_ = failure;
+  }
+  int Asked(const std::string& name) {
+    const std::scoped_lock lock(mutex_);
+    return asked_[name];
+  }
+  HttpAnswer LogIn(HttpClient& client, const std::string& name,
+                   const std::string& password = kPassword) {
+    return client.Post("/api/v1/login", {{"name", name}, {"password", password}});
+  }
+  json Account(const std::string& name) {
+    const json users = LoggedIn("engineer").Get("/api/v1/users").json()["users"];
+    for (const json& user : users)
+      if (user["name"] == name) return user;
+    return nullptr;
+  }
+  static int ChangeAnna(HttpClient& engineer, json change) {
+    change["own_password"] = kPassword;
+    return engineer.Put("/api/v1/users/anna", change).status;
+  }
+
+  std::mutex mutex_;
+  std::map<std::string, std::optional<Role>> roles_;
+  std::map<std::string, int> asked_;
+  Message failure_;
+  bool is_full_ = false;
+};
+
+TEST_F(DirectoryLogInTest, TheFirstLogInMakesTheAccountWithTheRoleOfTheGroups) {
+  EXPECT_EQ(Account("anna"), nullptr);
+  HttpClient anna(port_);
+  const HttpAnswer answer = LogIn(anna, "Anna");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  EXPECT_EQ(answer.json()["user"], "anna") << "capital letters make no other person";
+  EXPECT_EQ(answer.json()["role"], "technician");
+  EXPECT_EQ(Account("anna")["in_directory"], true);
+  EXPECT_EQ(Account("technician")["in_directory"], false);
+  anna.FetchToken();
+  const json session = anna.Get("/api/v1/session").json();
+  EXPECT_EQ(session["in_directory"], true);
+  EXPECT_EQ(session["password_change_required"], false);
+}
+
+TEST_F(DirectoryLogInTest, AWrongPasswordIsAnsweredAsAnyOtherAndCounted) {
+  HttpClient stranger(port_);
+  const HttpAnswer wrong = LogIn(stranger, "anna", "not this one at all");
+  EXPECT_EQ(wrong.status, 403);
+  EXPECT_EQ(wrong.body, LogIn(stranger, "engineer", "not this one at all").body);
+  EXPECT_EQ(Account("anna"), nullptr);
+  int status = 403;
+  for (int i = 0; i < 20 && status == 403; ++i)
+    status = LogIn(stranger, "anna", "not this one at all").status;
+  EXPECT_EQ(status, 429);
+}
+
+TEST_F(DirectoryLogInTest, WithoutAGroupOfThisUnitNobodyGetsIn) {
+  HttpClient visitor(port_);
+  const HttpAnswer answer = LogIn(visitor, "visitor");
+  EXPECT_EQ(answer.status, 403);
+  EXPECT_THAT(answer.body, HasSubstr("none of your groups"));
+  EXPECT_EQ(Account("visitor"), nullptr);
+}
+
+TEST_F(DirectoryLogInTest, WhileTheDirectoryIsAwayTheUnitsOwnAccountsGoOn) {
+  HttpClient before(port_);
+  ASSERT_EQ(LogIn(before, "anna").status, 200);
+  SetFailure(say::web::NothingHere());
+  HttpClient anna(port_);
+  const HttpAnswer answer = LogIn(anna, "anna");
+  EXPECT_EQ(answer.status, 503);
+  EXPECT_THAT(answer.body, HasSubstr("directory does not answer"));
+  HttpClient technician(port_);
+  EXPECT_EQ(LogIn(technician, "technician").status, 200);
+  EXPECT_EQ(Asked("technician"), 0) << "a password of this unit leaves it for no directory";
+  is_full_ = true;
+  EXPECT_EQ(LogIn(anna, "anna").status, 503);
+}
+
+TEST_F(DirectoryLogInTest, AnotherGroupIsAnotherRoleAndEndsWhatWasOpen) {
+  HttpClient anna(port_);
+  ASSERT_EQ(anna.LogIn("anna", kPassword), 200);
+  SetRole("anna", Role::kPhysicist);
+  HttpClient again(port_);
+  EXPECT_EQ(LogIn(again, "anna").json()["role"], "physicist");
+  EXPECT_EQ(Account("anna")["role"], "physicist");
+  EXPECT_EQ(anna.Get("/api/v1/session").status, 401);
+  SetRole("anna", std::nullopt);
+  EXPECT_EQ(LogIn(again, "anna").status, 403);
+}
+
+TEST_F(DirectoryLogInTest, ASignatureAsksAgain) {
+  HttpClient marie(port_);
+  ASSERT_EQ(marie.LogIn("marie", kPassword), 200);
+  const auto sign = [&](const char* password) {
+    return marie.Put("/api/v1/session/pin", {{"pin", "4711"}, {"password", password}});
+  };
+  EXPECT_EQ(sign("not this one at all").status, 403);
+  const int asked = Asked("marie");
+  EXPECT_EQ(sign(kPassword).status, 200);
+  EXPECT_EQ(Asked("marie"), asked + 1);
+  SetRole("marie", Role::kTechnician);
+  const HttpAnswer changed = sign(kPassword);
+  EXPECT_EQ(changed.status, 403);
+  EXPECT_THAT(changed.body, HasSubstr("have changed"));
+  SetFailure(say::web::NothingHere());
+  EXPECT_EQ(sign(kPassword).status, 503);
+}
+
+TEST_F(DirectoryLogInTest, PasswordAndRoleAreChangedThereAndTheAccountCanBeDisabledHere) {
+  HttpClient anna(port_);
+  ASSERT_EQ(anna.LogIn("anna", kPassword), 200);
+  EXPECT_EQ(anna.Post("/api/v1/session/password",
+                      {{"old_password", kPassword}, {"password", "another long one"}})
+                .status,
+            400);
+  HttpClient engineer = LoggedIn("engineer");
+  EXPECT_EQ(ChangeAnna(engineer, {{"role", "engineer"}}), 400);
+  EXPECT_EQ(ChangeAnna(engineer, {{"password", "another long one"}}), 400);
+  EXPECT_EQ(ChangeAnna(engineer, {{"disabled", true}}), 200);
+  EXPECT_EQ(anna.Get("/api/v1/session").status, 401);
+  const int asked = Asked("anna");
+  HttpClient again(port_);
+  EXPECT_EQ(LogIn(again, "anna").status, 403);
+  EXPECT_EQ(Asked("anna"), asked);
+}
+
+}  // namespace
+}  // namespace plumb::test
