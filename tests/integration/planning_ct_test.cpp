@@ -65,7 +65,7 @@ TEST_F(PlanningCtTest, ImagesTakeThePlaceOfAContourThatIsMissing) {
   ASSERT_EQ(images.exit_code, 0) << images.err;
   EXPECT_THAT(images.out, HasSubstr("CT -500 HU"));
   EXPECT_THAT(images.out, HasSubstr("the couch, whose top lies at"));
-  const double top_m = ReadScene(folder_ / "planned").mesh.vertices.front().z();
+  const double top_m = ReadScene(folder_ / "planned").cloud.points.front().z();
   EXPECT_NEAR(top_m, 0.1, 0.0005);
   // One image of another series spoils all of them, and leaves nothing behind.
   CtImage other = SmallImages(options).front();
@@ -87,7 +87,8 @@ TEST_F(PlanningCtTest, FromImagesToSixNumbersInACalibratedRoom) {
                 .exit_code,
             0);
   json plan = json::parse(ReadText(suite / "suite.json"));
-  plan["pairs"] = {{"ct_HFS", "placement_1"}, {"ct_FFP", "placement_1"}};
+  plan["pairs"] =
+      json::array({json::array({"ct_HFS", "placement_1"}), json::array({"ct_FFP", "placement_1"})});
   plan["scenes"] = {"ct_HFS", "ct_FFP", "placement_1"};
   fs::create_directory(folder_ / "recordings");
   fs::create_symlink(suite / "truth", folder_ / "truth");
