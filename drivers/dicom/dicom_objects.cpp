@@ -314,7 +314,6 @@ Eigen::Vector3d Required(const Item& set, const DcmTagKey& tag) {
 
 CtImage ImageOf(const Item& set) {
   CtImage image;
-  image.file = FileOf(set, DCM_SeriesDescription, DCM_SeriesDate, DCM_SeriesTime);
   image.series_uid = set.Text(DCM_SeriesInstanceUID);
   image.position = set.Text(DCM_PatientPosition);
   image.rows = static_cast<int>(set.Word(DCM_Rows, 0));
@@ -377,10 +376,16 @@ PlanningContent ReadDicom(std::span<const std::uint8_t> bytes) {
     content.plan = PlanOf(root);
     content.file = content.plan->file;
   } else if (class_uid == UID_CTImageStorage) {
-    const DcmXfer syntax(data->getOriginalXfer());
-    if (syntax.isEncapsulated()) throw DataError(say::dicom::ImageCompressed(syntax.getXferName()));
-    content.image = ImageOf(root);
-    content.file = content.image->file;
+    content.file = FileOf(root, DCM_SeriesDescription, DCM_SeriesDate, DCM_SeriesTime);
+    try {
+      const DcmXfer syntax(data->getOriginalXfer());
+      if (syntax.isEncapsulated())
+        throw DataError(say::dicom::ImageCompressed(syntax.getXferName()));
+      content.image = ImageOf(root);
+      content.image->file = content.file;
+    } catch (const DataError& why) {
+      content.image_fault = why.message();  // it can be described, not used
+    }
   } else {
     content.file = FileOf(root, DCM_SeriesDescription, DCM_SeriesDate, DCM_SeriesTime);
   }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "algo/base/message.hpp"
 #include "algo/types/ct_image.hpp"
 #include "algo/types/treatment_plan.hpp"
 
@@ -18,6 +19,7 @@ struct PlanningContent {
   std::optional<StructureSet> structures;
   std::optional<TreatmentPlan> plan;
   std::optional<CtImage> image;
+  Message image_fault;  ///< Why a CT image has no `image`; empty otherwise.
 };
 
 /// Larger files are refused.

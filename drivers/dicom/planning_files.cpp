@@ -100,6 +100,8 @@ void ForEachCtImage(const std::vector<fs::path>& paths,
     for (const fs::path& file : is_folder ? DicomFilesIn(path) : std::vector{path}) {
       const PlanningContent content = ReadDicomFile(file);
       if (is_folder && (content.structures || content.plan)) continue;
+      if (!content.image_fault.empty())
+        throw DataError(say::dicom::Damaged(file.string(), content.image_fault));
       if (!content.image)
         throw DataError(
             say::dicom::OtherKind(file.string(), content.modality, say::dicom::KindImage()));

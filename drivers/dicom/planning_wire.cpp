@@ -7,6 +7,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/message_json.hpp"
 #include "words/dicom.hpp"
 
 namespace plumb {
@@ -173,6 +174,9 @@ std::string FactsOf(const PlanningContent& content) {
   if (content.structures) json["rois"] = Written(*content.structures);
   if (content.plan) json["plan"] = Written(*content.plan);
   if (content.image) json["image"] = Written(*content.image);
+  if (!content.image_fault.empty())
+    json["image_fault"] = {{"english", content.image_fault.English()},
+                           {"message", MessageJson(content.image_fault)}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -208,6 +212,9 @@ PlanningContent ParsePlanning(std::string_view facts, std::span<const double> po
       content.image = ImageOf(json["image"], points);
       content.image->file = content.file;
     }
+    if (json.contains("image_fault"))
+      content.image_fault = MessageFromJson(json["image_fault"].at("message"),
+                                            json["image_fault"].at("english").get<std::string>());
     return content;
   } catch (const nlohmann::json::exception&) {
     throw DataError(say::dicom::ReaderVersion());

@@ -130,7 +130,11 @@ TEST_F(PlanningCtTest, InfoDescribesTheFilesWithoutThePatient) {
   const json facts = json::parse(plan.out);
   EXPECT_EQ(facts.at("positions"), json({"HFS"}));
   EXPECT_NEAR(facts.at("beams").at("AP").at("isocentre_lps_mm").at(1), -304.3, 1e-9);
-  for (const RunResult* result : {&structures, &plan}) {
+  const RunResult image =
+      Plumb({"info", Written(folder_ / "image.dcm", DicomBytes(SmallImages().front())), "--json"});
+  EXPECT_EQ(json::parse(image.out).at("position"), "HFS");
+  EXPECT_EQ(json::parse(image.out).at("pixel_mm"), json({5.0, 5.0}));
+  for (const RunResult* result : {&structures, &plan, &image}) {
     EXPECT_EQ(result->out.find("SIM-1"), std::string::npos);
     EXPECT_EQ(result->out.find("Simulated^Body"), std::string::npos);
   }

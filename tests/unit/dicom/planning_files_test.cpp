@@ -168,9 +168,9 @@ TEST_F(PlanningFilesTest, PixelsAreWhatTheFileSaysOrRefused) {
   const auto steeper = ReadDicomFile(Write("i.dcm", changed("\x28\0\x53\x10"s, 8, "2 "))).image;
   ASSERT_TRUE(steeper);
   EXPECT_NEAR(steeper->hu.front(), 2 * (image.hu.front() + 1024) - 1024, 1.1);
-  const auto refused = [&](const std::string& file) {
-    const Message why = Refusal(Write("i.dcm", file));
-    EXPECT_TRUE(why.Is(say::dicom::kDamaged)) << why.English();
+  const auto refused = [&](const std::string& changed_bytes) {
+    const auto file = Write("i.dcm", changed_bytes);
+    EXPECT_THROW(ForEachCtImage({file}, [](const CtImage&, const std::string&) {}), DataError);
   };
   refused(changed("\x28\0\0\x01US"s, 8, word(8)));     // bits allocated
   refused(changed("\x28\0\x02\x01US"s, 8, word(15)));  // high bit
@@ -179,7 +179,15 @@ TEST_F(PlanningFilesTest, PixelsAreWhatTheFileSaysOrRefused) {
   refused(changed("\x28\0\x10\0US"s, 8, word(image.rows + 1)));
   refused(changed("\x28\0\x53\x10"s, 8, "0 "));  // slope
   refused(bytes.substr(0, bytes.size() - 400));
-  refused(changed("1.2.840.10008.1.2.1\0"s, 0, "1.2.840.10008.1.2.5\0"s));  // RLE
+  const std::string compressed =
+      changed("1.2.840.10008.1.2.1\0"s, 0, "1.2.840.10008.1.2.5\0"s);  // RLE
+  refused(compressed);
+  // It is described all the same.
+  const PlanningContent described =
+      ReadDicomFile(Write("i.dcm", changed("\x28\0\x53\x10"s, 8, "0 ")));
+  EXPECT_EQ(described.modality, "CT");
+  EXPECT_EQ(described.file.frame_of_reference_uid, "2.25.52");
+  EXPECT_TRUE(described.image_fault.Is(say::dicom::kImageFormat));
 }
 
 TEST_F(PlanningFilesTest, ImagesAreFoundInFoldersBesideTheirPlan) {
