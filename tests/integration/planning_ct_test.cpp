@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <vector>
+
 #include "algo/planning/ct_skin.hpp"
 #include "daemon/export_formats/mesh_file.hpp"
 #include "daemon/files/scene_folder.hpp"

@@ -9,6 +9,10 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "algo/base/errors.hpp"
 #include "algo/planning/contour_surface.hpp"
