@@ -129,14 +129,29 @@ void RequireOnePatient(const StructureSet& structures, const TreatmentPlan& plan
     throw DataError(say::planning::OtherPatient());
 }
 
+void RequireUsablePlan(const TreatmentPlan& plan, std::vector<Message>& warnings) {
+  if (plan.geometry != "PATIENT") throw DataError(say::planning::Geometry(plan.geometry));
+  if (plan.approval == "REJECTED") throw DataError(say::planning::Rejected());
+  if (plan.approval == "UNAPPROVED") warnings.push_back(say::planning::Unapproved());
+}
+
 void RequireUsablePlan(const StructureSet& structures, const TreatmentPlan& plan,
                        std::vector<Message>& warnings) {
-  if (plan.geometry != "PATIENT") throw DataError(say::planning::Geometry(plan.geometry));
+  RequireUsablePlan(plan, warnings);
   if (plan.structure_set_uid != structures.file.instance_uid)
     throw DataError(
         say::planning::Superseded(plan.structure_set_uid, structures.file.instance_uid));
-  if (plan.approval == "REJECTED") throw DataError(say::planning::Rejected());
-  if (plan.approval == "UNAPPROVED") warnings.push_back(say::planning::Unapproved());
+}
+
+void RequireImagesOfPlan(const CtSkin& images, const TreatmentPlan& plan,
+                         const PlannedPlace& place) {
+  const PlanningFile &image = images.file(), &planned = plan.file;
+  if (image.patient_id != planned.patient_id ||
+      (planned.patient_id.empty() && image.patient_name != planned.patient_name))
+    throw DataError(say::planning::ImagesOtherPatient());
+  const std::string posture(Name(place.posture));
+  if (!images.position().empty() && images.position() != posture)
+    throw DataError(say::planning::ImagesPosition(images.position(), posture));
 }
 
 void RequireOneFrame(const StructureSet& structures, const PlannedRoi& roi,
@@ -163,6 +178,12 @@ PlannedPlace ChoosePlace(const TreatmentPlan& plan, const std::optional<std::str
   if (beam) place.beam = chosen.name;
   CheckCouch(plan, warnings);
   return place;
+}
+
+bool HasExternal(const StructureSet& structures) {
+  return std::any_of(structures.rois.begin(), structures.rois.end(), [](const PlannedRoi& roi) {
+    return roi.type == "EXTERNAL" && HasContours(roi);
+  });
 }
 
 const PlannedRoi& ChooseRoi(const StructureSet& structures,

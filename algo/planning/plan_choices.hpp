@@ -10,6 +10,7 @@
 
 #include "algo/base/message.hpp"
 #include "algo/base/posture.hpp"
+#include "algo/planning/ct_skin.hpp"
 #include "algo/types/treatment_plan.hpp"
 
 namespace plumb {
@@ -27,6 +28,11 @@ void RequireOnePatient(const StructureSet& structures, const TreatmentPlan& plan
 /// Refuses a plan that was made on another structure set, without one, or rejected.
 void RequireUsablePlan(const StructureSet& structures, const TreatmentPlan& plan,
                        std::vector<Message>& warnings);
+/// The same without a structure set to compare with.
+void RequireUsablePlan(const TreatmentPlan& plan, std::vector<Message>& warnings);
+/// Refuses images of another patient or position than the plan's.
+void RequireImagesOfPlan(const CtSkin& images, const TreatmentPlan& plan,
+                         const PlannedPlace& place);
 /// A frame that a file does not state cannot differ, but one of contour and structure set and the
 /// plan's must be stated.
 void RequireOneFrame(const StructureSet& structures, const PlannedRoi& roi,
@@ -36,6 +42,8 @@ void RequireOneFrame(const StructureSet& structures, const PlannedRoi& roi,
 [[nodiscard]] PlannedPlace ChoosePlace(const TreatmentPlan& plan,
                                        const std::optional<std::string>& beam,
                                        std::vector<Message>& warnings);
+/// True if a contour of type EXTERNAL has points.
+[[nodiscard]] bool HasExternal(const StructureSet& structures);
 /// The one of that name, or the one of type EXTERNAL with contours. Proposes one where there is
 /// none or more than one, and never takes it by itself.
 [[nodiscard]] const PlannedRoi& ChooseRoi(const StructureSet& structures,

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
 #include "algo/planning/contour_surface.hpp"
+#include "algo/planning/couch_top.hpp"
 #include "algo/planning/iec_axes.hpp"
 #include "algo/planning/plan_choices.hpp"
 #include "algo/surface/surface_mesh.hpp"
@@ -21,6 +23,13 @@ constexpr double kFlat_mm = 0.01;
 constexpr double kMostReach_m = 3.0;  // of a point from the isocentre
 constexpr double kWideSpacing_m = 5 * kMillimetre, kMostSpacing_m = 6 * kMillimetre;
 constexpr std::int64_t kFewestSlices = 5;
+// Of images: what is smaller is a tube or a cable. A couch sags, and its top is no exact plane.
+constexpr double kLeastImagePart_m2 = 500e-6, kAboveCouch_m = 3 * kMillimetre;
+// The skin that a camera sees may be that of another threshold: half-way between air and tissue,
+// or as far on the other side.
+constexpr double kThresholdHalf_hu = 200.0;
+constexpr double kPixelHalf = 0.2;         // of a pixel: twice the standard deviation of slices
+constexpr double kMostThreshold_mm = 3.0;  // where the images are too blurred to tell
 
 // A contour of a slice in IEC axes; nothing for what is no part of a surface, such as a point.
 void AddSlice(const PlannedRoi& roi, const PlannedContour& contour, const Eigen::Matrix3d& R,
@@ -64,27 +73,90 @@ void Warn(const ContourSurface& surface, std::vector<Message>& warnings) {
   if (surface.cut_at_side) warnings.push_back(say::planning::CutAtSide());
 }
 
-ContourSurface SurfaceOf(const PlannedRoi& roi, const PlannedPlace& place, PlanningSource& source) {
+std::vector<ContourSlice> SlicesOf(const PlannedRoi& roi, const PlannedPlace& place) {
   const Eigen::Matrix3d R = IecFromPatient(place.posture);
   std::vector<ContourSlice> slices;
   for (const PlannedContour& contour : roi.contours)
     AddSlice(roi, contour, R, place.isocentre_mm, slices);
+  return slices;
+}
+
+ContourSurface SurfaceOf(const std::string& name, std::vector<ContourSlice> slices,
+                         const ContourSurfaceOptions& options, PlanningSource& source) {
   source.slices = CountPlaces(slices);
   if (source.slices < kFewestSlices)
-    throw DataError(say::planning::FewSlices(roi.name, source.slices, kFewestSlices));
+    throw DataError(say::planning::FewSlices(name, source.slices, kFewestSlices));
   ContourSurface surface;
   try {
-    surface = SurfaceFromAbove(std::move(slices));
+    surface = SurfaceFromAbove(std::move(slices), options);
   } catch (const std::invalid_argument&) {
-    throw DataError(say::planning::NoSurface(roi.name));
+    throw DataError(say::planning::NoSurface(name));
   }
   if (surface.spacing_m > kMostSpacing_m + kFlat_mm * kMillimetre)
     throw DataError(say::planning::SpacingTooWide(surface.spacing_m / kMillimetre,
                                                   kMostSpacing_m / kMillimetre));
   const bool any = std::any_of(surface.heights.z.begin(), surface.heights.z.end(),
                                [](float z) { return std::isfinite(z); });
-  if (!any) throw DataError(say::planning::NoSurface(roi.name));
+  if (!any) throw DataError(say::planning::NoSurface(name));
   return surface;
+}
+
+// Top of the couch as a planning system has drawn it.
+std::optional<double> DrawnCouch(const StructureSet& structures, const PlannedPlace& place) {
+  std::vector<double> tops;
+  for (const PlannedRoi& roi : structures.rois) {
+    if (roi.type != "SUPPORT") continue;
+    for (const ContourSlice& slice : SlicesOf(roi, place)) {
+      double top = slice.contours.front().front().y();
+      for (const Eigen::Vector2d& p : slice.contours.front()) top = std::max(top, p.y());
+      tops.push_back(top);
+    }
+  }
+  if (tops.empty()) return std::nullopt;
+  return TakeQuantile(tops, 0.5);
+}
+
+ContourSurface SurfaceOfImages(const CtSkin& images, const std::optional<StructureSet>& structures,
+                               const PlannedPlace& place, Scene& scene) {
+  std::vector<ContourSlice> slices = SlicesOf(images.roi(), place);
+  std::optional<double> couch = structures ? DrawnCouch(*structures, place) : std::nullopt;
+  if (!couch) couch = CouchTop(slices);
+  if (couch) RemoveBelow(*couch + kAboveCouch_m, slices);
+  scene.warnings.push_back(couch ? say::planning::CouchRemoved(*couch / kMillimetre)
+                                 : say::planning::CouchNotFound());
+  ContourSurface surface = SurfaceOf(images.roi().name, std::move(slices),
+                                     {.min_area_m2 = kLeastImagePart_m2}, *scene.planning);
+  const double threshold_mm =
+      std::min(kMostThreshold_mm, kThresholdHalf_hu / std::max(images.Steepness(), 1.0));
+  const double pixels_mm = kPixelHalf * images.pixel_mm();
+  scene.planning->skin_u95_m = std::hypot(threshold_mm, pixels_mm) * kMillimetre;
+  scene.warnings.push_back(say::planning::SkinOfImages(images.threshold_hu(), threshold_mm,
+                                                       pixels_mm, images.pixel_mm()));
+  return surface;
+}
+
+void FillSource(const TreatmentPlan& plan, const PlannedPlace& place, const ContourSurface& surface,
+                PlanningSource& source) {
+  source.posture = place.posture;
+  source.isocentre_mm = place.isocentre_mm;
+  source.beam = place.beam;
+  source.plan_label = plan.file.label;
+  source.plan_date = plan.file.date;
+  source.approval = plan.approval;
+  source.plan_uid = plan.file.instance_uid;
+  source.structure_set_uid = plan.structure_set_uid;
+  source.frame_of_reference_uid = plan.file.frame_of_reference_uid;
+  source.slice_spacing_m = surface.spacing_m;
+  source.parts_apart = static_cast<std::int64_t>(surface.parts_apart);
+  source.parts_left_out = static_cast<std::int64_t>(surface.crumbs + surface.couch_parts);
+  source.support_m = surface.support_m;
+}
+
+void SetSurface(const ContourSurface& surface, Scene& scene) {
+  scene.height_map = surface.heights;
+  scene.mesh = MeshOfHeightMap(surface.heights);
+  scene.cloud.points = scene.mesh.vertices;
+  scene.cloud.normals = scene.mesh.normals;
 }
 
 }  // namespace
@@ -100,28 +172,39 @@ Scene MakePlannedScene(const StructureSet& structures, const TreatmentPlan& plan
   RequireOneFrame(structures, roi, plan);
 
   PlanningSource& source = scene.planning.emplace();
-  const ContourSurface surface = SurfaceOf(roi, place, source);
+  const ContourSurface surface = SurfaceOf(roi.name, SlicesOf(roi, place), {}, source);
   source.roi = roi.name;
-  source.posture = place.posture;
-  source.isocentre_mm = place.isocentre_mm;
-  source.beam = place.beam;
-  source.plan_label = plan.file.label;
-  source.plan_date = plan.file.date;
-  source.approval = plan.approval;
-  source.plan_uid = plan.file.instance_uid;
-  source.structure_set_uid = structures.file.instance_uid;
-  source.frame_of_reference_uid = plan.file.frame_of_reference_uid;
-  source.slice_spacing_m = surface.spacing_m;
-  source.parts_apart = static_cast<std::int64_t>(surface.parts_apart);
-  source.parts_left_out = static_cast<std::int64_t>(surface.crumbs + surface.couch_parts);
-  source.support_m = surface.support_m;
+  FillSource(plan, place, surface, source);
   Warn(surface, scene.warnings);
   scene.warnings.push_back(say::planning::SkinUnknown(source.skin_u95_m / kMillimetre));
+  SetSurface(surface, scene);
+  return scene;
+}
 
-  scene.height_map = surface.heights;
-  scene.mesh = MeshOfHeightMap(surface.heights);
-  scene.cloud.points = scene.mesh.vertices;
-  scene.cloud.normals = scene.mesh.normals;
+Scene MakePlannedScene(const std::optional<StructureSet>& structures, const TreatmentPlan& plan,
+                       const CtSkin& images, const PlanningChoice& choice) {
+  if (structures && (choice.roi || HasExternal(*structures)))
+    return MakePlannedScene(*structures, plan, choice);
+  if (choice.roi) throw DataError(say::planning::NoContours());
+  Scene scene;
+  scene.frame = SceneFrame::kIec;
+  if (structures) {
+    RequireOnePatient(*structures, plan);
+    RequireUsablePlan(*structures, plan, scene.warnings);
+  } else {
+    RequireUsablePlan(plan, scene.warnings);
+    scene.warnings.push_back(say::planning::ImagesByFrame());
+  }
+  const PlannedPlace place = ChoosePlace(plan, choice.beam, scene.warnings);
+  RequireImagesOfPlan(images, plan, place);
+  RequireOneFrame(structures.value_or(StructureSet()), images.roi(), plan);
+
+  PlanningSource& source = scene.planning.emplace();
+  const ContourSurface surface = SurfaceOfImages(images, structures, place, scene);
+  source.roi = images.roi().name;
+  FillSource(plan, place, surface, source);
+  Warn(surface, scene.warnings);
+  SetSurface(surface, scene);
   return scene;
 }
 

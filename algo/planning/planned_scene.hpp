@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "algo/planning/ct_skin.hpp"
 #include "algo/types/scene.hpp"
 #include "algo/types/treatment_plan.hpp"
 
@@ -21,6 +22,13 @@ struct PlanningChoice {
 /// @throws DataError if the files do not belong together or must not be used, and where the choice
 ///         is needed: see docs/planning-ct.md, which lists every rule.
 [[nodiscard]] Scene MakePlannedScene(const StructureSet& structures, const TreatmentPlan& plan,
+                                     const PlanningChoice& choice = {});
+
+/// The same with the images of the CT, whose skin is taken where the structure set has no external
+/// contour and none is chosen, or where there is no structure set. The couch is removed: by the
+/// structure set's contour of it, otherwise by its shape.
+[[nodiscard]] Scene MakePlannedScene(const std::optional<StructureSet>& structures,
+                                     const TreatmentPlan& plan, const CtSkin& images,
                                      const PlanningChoice& choice = {});
 
 }  // namespace plumb

@@ -12,7 +12,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
-#include "algo/planning/planned_scene.hpp"
+#include "algo/planning/ct_skin.hpp"
 #include "daemon/cli/batch.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
@@ -27,9 +27,9 @@
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
+#include "daemon/planning/planning_import.hpp"
 #include "daemon/reports/text_report.hpp"
 #include "daemon/result/result_folder.hpp"
-#include "drivers/dicom/planning_files.hpp"
 #include "drivers/files/file_io.hpp"
 #include "words/cli.hpp"
 #include "words/output.hpp"
@@ -77,10 +77,13 @@ class FirstFrames : public FrameSource {
 Scene Reconstruct(const Suite& suite, const std::string& name, const Config& config, double part,
                   const std::filesystem::path& folder, const CommandContext& context,
                   Progress& progress) {
-  const std::filesystem::path structures = suite.recordings.at(name) / "structures.dcm";
-  if (std::filesystem::exists(structures)) {
-    Scene planned = MakePlannedScene(ReadStructureSet(structures),
-                                     ReadTreatmentPlan(suite.recordings.at(name) / "plan.dcm"));
+  const std::filesystem::path planning = suite.recordings.at(name), plan = planning / "plan.dcm";
+  if (std::filesystem::exists(plan)) {
+    const std::filesystem::path images = planning / "images";
+    const Scene planned =
+        std::filesystem::exists(images)
+            ? ReadPlanningWithImages({}, plan, {images}, kSkinThreshold_hu, {})
+            : ReadPlanning({.structures = planning / "structures.dcm", .plan = plan}, {}).scene;
     WriteScene(planned, folder);
     return planned;
   }

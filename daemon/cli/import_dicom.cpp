@@ -10,7 +10,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "algo/planning/ct_skin.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/language.hpp"
 #include "daemon/cli/progress.hpp"
@@ -22,7 +24,10 @@ namespace plumb {
 namespace {
 
 struct ImportDicomArguments {
-  std::filesystem::path structures, plan, out;
+  std::vector<std::filesystem::path> files;  ///< Structure set and plan, or the plan alone.
+  std::vector<std::filesystem::path> images;
+  double threshold_hu = kSkinThreshold_hu;
+  std::filesystem::path out;
   PlanningChoice choice;
   bool json = false;
 };
@@ -62,11 +67,28 @@ std::string TextOf(const Scene& scene, const ImportDicomArguments& options,
   return text;
 }
 
+Scene Read(const ImportDicomArguments& options, Progress& progress) {
+  const std::vector<std::filesystem::path>& files = options.files;
+  if (options.images.empty())
+    return ReadPlanning({.structures = files.front(), .plan = files.back()}, options.choice).scene;
+  std::optional<std::filesystem::path> structures;
+  if (files.size() > 1) structures = files.front();
+  return ReadPlanningWithImages(
+      structures, files.back(), options.images, options.threshold_hu, options.choice,
+      [&](std::size_t count) {
+        // How many there will be is not known.
+        progress.Update(say::cli::ReadingDicom(),
+                        0.8 * static_cast<double>(count) / (static_cast<double>(count) + 100.0));
+      });
+}
+
 int Run(const ImportDicomArguments& options, const CommandContext& context) {
+  if (options.files.size() < 2 && options.images.empty())
+    throw InvalidRequest(say::cli::StructuresOrImages());
   { const AtomicFolder check(options.out, SceneOutput()); }  // rejects a bad place before the work
   Progress progress(context.language);
   progress.Update(say::cli::ReadingDicom(), 0.1);
-  Scene scene = ReadPlanning({options.structures, options.plan}, options.choice).scene;
+  Scene scene = Read(options, progress);
   CompareWithEarlierPlan(options.out, scene);
   progress.Update(say::cli::Writing(), 0.9);
   WriteScene(scene, options.out, context.stop);
@@ -79,12 +101,20 @@ int Run(const ImportDicomArguments& options, const CommandContext& context) {
 
 Command AddImportDicom(CLI::App& app) {
   auto options = std::make_shared<ImportDicomArguments>();
-  app.add_option("structures", options->structures, "DICOM RT Structure Set with the contours")
+  app.add_option("files", options->files,
+                 "DICOM RT Structure Set with the contours, and the RT Plan made on it with "
+                 "isocentre and position; with --images the plan alone may do")
       ->required()
-      ->type_name("STRUCTURES");
-  app.add_option("plan", options->plan, "DICOM RT Plan made on it: isocentre and position")
-      ->required()
-      ->type_name("PLAN");
+      ->expected(1, 2)
+      ->type_name("[STRUCTURES] PLAN");
+  app.add_option("--images", options->images,
+                 "CT images, or folders of them: the skin is taken from them where the structure "
+                 "set has no external contour")
+      ->type_name("CT");
+  app.add_option("--threshold", options->threshold_hu, "Hounsfield units of the skin in the images")
+      ->check(CLI::Range(-900.0, 0.0))
+      ->capture_default_str()
+      ->type_name("HU");
   app.add_option("--out", options->out, "Scene folder to write")->required()->type_name("SCENE");
   app.add_option("--roi", options->choice.roi,
                  "The contour that is the skin, where the structure set does not say it")

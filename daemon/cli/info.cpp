@@ -143,6 +143,19 @@ ordered_json DicomFacts(const fs::path& path) {
       rois[roi.name] = {{"type", roi.type}, {"contours", roi.contours.size()}, {"points", points}};
     }
   }
+  if (const auto& image = content.image) {
+    facts["series_uid"] = image->series_uid;
+    facts["position"] = image->position;
+    facts["image_width"] = image->columns;
+    facts["image_height"] = image->rows;
+    facts["pixel_mm"] = {image->column_spacing_mm, image->row_spacing_mm};
+    facts["first_pixel_lps_mm"] = {image->origin_mm.x(), image->origin_mm.y(),
+                                   image->origin_mm.z()};
+  }
+  if (!content.image_fault.empty()) {
+    facts["fault"] = content.image_fault.English();
+    facts["fault_message"] = MessageJson(content.image_fault);
+  }
   if (!content.plan) return facts;
   facts["approval"] = content.plan->approval;
   facts["geometry"] = content.plan->geometry;

@@ -109,6 +109,9 @@ void AddCtOptions(CLI::App& app, const std::shared_ptr<SimulateArguments>& optio
          "skin; default: 0")
       ->check(CLI::Range(0.0, 5.0))
       ->type_name("MM");
+  app.add_flag("--ct-images", options->simulate.ct_images,
+               "Suite ct: write the CTs as images, with a couch beneath the body, in place of "
+               "structure sets");
   app.add_option_function<std::vector<std::string>>(
          "--ct-quirk",
          [options](const std::vector<std::string>& names) {

@@ -23,6 +23,21 @@ ReadPlan ReadPlanning(const PlanningFiles& files, const PlanningChoice& choice) 
   return {.scene = MakePlannedScene(structures, plan, choice), .patient_id = plan.file.patient_id};
 }
 
+Scene ReadPlanningWithImages(const std::optional<fs::path>& structures, const fs::path& plan,
+                             const std::vector<fs::path>& images, double threshold_hu,
+                             const PlanningChoice& choice,
+                             const std::function<void(std::size_t)>& progress) {
+  const TreatmentPlan planned = ReadTreatmentPlan(plan);
+  std::optional<StructureSet> drawn;
+  if (structures) drawn = ReadStructureSet(*structures);
+  CtSkin skin(threshold_hu);
+  ForEachCtImage(images, [&](const CtImage& image, const std::string& name) {
+    skin.Add(image, name);
+    if (progress) progress(skin.num_images());
+  });
+  return MakePlannedScene(drawn, planned, skin, choice);
+}
+
 void CompareWithEarlierPlan(const fs::path& folder, Scene& scene) {
   if (!IsSceneFolder(folder)) return;
   try {

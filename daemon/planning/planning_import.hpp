@@ -4,7 +4,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "algo/planning/planned_scene.hpp"
 
@@ -27,6 +30,16 @@ struct ReadPlan {
 /// @throws DataError as of MakePlannedScene() and for files that cannot be read; IoError if this
 ///         installation has no reader.
 [[nodiscard]] ReadPlan ReadPlanning(const PlanningFiles& files, const PlanningChoice& choice);
+
+/// The same with the images of the CT, for a structure set without an external contour or none
+/// (see MakePlannedScene()). Takes some 0.1 s an image.
+/// @param images  Files and folders; see ForEachCtImage().
+/// @param progress  Called with the number of images that were read.
+[[nodiscard]] Scene ReadPlanningWithImages(const std::optional<std::filesystem::path>& structures,
+                                           const std::filesystem::path& plan,
+                                           const std::vector<std::filesystem::path>& images,
+                                           double threshold_hu, const PlanningChoice& choice,
+                                           const std::function<void(std::size_t)>& progress = {});
 
 /// Says it among the warnings of `scene` if the scene in that folder, which it follows, is of a
 /// later plan.

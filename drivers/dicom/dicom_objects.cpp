@@ -9,6 +9,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <span>
 #include <string_view>
 
 #include "algo/base/errors.hpp"
@@ -95,6 +96,27 @@ class Item {
     if (numbers.size() != 3)
       throw DataError(say::dicom::NoPoint(NameOf(tag), static_cast<std::int64_t>(numbers.size())));
     return Eigen::Vector3d(numbers.data());
+  }
+
+  /// Values of 16 bits, such as pixels; borrowed from the data set.
+  [[nodiscard]] std::span<const Uint16> Words(const DcmTagKey& tag) const {
+    const Uint16* words = nullptr;
+    unsigned long count = 0;
+    if (item_.findAndGetUint16Array(tag, words, &count).bad() || words == nullptr) return {};
+    return {words, count};
+  }
+  /// One that stands as binary.
+  [[nodiscard]] std::int64_t Word(const DcmTagKey& tag, std::int64_t missing) const {
+    const std::span<const Uint16> words = Words(tag);
+    return words.empty() ? missing : words.front();
+  }
+
+  /// The bits of what stands for pixels without a value; signed or not as the pixels are.
+  [[nodiscard]] std::optional<std::int64_t> Padding() const {
+    Sint16 value = 0;
+    if (item_.findAndGetSint16(DCM_PixelPaddingValue, value).good()) return value;
+    const std::span<const Uint16> words = Words(DCM_PixelPaddingValue);
+    return words.empty() ? std::nullopt : std::optional<std::int64_t>(words.front());
   }
 
   /// Calls visit(Item) for each item of a sequence, if there is one.
@@ -242,6 +264,85 @@ TreatmentPlan PlanOf(const Item& set) {
   return plan;
 }
 
+/// How pixels of 16 bits become Hounsfield units.
+struct PixelScale {
+  std::int64_t bits = 16, is_signed = 0;
+  double slope = 1.0, intercept = 0.0;
+  std::optional<std::int64_t> nothing = {};  ///< Value of pixels outside the field of view.
+
+  [[nodiscard]] std::int64_t Stored(std::int64_t word) const {
+    const std::int64_t range = std::int64_t{1} << bits;
+    const std::int64_t value = word & (range - 1);
+    return is_signed != 0 && value >= range / 2 ? value - range : value;
+  }
+  [[nodiscard]] float Hu(Uint16 word) const {
+    const std::int64_t value = Stored(word);
+    return static_cast<float>(nothing == value ? kAir_hu
+                                               : slope * static_cast<double>(value) + intercept);
+  }
+};
+
+PixelScale ScaleOf(const Item& set) {
+  const auto expect = [&](const DcmTagKey& tag, std::int64_t found, std::int64_t least,
+                          std::int64_t most) {
+    if (found < least || found > most)
+      throw DataError(say::dicom::ImageFormat(tag.toString().c_str(), std::to_string(found)));
+    return found;
+  };
+  expect(DCM_SamplesPerPixel, set.Word(DCM_SamplesPerPixel, 1), 1, 1);
+  expect(DCM_BitsAllocated, set.Word(DCM_BitsAllocated, 0), 16, 16);
+  PixelScale scale;
+  scale.bits = expect(DCM_BitsStored, set.Word(DCM_BitsStored, 0), 8, 16);
+  expect(DCM_HighBit, set.Word(DCM_HighBit, 0), scale.bits - 1, scale.bits - 1);
+  scale.is_signed = expect(DCM_PixelRepresentation, set.Word(DCM_PixelRepresentation, -1), 0, 1);
+  if (const auto nothing = set.Padding()) scale.nothing = scale.Stored(*nothing);
+  const auto slope = set.Number(DCM_RescaleSlope), intercept = set.Number(DCM_RescaleIntercept);
+  if (!slope || !intercept || !(std::abs(*slope) > 1e-6 && std::abs(*slope) < 1e3) ||
+      !(std::abs(*intercept) < 1e5))
+    throw DataError(
+        say::dicom::ImageFormat(DCM_RescaleSlope.toString().c_str(), set.Text(DCM_RescaleSlope)));
+  scale.slope = *slope;
+  scale.intercept = *intercept;
+  return scale;
+}
+
+Eigen::Vector3d Required(const Item& set, const DcmTagKey& tag) {
+  const auto point = set.Point(tag);
+  if (!point) throw DataError(say::dicom::NoPoint(tag.toString().c_str(), 0));
+  return *point;
+}
+
+CtImage ImageOf(const Item& set) {
+  CtImage image;
+  image.series_uid = set.Text(DCM_SeriesInstanceUID);
+  image.position = set.Text(DCM_PatientPosition);
+  image.rows = static_cast<int>(set.Word(DCM_Rows, 0));
+  image.columns = static_cast<int>(set.Word(DCM_Columns, 0));
+  for (const auto& [tag, side] :
+       {std::pair(DCM_Rows, image.rows), std::pair(DCM_Columns, image.columns)}) {
+    if (side < 1 || side > kMostImageSide)
+      throw DataError(say::dicom::ImageFormat(tag.toString().c_str(), std::to_string(side)));
+  }
+  image.origin_mm = Required(set, DCM_ImagePositionPatient);
+  const std::vector<double> directions = set.Numbers(DCM_ImageOrientationPatient);
+  const std::vector<double> spacing = set.Numbers(DCM_PixelSpacing);
+  if (directions.size() != 6 || spacing.size() != 2)
+    throw DataError(say::dicom::NoPoint(DCM_ImageOrientationPatient.toString().c_str(),
+                                        static_cast<std::int64_t>(directions.size())));
+  image.along_row = Eigen::Vector3d(directions.data());
+  image.along_column = Eigen::Vector3d(directions.data() + 3);
+  image.row_spacing_mm = spacing[0];
+  image.column_spacing_mm = spacing[1];
+  const PixelScale scale = ScaleOf(set);
+  const std::span<const Uint16> words = set.Words(DCM_PixelData);
+  const std::int64_t expected = std::int64_t{image.rows} * image.columns;
+  if (static_cast<std::int64_t>(words.size()) != expected)
+    throw DataError(say::dicom::ImageCut(static_cast<std::int64_t>(words.size()), expected));
+  image.hu.reserve(words.size());
+  for (const Uint16 word : words) image.hu.push_back(scale.Hu(word));
+  return image;
+}
+
 }  // namespace
 
 void PrepareDicom() {
@@ -274,6 +375,17 @@ PlanningContent ReadDicom(std::span<const std::uint8_t> bytes) {
   } else if (class_uid == UID_RTPlanStorage) {
     content.plan = PlanOf(root);
     content.file = content.plan->file;
+  } else if (class_uid == UID_CTImageStorage) {
+    content.file = FileOf(root, DCM_SeriesDescription, DCM_SeriesDate, DCM_SeriesTime);
+    try {
+      const DcmXfer syntax(data->getOriginalXfer());
+      if (syntax.isEncapsulated())
+        throw DataError(say::dicom::ImageCompressed(syntax.getXferName()));
+      content.image = ImageOf(root);
+      content.image->file = content.file;
+    } catch (const DataError& why) {
+      content.image_fault = why.message();  // it can be described, not used
+    }
   } else {
     content.file = FileOf(root, DCM_SeriesDescription, DCM_SeriesDate, DCM_SeriesTime);
   }

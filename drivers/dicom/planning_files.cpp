@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
@@ -36,6 +37,17 @@ PlanningContent AskReader(const fs::path& file) {
   std::vector<double> numbers(static_cast<std::size_t>(header.num_numbers));
   reader.Read(numbers.data(), numbers.size() * sizeof(double));
   return ParsePlanning(text, numbers);
+}
+
+/// DICOM files of a folder, not of those in it.
+std::vector<fs::path> DicomFilesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+    if (IsDicomFile(at->path())) files.push_back(at->path());
+  if (error || files.empty()) throw DataError(say::dicom::NoImages(folder.string()));
+  std::ranges::sort(files);
+  return files;
 }
 
 std::string SaidName(const fs::path& file, const fs::path& name) {
@@ -79,6 +91,23 @@ TreatmentPlan ReadTreatmentPlan(const fs::path& file, const fs::path& name) {
     throw DataError(
         say::dicom::OtherKind(SaidName(file, name), content.modality, say::dicom::KindPlan()));
   return *std::move(content.plan);
+}
+
+void ForEachCtImage(const std::vector<fs::path>& paths,
+                    const std::function<void(const CtImage&, const std::string&)>& visit) {
+  for (const fs::path& path : paths) {
+    const bool is_folder = fs::is_directory(path);
+    for (const fs::path& file : is_folder ? DicomFilesIn(path) : std::vector{path}) {
+      const PlanningContent content = ReadDicomFile(file);
+      if (is_folder && (content.structures || content.plan)) continue;
+      if (!content.image_fault.empty())
+        throw DataError(say::dicom::Damaged(file.string(), content.image_fault));
+      if (!content.image)
+        throw DataError(
+            say::dicom::OtherKind(file.string(), content.modality, say::dicom::KindImage()));
+      visit(*content.image, file.string());
+    }
+  }
 }
 
 }  // namespace plumb

@@ -3,6 +3,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
 
 #include "drivers/dicom/planning_content.hpp"
 
@@ -22,5 +25,12 @@ namespace plumb {
                                             const std::filesystem::path& name = {});
 [[nodiscard]] TreatmentPlan ReadTreatmentPlan(const std::filesystem::path& file,
                                               const std::filesystem::path& name = {});
+
+/// Visits the CT images among files, one after the other, so that only one is in memory.
+/// @param paths  Files, and folders whose DICOM files count; structure sets and plans that lie in a
+///               folder beside the images are left out.
+/// @throws DataError as above, for images of another kind, and for a folder without DICOM files.
+void ForEachCtImage(const std::vector<std::filesystem::path>& paths,
+                    const std::function<void(const CtImage&, const std::string& name)>& visit);
 
 }  // namespace plumb

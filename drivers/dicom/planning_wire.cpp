@@ -7,6 +7,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/message_json.hpp"
 #include "words/dicom.hpp"
 
 namespace plumb {
@@ -128,17 +129,60 @@ TreatmentPlan PlanOf(const Json& json) {
   return plan;
 }
 
+Json Written(const CtImage& image) {
+  const auto written = [](const Eigen::Vector3d& v) { return Json{v.x(), v.y(), v.z()}; };
+  return {{"series_uid", image.series_uid},
+          {"position", image.position},
+          {"rows", image.rows},
+          {"columns", image.columns},
+          {"origin_mm", written(image.origin_mm)},
+          {"along_row", written(image.along_row)},
+          {"along_column", written(image.along_column)},
+          {"column_spacing_mm", image.column_spacing_mm},
+          {"row_spacing_mm", image.row_spacing_mm}};
+}
+
+CtImage ImageOf(const Json& json, std::span<const double> numbers) {
+  const auto vector = [&](const char* key) {
+    const Json& v = json.at(key);
+    return Eigen::Vector3d(v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>());
+  };
+  CtImage image{.file = {},
+                .series_uid = json.at("series_uid").get<std::string>(),
+                .position = json.at("position").get<std::string>(),
+                .rows = json.at("rows").get<int>(),
+                .columns = json.at("columns").get<int>(),
+                .origin_mm = vector("origin_mm"),
+                .along_row = vector("along_row"),
+                .along_column = vector("along_column"),
+                .column_spacing_mm = json.at("column_spacing_mm").get<double>(),
+                .row_spacing_mm = json.at("row_spacing_mm").get<double>(),
+                .hu = {}};
+  const auto is_side = [](int side) { return side > 0 && side <= kMostImageSide; };
+  if (!is_side(image.rows) || !is_side(image.columns) ||
+      numbers.size() !=
+          static_cast<std::size_t>(image.rows) * static_cast<std::size_t>(image.columns))
+    throw DataError(say::dicom::ReaderVersion());
+  image.hu.assign(numbers.begin(), numbers.end());
+  return image;
+}
+
 }  // namespace
 
 std::string FactsOf(const PlanningContent& content) {
   Json json = {{"file", Written(content.file)}, {"modality", content.modality}};
   if (content.structures) json["rois"] = Written(*content.structures);
   if (content.plan) json["plan"] = Written(*content.plan);
+  if (content.image) json["image"] = Written(*content.image);
+  if (!content.image_fault.empty())
+    json["image_fault"] = {{"english", content.image_fault.English()},
+                           {"message", MessageJson(content.image_fault)}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::vector<double> PointsOf(const PlanningContent& content) {
   std::vector<double> numbers;
+  if (content.image) numbers.assign(content.image->hu.begin(), content.image->hu.end());
   if (!content.structures) return numbers;
   for (const PlannedRoi& roi : content.structures->rois) {
     for (const PlannedContour& contour : roi.contours)
@@ -164,6 +208,13 @@ PlanningContent ParsePlanning(std::string_view facts, std::span<const double> po
       content.plan = PlanOf(json["plan"]);
       content.plan->file = content.file;
     }
+    if (json.contains("image")) {
+      content.image = ImageOf(json["image"], points);
+      content.image->file = content.file;
+    }
+    if (json.contains("image_fault"))
+      content.image_fault = MessageFromJson(json["image_fault"].at("message"),
+                                            json["image_fault"].at("english").get<std::string>());
     return content;
   } catch (const nlohmann::json::exception&) {
     throw DataError(say::dicom::ReaderVersion());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What plumb-dicom-reader says to its parent: facts as JSON, the contours' points as numbers.
+// What plumb-dicom-reader says to its parent: facts as JSON, the contours' points
+// or an image's pixels as numbers.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +20,8 @@ struct PlanningHeader {
   std::uint32_t magic = kMagic;
   std::uint32_t is_error = 0;     ///< 1: the text is that of ReaderErrorText().
   std::uint64_t text_bytes = 0;   ///< JSON.
-  std::uint64_t num_numbers = 0;  ///< Three for each point, in the order of the contours.
+  std::uint64_t num_numbers = 0;  ///< Three for each point, in the order of the contours;
+                                  ///< one for each pixel.
 };
 inline constexpr std::size_t kMostFactBytes = std::size_t{32} << 20;
 

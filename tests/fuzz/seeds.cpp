@@ -75,6 +75,7 @@ void WriteDicom(const fs::path& root) {
       SmallCt({.quirks = {simulated::CtQuirk::kPoints, simulated::CtQuirk::kHoles}});
   WriteWholeFile(Folder(root / "dicom") / "structures", std::string_view(DicomBytes(structures)));
   WriteWholeFile(root / "dicom/plan", std::string_view(DicomBytes(plan)));
+  WriteWholeFile(root / "dicom/image", std::string_view(DicomBytes(SmallImages().front())));
 }
 #endif
 

@@ -4,8 +4,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <vector>
+
+#include "algo/planning/ct_skin.hpp"
 #include "daemon/export_formats/mesh_file.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "drivers/dicom/planning_files.hpp"
 #include "tests/integration/command_line.hpp"
 #include "tests/unit/dicom/small_files.hpp"
 
@@ -46,6 +51,68 @@ TEST_F(PlanningCtTest, ASceneIsWrittenOrNothing) {
   EXPECT_EQ(ReadScene(folder_ / "planned").planning->roi, "BODY");
 }
 
+TEST_F(PlanningCtTest, ImagesTakeThePlaceOfAContourThatIsMissing) {
+  const simulated::PlanningCtOptions options{.quirks = {simulated::CtQuirk::kNoExternal}};
+  EXPECT_EQ(Import(options).exit_code, 3);
+  fs::create_directory(folder_ / "ct");
+  int number = 0;
+  simulated::MakeCtImages(SmallCt(options).first, options, {.pixel_mm = 1.0},
+                          [&](const CtImage& image) {
+                            Written(folder_ / "ct" / std::to_string(++number), DicomBytes(image));
+                          });
+  const RunResult both = Import(options, {"--images", folder_ / "ct", "--json"});
+  ASSERT_EQ(both.exit_code, 0) << both.err;
+  EXPECT_EQ(json::parse(both.out).at("planning").at("roi"), "CT -300 HU");
+  const RunResult images = Plumb({"import-dicom", folder_ / "plan.dcm", "--images", folder_ / "ct",
+                                  "--threshold", "-500", "--out", folder_ / "planned"});
+  ASSERT_EQ(images.exit_code, 0) << images.err;
+  EXPECT_THAT(images.out, HasSubstr("CT -500 HU"));
+  EXPECT_THAT(images.out, HasSubstr("the couch, whose top lies at"));
+  const double top_m = ReadScene(folder_ / "planned").cloud.points.front().z();
+  EXPECT_NEAR(top_m, 0.1, 0.0005);
+  // One image of another series spoils all of them, and leaves nothing behind.
+  CtImage other = SmallImages(options).front();
+  other.series_uid = "2.25.3";
+  Written(folder_ / "ct" / "other", DicomBytes(other));
+  const RunResult mixed = Plumb({"import-dicom", folder_ / "plan.dcm", "--images", folder_ / "ct",
+                                 "--out", folder_ / "mixed"});
+  EXPECT_EQ(mixed.exit_code, 3);
+  EXPECT_THAT(mixed.err, HasSubstr("of another series"));
+  EXPECT_FALSE(fs::exists(folder_ / "mixed"));
+}
+
+// Images alone, with a couch beneath the body, become a reference; a sweep is compared with it.
+TEST_F(PlanningCtTest, FromImagesToSixNumbersInACalibratedRoom) {
+  const fs::path suite = SmallCtSuite();
+  ASSERT_EQ(Plumb({"simulate", "--suite", "ct", "--frames", "2", "--size", "320x240", "--seed", "5",
+                   "--unit", "5", "--ct-images", "--ct-quirk", "short", "--ct-spacing", "5",
+                   "--out", folder_ / "images"})
+                .exit_code,
+            0);
+  json plan = json::parse(ReadText(suite / "suite.json"));
+  plan["pairs"] =
+      json::array({json::array({"ct_HFS", "placement_1"}), json::array({"ct_FFP", "placement_1"})});
+  plan["scenes"] = {"ct_HFS", "ct_FFP", "placement_1"};
+  fs::create_directory(folder_ / "recordings");
+  fs::create_symlink(suite / "truth", folder_ / "truth");
+  for (const char* name : {"ct_HFS", "ct_FFP"}) {
+    EXPECT_FALSE(fs::exists(folder_ / "images/recordings" / name / "structures.dcm"));
+    fs::create_symlink(folder_ / "images/recordings" / name, folder_ / "recordings" / name);
+  }
+  fs::create_symlink(suite / "recordings/placement_1", folder_ / "recordings/placement_1");
+  for (const char* part : {"room", "room.toml"}) fs::create_symlink(suite / part, folder_ / part);
+  WriteText(folder_ / "suite.json", plan.dump());
+  const RunResult result = Plumb(
+      {"evaluate", folder_, "--config", folder_ / "room.toml", "--out", folder_ / "out", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json total = json::parse(result.out).at("total");
+  EXPECT_EQ(total.at("without_motion"), 0);
+  // Measured: 1.16 mm, 0.10 deg, all inside.
+  EXPECT_LT(total.at("translation_mm").at("max").get<double>(), 1.6);
+  EXPECT_LT(total.at("rotation_deg").at("max").get<double>(), 0.15);
+  EXPECT_GE(total.at("intervals_95").at("all").at("inside").get<int>(), 11) << "of 12";
+}
+
 TEST_F(PlanningCtTest, AnOlderPlanInPlaceOfALaterOneIsSaid) {
   ASSERT_EQ(Import({}).exit_code, 0);
   auto [structures, plan] = SmallCt();
@@ -66,7 +133,11 @@ TEST_F(PlanningCtTest, InfoDescribesTheFilesWithoutThePatient) {
   const json facts = json::parse(plan.out);
   EXPECT_EQ(facts.at("positions"), json({"HFS"}));
   EXPECT_NEAR(facts.at("beams").at("AP").at("isocentre_lps_mm").at(1), -304.3, 1e-9);
-  for (const RunResult* result : {&structures, &plan}) {
+  const RunResult image =
+      Plumb({"info", Written(folder_ / "image.dcm", DicomBytes(SmallImages().front())), "--json"});
+  EXPECT_EQ(json::parse(image.out).at("position"), "HFS");
+  EXPECT_EQ(json::parse(image.out).at("pixel_mm"), json({5.0, 5.0}));
+  for (const RunResult* result : {&structures, &plan, &image}) {
     EXPECT_EQ(result->out.find("SIM-1"), std::string::npos);
     EXPECT_EQ(result->out.find("Simulated^Body"), std::string::npos);
   }
@@ -168,6 +239,51 @@ TEST_F(PlanningCtTest, AResultWithoutAnAnswerHasNoPlaceInTheCt) {
   EXPECT_EQ(other.exit_code, 3);
   EXPECT_THAT(other.err, HasSubstr("not compared with the scene"));
   EXPECT_FALSE(fs::exists(folder_ / "other"));
+}
+
+double DistanceFrom(const std::vector<Eigen::Vector3d>& contour, const Eigen::Vector3d& p) {
+  double nearest = 1e9;
+  for (std::size_t i = 0, j = contour.size() - 1; i < contour.size(); j = i++) {
+    const Eigen::Vector3d along = contour[i] - contour[j], q = p - contour[j];
+    const double share = std::clamp(q.dot(along) / std::max(along.squaredNorm(), 1e-12), 0.0, 1.0);
+    nearest = std::min(nearest, (q - share * along).norm());
+  }
+  return nearest;
+}
+
+TEST_F(PlanningCtTest, TheSkinOfARealImageIsThePlanningSystemsContour) {
+  PLUMB_SHARED_DATA(real, "dicom-real");
+  const PlanningContent content = ReadDicomFile(real / "ct.0.dcm");
+  ASSERT_TRUE(content.image);
+  CtSkin skin;
+  skin.Add(*content.image, "image");
+  const StructureSet structures = ReadStructureSet(real / "rtss.dcm");
+  const auto largest = [&](const PlannedRoi& roi) {
+    const PlannedContour* found = nullptr;
+    for (const PlannedContour& contour : roi.contours) {
+      if (std::abs(contour.points_mm.front().z() - content.image->origin_mm.z()) < 0.01 &&
+          (found == nullptr || contour.points_mm.size() > found->points_mm.size()))
+        found = &contour;
+    }
+    return found;
+  };
+  const auto body = std::ranges::find(structures.rois, "BODY", &PlannedRoi::name);
+  ASSERT_NE(body, structures.rois.end());
+  const PlannedContour* const drawn = largest(*body);
+  const PlannedContour* const found = largest(skin.roi());
+  ASSERT_TRUE(drawn != nullptr && found != nullptr);
+  double middle = 0.0;
+  for (const Eigen::Vector3d& p : drawn->points_mm)
+    middle += p.y() / static_cast<double>(drawn->points_mm.size());
+  std::vector<double> off_mm;  // of the upper side, which has no couch
+  for (const Eigen::Vector3d& p : found->points_mm)
+    if (p.y() < middle) off_mm.push_back(DistanceFrom(drawn->points_mm, p));
+  ASSERT_GT(off_mm.size(), 200U);
+  std::ranges::sort(off_mm);
+  // Measured: 0.17 mm, 95 %: 0.9 mm, 235 HU/mm.
+  EXPECT_LT(off_mm[off_mm.size() / 2], 0.3);
+  EXPECT_LT(off_mm[off_mm.size() * 95 / 100], 1.5);
+  EXPECT_NEAR(skin.Steepness(), 235, 60);
 }
 
 TEST_F(PlanningCtTest, ARealPlanIsImported) {

@@ -52,6 +52,7 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
       {"mesh", "a"},
       {"import-dicom", "structures.dcm", "--out", "x"},
       {"import-dicom", "structures.dcm", "plan.dcm"},
+      {"import-dicom", "plan.dcm", "--images", "ct", "--threshold", "300", "--out", "x"},
       {"export-dicom", "result", "--reference", "a", "--current", "b"},
       {"export-dicom", "result", "--reference", "a", "--out", "x"},
       {"export-dicom", "result", "--reference", "a", "--current", "b", "--out", "x",

@@ -183,20 +183,52 @@ await h.step('what the planning system sent is listed and imported from there', 
   await rowOf('Plan THORAX').getByRole('link', { name: 'a reference' }).waitFor();
 });
 
-await h.step('the worklist of today stands above the patients and opens nothing', async () => {
+await h.step('the worklist of today opens a session by a tap, and never changes one', async () => {
+  const session = async () => (await h.api(planner, 'status')).body.session;
+  const other = { code: 'OTHER-9', site: '' };
+  const stranger = (await h.api(planner, 'patients', 'POST', other)).body.id;
   h.tell(`worklist ${patient}`);
   await planner.goto(`${h.url}#/patients`);
   const today = planner.getByRole('table', { name: 'Today' });
   await today.getByText('09:30').waitFor();
   await planner.getByText('2 appointments are of patients who are not known here').waitFor();
+  const start = today.getByRole('button', { name: 'Start treatment session, CT-1' });
+  // Whoever is open stays open: the list only says so.
+  if (await session()) {
+    await h.api(planner, 'treatment/close', 'POST', { session_id: (await session()).id });
+  }
+  await start.waitFor();
   await h.look(planner, 'worklist');
   await second.goto(`${h.url}#/patients`);
   await second.getByRole('table', { name: 'Today' }).waitFor();
   await h.look(second, 'worklist-phone');
-  const before = (await h.api(planner, 'status')).body.session;
+  await h.api(planner, `patients/${stranger}/open`, 'POST', { purpose: 'reference', reason: '' });
+  await today.getByText('The session of OTHER-9 is open: close it first.').waitFor();
+  equal(await start.count(), 0, 'no way to change it');
+  await h.look(planner, 'worklist-other');
+  const others = await session();
   await today.getByRole('link', { name: 'CT-1' }).click();
   await planner.waitForURL(new RegExp(`#/patient/${patient}`));
-  equal((await h.api(planner, 'status')).body.session?.id, before?.id, 'no session was changed');
+  equal((await session()).id, others.id, 'no session was changed');
+  await h.api(planner, 'treatment/close', 'POST', { session_id: others.id });
+  await planner.goto(`${h.url}#/patients`);
+  await planner.getByRole('button', { name: 'Add a patient' }).first().click();
+  equal(await planner.evaluate(() => document.activeElement.dataset.code), '', 'its code is next');
+  // A fraction of just now may go on: that is asked on the patient's page, and nothing is opened.
+  await start.click();
+  await planner.waitForURL(new RegExp(`#/patient/${patient}`));
+  equal(await session(), null, 'nothing is open yet');
+  const fraction = { purpose: 'fraction', reason: '' };
+  await h.api(planner, `patients/${patient}/open`, 'POST', fraction);
+  await h.api(planner, 'treatment/close', 'POST', { session_id: (await session()).id });
+  await planner.goto(`${h.url}#/patients`);
+  await start.click();
+  await planner.waitForURL(/#\/scan/);
+  const opened = await session();
+  equal([opened.patient_id, opened.purpose].join(), `${patient},fraction`, 'whose session');
+  await planner.goto(`${h.url}#/patients`);
+  await today.getByText('session open').waitFor();
+  equal(await start.count(), 0, 'it is open already');
 });
 
 await h.finish();

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/simulator/suites/dicom_writer.hpp"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -35,9 +37,10 @@ std::string Value(std::uint32_t tag, const char* kind, std::string value) {
   if (value.size() % 2 != 0) value += std::string_view(kind) == "UI" ? '\0' : ' ';
   std::string bytes = Tag(tag);
   const bool is_long = value.size() > kMostShort;
-  const std::string_view written = is_long ? "UN" : kind;
+  const bool is_words = std::string_view(kind) == "OW";
+  const std::string_view written = is_long && !is_words ? "UN" : kind;
   bytes += written;
-  if (is_long || written == "OB") {
+  if (is_long || is_words || written == "OB") {
     Put16(bytes, 0);
     Put32(bytes, value.size());
   } else {
@@ -120,7 +123,40 @@ std::string BeamItem(const PlannedBeam& beam) {
   return item;
 }
 
+std::string Word(int value) {
+  std::string bytes;
+  Put16(bytes, static_cast<unsigned>(value));
+  return bytes;
+}
+
 }  // namespace
+
+std::string DicomBytes(const CtImage& image) {
+  constexpr int kIntercept_hu = -1024, kMostStored = 4095;
+  const PlanningFile& file = image.file;
+  std::string pixels;
+  for (const float hu : image.hu)
+    pixels += Word(std::clamp(static_cast<int>(std::lround(hu)) - kIntercept_hu, 0, kMostStored));
+  std::string head =
+      Value(0x00080005, "CS", "ISO_IR 192") + Value(0x00080016, "UI", file.class_uid) +
+      Value(0x00080018, "UI", file.instance_uid) + Value(0x00080060, "CS", "CT") +
+      Value(0x00100010, "PN", file.patient_name) + Value(0x00100020, "LO", file.patient_id) +
+      Value(0x00185100, "CS", image.position) + Value(0x0020000D, "UI", "2.25.1309") +
+      Value(0x0020000E, "UI", image.series_uid) + Value(0x00200032, "DS", Point(image.origin_mm));
+  const Eigen::Vector3d &x = image.along_row, &y = image.along_column;
+  head += Value(0x00200037, "DS",
+                fmt::format("{:g}\\{:g}\\{:g}\\{:g}\\{:g}\\{:g}", x.x(), x.y(), x.z(), y.x(), y.y(),
+                            y.z())) +
+          Value(0x00200052, "UI", file.frame_of_reference_uid) + Value(0x00280002, "US", Word(1)) +
+          Value(0x00280004, "CS", "MONOCHROME2") + Value(0x00280010, "US", Word(image.rows)) +
+          Value(0x00280011, "US", Word(image.columns)) +
+          Value(0x00280030, "DS",
+                fmt::format("{:.6f}\\{:.6f}", image.row_spacing_mm, image.column_spacing_mm)) +
+          Value(0x00280100, "US", Word(16)) + Value(0x00280101, "US", Word(12)) +
+          Value(0x00280102, "US", Word(11)) + Value(0x00280103, "US", Word(0)) +
+          Value(0x00281052, "DS", std::to_string(kIntercept_hu)) + Value(0x00281053, "DS", "1");
+  return WholeFile(file, head + Value(0x7FE00010, "OW", pixels));
+}
 
 std::string DicomBytes(const StructureSet& structures) {
   const PlanningFile& file = structures.file;

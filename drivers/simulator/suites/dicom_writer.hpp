@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes structure sets and plans as DICOM files, independently of the library that reads them.
+// Writes structure sets, plans and CT images as DICOM files, independently of the library that
+// reads them.
 #pragma once
 
 #include <string>
 
+#include "algo/types/ct_image.hpp"
 #include "algo/types/treatment_plan.hpp"
 
 namespace plumb {
@@ -12,5 +14,6 @@ namespace plumb {
 /// stand as UN, as CP-1066 asks for. Empty texts and values that are not stated are left out.
 [[nodiscard]] std::string DicomBytes(const StructureSet& structures);
 [[nodiscard]] std::string DicomBytes(const TreatmentPlan& plan);
+[[nodiscard]] std::string DicomBytes(const CtImage& image);
 
 }  // namespace plumb

@@ -52,22 +52,6 @@ std::vector<Loop> Cut(const std::vector<Vector3d>& vertices,
   return loops;
 }
 
-/// IEC axes to the patient's, stated here once more as the table of the standard, so that an error
-/// of the reader's table shows.
-Vector3d PatientOf(PatientPosture posture, const Vector3d& iec) {
-  switch (posture) {
-    case PatientPosture::kHeadFirstSupine:
-      return {iec.x(), -iec.z(), iec.y()};
-    case PatientPosture::kHeadFirstProne:
-      return {-iec.x(), iec.z(), iec.y()};
-    case PatientPosture::kFeetFirstSupine:
-      return {-iec.x(), -iec.z(), -iec.y()};
-    case PatientPosture::kFeetFirstProne:
-      return {iec.x(), iec.z(), -iec.y()};
-  }
-  return iec;
-}
-
 class CtMaker {
  public:
   CtMaker(const TriangleMesh& surface, const Pose& T_iec_surface, const PlanningCtOptions& options)
@@ -240,6 +224,20 @@ class CtMaker {
 };
 
 }  // namespace
+
+Vector3d PatientOf(PatientPosture posture, const Vector3d& iec) {
+  switch (posture) {
+    case PatientPosture::kHeadFirstSupine:
+      return {iec.x(), -iec.z(), iec.y()};
+    case PatientPosture::kHeadFirstProne:
+      return {-iec.x(), iec.z(), iec.y()};
+    case PatientPosture::kFeetFirstSupine:
+      return {-iec.x(), -iec.z(), -iec.y()};
+    case PatientPosture::kFeetFirstProne:
+      return {iec.x(), iec.z(), -iec.y()};
+  }
+  return iec;
+}
 
 std::pair<StructureSet, TreatmentPlan> MakePlanningCt(const TriangleMesh& surface,
                                                       const Pose& T_iec_surface,

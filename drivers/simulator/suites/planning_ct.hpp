@@ -82,6 +82,10 @@ struct PlanningCtOptions {
   std::vector<CtQuirk> quirks = {};
 };
 
+/// IEC axes to the patient's, stated here once more as the table of the standard, so that an error
+/// of the reader's table shows.
+[[nodiscard]] Eigen::Vector3d PatientOf(PatientPosture posture, const Eigen::Vector3d& iec);
+
 /// @param surface  A closed mesh, with normals if `skin_m` is not 0.
 /// @param T_iec_surface  To IEC axes with the isocentre at the origin: how the patient lies.
 [[nodiscard]] std::pair<StructureSet, TreatmentPlan> MakePlanningCt(

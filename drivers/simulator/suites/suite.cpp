@@ -9,6 +9,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/replay/tum_writer.hpp"
+#include "drivers/simulator/suites/ct_images.hpp"
 #include "drivers/simulator/suites/dicom_writer.hpp"
 #include "drivers/simulator/suites/suite_plan.hpp"
 #include "drivers/simulator/suites/truth_writer.hpp"
@@ -94,16 +95,29 @@ void WriteTumRecording(const fs::path& folder, const simulated::SensorUnit& unit
   writer.Finish();
 }
 
+void WriteCtImages(const StructureSet& structures, const simulated::PlanningCtOptions& options,
+                   const fs::path& folder) {
+  FolderBeside::Make(folder);
+  int number = 0;
+  simulated::MakeCtImages(structures, options, {}, [&](const CtImage& image) {
+    WriteWholeFile(folder / fmt::format("{:04}.dcm", ++number),
+                   std::string_view(DicomBytes(image)));
+  });
+}
+
 // The planning CTs as a planning system would export them, and the room that they are compared in.
-void WriteCts(const fs::path& suite, const simulated::SuitePlan& plan) {
+void WriteCts(const fs::path& suite, const simulated::SuitePlan& plan, bool with_images) {
   for (const simulated::CtPlan& ct : plan.cts) {
     const fs::path folder = suite / "recordings" / ct.name, truth = suite / "truth" / ct.name;
     FolderBeside::Make(folder);
     FolderBeside::Make(truth);
     const auto [structures, treatment] =
         simulated::MakePlanningCt(ct.body->surface, plan.T_iec_world * ct.T_world_body, ct.options);
-    WriteWholeFile(folder / "structures.dcm", std::string_view(DicomBytes(structures)));
     WriteWholeFile(folder / "plan.dcm", std::string_view(DicomBytes(treatment)));
+    if (with_images)
+      WriteCtImages(structures, ct.options, folder / "images");
+    else
+      WriteWholeFile(folder / "structures.dcm", std::string_view(DicomBytes(structures)));
     simulated::WriteTruth(truth, plan, ct);
   }
   if (plan.cts.empty()) return;
@@ -151,7 +165,7 @@ void SimulateSuite(const SimulateOptions& options, const std::stop_token& stop,
     else
       simulated::WriteTruth(truth, plan, i, *source, sightings.counts());
   }
-  WriteCts(folder.path(), plan);
+  WriteCts(folder.path(), plan, options.ct_images);
   simulated::WriteUnit(folder.path() / "truth" / "unit.json", plan.unit);
   WriteSuiteFile(folder.path(), plan, options);
   folder.Commit();

@@ -45,6 +45,7 @@ struct SimulateOptions {
   double ct_spacing_m = 3 * kMillimetre;                     ///< Of the slices of the suite `ct`.
   /// Standard deviation of how far its contours lie outside the skin, which no file states.
   double ct_skin_m = 0.0;
+  bool ct_images = false;  ///< Its CTs are images on a couch, without a structure set.
   std::vector<simulated::CtQuirk> ct_quirks = {};  ///< Of its files.
   int frames = 150;                                ///< Per scene; the sweep lasts frames / rate_hz.
   double rate_hz = 15.0;

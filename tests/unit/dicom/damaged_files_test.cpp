@@ -45,6 +45,14 @@ std::string Damaged(std::string bytes, std::mt19937& random) {
   return bytes;
 }
 
+void ExpectSmallReaders() {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  rusage children{};
+  ASSERT_EQ(::getrusage(RUSAGE_CHILDREN, &children), 0);
+  EXPECT_LT(children.ru_maxrss, 200 * 1024) << "kB, of the largest reader";
+#endif
+}
+
 TEST(DamagedFilesTest, FiveHundredDamagedFilesAreReadOrRefused) {
   const testing::TempFolder folder;
   const auto [structures, plan] = SmallCt();
@@ -67,11 +75,35 @@ TEST(DamagedFilesTest, FiveHundredDamagedFilesAreReadOrRefused) {
   }
   EXPECT_GT(read, 30);  // measured: 64
   EXPECT_GT(refused, 100);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  rusage children{};
-  ASSERT_EQ(::getrusage(RUSAGE_CHILDREN, &children), 0);
-  EXPECT_LT(children.ru_maxrss, 200 * 1024) << "kB, of the largest reader";
-#endif
+  ExpectSmallReaders();
+}
+
+TEST(DamagedFilesTest, FiveHundredDamagedImagesAreReadOrRefused) {
+  const testing::TempFolder folder;
+  const std::vector<CtImage> images = SmallImages();
+  const std::string bytes = DicomBytes(images.front());
+  // Damage to pixels is only another image.
+  const std::size_t facts = bytes.size() - 2 * images.front().hu.size();
+  std::mt19937 random(48);
+  int read = 0, refused = 0;
+  for (int i = 0; i < 500; ++i) {
+    const auto file = Written(folder.path() / "damaged.dcm",
+                              Damaged(bytes.substr(0, facts), random) + bytes.substr(facts));
+    try {
+      const PlanningContent content = ReadDicomFile(file);
+      content.image ? ++read : ++refused;
+      CtSkin skin;
+      skin.Add(content.image.value_or(images.front()), "image");
+      EXPECT_LE(skin.roi().contours.size(), images.front().hu.size());
+    } catch (const DataError& error) {
+      ++refused;
+      EXPECT_EQ(std::string(error.what()).find("crashed"), std::string::npos)
+          << "file " << i << ": " << error.what();
+    }
+  }
+  EXPECT_GT(read, 30);
+  EXPECT_GT(refused, 100);
+  ExpectSmallReaders();
 }
 
 }  // namespace

@@ -124,6 +124,100 @@ TEST_F(PlanningFilesTest, OtherFilesAreRefusedWithTheirKind) {
   EXPECT_TRUE(Refusal(Write("empty", "")).Is(say::dicom::kDamaged));
 }
 
+TEST_F(PlanningFilesTest, AnImageIsReadAsItWasWritten) {
+  const CtImage written = SmallImages({.posture = PatientPosture::kFeetFirstProne})[3];
+  const PlanningContent content = ReadDicomFile(Write("image.dcm", DicomBytes(written)));
+  EXPECT_EQ(content.modality, "CT");
+  ASSERT_TRUE(content.image);
+  const CtImage& read = *content.image;
+  EXPECT_EQ(read.file.patient_id, "SIM-1");
+  EXPECT_EQ(read.file.frame_of_reference_uid, "2.25.52");
+  EXPECT_EQ(read.series_uid, written.series_uid);
+  EXPECT_EQ(read.position, "FFP");
+  ASSERT_EQ(read.rows, written.rows);
+  ASSERT_EQ(read.columns, written.columns);
+  EXPECT_NE(read.rows, read.columns);
+  EXPECT_LT((read.origin_mm - written.origin_mm).norm(), 1e-3);
+  EXPECT_LT((read.along_row - written.along_row).norm(), 1e-9);
+  EXPECT_LT((read.along_column - written.along_column).norm(), 1e-9);
+  EXPECT_DOUBLE_EQ(read.row_spacing_mm, 5.0);
+  ASSERT_EQ(read.hu.size(), written.hu.size());
+  for (std::size_t i = 0; i < read.hu.size(); ++i)
+    ASSERT_NEAR(read.hu[i], std::max(-1024.0F, written.hu[i]), 0.51);
+}
+
+// Signed pixels, a padding value, and what is refused: each by one value of the file.
+TEST_F(PlanningFilesTest, PixelsAreWhatTheFileSaysOrRefused) {
+  const CtImage image = SmallImages().front();
+  const std::string bytes = DicomBytes(image);
+  const auto changed = [&](const std::string& tag, std::size_t at, const std::string& value) {
+    std::string copy = bytes;
+    const std::size_t found = copy.find(tag);
+    EXPECT_NE(found, std::string::npos) << tag;
+    return copy.replace(found + at, value.size(), value);
+  };
+  const auto word = [](int value) {
+    return std::string{static_cast<char>(value & 0xFF), static_cast<char>(value >> 8)};
+  };
+  using namespace std::string_literals;
+  // 12 bits that are signed: 2048 and more are negative.
+  const auto is_signed =
+      ReadDicomFile(Write("i.dcm", changed("\x28\0\x03\x01US"s, 8, word(1)))).image;
+  ASSERT_TRUE(is_signed);
+  EXPECT_NEAR(is_signed->hu.front(), image.hu.front(), 0.51);
+  const auto steeper = ReadDicomFile(Write("i.dcm", changed("\x28\0\x53\x10"s, 8, "2 "))).image;
+  ASSERT_TRUE(steeper);
+  EXPECT_NEAR(steeper->hu.front(), 2 * (image.hu.front() + 1024) - 1024, 1.1);
+  const auto refused = [&](const std::string& changed_bytes) {
+    const auto file = Write("i.dcm", changed_bytes);
+    EXPECT_THROW(ForEachCtImage({file}, [](const CtImage&, const std::string&) {}), DataError);
+  };
+  refused(changed("\x28\0\0\x01US"s, 8, word(8)));     // bits allocated
+  refused(changed("\x28\0\x02\x01US"s, 8, word(15)));  // high bit
+  refused(changed("\x28\0\x02\0US"s, 8, word(3)));     // colours
+  refused(changed("\x28\0\x10\0US"s, 8, word(4000)));  // rows
+  refused(changed("\x28\0\x10\0US"s, 8, word(image.rows + 1)));
+  refused(changed("\x28\0\x53\x10"s, 8, "0 "));  // slope
+  refused(bytes.substr(0, bytes.size() - 400));
+  const std::string compressed =
+      changed("1.2.840.10008.1.2.1\0"s, 0, "1.2.840.10008.1.2.5\0"s);  // RLE
+  refused(compressed);
+  // It is described all the same.
+  const PlanningContent described =
+      ReadDicomFile(Write("i.dcm", changed("\x28\0\x53\x10"s, 8, "0 ")));
+  EXPECT_EQ(described.modality, "CT");
+  EXPECT_EQ(described.file.frame_of_reference_uid, "2.25.52");
+  EXPECT_TRUE(described.image_fault.Is(say::dicom::kImageFormat));
+}
+
+TEST_F(PlanningFilesTest, ImagesAreFoundInFoldersBesideTheirPlan) {
+  const auto [structures, plan] = SmallCt();
+  const auto folder = folder_.path() / "ct";
+  std::filesystem::create_directory(folder);
+  const std::vector<CtImage> images = SmallImages();
+  for (std::size_t i = 0; i < images.size(); ++i)
+    Written(folder / (std::to_string(100 + i) + ".dcm"), DicomBytes(images[i]));
+  Written(folder / "plan.dcm", DicomBytes(plan));
+  Written(folder / "structures.dcm", DicomBytes(structures));
+  Written(folder / "notes.txt", "nothing of DICOM");
+  std::vector<double> places;
+  const auto visit = [&](const CtImage& image, const std::string&) {
+    places.push_back(image.origin_mm.z());
+  };
+  ForEachCtImage({folder}, visit);
+  ASSERT_EQ(places.size(), images.size());
+  EXPECT_NEAR(places.back(), images.back().origin_mm.z(), 1e-3);
+  // A file that is named must be an image, and of other images none is left out silently.
+  EXPECT_THROW(ForEachCtImage({folder / "plan.dcm"}, visit), DataError);
+  std::string mr = DicomBytes(images.front());
+  mr.replace(mr.rfind("1.2.840.10008.5.1.4.1.1.2"), 25, "1.2.840.10008.5.1.4.1.1.4");
+  Written(folder / "mr.dcm", mr);
+  EXPECT_THROW(ForEachCtImage({folder}, visit), DataError);
+  const auto empty = folder_.path() / "empty";
+  std::filesystem::create_directory(empty);
+  EXPECT_THROW(ForEachCtImage({empty}, visit), DataError);
+}
+
 TEST_F(PlanningFilesTest, ATruncatedFileIsNeverHalfOfOne) {
   const auto [structures, plan] = SmallCt();
   const std::string bytes = DicomBytes(structures);

@@ -6,8 +6,10 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "drivers/files/file_io.hpp"
+#include "drivers/simulator/suites/ct_images.hpp"
 #include "drivers/simulator/suites/dicom_writer.hpp"
 #include "drivers/simulator/suites/planning_ct.hpp"
 
@@ -26,6 +28,14 @@ inline TriangleMesh BoxMesh() {
 inline std::pair<StructureSet, TreatmentPlan> SmallCt(
     const simulated::PlanningCtOptions& options = {}) {
   return simulated::MakePlanningCt(BoxMesh(), Pose::Identity(), options);
+}
+
+/// Its images, of pixels of 5 mm, on a couch.
+inline std::vector<CtImage> SmallImages(const simulated::PlanningCtOptions& options = {}) {
+  std::vector<CtImage> images;
+  simulated::MakeCtImages(SmallCt(options).first, options, {.pixel_mm = 5.0},
+                          [&](const CtImage& image) { images.push_back(image); });
+  return images;
 }
 
 inline std::filesystem::path Written(const std::filesystem::path& file, const std::string& bytes) {

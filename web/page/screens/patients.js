@@ -32,22 +32,57 @@ function referenceState(patient) {
   return approved || waits ? [approved, approved && waits && ' ', waits] : text.noReference;
 }
 
-/// Whom the clinic's worklist expects today. A row leads to the patient and opens nothing.
-function todaysList() {
+/// What a person may do with an appointment of today. Nothing here changes a session that is open:
+/// that of another patient has to be closed first.
+/// @param patient  As the list of patients has it; undefined: archived, or not loaded yet.
+function todaysAction(patient) {
+  const text = S.patients;
+  const session = live.status?.session;
+  if (!patient || !may('scan')) return S.none;
+  if (session?.patient_id === patient.id) {
+    return [h('span', { class: 'badge here' }, text.isOpen), ' ',
+      h('a', { href: '#/scan' }, S.status.goScan)];
+  }
+  if (!patient.approved_reference_id) return h('span', { class: 'hint' }, text.needsReference);
+  if (session) return h('span', { class: 'hint' }, text.todayOther(session.patient_code));
+  return action(text.openFraction, async () => {
+    const now = await get(`patients/${patient.id}`);
+    // Whether a fraction goes on or a new one begins is asked on the patient's own page.
+    if (now.last_session || live.status?.session) {
+      location.hash = `#/patient/${patient.id}`;
+      return;
+    }
+    await openPatient(patient, 'fraction', {});
+    location.hash = '#/scan';
+  }, { 'aria-label': `${text.openFraction}, ${patient.code}` });
+}
+
+/// Whom the clinic's worklist expects today. Sessions open by a person's tap only.
+/// @param find  From an identifier to the patient.
+/// @param add  Leads to where an unknown patient is added; undefined: the person may not.
+function todaysList(find, add) {
   const text = S.patients;
   const element = h('section', { class: 'card', hidden: true });
-  const show = (found) => {
+  let found = null;
+  const draw = () => {
+    if (!found) return;
     element.hidden = !found.is_on;
     const rows = found.patients.map((one) => row(one.time || S.none,
-      h('a', { href: `#/patient/${one.patient_id}` }, one.patient_code)));
+      h('a', { href: `#/patient/${one.patient_id}` }, one.patient_code),
+      todaysAction(find(one.patient_id))));
     const nobody = found.is_settled ? text.nobodyToday : text.todayAsked;
     redraw(element, h('h2', {}, text.today),
       found.fault && h('p', { class: 'caution' }, sentence(said(found, 'fault'))),
-      rows.length ? table([text.todayTime, text.code], rows, text.today)
+      rows.length ? table([text.todayTime, text.code, S.action], rows, text.today)
         : !found.fault && hint(nobody),
-      found.unknown > 0 && hint(text.todayUnknown(found.unknown)));
+      found.unknown > 0 && hint(text.todayUnknown(found.unknown)),
+      found.unknown > 0 && add && h('div', { class: 'row below' }, action(text.add, add, {})));
   };
-  return { element, load: () => whenSettled('worklist', element, show) };
+  const load = () => whenSettled('worklist', element, (now) => {
+    found = now;
+    draw();
+  });
+  return { element, draw, load };
 }
 
 export async function showPatients(place) {
@@ -87,6 +122,7 @@ export async function showPatients(place) {
     // The state says which drafts wait for what.
     [{ patients }] = await Promise.all([get('patients', true), live.refreshed()]);
     draw();
+    today.draw();
   };
   search.addEventListener('input', () => {
     missed.textContent = '';
@@ -107,7 +143,12 @@ export async function showPatients(place) {
     say(text.noMatch(search.value.trim()));
     search.select();  // or the next code would be added to this one
   });
-  const today = todaysList();
+  const toForm = async () => {
+    code.focus();
+    code.scrollIntoView({ block: 'center' });
+  };
+  const today = todaysList((id) => patients.find((one) => one.id === id && !one.archived),
+    may('patients') && toForm);
   clear(place, h('h1', {}, text.title), today.element,
     h('section', { class: 'card' }, field(text.search, search), missed, list,
       h('label', { class: 'check below' }, archived, ' ', text.showArchived),
@@ -134,7 +175,10 @@ export async function showPatients(place) {
   if (!matchMedia('(pointer: coarse)').matches) search.focus({ preventScroll: true });
   await load();
   today.load();
-  return live.listen((kind) => { if (kind === 'data') load().catch(() => {}); });
+  return live.listen((kind) => {
+    if (kind === 'data') load().catch(() => {});
+    if (kind === 'status') today.draw();
+  });
 }
 
 /// If another patient's session is open, it is named and closed by the same tap. A session that is

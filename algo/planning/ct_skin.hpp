@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// The skin in the images of a CT, as contours such as a structure set has.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "algo/types/ct_image.hpp"
+
+namespace plumb {
+
+/// Tissue is brighter and air darker; about the edge that planning systems draw.
+inline constexpr double kSkinThreshold_hu = -300.0;
+/// More images are refused.
+inline constexpr std::size_t kMostCtImages = 2000;
+
+/// Takes one image after the other, of which only the contours stay: what air cannot reach from the
+/// image's edge is inside, so that lungs are no holes; what the edge of the image cuts is closed
+/// along it. The couch is still part of it (see couch_top.hpp).
+class CtSkin {
+ public:
+  explicit CtSkin(double threshold_hu = kSkinThreshold_hu);
+
+  /// @param name  What messages call it.
+  /// @throws DataError for an image of another series, frame or patient than those before, at the
+  ///         place of one of them, or that is not axial.
+  void Add(const CtImage& image, const std::string& name);
+
+  [[nodiscard]] std::size_t num_images() const { return places_.size(); }
+  [[nodiscard]] double threshold_hu() const { return threshold_hu_; }
+  /// Its name states the threshold.
+  [[nodiscard]] const PlannedRoi& roi() const { return roi_; }
+  [[nodiscard]] const PlanningFile& file() const { return file_; }
+  [[nodiscard]] const std::string& position() const { return position_; }
+  [[nodiscard]] double pixel_mm() const { return pixel_mm_; }
+  /// How much the images change across the skin: the median, HU per millimetre; 0 without any.
+  [[nodiscard]] double Steepness() const;
+
+ private:
+  void RequireSameSeries(const CtImage& image, const std::string& name) const;
+
+  double threshold_hu_;
+  PlannedRoi roi_;
+  PlanningFile file_;
+  std::string series_uid_, position_;
+  double pixel_mm_ = 0.0;
+  std::size_t num_points_ = 0;
+  std::set<std::int64_t> places_;  // along the body, in hundredths of a millimetre
+  std::vector<double> steepness_;  // of each image
+};
+
+}  // namespace plumb

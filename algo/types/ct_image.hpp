@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// One image of a CT, as its file states it. Lengths in millimetres in the axes of the CT (LPS).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "algo/types/treatment_plan.hpp"
+
+namespace plumb {
+
+struct CtImage {
+  PlanningFile file;
+  std::string series_uid;
+  std::string position;  ///< Such as "HFS"; empty where it is not stated.
+  int rows = 0, columns = 0;
+  Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();  ///< Centre of the first pixel.
+  /// Directions in which the columns of a row, and the rows, follow each other.
+  Eigen::Vector3d along_row = Eigen::Vector3d::UnitX(), along_column = Eigen::Vector3d::UnitY();
+  double column_spacing_mm = 0.0, row_spacing_mm = 0.0;  ///< From column to column, row to row.
+  std::vector<float> hu;  ///< Row by row. Pixels without a measurement are as air.
+};
+
+inline constexpr double kAir_hu = -1000.0;
+
+}  // namespace plumb
