@@ -75,4 +75,11 @@ std::optional<CheckedBackup> CheckNextBackup(StoreDatabase& database, std::chron
   return checked;
 }
 
+bool IsVerificationDue(Database& database, WallClock::time_point now) {
+  const std::optional<std::int64_t> since = database.FirstInteger(
+      "SELECT ifnull((SELECT max(time) FROM audit WHERE action = 'backup.verify'), "
+      "(SELECT min(time) FROM audit WHERE action = 'backup.make'))");
+  return since && now - FromStored(*since) > kVerifiedEvery;
+}
+
 }  // namespace plumb

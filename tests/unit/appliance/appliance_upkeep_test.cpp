@@ -154,6 +154,39 @@ TEST_F(ApplianceUpkeepTest, ABackupFromThePageEndsTheWarningOfAFailedOne) {
   });
 }
 
+TEST_F(ApplianceUpkeepTest, ThatAnEncryptedBackupIsToBeVerifiedIsAWarningUntilItIsNoted) {
+  const char* const kDue = "Nobody has opened an encrypted backup for half a year";
+  parts_.config.appliance.backup_folder = folder_ / "backups";
+  const auto made_before = [&](int days) {
+    Store(state()).audit.Log(kTester, "backup.make", "", Message());
+    ChangeDatabase("DROP TRIGGER IF EXISTS audit_no_update; UPDATE audit SET time = time - " +
+                   std::to_string(days * 24LL * 3600 * 1'000'000));
+  };
+  made_before(184);
+  Play([&] {
+    ASSERT_TRUE(Comes([&] { return Backups().size() == 2; }));
+    WaitForTicks(400);
+    On([&] { EXPECT_FALSE(Warns(kDue)) << "plumbd opens a plain one itself"; });
+  });
+  parts_.config.appliance.backup_recipients =
+      AgeRecipients({"age1z8q8p3f3getd6h87azd0zc2vzskwttwywjqumzv8yqddd73pwg3svc56n6"});
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Warns(kDue); }));
+    const auto noted = std::make_shared<std::promise<Change>>();
+    On([&] {
+      services_->services().maintenance.NoteBackupVerified(
+          kTester, [noted](const Change& change) { noted->set_value(change); });
+    });
+    EXPECT_EQ(noted->get_future().get().result, ChangeResult::kDone);
+    EXPECT_TRUE(Comes([&] { return !Warns(kDue); }));
+    On([&] {
+      const auto entries = shared_->store->audit.Find({0, 10, "backup.verify"});
+      ASSERT_EQ(entries.size(), 1U);
+      EXPECT_EQ(entries[0].user, kTester.user);
+    });
+  });
+}
+
 TEST_F(ApplianceUpkeepTest, ThatNoBackupIsSetUpIsAWarning) {
   Play([&] {
     On([&] {
