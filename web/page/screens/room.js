@@ -155,8 +155,8 @@ const wristband = ({ session }) => [word(S.room.wristband, 'info'),
   h('p', { class: 'room-hint' }, S.room.wristbandHint(session?.patient_code ?? ''))];
 
 /// Whether people lie down now for a sweep that is compared with a reference.
-const showsPosture = (status) => status.state === 'ready' && hasOutline(status)
-  && status.press !== 'monitoring' && !status.wants_wristband;
+const showsPosture = (status) => ['ready', 'result'].includes(status.state)
+  && hasOutline(status) && status.press !== 'monitoring' && !status.wants_wristband;
 
 function resting(status, camera) {
   const text = S.room;
@@ -336,13 +336,13 @@ function display(main, speak) {
     main.classList.toggle('off', !live.connected);
     offline.draw();
     main.dataset.state = status.state;
-    withCamera(status.state === 'scanning' || showsPosture(status));
     showSurface(status.state === 'scanning');
     const last = status.last_result;
     const isCheck = status.state === 'result' && lastPurpose === 'daily_check';
     // An answer is shown only in its own state: never during a sweep, nor in another session.
     const mine = last && (last.session_id ?? null) === lastSession;
     const visible = status.state === 'result' && !isCheck && mine ? last : null;
+    withCamera(status.state === 'scanning' || (!visible && !isCheck && showsPosture(status)));
     const said = !visible && !isCheck && saysNoSession(status);
     if (session && session.patient_id !== patient) {
       if (patient) swapped = now();
