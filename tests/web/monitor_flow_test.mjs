@@ -235,7 +235,7 @@ await h.step('the records are there, also of the session that was cut off', asyn
   }
   const [whole, cut] = await Promise.all([swept, scan].map((of) =>
     h.api(tech, `scans/${of}/monitoring/1.json`).then((answer) => answer.body)));
-  check(whole.said.some(({ event }) => event === 'moved_sensor'), 'the nudge is in it');
+  check(whole.states_s.moved_sensor > 0, 'the nudge is in it');
   check(whole.states_s.monitoring > 1 && cut.states_s.monitoring > 0, 'times in each state');
   await tech.goto(`${h.url}#/monitoring/${swept}-1`);
   await tech.getByRole('heading', { name: 'Live monitoring' }).first().waitFor(kSlow);
