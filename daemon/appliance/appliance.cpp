@@ -64,6 +64,7 @@ Appliance::Appliance(SharedParts& shared)
       peers_(shared.peers),
       not_archived_(shared.not_archived),
       sensors_(shared.sensors),
+      outline_(shared.outline),
       button_(loop_, parts_.button, [this](ButtonPress press) { (void)Press(press, kButton); }),
       rest_(loop_, sensors_, [this] { PublishState(); }) {
   shared.sensor_changed = [this](const SensorEvent& event) { OnSensor(event); };
@@ -261,6 +262,7 @@ Appliance::Answer Appliance::PrepareCheck(bool opens, const Actor& actor) {
   if (Message why = WhyNotIdle(); !why.empty()) return why;
   if (!opens && !session_.check()) return say::scan::NoCheckOpen();
   session_.SetCheck(opens ? std::optional(actor) : std::nullopt);
+  FollowReference();
   notices_.TellPage(web::EventKind::kStatus);
   if (!opens) Audit(actor, "check.leave", "", {});
   return {};
@@ -325,12 +327,14 @@ void Appliance::OpenSession(const std::string& session_id, const std::string& pa
                             ScanPurpose purpose, const std::string& reason, const Actor& actor) {
   if (monitoring_.IsActive()) (void)Handle(ScanEvent::kMonitorStop, &actor);
   session_.Open(session_id, patient_id, purpose, reason, actor);
+  FollowReference();
   notices_.TellPage(web::EventKind::kStatus);
 }
 
 void Appliance::ForgetSession() {
   if (monitoring_.IsActive()) (void)Handle(ScanEvent::kMonitorEnded);
   session_.Forget();
+  FollowReference();
   notices_.TellPage(web::EventKind::kStatus);
 }
 
@@ -397,6 +401,7 @@ void Appliance::OnTick() {
   upkeep_.Tick(IsRunning());
   button_.Tick();
   WatchRest();
+  FollowReference();
   LookForMessages();
   TellPeers();
 }

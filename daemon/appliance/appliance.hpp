@@ -117,6 +117,7 @@ class Appliance : private StorageUser {
   void OnMonitorFailed(const Message& why);
   void WatchRest();
   [[nodiscard]] bool PressMonitors() const;
+  void FollowReference();
   void BeginSession();
   [[nodiscard]] ScanJob MakeJob(const Settings& settings);
   [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);
@@ -161,6 +162,7 @@ class Appliance : private StorageUser {
   PeerWatch& peers_;
   const Message& not_archived_;
   SensorThread& sensors_;
+  OutlineWatch& outline_;
   Message space_fault_;  ///< Why no scan can be stored although the store works.
   ScanState state_;
   Message sensor_fault_, scan_fault_, rolled_back_;

@@ -89,6 +89,28 @@ void Appliance::WatchRest() {
                   : std::filesystem::path());
 }
 
+/// Whose outline the camera's picture shows: that of the reference which the open session compares
+/// with, so of nobody else.
+void Appliance::FollowReference() {
+  if (store_ == nullptr || !session_.IsOpen() || session_.purpose() != ScanPurpose::kFraction)
+    return outline_.Follow({});
+  try {
+    const std::optional<Reference> reference = store_->references.OfSession(session_.id());
+    if (!reference) return outline_.Follow({});
+    OutlineJob job{.scene = store_->folders.Scan(reference->scan_id) / "scene"};
+    job.check_reference = [&store = store_,
+                           scan = reference->scan_id](const std::stop_token& stop) {
+      return store->integrity.Check(scan, /*scene_only=*/true, stop);
+    };
+    if (const auto room = room_.OfJob(); room && room->why_not.empty())
+      job.markers_iec = room->markers_iec;
+    outline_.Follow(std::move(job));
+  } catch (const std::exception& error) {
+    outline_.Follow({});
+    storage_.FailLater(error);
+  }
+}
+
 bool Appliance::PressMonitors() const {
   return rest_.IsAtRest() && WhyNotMonitor().empty() &&
          (state_.phase == ApplianceState::kReady || state_.phase == ApplianceState::kResult);

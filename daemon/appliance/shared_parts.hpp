@@ -14,6 +14,7 @@
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/work_thread.hpp"
 #include "daemon/messages_out/messages_out.hpp"
+#include "daemon/monitoring/outline_watch.hpp"
 #include "daemon/peers/peer_watch.hpp"
 #include "daemon/storage/storage_upkeep.hpp"
 #include "daemon/storage/storage_watch.hpp"
@@ -48,7 +49,8 @@ struct SharedParts {
   MessagesOut messages;
   PeerWatch peers;
   WorkThread check_thread{4};  ///< Reads stored files; changes do not wait for it.
-  SensorThread sensors;        // last: its events use the members above
+  SensorThread sensors;        // its events use the members above
+  OutlineWatch outline{sensors};
 };
 
 }  // namespace plumb

@@ -12,6 +12,7 @@
 
 #include "daemon/archive/backup.hpp"
 #include "daemon/database/store_database.hpp"
+#include "web/model/wall_clock.hpp"
 
 namespace plumb {
 
@@ -32,5 +33,12 @@ struct CheckedBackup {
 /// @throws IoError and its kinds; Interrupted
 std::optional<CheckedBackup> CheckNextBackup(StoreDatabase& database, std::chrono::hours at_least,
                                              const std::stop_token& stop = {});
+
+/// Nobody but who has the private key can tell whether an encrypted backup opens: asked for twice a
+/// year.
+inline constexpr std::chrono::hours kVerifiedEvery{24 * 183};
+/// Whether a person has noted no such verification for as long, as the log says. Before the first
+/// one the time runs from the first backup. @throws IoError and its kinds
+[[nodiscard]] bool IsVerificationDue(Database& database, WallClock::time_point now);
 
 }  // namespace plumb

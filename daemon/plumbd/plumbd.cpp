@@ -81,7 +81,8 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const PlumbdOptions& options, co
                                             : 640,
                          .height = is_small ? 240 : 480,
                          .max_scenes = static_cast<std::size_t>(options.sim_scenes),
-                         .at_rest = options.sim_rest,
+                         .at_rest = options.sim_rest || options.sim_couch,
+                         .rest_steps = options.sim_couch,
                          .second_serial = config.appliance.second_sensor_serial,
                          .plugged = !options.sim_unplugged,
                          .room = options.sim_room};

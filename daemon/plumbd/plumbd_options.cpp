@@ -64,6 +64,39 @@ void KeepPanelAndPage(const Config& salvaged, bool is_listen_given, Config& conf
   config.web = web;
 }
 
+void AddVirtualSensorOptions(CLI::App& app, PlumbdOptions& options) {
+  app.add_option("--sim-frames", options.sim_frames, "Frames of a simulated sweep, 30 per second")
+      ->check(CLI::Range(2, 20000))
+      ->group("Virtual sensor");
+  app.add_option("--sim-size", options.sim_size, "Size of its images")
+      ->check(CLI::IsMember({"640x480", "320x240", "848x480"}))
+      ->group("Virtual sensor");
+  app.add_option("--sim-seed", options.sim_seed, "Seed of its scenes and noise")
+      ->group("Virtual sensor");
+  app.add_option("--sim-room", options.sim_room,
+                 "Seed of another room and sensor that see the same bodies")
+      ->group("Virtual sensor");
+  app.add_option("--sim-scenes", options.sim_scenes, "Number of the suite's scenes; 0: all")
+      ->check(CLI::Range(0, 1000))
+      ->group("Virtual sensor");
+  app.add_option("--sim-result-s", options.sim_result_s, "Seconds for which a result is shown")
+      ->check(CLI::Range(1, 3600))
+      ->group("Virtual sensor");
+  app.add_flag("--sim-board", options.sim_board,
+               "Start with three scenes of the room calibration board")
+      ->group("Virtual sensor");
+  app.add_flag("--sim-rest", options.sim_rest,
+               "Also render what a sensor at rest sees, for sim mount and sim move")
+      ->group("Virtual sensor");
+  app.add_flag(
+         "--sim-couch", options.sim_couch,
+         "The same, and as the couch is brought in steps to where the first body lay, for sim "
+         "move 2 and on")
+      ->group("Virtual sensor");
+  app.add_flag("--sim-unplugged", options.sim_unplugged, "The sensor is not attached at the start")
+      ->group("Virtual sensor");
+}
+
 }  // namespace
 
 std::optional<fs::path> ConfigFile(const PlumbdOptions& options) {
@@ -105,31 +138,7 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
       ->type_name("DIR");
   app.add_option("--listen", options.listen, "Address of the page")->type_name("ADDRESS:PORT");
   app.add_option("--control", options.control, "Control socket")->type_name("SOCK");
-  app.add_option("--sim-frames", options.sim_frames, "Frames of a simulated sweep, 30 per second")
-      ->check(CLI::Range(2, 20000))
-      ->group("Virtual sensor");
-  app.add_option("--sim-size", options.sim_size, "Size of its images")
-      ->check(CLI::IsMember({"640x480", "320x240", "848x480"}))
-      ->group("Virtual sensor");
-  app.add_option("--sim-seed", options.sim_seed, "Seed of its scenes and noise")
-      ->group("Virtual sensor");
-  app.add_option("--sim-room", options.sim_room,
-                 "Seed of another room and sensor that see the same bodies")
-      ->group("Virtual sensor");
-  app.add_option("--sim-scenes", options.sim_scenes, "Number of the suite's scenes; 0: all")
-      ->check(CLI::Range(0, 1000))
-      ->group("Virtual sensor");
-  app.add_option("--sim-result-s", options.sim_result_s, "Seconds for which a result is shown")
-      ->check(CLI::Range(1, 3600))
-      ->group("Virtual sensor");
-  app.add_flag("--sim-board", options.sim_board,
-               "Start with three scenes of the room calibration board")
-      ->group("Virtual sensor");
-  app.add_flag("--sim-rest", options.sim_rest,
-               "Also render what a sensor at rest sees, for sim mount and sim move")
-      ->group("Virtual sensor");
-  app.add_flag("--sim-unplugged", options.sim_unplugged, "The sensor is not attached at the start")
-      ->group("Virtual sensor");
+  AddVirtualSensorOptions(app, options);
   app.footer(fmt::format("\n{}", kResearchNotice));
 }
 

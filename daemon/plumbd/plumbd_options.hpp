@@ -29,7 +29,7 @@ struct PlumbdOptions {
   unsigned sim_seed = 1;
   std::optional<unsigned> sim_room;
   std::string sim_size = "640x480";
-  bool sim_unplugged = false, sim_board = false, sim_rest = false;
+  bool sim_unplugged = false, sim_board = false, sim_rest = false, sim_couch = false;
   double sim_result_s = kResultValid_s;
 };
 

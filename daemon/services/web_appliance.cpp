@@ -2,27 +2,22 @@
 // The page's service for the state of the appliance and its button.
 #include "daemon/services/web_services.hpp"
 
-#include <algorithm>
 #include <utility>
-#include <vector>
-
-#include <opencv2/imgproc.hpp>
 
 #include "daemon/files/compact_map.hpp"
-#include "drivers/files/image_file.hpp"
+#include "daemon/monitoring/outline_watch.hpp"
 
 namespace plumb {
 
 namespace {
 
 constexpr auto kPreviewEvery = std::chrono::milliseconds(200);
-constexpr int kPreviewWidth = 320;
-constexpr int kPreviewQuality = 70;
 
 class WebAppliance final : public web::ApplianceService {
  public:
-  WebAppliance(Appliance& appliance, const SensorThread& sensors, Notices& notices)
-      : appliance_(appliance), sensors_(sensors), notices_(notices) {}
+  WebAppliance(Appliance& appliance, const SensorThread& sensors, OutlineWatch& outline,
+               Notices& notices)
+      : appliance_(appliance), sensors_(sensors), outline_(outline), notices_(notices) {}
 
   Status GetStatus() override { return appliance_.WebStatus(); }
 
@@ -37,16 +32,21 @@ class WebAppliance final : public web::ApplianceService {
     }
     if (preview_ && (now - preview_at_ < kPreviewEvery || frame->index == preview_index_))
       return preview_;
-    cv::Mat small;
-    const int width = std::min(kPreviewWidth, frame->color_rgb.cols);
-    cv::resize(frame->color_rgb, small,
-               {width, frame->color_rgb.rows * width / frame->color_rgb.cols}, 0, 0,
-               cv::INTER_AREA);
-    const std::vector<std::uint8_t> jpeg = EncodeJpeg(small, kPreviewQuality);
-    preview_ = std::make_shared<const std::string>(jpeg.begin(), jpeg.end());
+    preview_ = std::make_shared<const std::string>(PreviewJpeg(frame->color_rgb));
     preview_at_ = now;
     preview_index_ = frame->index;
     return preview_;
+  }
+
+  std::optional<CameraOutline> Outline() override {
+    const auto picture = outline_.Newest();
+    if (!picture) return std::nullopt;
+    CameraOutline outline{.jpeg = picture->jpeg, .lines = {}, .is_placed = picture->is_placed};
+    for (const auto& line : picture->lines) {
+      auto& points = outline.lines.emplace_back();
+      for (const Eigen::Vector2f& p : line) points.emplace_back(p.x(), p.y());
+    }
+    return outline;
   }
 
   std::shared_ptr<const std::string> SweptSurface() override {
@@ -80,6 +80,7 @@ class WebAppliance final : public web::ApplianceService {
  private:
   Appliance& appliance_;
   const SensorThread& sensors_;
+  OutlineWatch& outline_;
   Notices& notices_;
   std::shared_ptr<const std::string> preview_;
   std::optional<std::int64_t> preview_index_;  ///< Index of the frame that it shows.
@@ -92,8 +93,8 @@ class WebAppliance final : public web::ApplianceService {
 
 std::unique_ptr<web::ApplianceService> MakeWebAppliance(Appliance& appliance,
                                                         const SensorThread& sensors,
-                                                        Notices& notices) {
-  return std::make_unique<WebAppliance>(appliance, sensors, notices);
+                                                        OutlineWatch& outline, Notices& notices) {
+  return std::make_unique<WebAppliance>(appliance, sensors, outline, notices);
 }
 
 }  // namespace plumb

@@ -38,6 +38,14 @@ class WebMaintenance final : public web::MaintenanceService {
         }));
   }
 
+  void NoteBackupVerified(const Actor& actor, Done done) override {
+    store_.Write(&Store::audit, alive_.WhileAlive([this, done](const Change& change) {
+      if (change.result == ChangeResult::kDone) upkeep_.BackupVerified();
+      done(change);
+    }),
+                 [=](AuditStore& audit) { audit.Log(actor, "backup.verify", "", Message()); });
+  }
+
   void WriteDiagnostics(const Actor& actor, Done done) override {
     const nlohmann::json status = appliance_.StatusJson();
     const std::string loop = LoopTable(meter_);

@@ -39,7 +39,7 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
                          std::unique_ptr<SystemRestart> restart)
     : store_(shared.loop, shared.storage, shared.store_thread, shared.notices),
       audit_(MakeWebAuditLog(store_)),
-      button_(MakeWebAppliance(appliance, shared.sensors, shared.notices)),
+      button_(MakeWebAppliance(appliance, shared.sensors, shared.outline, shared.notices)),
       patients_(
           MakeWebPatients(appliance, shared.session, shared.references, shared.notices, store_)),
       references_(

@@ -20,6 +20,7 @@ namespace plumb {
 [[nodiscard]] std::unique_ptr<web::AccountService> MakeWebAccounts(StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::ApplianceService> MakeWebAppliance(Appliance& appliance,
                                                                       const SensorThread& sensors,
+                                                                      OutlineWatch& outline,
                                                                       Notices& notices);
 [[nodiscard]] std::unique_ptr<web::AuditLog> MakeWebAuditLog(StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::CheckService> MakeWebChecks(Appliance& appliance,

@@ -80,6 +80,7 @@ void StorageUpkeep::Tick(bool is_running) {
   if (--ticks_to_record_check_ <= 0) CheckRecords();
   if (--ticks_to_checkpoint_ <= 0) EmptyLog();
   if (--ticks_to_note_ <= 0) NoteOutside();
+  if (--ticks_to_verification_ <= 0) AskForVerification();
   if (--ticks_to_backup_check_ <= 0) CheckBackups();
 }
 
@@ -428,6 +429,24 @@ void StorageUpkeep::BackUpIfDue() {
   });
 }
 
+void StorageUpkeep::AskForVerification() {
+  ticks_to_verification_ = kMaintenanceTicks;
+  const ApplianceConfig& config = config_.appliance;
+  const bool is_encrypted = !config.backup_folder.empty() && !config.backup_recipients.empty();
+  if (!is_encrypted || !storage_.IsUsable() || stop_.stop_requested()) return;
+  (void)reads_.Post([this] {
+    try {
+      const bool is_due = IsVerificationDue(*store_->database().ForLists(), WallClock::now());
+      loop_.Post("verification of backups", [this, is_due] {
+        if (std::exchange(is_verification_due_, is_due) != is_due) notify_(web::EventKind::kStatus);
+      });
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError,
+          fmt::format("cannot look when a backup was verified: {}", error.what()));
+    }
+  });
+}
+
 std::vector<Message> StorageUpkeep::Warnings(bool is_demo) const {
   std::vector<Message> warnings;
   if (storage_.IsNearlyFull())
@@ -456,6 +475,7 @@ std::vector<Message> StorageUpkeep::Warnings(bool is_demo) const {
   for (const auto& [place, fault] : backup_faults_) {
     if (!fault.empty()) warnings.push_back(say::upkeep::BackupNotAsMade(fault));
   }
+  if (is_verification_due_) warnings.push_back(say::upkeep::VerificationDue());
   if (backup_is_beside_scans_)
     warnings.push_back(say::upkeep::BackupBesideScans(config_.appliance.backup_folder.string()));
   return warnings;

@@ -53,6 +53,8 @@ class StorageUpkeep {
   void BackUp(const Actor& actor, const std::filesystem::path& folder,
               std::function<void(const Message& error, const BackupReport& report)> done,
               AgeRecipients recipients = {});
+  /// A person has noted that a backup was verified.
+  void BackupVerified() { ticks_to_verification_ = 0; }
   /// Target of today's backup; empty if no folder is configured.
   [[nodiscard]] std::filesystem::path BackupTarget() const;
 
@@ -89,6 +91,7 @@ class StorageUpkeep {
   void CheckStoredFiles();
   void CountUnusable();
   void BackUpIfDue();
+  void AskForVerification();
   void EmptyLog();
   void NoteOutside();
 
@@ -110,6 +113,7 @@ class StorageUpkeep {
   std::int64_t lost_entries_ = 0;     ///< Of the audit log: the state folder was rolled back.
   Message backup_fault_, backup_unrehearsed_;
   std::optional<std::chrono::system_clock::time_point> backup_made_at_;
+  bool is_verification_due_ = false;     ///< Of an encrypted one, by who has its key.
   bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.
   int ticks_to_disk_check_ = kDiskCheckTicks;
   int ticks_to_removal_ = kMaintenanceTicks;
@@ -118,6 +122,7 @@ class StorageUpkeep {
   int ticks_to_record_check_ = 0;
   int ticks_to_checkpoint_ = kCheckpointTicks;
   int ticks_to_note_ = 0;
+  int ticks_to_verification_ = 0;
   int ticks_to_backup_check_ = kFirstFileCheckTicks;
   ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};
   std::stop_source stop_;

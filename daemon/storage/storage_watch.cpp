@@ -18,6 +18,7 @@
 #include "daemon/database/database.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/storage/kept_clock.hpp"
 #include "daemon/unit/provisioning.hpp"
 
 namespace plumb {
@@ -291,11 +292,7 @@ double StorageWatch::UsedFraction() const {
 }
 
 bool StorageWatch::IsClockKept() const {
-  if (options_.is_clock_kept) return options_.is_clock_kept();
-  // systemd-timesyncd writes this file when a server answers for the first time since the machine
-  // started. The sandbox (ProtectClock=) forbids asking the kernel.
-  std::error_code error;
-  return std::filesystem::exists("/run/systemd/timesync/synchronized", error);
+  return options_.is_clock_kept ? options_.is_clock_kept() : plumb::IsClockKept();
 }
 
 bool StorageWatch::IsNearlyFull() const {

@@ -34,7 +34,7 @@ struct StorageOptions {
   /// Measures the room on the disk of a folder. Empty: asks the system.
   std::function<std::filesystem::space_info(const std::filesystem::path&, std::error_code&)> space =
       {};
-  /// Whether a time server has set the wall clock. Empty: asks systemd-timesyncd.
+  /// Whether a time server has set the wall clock. Empty: as IsClockKept() has it.
   std::function<bool()> is_clock_kept = {};
 };
 

@@ -52,6 +52,8 @@ struct SimulatedSweeps {
   /// Also what a sensor at rest sees of the body of the last scene, while it breathes, and after it
   /// was moved by 5 mm.
   bool at_rest = false;
+  /// With `at_rest`: also after the couch was brought in steps to where the first scene's body lay.
+  bool rest_steps = false;
   /// With `at_rest`: of a second unit, which sees the same body from its other side; empty: none.
   std::string second_serial = {};
   bool plugged = true;  ///< Whether the unit is attached at the start.

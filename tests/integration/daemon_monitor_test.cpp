@@ -234,6 +234,46 @@ TEST_F(DaemonMonitorTest, ThePlaceOfAFixedSensorIsLearnedByTheRoomsMarkersAndChe
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 
+TEST_F(DaemonMonitorTest, TheOutlineIsThatOfTheReferenceOfTheOpenSessionAndOfNothingElse) {
+  Plumbd plumbd(folder_.path(), {.arguments = {"--sim-rest"}, .scenes = 2});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  test::HttpClient engineer = plumbd.MakeFirstAccount();
+  const auto outline = [&] { return engineer.Get("/api/v1/preview/outline"); };
+  const auto wait_for = [&](const char* what, int status) {
+    plumbd.WaitFor(what, [&](const json&) { return outline().status == status; });
+  };
+  plumbd.WaitForState("ready");
+  EXPECT_EQ(outline().status, 404) << "no reference";
+  (void)plumbd.ScanOnce();
+  json found;
+  const auto is_placed = [&](const json&) {
+    found = outline().json();
+    return found.value("is_placed", false) && !found["lines"].empty();
+  };
+  plumbd.WaitFor("an outline", is_placed);
+  for (const json& line : found["lines"]) {
+    EXPECT_GE(line.size(), 2U);
+    for (const json& point : line) {
+      EXPECT_TRUE(point[0] >= 0 && point[0] <= 1 && point[1] >= 0 && point[1] <= 1) << point;
+    }
+  }
+  // Before a sweep as in it: also of a body that lies elsewhere.
+  plumbd.Sim("next-scene");
+  plumbd.Press();
+  plumbd.WaitForState("scanning");
+  plumbd.WaitFor("an outline during the sweep", is_placed);
+  plumbd.Press(/*is_long=*/true);
+  plumbd.WaitForState("ready");
+  ASSERT_EQ(engineer.Post("/api/v1/checks/open").status, 200);
+  EXPECT_EQ(outline().status, 404) << "a daily check is of no patient";
+  ASSERT_EQ(engineer.Post("/api/v1/checks/leave").status, 200);
+  wait_for("an outline again", 200);
+  const json session = engineer.Get("/api/v1/status").json()["session"];
+  ASSERT_EQ(engineer.Post("/api/v1/treatment/close", {{"session_id", session["id"]}}).status, 200);
+  EXPECT_EQ(outline().status, 404) << "nothing of a patient whose session is closed";
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
 TEST_F(DaemonMonitorTest, ALivePositionIsSignedOnlyWhereTheSettingSaysSo) {
   Plumbd plumbd(folder_.path(), {.arguments = {"--sim-rest"}, .scenes = 2});
   ASSERT_TRUE(plumbd.WaitUntilUp());

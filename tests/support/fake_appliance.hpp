@@ -66,6 +66,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::vector<AuditEntry> audit;  ///< Oldest first.
   std::string ExportAudit() override { return "{\"number\":1}\n"; }
   std::shared_ptr<const std::string> preview, surface;
+  std::optional<CameraOutline> outline;
   std::filesystem::path diagnostics_file;
   std::uint64_t uploaded_bytes = 0;
   std::optional<FactoryReset> factory_reset;  ///< Asked for.
@@ -111,6 +112,7 @@ class FakeAppliance : public web::BackgroundWork,
   Status GetStatus() override;
   Health GetHealth() override { return health; }
   std::shared_ptr<const std::string> Preview() override { return preview; }
+  std::optional<CameraOutline> Outline() override { return outline; }
   std::shared_ptr<const std::string> SweptSurface() override {
     return status.state == ApplianceState::kScanning ? surface : nullptr;
   }
@@ -205,6 +207,9 @@ class FakeAppliance : public web::BackgroundWork,
   void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
                   Done done) override;
   void MakeBackup(const Actor& actor, Done done) override;
+  void NoteBackupVerified(const Actor& actor, Done done) override {
+    Did(actor, "backup.verify", "", done);
+  }
   void AcceptScan(const Actor& actor, const std::string& id, const std::string& reason,
                   Done done) override;
   std::optional<std::string> CompactMap(const std::string& scan_id,

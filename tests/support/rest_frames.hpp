@@ -29,6 +29,7 @@ class RestFrames {
   RestFrames(const Scene& scene, double side, unsigned seed);
 
   [[nodiscard]] StreamInfo info() const;
+  [[nodiscard]] const Pose& T_camera_scene() const { return T_camera_scene_; }
   /// @param covered  Something lies before the body; the markers are seen.
   [[nodiscard]] Frame At(double time_s, bool covered = false);
   /// The body lies elsewhere from now on. @param T_motion  Scene frame.

@@ -109,6 +109,19 @@ void ObeySensor(FakeAppliance& service, const std::string& name, std::istream& w
     const std::vector<std::uint8_t> jpeg = EncodeJpeg(picture, 70);
     service.preview = std::make_shared<const std::string>(jpeg.begin(), jpeg.end());
   }
+  if (name == "outline") {  // placed, waits, outside, or none
+    std::string what;
+    words >> what;
+    service.outline.reset();
+    if (what != "none" && service.preview) {
+      CameraOutline& outline = service.outline.emplace();
+      outline.jpeg = *service.preview;
+      outline.is_placed = what != "waits";
+      if (what == "placed")
+        outline.lines = {{{0.3F, 0.2F}, {0.7F, 0.25F}, {0.8F, 0.7F}, {0.25F, 0.75F}, {0.3F, 0.2F}},
+                         {{0.4F, 1.0F}, {0.5F, 0.85F}, {0.6F, 1.0F}}};
+    }
+  }
   if (name == "cold" || name == "warm") {
     service.status.sensor.powered_s = name == "cold" ? 1020 : 1800;
     service.status.reference_block = name == "cold" ? say::scan::IsWarmingUp(20) : Message();

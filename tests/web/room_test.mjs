@@ -164,6 +164,46 @@ await h.step('one tap opens, confirms and leads to the sweep; the room says whos
   await room.locator('.room-fraction', { hasText: 'Fraction 1' }).waitFor();
 });
 
+await h.step('the outline of the reference lies over the picture, for the posture', async () => {
+  h.tell('camera');
+  const notes = {
+    waits: 'appears when four room markers are seen', outside: 'outside this picture',
+    placed: 'Yellow: the reference, version 1, as it lay.',
+  };
+  for (const [what, note] of Object.entries(notes)) {
+    h.tell(`outline ${what}`);
+    for (const page of [anna, room]) {
+      const picture = page.locator('.preview');
+      await picture.getByText(note).waitFor(kSlow);
+      equal(await picture.getByRole('img', { name: note }).count(), what === 'placed' ? 1 : 0,
+        `${what}: a drawing with its words`);
+    }
+  }
+  // Where it says, over the picture and not beside it.
+  for (const page of [anna, room]) {
+    const [line, picture] = await Promise.all(['.lying .line', '.preview img'].map((part) =>
+      page.locator(part).boundingBox()));
+    const shown = await page.locator('.preview img').evaluate(
+      ({ naturalWidth, naturalHeight }) => naturalWidth / naturalHeight);
+    const width = Math.min(picture.width, picture.height * shown);
+    const left = picture.x + (picture.width - width) / 2;
+    check(Math.abs(line.x - (left + 0.25 * width)) < 5, `left end: ${line.x} of ${left}, ${width}`);
+    check(Math.abs(line.x + line.width - (left + 0.8 * width)) < 5, 'right end');
+  }
+  await room.waitForFunction(() =>
+    document.documentElement.scrollHeight <= window.innerHeight + 1);
+  await h.look(room, 'room-outline', { fullPage: false });
+  await anna.setViewportSize({ width: 390, height: 844 });
+  await h.look(anna, 'scan-phone-outline');
+  await anna.setViewportSize({ width: 1280, height: 800 });
+  h.tell('outline none');
+  for (const page of [anna, room]) {
+    await page.locator('.lying').waitFor({ state: 'hidden' });
+    await page.locator('.preview img').waitFor();
+  }
+  h.tell('outline placed');
+});
+
 await h.step('the room follows the button by itself, in words of 10 cm', async () => {
   h.tell('slow');
   h.tell('moved z 8 HFS');

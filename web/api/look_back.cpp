@@ -43,8 +43,8 @@ LoginHistory LoginsBefore(AuditLog& log, const std::string& user, WallClock::tim
   return history;
 }
 
-std::optional<AuditEntry> LastBackup(AuditLog& log) {
-  const std::vector<AuditEntry> newest = log.Audit({0, 1, "backup.make"});
+std::optional<AuditEntry> LastEntry(AuditLog& log, const std::string& action) {
+  const std::vector<AuditEntry> newest = log.Audit({0, 1, action});
   return newest.empty() ? std::nullopt : std::optional(newest.front());
 }
 

@@ -21,6 +21,7 @@ struct LoginHistory {
 /// @param before  Beginning of the present session.
 [[nodiscard]] LoginHistory LoginsBefore(AuditLog& log, const std::string& user,
                                         WallClock::time_point before);
-[[nodiscard]] std::optional<AuditEntry> LastBackup(AuditLog& log);
+/// The newest of an action.
+[[nodiscard]] std::optional<AuditEntry> LastEntry(AuditLog& log, const std::string& action);
 
 }  // namespace plumb::web

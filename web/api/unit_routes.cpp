@@ -2,7 +2,11 @@
 // The unit: status and button, settings, audit log, updates, maintenance.
 #include "web/api/all_routes.hpp"
 
+#include <sodium.h>
+
+#include <cmath>
 #include <filesystem>
+#include <string>
 #include <utility>
 
 #include "algo/base/errors.hpp"
@@ -19,6 +23,22 @@
 
 namespace plumb::web {
 namespace {
+
+Json OutlineJson(const CameraOutline& outline) {
+  const auto short_form = [](float share) { return std::round(share * 1e4) / 1e4; };
+  Json lines = Json::array();
+  for (const auto& line : outline.lines) {
+    Json& points = lines.emplace_back(Json::array());
+    for (const auto& [x, y] : line) points.push_back({short_form(x), short_form(y)});
+  }
+  std::string picture(
+      sodium_base64_ENCODED_LEN(outline.jpeg.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
+  sodium_bin2base64(picture.data(), picture.size(),
+                    reinterpret_cast<const unsigned char*>(outline.jpeg.data()),
+                    outline.jpeg.size(), sodium_base64_VARIANT_ORIGINAL);
+  picture.pop_back();  // its zero byte
+  return {{"picture", picture}, {"lines", lines}, {"is_placed", outline.is_placed}};
+}
 
 void AddApplianceRoutes(Routes& routes, ApplianceService& appliance) {
   routes.Read("/health", Permission::kNone, [&appliance](const Request&) {
@@ -37,6 +57,14 @@ void AddApplianceRoutes(Routes& routes, ApplianceService& appliance) {
               const auto picture = appliance.Preview();
               if (!picture) return ErrorResponse(404, say::web::NoCameraImage());
               return BodyResponse("image/jpeg", *picture);
+            })
+      .Discloses("view.camera");
+  routes
+      .Read("/api/v1/preview/outline", Permission::kRoom,
+            [&appliance](const Request&) {
+              const auto outline = appliance.Outline();
+              if (!outline) return ErrorResponse(404, say::web::NoOutline());
+              return JsonResponse(OutlineJson(*outline));
             })
       .Discloses("view.camera");
   routes
@@ -139,8 +167,13 @@ void AddMessageRoutes(Routes& routes, ApplianceService& appliance,
 
 void AddMaintenanceRoutes(Routes& routes, MaintenanceService& maintenance, AuditLog& audit) {
   routes.ReadInBackground("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
-    return JsonResponse({{"last", LastBackup(audit)}});
+    return JsonResponse({{"last", LastEntry(audit, "backup.make")},
+                         {"verified", LastEntry(audit, "backup.verify")}});
   });
+  routes.Write("POST", "/api/v1/backup/verified", Permission::kSettings, BodyKind::kNone,
+               [&maintenance](const Request& request, const Done& done) {
+                 maintenance.NoteBackupVerified(request.actor(), done);
+               });
   routes.Write("POST", "/api/v1/backup", Permission::kSettings, BodyKind::kNone,
                [&maintenance](const Request& request, const Done& done) {
                  maintenance.MakeBackup(request.actor(), done);

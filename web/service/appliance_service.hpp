@@ -4,10 +4,12 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "web/model/account.hpp"
 #include "web/model/change.hpp"
+#include "web/model/outlined_picture.hpp"
 #include "web/model/status.hpp"
 
 namespace plumb::web {
@@ -31,6 +33,10 @@ class ApplianceService {
   /// The newest camera picture as a small JPEG (at most 320 pixels wide, at most 5 per second);
   /// null when the sensor delivers none.
   [[nodiscard]] virtual std::shared_ptr<const std::string> Preview() = 0;
+  /// A picture twice a second with the outline of the reference that the open session compares
+  /// with, as long as somebody asks; nothing without such a reference, during a daily check, and
+  /// when the sensor delivers no picture.
+  [[nodiscard]] virtual std::optional<CameraOutline> Outline() = 0;
   /// The surface seen so far by the sweep, from above, in the encoding of
   /// daemon/files/compact_map.hpp: cells of 2 cm around the reference marker, 32767 where the
   /// region was not seen yet. Null without a sweep, and until that marker has been seen.

@@ -39,6 +39,9 @@ class MaintenanceService {
   /// kInvalid if no folder is configured. The message names files that were not as they were
   /// stored.
   virtual void MakeBackup(const Actor& actor, Done done) = 0;
+  /// A person has opened a backup with its private key, elsewhere, and verified it: noted in the
+  /// log.
+  virtual void NoteBackupVerified(const Actor& actor, Done done) = 0;
   /// Returns a file (without patient data) that is downloaded once and then removed.
   virtual void WriteDiagnostics(const Actor& actor, Done done) = 0;
   /// Sends a test message by every way that the configuration names; answers when each has taken

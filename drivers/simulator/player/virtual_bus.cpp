@@ -45,8 +45,10 @@ std::string VirtualBus::Obey(const std::string& line) try {
   if (verb == "unplug") return Unplug(argument);
   if (verb == "next-scene") return show(stage_->Now().index + 1);
   if (verb == "scene") return show(std::stoul(argument));
-  if (verb == "mount" || verb == "move")
-    return stage_->ShowAtRest(verb == "mount" ? 0 : 1) ? "ok" : "refused: nothing at rest to show";
+  if (verb == "mount" || verb == "move") {
+    const std::size_t loop = verb == "mount" ? 0 : argument.empty() ? 1 : std::stoul(argument);
+    return stage_->ShowAtRest(loop) ? "ok" : "refused: nothing at rest to show";
+  }
   if (verb == "hold") return show(stage_->Now().index);
   if (verb == "rewind") {
     std::int64_t origin_us = 0;

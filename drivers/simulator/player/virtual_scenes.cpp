@@ -78,7 +78,9 @@ class Renderer {
     num_sweeps_ = plan_.scenes.size();
     if (options_.max_scenes > 0) num_sweeps_ = std::min(num_sweeps_, options_.max_scenes);
     if (options_.at_rest)
-      simulated::AddRestLoops(plan_, simulate, num_sweeps_ - 1, !options_.second_serial.empty());
+      simulated::AddRestLoops(
+          plan_, simulate, num_sweeps_ - 1,
+          {.with_second = !options_.second_serial.empty(), .with_steps = options_.rest_steps});
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) throw IoError(DescribeWriteError(folder_, error.value()));
@@ -161,10 +163,11 @@ RenderedScenes RenderScenes(const VirtualSensorOptions& options, const std::stop
   const Renderer renderer(options, ScenesOf(options));
   std::vector<std::size_t> wanted;
   for (std::size_t i = 0; i < renderer.num_sweeps(); ++i) wanted.push_back(i);
-  const std::size_t total = renderer.plan().scenes.size();
-  const bool has_second = options.at_rest && !options.second_serial.empty();
-  const std::size_t loops = has_second ? 4 : options.at_rest ? 2 : 0;
-  for (std::size_t i = total - loops; i < total; ++i) wanted.push_back(i);
+  const auto& planned = renderer.plan().scenes;
+  const auto is_rest = [](const auto& scene) { return scene.name.starts_with("rest"); };
+  const auto first_rest = std::find_if(planned.begin(), planned.end(), is_rest);
+  for (auto i = first_rest; i != planned.end(); ++i)
+    wanted.push_back(static_cast<std::size_t>(i - planned.begin()));
   RenderedScenes scenes;
   for (std::size_t k = 0; k < wanted.size(); ++k) {
     const std::string& name = renderer.plan().scenes[wanted[k]].name;
@@ -173,15 +176,16 @@ RenderedScenes RenderScenes(const VirtualSensorOptions& options, const std::stop
         progress((static_cast<double>(k) + fraction) / static_cast<double>(wanted.size()), name);
     });
     if (k >= renderer.num_sweeps()) {
-      (scenes.at_rest.size() < 2 ? scenes.at_rest : scenes.second_at_rest)
-          .push_back(std::move(cache));
+      const bool is_second = name.starts_with("rest_second");
+      (is_second ? scenes.second_at_rest : scenes.at_rest).push_back(std::move(cache));
+      if (is_second)
+        scenes.second_camera = simulated::MakeSource(renderer.plan(), wanted[k])->info();
       continue;
     }
     scenes.names.push_back(name);
     scenes.caches.push_back(std::move(cache));
   }
   scenes.camera = simulated::MakeSource(renderer.plan(), 0)->info();
-  if (has_second) scenes.second_camera = simulated::MakeSource(renderer.plan(), total - 1)->info();
   return scenes;
 }
 

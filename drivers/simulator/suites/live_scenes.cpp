@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "algo/base/units.hpp"
 #include "drivers/simulator/world/random.hpp"
 
@@ -193,7 +195,7 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
 }
 
 void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t sweep,
-                  bool with_second) {
+                  const RestLoops& wanted) {
   constexpr double kBreath_s = 4.0;
   const ScenePlan swept = plan.scenes.at(sweep);
   BodyShape chest = swept.body->shape, belly = swept.body->shape;
@@ -211,7 +213,7 @@ void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t s
   const auto still = std::make_shared<const LiveScript>(script);
   script.steps = {{-2.0, -1.0, Shift(3.0, 4.0, 0.0)}};
   const auto moved = std::make_shared<const LiveScript>(std::move(script));
-  const auto add = [&](const char* name, const SensorAtPlace& place,
+  const auto add = [&](const std::string& name, const SensorAtPlace& place,
                        const std::shared_ptr<const LiveScript>& seen,
                        const std::shared_ptr<const SensorUnit>& unit, std::uint64_t number) {
     ScenePlan& scene = plan.scenes.emplace_back(swept);
@@ -228,11 +230,29 @@ void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t s
   const SensorAtPlace first{.T_world_camera = PlaceOfSensor(still->centre, side, random)};
   add("rest", first, still, nullptr, 0);
   add("rest_moved", first, moved, nullptr, 1);
-  if (!with_second) return;
-  const SensorAtPlace second{.T_world_camera = PlaceOfSensor(still->centre, -side, random)};
-  const auto unit = AnotherUnit(options);
-  add("rest_second", second, still, unit, 2);
-  add("rest_second_moved", second, moved, unit, 3);
+  if (wanted.with_second) {
+    const SensorAtPlace second{.T_world_camera = PlaceOfSensor(still->centre, -side, random)};
+    const auto unit = AnotherUnit(options);
+    add("rest_second", second, still, unit, 2);
+    add("rest_second_moved", second, moved, unit, 3);
+  }
+  if (!wanted.with_steps) return;
+  constexpr int kSteps = 3;
+  LiveScript script_there = *still;
+  for (int i = 1; i <= kSteps; ++i) {
+    script_there.T_world_body = Interpolate(still->T_world_body, plan.scenes.front().T_world_body,
+                                            static_cast<double>(i) / kSteps);
+    script_there.centre = script_there.T_world_body * swept.body->centroid;
+    add(fmt::format("rest_step_{}", i), first, std::make_shared<const LiveScript>(script_there),
+        nullptr, 4 + static_cast<std::uint64_t>(i));
+  }
+  const auto there = std::make_shared<const LiveScript>(script_there);
+  SensorAtPlace nudged = first;
+  nudged.T_world_camera.translation() += Vector3d(3.0, -2.0, 1.0) * kMillimetre;
+  add("rest_nudged", nudged, there, nullptr, 8);
+  // So long a breath that nothing moves within the loop: its end of inspiration.
+  script_there.breaths = {{-1000.0, 1004.0, 8 * kMillimetre, 3 * kMillimetre}};
+  add("rest_held", first, std::make_shared<const LiveScript>(std::move(script_there)), nullptr, 9);
 }
 
 }  // namespace plumb::simulated

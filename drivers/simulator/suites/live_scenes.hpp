@@ -23,11 +23,20 @@ namespace plumb::simulated {
 /// twice a second), `live_pushed_2mm` and `live_pushed_5mm`.
 void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options);
 
+/// Beside `rest` and `rest_moved`.
+struct RestLoops {
+  /// `rest_second` and `rest_second_moved`: at the same time, what another unit sees from the other
+  /// side.
+  bool with_second = false;
+  /// `rest_step_1` to `rest_step_3`: the couch is brought to where the body of the first sweep lay;
+  /// `rest_nudged`: there, after the sensor was nudged by 4 mm; `rest_held`: there, at the end of
+  /// inspiration.
+  bool with_steps = false;
+};
+
 /// Adds `rest`, one breath of four seconds before a sensor at rest over the body of a sweep, which
 /// can be repeated for ever, and `rest_moved`, the same after the body was moved by 5 mm.
-/// @param with_second  Also `rest_second` and `rest_second_moved`: at the same time, what another
-///        unit sees from the other side.
 void AddRestLoops(SuitePlan& plan, const SimulateOptions& options, std::size_t sweep,
-                  bool with_second = false);
+                  const RestLoops& wanted = {});
 
 }  // namespace plumb::simulated

@@ -79,6 +79,15 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
     std::sort(ids.begin(), ids.end());
     return ids;
   }
+  static constexpr const char* kVerificationDue =
+      "Nobody has opened an encrypted backup for half a year";
+  /// The first one was made 184 days ago.
+  void LetABackupBeOld() const {
+    constexpr std::int64_t kDays_us = 184LL * 24 * 3600 * 1'000'000;
+    Store(state()).audit.Log(kTester, "backup.make", "", Message());
+    ChangeDatabase("DROP TRIGGER audit_no_update; UPDATE audit SET time = time - " +
+                   std::to_string(kDays_us));
+  }
   void ChangeDatabase(const std::string& sql) const {
     Database(state() / "plumb.db", Database::Access::kReadWrite).Execute(sql);
   }
@@ -150,6 +159,38 @@ TEST_F(ApplianceUpkeepTest, ABackupFromThePageEndsTheWarningOfAFailedOne) {
       ASSERT_EQ(Backups().size(), 1U);
       EXPECT_EQ(Backups()[0].user, kTester.user);
       EXPECT_FALSE(Warns("The last backup failed: "));
+    });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, APlainBackupIsOpenedByPlumbdItselfAndAsksNobody) {
+  parts_.config.appliance.backup_folder = folder_ / "backups";
+  LetABackupBeOld();
+  Play([&] {
+    ASSERT_TRUE(Comes([&] { return Backups().size() == 2; }));
+    WaitForTicks(400);
+    On([&] { EXPECT_FALSE(Warns(kVerificationDue)); });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, ThatAnEncryptedBackupIsToBeVerifiedIsAWarningUntilItIsNoted) {
+  parts_.config.appliance.backup_folder = folder_ / "backups";
+  parts_.config.appliance.backup_recipients =
+      AgeRecipients({"age1z8q8p3f3getd6h87azd0zc2vzskwttwywjqumzv8yqddd73pwg3svc56n6"});
+  LetABackupBeOld();
+  Play([&] {
+    EXPECT_TRUE(Comes([&] { return Warns(kVerificationDue); }));
+    const auto noted = std::make_shared<std::promise<Change>>();
+    On([&] {
+      services_->services().maintenance.NoteBackupVerified(
+          kTester, [noted](const Change& change) { noted->set_value(change); });
+    });
+    EXPECT_EQ(noted->get_future().get().result, ChangeResult::kDone);
+    EXPECT_TRUE(Comes([&] { return !Warns(kVerificationDue); }));
+    On([&] {
+      const auto entries = shared_->store->audit.Find({0, 10, "backup.verify"});
+      ASSERT_EQ(entries.size(), 1U);
+      EXPECT_EQ(entries[0].user, kTester.user);
     });
   });
 }

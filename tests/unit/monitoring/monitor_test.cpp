@@ -74,6 +74,27 @@ class MonitorTest : public testing::Test {
   double longest_s_ = 0.0;  ///< Processor time of one frame.
 };
 
+TEST_F(MonitorTest, ABodyThatWasMovedSinceItsSweepHasNoNumbersAgainstTheReference) {
+  for (const double shift_m : {0.005, 0.030}) {
+    sensors_.clear();
+    time_s_ = 0;
+    AddSensor(1.0);
+    Move({shift_m, 0.0, 0.0});
+    MonitorOptions options;
+    options.accepted = AcceptedMotion{.centroid_m = test::MiddleOfBody()};
+    options.judges_reference = true;
+    monitor_ = std::make_unique<Monitor>(*scene_, std::vector{sensors_[0]->info()}, options);
+    const std::vector<MonitorLine> lines = RunUntil(14.0);
+    const bool is_near = shift_m < 0.01;
+    EXPECT_TRUE(lines.back().since_zero) << shift_m;
+    EXPECT_EQ(lines.back().against_reference.has_value(), is_near) << shift_m;
+    EXPECT_EQ(lines.back().reason, is_near ? BlindReason::kNone : BlindReason::kNoZero);
+    const auto is_in = [](const MonitorLine& line) { return line.advice == LiveAdvice::kIn; };
+    EXPECT_EQ(std::ranges::any_of(lines, is_in), is_near)
+        << "the result of the sweep does not hold where the body lies now";
+  }
+}
+
 TEST_F(MonitorTest, OneSensorFollowsTheBodyAndNoFrameTakesLong) {
   AddSensor(1.0);
   Begin();

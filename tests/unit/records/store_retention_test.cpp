@@ -200,6 +200,29 @@ class RetentionTest : public StoreTest {
   static std::string Us(int hours) { return std::to_string(hours * 3'600'000'000LL); }
 };
 
+TEST_F(RetentionTest, ThatABackupIsVerifiedIsAskedForTwiceAYear) {
+  using std::chrono::hours;
+  using std::chrono::seconds;
+  const auto store = Open();
+  const auto is_due = [&](WallClock::time_point now) {
+    return IsVerificationDue(*store->database().ForLists(), now);
+  };
+  const auto time_of = [&](const char* action) {
+    return store->audit.Find({0, 1, action})[0].time;
+  };
+  EXPECT_FALSE(is_due(WallClock::now() + 10 * kVerifiedEvery)) << "there is no backup";
+  store->audit.Log(kAnna, "backup.make", "", Message());
+  const WallClock::time_point first = time_of("backup.make");
+  EXPECT_FALSE(is_due(first + hours(24 * 183)));
+  EXPECT_TRUE(is_due(first + hours(24 * 183) + seconds(1)));
+  store->audit.Log(kAnna, "backup.verify", "", Message());
+  const WallClock::time_point verified = time_of("backup.verify");
+  EXPECT_FALSE(is_due(verified + hours(24 * 183)));
+  EXPECT_TRUE(is_due(verified + hours(24 * 183) + seconds(1)));
+  store->audit.Log(kAnna, "backup.make", "", Message());
+  EXPECT_TRUE(is_due(verified + hours(24 * 183) + seconds(1))) << "a new one proves nothing";
+}
+
 TEST_F(RetentionTest, WhatNoVerifiedBackupHoldsStays) {
   const std::vector<std::string> scans = OldScans(2);
   const auto store = Open();

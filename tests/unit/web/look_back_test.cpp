@@ -80,14 +80,14 @@ TEST_F(LookBackTest, FindsBehindManyEntriesAndEndsSomewhere) {
   EXPECT_TRUE(web::LoginsBefore(service_, "anna", begun_).last);
   for (int i = 0; i < 20; ++i) Add(begun_ - minutes(60), "bob", "login");
   EXPECT_FALSE(web::LoginsBefore(service_, "anna", begun_).last) << "at most 5000 log-ins";
-  ASSERT_TRUE(web::LastBackup(service_));
-  EXPECT_EQ(web::LastBackup(service_)->user, "bob");
+  ASSERT_TRUE(web::LastEntry(service_, "backup.make"));
+  EXPECT_EQ(web::LastEntry(service_, "backup.make")->user, "bob");
 }
 
 TEST_F(LookBackTest, AnEmptyLogTellsNothing) {
   EXPECT_FALSE(web::LoginsBefore(service_, "anna", begun_).last);
   EXPECT_EQ(web::LoginsBefore(service_, "anna", begun_).failed, 0);
-  EXPECT_FALSE(web::LastBackup(service_));
+  EXPECT_FALSE(web::LastEntry(service_, "backup.make"));
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ import { showFault, showLogin } from './login.js';
 import { askMonitor, monitorView } from '../monitoring/monitor.js';
 import { comparesWith } from './captured.js';
 import {
-  formingNumbers, preview, stepWords, surfaceIn, surfaceWords, toneOf,
+  formingNumbers, hasOutline, preview, stepWords, surfaceIn, surfaceWords, toneOf,
 } from './scan.js';
 import { ageOf, validityNote, verdictStrip } from './verdict.js';
 
@@ -154,7 +154,11 @@ const saysNoSession = (status) => (status.state === 'ready' || status.state === 
 const wristband = ({ session }) => [word(S.room.wristband, 'info'),
   h('p', { class: 'room-hint' }, S.room.wristbandHint(session?.patient_code ?? ''))];
 
-function resting(status) {
+/// Whether people lie down now for a sweep that is compared with a reference.
+const showsPosture = (status) => ['ready', 'result'].includes(status.state)
+  && hasOutline(status) && status.press !== 'monitoring' && !status.wants_wristband;
+
+function resting(status, camera) {
   const text = S.room;
   if (status.state === 'no_sensor') {
     return [word(text.sensorMissing, 'bad'),
@@ -170,7 +174,8 @@ function resting(status) {
   return [word(closed ? text.noSession : text.ready, closed ? 'bad' : 'good'),
     siteHint && h('p', { class: 'room-hint site-hint' }, siteHint),
     h('p', { class: 'room-hint' }, closed ? text.openOne
-      : status.press === 'monitoring' ? S.stateHints.at_rest : text.press)];
+      : status.press === 'monitoring' ? S.stateHints.at_rest : text.press),
+    showsPosture(status) && h('div', { class: 'room-lying' }, camera)];
 }
 
 /// Posture comes first: what no move of the couch puts right.
@@ -331,13 +336,13 @@ function display(main, speak) {
     main.classList.toggle('off', !live.connected);
     offline.draw();
     main.dataset.state = status.state;
-    withCamera(status.state === 'scanning');
     showSurface(status.state === 'scanning');
     const last = status.last_result;
     const isCheck = status.state === 'result' && lastPurpose === 'daily_check';
     // An answer is shown only in its own state: never during a sweep, nor in another session.
     const mine = last && (last.session_id ?? null) === lastSession;
     const visible = status.state === 'result' && !isCheck && mine ? last : null;
+    withCamera(status.state === 'scanning' || (!visible && !isCheck && showsPosture(status)));
     const said = !visible && !isCheck && saysNoSession(status);
     if (session && session.patient_id !== patient) {
       if (patient) swapped = now();
@@ -378,7 +383,8 @@ function display(main, speak) {
     const fraction = status.state === 'scanning' ? scan?.coverage : scan?.step_fraction;
     const key = JSON.stringify([S.languageName, status.state, scan?.guidance,
       fraction === null, scan?.step, isCheck && status.last_check, faultWords(status),
-      session?.id, status.next_purpose, status.press, status.wants_wristband]);
+      session?.id, status.next_purpose, status.press, status.wants_wristband,
+      showsPosture(status)]);
     if (key === drawn && body.hasChildNodes()) {
       update(fraction);
       return;
@@ -386,7 +392,7 @@ function display(main, speak) {
     drawn = key;
     const parts = status.state === 'scanning' ? sweep(status, camera?.element, seen)
       : status.state === 'working' ? computing(status)
-        : isCheck ? [checkResult(status.last_check)] : resting(status);
+        : isCheck ? [checkResult(status.last_check)] : resting(status, camera?.element);
     clear(body, parts);
     say(parts[0].textContent);
   };

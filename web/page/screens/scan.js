@@ -5,6 +5,7 @@ import {
 } from '../api.js';
 import { action, card, clear, done, enable, h, hint, say } from '../dom.js';
 import { liveSurface } from '../drawings/live_surface.js';
+import { referenceOutline } from '../drawings/outline.js';
 import { sweepHelp } from '../help/drawings.js';
 import { isAcknowledged, sessionLine, sessionName } from '../treatment.js';
 import { wristbandForm } from '../wristband.js';
@@ -15,34 +16,59 @@ import {
 import { six } from '../monitoring/monitor.js';
 
 const kPreviewEvery_ms = 250;
+const kOutlineEvery_ms = 400;
+const kOutlineAgain_s = 2;
 const kPreviewAgain_ms = 2000;  // without a picture
 const kSecondTap_s = 0.8;
 
-/// The camera's picture, as long as there is one.
+const bytesOf = (base64) => Uint8Array.from(atob(base64), (one) => one.charCodeAt(0));
+
+/// Whether the next or running sweep is compared with a reference, so that its outline helps.
+export const hasOutline = (status) => Boolean(status?.session?.reference)
+  && (status.scan?.purpose ?? status.next_purpose) === 'fraction';
+
+/// The camera's picture, as long as there is one, with the outline of the reference.
 export function preview() {
   const text = S.status;
   const picture = h('img', { alt: text.previewAlt, hidden: true });
   const none = hint(text.noPreview);
+  const outline = referenceOutline(picture);
   let url = null;
+  let noOutline = null;  // when there was none
+  const show = async (blob) => {
+    const fresh = URL.createObjectURL(blob);
+    picture.src = fresh;
+    await picture.decode().catch(() => {});
+    if (url) URL.revokeObjectURL(url);
+    url = fresh;
+    picture.hidden = false;
+    none.hidden = true;
+  };
   const stop = repeat(async () => {
     try {
+      if (hasOutline(live.status) && !(noOutline && since_s(noOutline) < kOutlineAgain_s)) {
+        const found = await fetchPicture('preview/outline');
+        if (found.ok) {
+          const one = await found.json();
+          await show(new Blob([bytesOf(one.picture)], { type: 'image/jpeg' }));
+          outline.draw(one, live.status);
+          return kOutlineEvery_ms;
+        }
+        noOutline = now();
+      }
+      outline.hide();
       const response = await fetchPicture('preview');
       if (!response.ok) throw new Error();
-      const fresh = URL.createObjectURL(await response.blob());
-      picture.src = fresh;
-      await picture.decode().catch(() => {});
-      if (url) URL.revokeObjectURL(url);
-      url = fresh;
-      picture.hidden = false;
-      none.hidden = true;
+      await show(await response.blob());
       return kPreviewEvery_ms;
     } catch {
       picture.hidden = true;
       none.hidden = false;
+      outline.hide();
       return kPreviewAgain_ms;
     }
   });
-  return { element: h('figure', { class: 'preview' }, picture, none), stop };
+  return { element: h('figure', { class: 'preview' }, outline.element, none, outline.note), stop };
 }
 
 /// In `place` while a sweep goes on: the surface that grows. `follow(wanted)` with every status.

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-import { get, live, may, postLong, put } from '../api.js';
+import {
+  get, live, may, post, postLong, put,
+} from '../api.js';
 import {
   action, card, checkbox, clear, done, field, form, h, hint, localTime, select,
 } from '../dom.js';
@@ -14,9 +16,12 @@ const kFlags = ['couch_markers', 'keep_recordings', 'scan_wristband'];
 function backupCard() {
   const text = S.settings;
   const last = h('p', { class: 'last-backup' });
+  const lastVerified = h('p', { class: 'last-verified' });
   const running = h('p', { class: 'hint', role: 'status' });
   const draw = async () => {
-    const { last: entry } = await get('backup', true);
+    const { last: entry, verified } = await get('backup', true);
+    lastVerified.textContent = verified
+      ? text.backupVerified(localTime(verified.time), verified.user) : text.backupNotVerified;
     const warnings = saidEach(live.status?.storage, 'warnings');
     clear(last, entry ? text.backupLast(localTime(entry.time), entry.user || S.product)
       : text.backupNone, entry && [' ', h('code', {}, said(entry, 'detail'))],
@@ -32,9 +37,14 @@ function backupCard() {
       await draw().catch(() => {});
     }
   }, {});
+  const verified = action(text.backupVerify, async () => {
+    await post('backup/verified');
+    done(S.saved);
+    await draw();
+  }, {});
   draw().catch((error) => clear(last, error.message));
   return card(text.backup,
-    hint(text.backupHint), last, now, running);
+    hint(text.backupHint), last, now, running, hint(text.backupVerifyHint), lastVerified, verified);
 }
 
 /// Who outside is told of what needs a person, and whether that works.
