@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/plan_options.hpp"
 #include "daemon/loop/log.hpp"
@@ -106,8 +107,9 @@ void Appliance::FollowReference() {
       job.markers_iec = room->markers_iec;
     outline_.Follow(std::move(job));
   } catch (const std::exception& error) {
+    // The next scan says what is wrong with the reference; a picture without it stops nobody's.
     outline_.Follow({});
-    storage_.FailLater(error);
+    Log(LogLevel::kWarning, MessageOf(error).English());
   }
 }
 

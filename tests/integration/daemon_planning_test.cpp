@@ -270,7 +270,8 @@ TEST_F(DaemonPlanningTest, FilesOfAnotherPatientAreRefusedUntilAPersonHasLooked)
   EXPECT_THAT(mixed.body, HasSubstr("CT-1"));
   EXPECT_EQ(Upload({}, "KH-9").status, 201);
 
-  // Nothing that is stored names the patient.
+  // Nothing that is stored names the patient. While plumbd runs, files come and go.
+  EXPECT_EQ(plumbd_->Stop(), 0);
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path())) {
     if (!entry.is_regular_file()) continue;
     std::ifstream in(entry.path(), std::ios::binary);

@@ -181,10 +181,14 @@ await h.step('the outline of the reference lies over the picture, for the postur
   }
   // Where it says, over the picture and not beside it.
   for (const page of [anna, room]) {
-    const [line, picture] = await Promise.all(['.lying .line', '.preview img'].map((part) =>
-      page.locator(part).boundingBox()));
-    const shown = await page.locator('.preview img').evaluate(
-      ({ naturalWidth, naturalHeight }) => naturalWidth / naturalHeight);
+    // All at once: the picture is drawn again twice a second.
+    const { line, picture, shown } = await (await page.waitForFunction(() => {
+      const drawn = document.querySelector('.lying .line');
+      const image = document.querySelector('.preview img');
+      if (!drawn || !image || !image.naturalWidth) return null;
+      const [lineAt, imageAt] = [drawn, image].map((one) => one.getBoundingClientRect().toJSON());
+      return { line: lineAt, picture: imageAt, shown: image.naturalWidth / image.naturalHeight };
+    })).jsonValue();
     const width = Math.min(picture.width, picture.height * shown);
     const left = picture.x + (picture.width - width) / 2;
     check(Math.abs(line.x - (left + 0.25 * width)) < 5, `left end: ${line.x} of ${left}, ${width}`);
