@@ -139,7 +139,7 @@ void Problem::CollectKeypoints() {
       if (o.z_m > 0)
         term.weight_z =
             1.0 /
-            std::hypot(options.keypoint_depth_sigmas * options.depth_noise.SigmaAt_m(o.z_m, 0.8),
+            std::hypot(options.keypoint_depth_sigmas * DepthSigma(options.depth_noise, o.z_m, 0.8),
                        std::sqrt(kReadingsOfImage) * options.shared_depth_sigma_m);
     }
   });

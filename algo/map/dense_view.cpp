@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <Eigen/Geometry>
 
@@ -37,6 +38,15 @@ float WindowDepth(const cv::Mat& depth_m, int row0, int column0, int side) {
 }
 
 }  // namespace
+
+double Grazing(double cos_incidence) {
+  const double theta = std::acos(std::clamp(cos_incidence, 0.17, 1.0));
+  return theta / (std::numbers::pi / 2 - theta);
+}
+
+double DepthSigma(const DepthNoise& noise, double z_m, double cos_incidence) {
+  return noise.Sigma_m(z_m, Grazing(cos_incidence));
+}
 
 DenseViewMaker::DenseViewMaker(const Intrinsics& intrinsics)
     : window_px_(std::max(1, intrinsics.width / kColumns)),

@@ -55,4 +55,10 @@ class DenseViewMaker {
   std::shared_ptr<const std::vector<Eigen::Vector2f>> rays_;
 };
 
+/// The incidence as DepthNoise::Sigma_m() takes it, at most that of 80 deg; cos_incidence in (0,
+/// 1]. Slow: for repeated measurements of one surface it is computed once.
+[[nodiscard]] double Grazing(double cos_incidence);
+/// Standard deviation of one depth measurement, metres; cos_incidence in (0, 1].
+[[nodiscard]] double DepthSigma(const DepthNoise& noise, double z_m, double cos_incidence);
+
 }  // namespace plumb

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 namespace plumb {
@@ -117,10 +118,12 @@ ViewModel MakeViewModel(const BlockImage& seen, const BlockGrid& grid, const Pos
     const float cosine = -normal.dot(points[i].normalized());
     if (!(cosine > kLeastCosine)) continue;
     const Eigen::Vector3d p = T_scene_camera * points[i].cast<double>();
+    const float angle = std::acos(std::min(cosine, 1.0F));
+    const float grazing = angle / ((0.5F * std::numbers::pi_v<float>)-angle);
     model.point[i] = p.cast<float>();
     model.normal[i] = R_scene_camera * normal;
     model.inverse_depth[i] = seen.inverse_depth[i];
-    model.sigma_m[i] = noise.SigmaAt_m(points[i].z(), cosine) * cosine;
+    model.sigma_m[i] = noise.Sigma_m(points[i].z(), grazing) * cosine;
     model.part[i] = part_of(p);
   }
   return model;

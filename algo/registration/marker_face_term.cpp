@@ -44,7 +44,7 @@ DepthRow MarkerFaceTerm::Linearise(const DepthNoise& noise) const {
   row.residual_m = in_marker.z();
   row.ConvertToRawUnits(view.slopes[cell], SlopeJacobian(view, cell));
   const double cosine = std::clamp(-n_depth.dot(p.normalized()), kLeastIncidence, 1.0);
-  row.sigma_m = std::hypot(noise.SigmaAt_m(p.z(), cosine) * cosine, kUnmodelled_m);
+  row.sigma_m = std::hypot(DepthSigma(noise, p.z(), cosine) * cosine, kUnmodelled_m);
   return row;
 }
 

@@ -35,8 +35,8 @@ std::optional<PlaneTerm> PlaneTerm::Between(const ViewPair& pair, std::size_t ce
 }
 
 PlaneTerm::Sigmas PlaneTerm::SigmasOf(const ViewPair& pair, const DepthNoise& noise) const {
-  return {noise.SigmaAt_m(pair.a.points[cell_a].z(), cos_a) * cos_a,
-          noise.SigmaAt_m(pair.b.points[cell_b].z(), cos_b) * cos_b};
+  return {DepthSigma(noise, pair.a.points[cell_a].z(), cos_a) * cos_a,
+          DepthSigma(noise, pair.b.points[cell_b].z(), cos_b) * cos_b};
 }
 
 DepthRow PlaneTerm::Linearise(const ViewPair& pair, const DepthNoise& noise) const {

@@ -5,27 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <concepts>
-#include <numbers>
 #include <optional>
 #include <string>
 
 #include "algo/base/message.hpp"
 
 namespace plumb {
-
-/// The incidence as DepthNoise::Sigma_m() takes it, at most that of 89 deg; up to 80 deg within
-/// 0.04 % of 1 + itself. The arc cosine is Abramowitz and Stegun's 4.4.45, since the library's took
-/// 60 of the 2,000 ms of processor time that follow the last frame of a sweep.
-/// @param cos_incidence  In (0, 1].
-template <std::floating_point Real>
-[[nodiscard]] Real GrazingOf(Real cos_incidence) {
-  constexpr Real kRightAngle = std::numbers::pi_v<Real> / 2;
-  const Real c = std::clamp(cos_incidence, Real(0.02), Real(1));
-  const Real angle =
-      std::sqrt(1 - c) *
-      (Real(1.5707288) + c * (Real(-0.2121144) + c * (Real(0.0742610) + c * Real(-0.0187293))));
-  return angle / (kRightAngle - angle);
-}
 
 /// Standard deviation of one depth measurement along the optical axis. At the distance z (metres)
 /// and the angle of incidence theta it is, in metres,
@@ -57,11 +42,6 @@ struct DepthNoise {
     constexpr Real kNearest_m = static_cast<Real>(0.1);  // finite, however near
     return SigmaFacing_m(z_m) +
            static_cast<Real>(grazing_m) / std::sqrt(std::max(z_m, kNearest_m)) * grazing * grazing;
-  }
-  /// @param cos_incidence  In (0, 1].
-  template <std::floating_point Real>
-  [[nodiscard]] Real SigmaAt_m(Real z_m, Real cos_incidence) const {
-    return Sigma_m(z_m, GrazingOf(cos_incidence));
   }
 
   bool operator==(const DepthNoise&) const = default;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -201,7 +202,7 @@ void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, 
       const float length = plane.norm();
       const float cos_incidence = inverse / (length * std::sqrt(ray.squaredNorm() + 1.0F));
       if (!(cos_incidence >= min_cos)) continue;
-      const float sigma = surface.depth_noise.SigmaAt_m(1.0F / inverse, cos_incidence);
+      const float sigma = AxialSigma(surface.depth_noise, 1.0F / inverse, cos_incidence);
       surface.normals[i] = plane * (-1.0F / length);
       surface.pixels[i].weight = cos_incidence / (sigma * sigma);
     }
@@ -209,6 +210,13 @@ void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, 
 }
 
 }  // namespace
+
+float AxialSigma(const DepthNoise& noise, float depth_m, float cos_incidence) {
+  if (!(cos_incidence < 1.0F)) return noise.SigmaFacing_m(depth_m);
+  constexpr float kRightAngle = std::numbers::pi_v<float> / 2.0F;
+  const float angle = std::acos(std::max(cos_incidence, 0.02F));
+  return noise.Sigma_m(depth_m, angle / (kRightAngle - angle));
+}
 
 Color ViewSurface::ColorAt(std::size_t i) const {
   if (color_rgb.empty()) return {0, 0, 0};

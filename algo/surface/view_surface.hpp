@@ -19,6 +19,11 @@
 
 namespace plumb {
 
+/// Standard deviation of one depth measurement, metres.
+/// @param depth_m  Along the optical axis.
+/// @param cos_incidence  Between surface normal and viewing ray, in (0, 1].
+[[nodiscard]] float AxialSigma(const DepthNoise& noise, float depth_m, float cos_incidence);
+
 struct ViewSurfaceOptions {
   float min_depth_m = 0.3F;
   float max_depth_m = 4.0F;

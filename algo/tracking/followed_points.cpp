@@ -57,7 +57,7 @@ void FollowedPoints::Follow(const Pyramid& last, const GrayImage& image, const c
     if (const double z = DepthAt(depth_m, pixel); z > 0) {
       point.inverse_z = 1.0 / z;
       const double sigma_m =
-          kDepthNoiseFactor * depth_noise_.SigmaAt_m(z, kUsualCosine) + kDepthError_m;
+          kDepthNoiseFactor * DepthSigma(depth_noise_, z, kUsualCosine) + kDepthError_m;
       point.inverse_z_sigma = sigma_m / (z * z);
     }
     points.push_back(point);

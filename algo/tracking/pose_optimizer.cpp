@@ -86,10 +86,10 @@ struct DenseSum {
 using GrazingOfCells = std::vector<double>;
 constexpr double kNotComputed = -1.0;  // Not a cosine of incidence, which is never negative.
 
-double GrazingAt(const DenseView& target, std::size_t cell, GrazingOfCells& known) {
+double GrazingOf(const DenseView& target, std::size_t cell, GrazingOfCells& known) {
   double& grazing = known[cell];
   if (grazing == kNotComputed)
-    grazing = GrazingOf(std::abs(target.normals[cell].dot(target.point(cell).normalized())));
+    grazing = Grazing(std::abs(target.normals[cell].dot(target.point(cell).normalized())));
   return grazing;
 }
 
@@ -143,7 +143,7 @@ DenseSum AddDense(const PoseProblem& problem, const std::vector<DensePoint>& poi
     if (std::abs(residual) > gate_m) continue;
     const double sigma =
         std::sqrt(2.0) * problem.depth_noise.Sigma_m(static_cast<double>(q.z()),
-                                                     GrazingAt(target, j, grazing_of_cells)) +
+                                                     GrazingOf(target, j, grazing_of_cells)) +
         kSurfaceError_m;
     // The motion is on the colour camera's side: q = T_target_color * exp(x) * p_color.
     const Eigen::Vector3d n_color = R_target_color.transpose() * n.cast<double>();

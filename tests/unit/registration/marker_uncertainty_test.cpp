@@ -156,7 +156,7 @@ TEST(MarkerUncertaintyTest, MarkersScatterAsThePosteriorStates) {
       }
       for (KeypointObservation& o : keyframe.keypoints) {
         o.pixel += noise(options.keypoint_sigma_px * scale);
-        o.z_m += options.keypoint_depth_sigmas * options.depth_noise.SigmaAt_m(o.z_m, 0.8) *
+        o.z_m += options.keypoint_depth_sigmas * DepthSigma(options.depth_noise, o.z_m, 0.8) *
                  normal(random);
       }
     }

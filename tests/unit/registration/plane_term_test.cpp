@@ -74,10 +74,8 @@ TEST_F(PlaneTermTest, ResidualIsWhatTheFormulaSays) {
   const Eigen::Vector3d x_a = start.views[0].points[cells.a].cast<double>();
   const Eigen::Vector3d x_b = start.views[1].points[cells.b].cast<double>();
   const Eigen::Vector3d n = start.map.keyframes[1].dense.normals[cells.b].cast<double>();
-  const double sigma_a =
-      DepthNoise().SigmaAt_m(x_a.z(), static_cast<double>(term->cos_a)) * term->cos_a;
-  const double sigma_b =
-      DepthNoise().SigmaAt_m(x_b.z(), static_cast<double>(term->cos_b)) * term->cos_b;
+  const double sigma_a = DepthSigma({}, x_a.z(), term->cos_a) * term->cos_a;
+  const double sigma_b = DepthSigma({}, x_b.z(), term->cos_b) * term->cos_b;
   const double slope = std::hypot(sigma_a * start.views[0].slopes[cells.a],
                                   sigma_b * start.views[1].slopes[cells.b]) /
                        std::hypot(sigma_a, sigma_b);

@@ -229,5 +229,14 @@ TEST(DenseView, EdgesAreLeftOut) {
   EXPECT_TRUE(view.normals[60 * 160 + 79].isZero()) << "no normal across an edge";
 }
 
+TEST(DepthSigma, FollowsNguyen) {
+  EXPECT_NEAR(DepthSigma({}, 0.4, 1.0), 0.0012, 1e-9);
+  EXPECT_NEAR(DepthSigma({}, 1.4, 1.0), 0.0031, 1e-9);
+  // theta = 60 degrees: 0.0001 / sqrt(1) * (60 / 30)^2 more.
+  EXPECT_NEAR(DepthSigma({}, 1.0, 0.5), 0.0012 + 0.0019 * 0.36 + 0.0004, 1e-9);
+  EXPECT_TRUE(std::isfinite(DepthSigma({}, 1.0, 0.0)));
+  EXPECT_TRUE(std::isfinite(DepthSigma({}, 0.0, 1.0)));
+}
+
 }  // namespace
 }  // namespace plumb
