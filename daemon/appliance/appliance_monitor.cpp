@@ -91,7 +91,7 @@ void Appliance::WatchRest() {
 }
 
 /// Whose outline the camera's picture shows: that of the reference which the open session compares
-/// with, so of nobody else.
+/// with, and never that of another patient.
 void Appliance::FollowReference() {
   if (store_ == nullptr || !session_.IsOpen() || session_.purpose() != ScanPurpose::kFraction)
     return outline_.Follow({});
@@ -107,7 +107,7 @@ void Appliance::FollowReference() {
       job.markers_iec = room->markers_iec;
     outline_.Follow(std::move(job));
   } catch (const std::exception& error) {
-    // The next scan says what is wrong with the reference; a picture without it stops nobody's.
+    // The next scan says what is wrong with the reference; without an outline it can still begin.
     outline_.Follow({});
     Log(LogLevel::kWarning, MessageOf(error).English());
   }

@@ -34,7 +34,7 @@ struct CheckedBackup {
 std::optional<CheckedBackup> CheckNextBackup(StoreDatabase& database, std::chrono::hours at_least,
                                              const std::stop_token& stop = {});
 
-/// Nobody but who has the private key can tell whether an encrypted backup opens: asked for twice a
+/// Only a holder of the private key can tell whether an encrypted backup opens: asked for twice a
 /// year.
 inline constexpr std::chrono::hours kVerifiedEvery{24 * 183};
 /// Whether a person has noted no such verification for as long, as the log says. Before the first

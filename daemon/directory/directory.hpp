@@ -13,8 +13,8 @@
 
 namespace plumb {
 
-/// Used on the loop's thread. One question at a time: those who log in wait for each other, nobody
-/// else does. On destruction it waits for the question that is open.
+/// Used on the loop's thread. One question at a time: people who log in wait for each other, and
+/// other requests for none of them. On destruction it waits for the question that is open.
 class Directory {
  public:
   /// @param loop  Outlives this object.

@@ -97,7 +97,7 @@ Descriptor Dialled(const sockaddr* address, socklen_t size) {
 }
 
 // A connection to the server, before anything is said. The library's own would wait for minutes
-// where nobody answers.
+// where no server answers.
 Descriptor Dial(const std::string& url) {
   LDAPURLDesc* given = nullptr;
   if (ldap_url_parse(url.c_str(), &given) != LDAP_URL_SUCCESS) Check(nullptr, LDAP_PARAM_ERROR);

@@ -20,7 +20,7 @@ namespace {
 constexpr int kPreviewColumns = 320;
 constexpr int kPreviewQuality = 70;
 constexpr std::chrono::milliseconds kOutlineEvery{500};
-// A picture that is older is not shown as one of now; nobody who looks asks less often.
+// An older picture is not shown as a current one; a page that shows it asks more often than this.
 constexpr double kOutlineHolds_s = 1.5;
 
 bool AreSame(const MarkerMap& a, const MarkerMap& b) {

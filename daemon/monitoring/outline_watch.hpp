@@ -24,7 +24,7 @@ namespace plumb {
 
 /// Whose outline is wanted.
 struct OutlineJob {
-  std::filesystem::path scene = {};  ///< Folder; empty: nobody's.
+  std::filesystem::path scene = {};  ///< Folder; empty: no outline is wanted.
   /// As ScanJob has it. On the watch's thread.
   std::function<Message(const std::stop_token&)> check_reference = {};
   /// Where the room's markers are for a planning CT, which has none of its own.
@@ -40,7 +40,7 @@ struct OutlinedPicture {
 };
 
 /// Used on the loop's thread. Looks at two images a second on a thread of its own that gives way to
-/// scans, and at none while nobody asks.
+/// scans, and only while a page asks.
 class OutlineWatch {
  public:
   /// @param sensors  Borrowed.

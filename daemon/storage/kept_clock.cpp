@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::uint64_t kPatience_us = 5'000'000;
 
-/// In plumbd's sandbox (ProtectClock=) nobody may ask the kernel; systemd-timedated does it for
-/// everybody.
+/// In plumbd's sandbox (ProtectClock=) no process may ask the kernel; systemd-timedated answers
+/// instead.
 int AskTimedated(timex& state) {
   constexpr const char* kName = "org.freedesktop.timedate1";
   sd_bus* bus = nullptr;
@@ -40,7 +40,7 @@ bool IsClockKept(const std::filesystem::path& note, const AskKernelClock& ask) {
   if (std::filesystem::exists(note, error)) return true;
   timex state{};  // no modes: nothing is set
   const int answer = ask ? ask(state) : AskSystem(state);
-  // The kernel sets the flag at its start, and again once nobody has told it better for hours.
+  // The kernel sets the flag at its start, and again if no time server has corrected it for hours.
   return answer >= 0 && answer != TIME_ERROR && (state.status & STA_UNSYNC) == 0;
 }
 
