@@ -29,7 +29,7 @@ constexpr double kLeastImagePart_m2 = 500e-6, kAboveCouch_m = 3 * kMillimetre;
 // or as far on the other side.
 constexpr double kThresholdHalf_hu = 200.0;
 constexpr double kPixelHalf = 0.2;         // of a pixel: twice the standard deviation of slices
-constexpr double kMostThreshold_mm = 3.0;  // where the images are too blurred to tell
+constexpr double kMostThreshold_mm = 3.0;  // Stated for images too blurred to show the skin.
 
 // A contour of a slice in IEC axes; nothing for what is no part of a surface, such as a point.
 void AddSlice(const PlannedRoi& roi, const PlannedContour& contour, const Eigen::Matrix3d& R,

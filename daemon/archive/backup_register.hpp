@@ -34,8 +34,8 @@ struct CheckedBackup {
 std::optional<CheckedBackup> CheckNextBackup(StoreDatabase& database, std::chrono::hours at_least,
                                              const std::stop_token& stop = {});
 
-/// Only a holder of the private key can tell whether an encrypted backup opens: asked for twice a
-/// year.
+/// How often a person is asked to open an encrypted backup with the private key, which the unit
+/// does not have.
 inline constexpr std::chrono::hours kVerifiedEvery{24 * 183};
 /// Whether a person has noted no such verification for as long, as the log says. Before the first
 /// one the time runs from the first backup. @throws IoError and its kinds

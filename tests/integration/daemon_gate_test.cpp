@@ -75,7 +75,7 @@ class DaemonGateTest : public ::testing::Test {
         .count();
   }
   static void WaitFor_ms(long long time_ms) {
-    while (Now_ms() < time_ms) std::this_thread::sleep_for(milliseconds(5));
+    std::this_thread::sleep_until(std::chrono::steady_clock::time_point(milliseconds(time_ms)));
   }
   /// Until a second of pulses has come, as the status says.
   void WaitForPulses(Plumbd& plumbd) const {
@@ -143,11 +143,12 @@ TEST_F(DaemonGateTest, AStalledLoopAStoppedAndAKilledProcessLeaveASteadyLine) {
   WaitForPulses(plumbd);
 
   // The loop hangs in a driver's call; the threads that see and judge the body go on.
-  std::ofstream(folder_ / "stall") << "";
+  const std::filesystem::path stall = folder_ / "stall";
+  ASSERT_EQ(::mkfifo(stall.c_str(), 0600), 0);
   const char kStall = 's';
   ASSERT_EQ(::write(button_, &kStall, 1), 1);
   ExpectSteadySince(Now_ms());
-  std::filesystem::remove(folder_ / "stall");
+  ::close(::open(stall.c_str(), O_WRONLY | O_CLOEXEC));
   WaitForPulses(plumbd);
 
   plumbd.Signal(SIGSTOP);

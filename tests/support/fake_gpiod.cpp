@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A library to be loaded before libgpiod (version 1): button and lights of the unmodified program
 // are files in the folder PLUMB_FAKE_GPIO. `button` is a FIFO of edges, '1' pressed, '0' released,
-// 'x' the line is gone, 's' the call does not return while the file `stall` exists; `held` exists:
-// it is pressed at the start. `lights` gets a line for each level that is set: milliseconds of the
-// steady clock, name of the line, 0 or 1.
+// 'x' the line is gone, 's' the call does not return until the FIFO `stall` is opened for writing;
+// `held` exists: it is pressed at the start. `lights` gets a line for each level that is set:
+// milliseconds of the steady clock, name of the line, 0 or 1.
 #include <fcntl.h>
 #include <gpiod.h>
 #include <time.h>
@@ -86,7 +86,7 @@ PLUMB_FAKE int gpiod_line_event_get_fd(gpiod_line* line) { return line->button; 
 PLUMB_FAKE int gpiod_line_event_read(gpiod_line* line, gpiod_line_event* event) {
   char edge = 0;
   if (::read(line->button, &edge, 1) != 1 || edge == 'x') return -1;
-  while (edge == 's' && ::access(InFolder("stall").c_str(), F_OK) == 0) ::usleep(2000);
+  if (edge == 's') ::close(::open(InFolder("stall").c_str(), O_RDONLY | O_CLOEXEC));
   ::clock_gettime(CLOCK_MONOTONIC, &event->ts);
   line->is_pressed = edge == '1';
   event->event_type =

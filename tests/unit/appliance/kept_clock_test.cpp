@@ -25,7 +25,7 @@ TEST(KeptClockTest, IsWhatAnyProgramThatKeepsTheClockTellsTheKernel) {
   const auto note = folder / "synchronized";
   EXPECT_TRUE(IsClockKept(note, Answers(TIME_OK, STA_PLL))) << "chrony or ntpd keeps it";
   EXPECT_TRUE(IsClockKept(note, Answers(TIME_INS, STA_PLL))) << "on the day of a leap second";
-  EXPECT_FALSE(IsClockKept(note, Answers(TIME_ERROR, STA_UNSYNC))) << "nobody does";
+  EXPECT_FALSE(IsClockKept(note, Answers(TIME_ERROR, STA_UNSYNC))) << "no program keeps it";
   EXPECT_FALSE(IsClockKept(note, Answers(TIME_OK, STA_UNSYNC | STA_PLL)));
   EXPECT_FALSE(IsClockKept(note, Answers(TIME_ERROR, 0))) << "its error is unknown";
   EXPECT_FALSE(IsClockKept(note, Answers(-1, 0))) << "a sandbox forbids asking";

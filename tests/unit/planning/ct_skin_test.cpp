@@ -21,6 +21,7 @@
 #include "drivers/simulator/suites/ct_images.hpp"
 #include "drivers/simulator/suites/planned_scenes.hpp"
 #include "drivers/simulator/suites/planning_ct.hpp"
+#include "tests/unit/planning/torso.hpp"
 #include "words/planning.hpp"
 
 namespace plumb {
@@ -29,26 +30,14 @@ namespace {
 using simulated::CtImageOptions;
 using simulated::CtQuirk;
 using simulated::PlanningCtOptions;
-using testing::Contains;
-using testing::Not;
-using testing::Truly;
+using ::testing::Contains;
+using ::testing::Not;
+using testing::PlaceOfTorso;
+using testing::Torso;
+using ::testing::Truly;
 
 auto Warns(const MessageId& id) {
   return Contains(Truly([id](const Message& message) { return message.Is(id); }));
-}
-
-const simulated::BodyModel& Torso() {
-  static const auto body = simulated::MakeBody({.kind = simulated::BodyKind::kTorso});
-  return *body;
-}
-
-Pose PlaceOfTorso() {
-  Eigen::Matrix3d R;
-  R << 0, 1, 0, -1, 0, 0, 0, 0, 1;
-  Pose T = Pose::Identity();
-  T.linear() = Eigen::AngleAxisd(0.035, Eigen::Vector3d::UnitZ()).toRotationMatrix() * R;
-  T.translation() = Eigen::Vector3d(0.02, -0.03, -0.12);
-  return T;
 }
 
 /// A region of 30 cm, so that a test takes a second.

@@ -12,6 +12,7 @@
 #include "algo/motion/region.hpp"
 #include "drivers/simulator/suites/planned_scenes.hpp"
 #include "drivers/simulator/suites/planning_ct.hpp"
+#include "tests/unit/planning/torso.hpp"
 #include "words/planning.hpp"
 
 namespace plumb {
@@ -19,26 +20,13 @@ namespace {
 
 using simulated::CtQuirk;
 using simulated::PlanningCtOptions;
-using testing::Contains;
-using testing::Truly;
-
-const simulated::BodyModel& Body() {
-  static const auto body = simulated::MakeBody({.kind = simulated::BodyKind::kTorso});
-  return *body;
-}
-
-// It lies on z = -0.12 m, head to the gantry, turned by 2 deg.
-Pose PlaceOfBody() {
-  Eigen::Matrix3d R;
-  R << 0, 1, 0, -1, 0, 0, 0, 0, 1;
-  Pose T = Pose::Identity();
-  T.linear() = Eigen::AngleAxisd(0.035, Eigen::Vector3d::UnitZ()).toRotationMatrix() * R;
-  T.translation() = Eigen::Vector3d(0.02, -0.03, -0.12);
-  return T;
-}
+using ::testing::Contains;
+using testing::PlaceOfTorso;
+using testing::Torso;
+using ::testing::Truly;
 
 std::pair<StructureSet, TreatmentPlan> Files(const PlanningCtOptions& options) {
-  return simulated::MakePlanningCt(Body().surface, PlaceOfBody(), options);
+  return simulated::MakePlanningCt(Torso().surface, PlaceOfTorso(), options);
 }
 
 Scene Import(const PlanningCtOptions& options, const PlanningChoice& choice = {}) {
@@ -62,19 +50,19 @@ auto Says(const MessageId& id) {
 
 // The largest distance of a scene's points from the body's true surface, and their number.
 std::pair<double, std::size_t> FarthestFromBody(const Scene& scene) {
-  const Pose T_body = PlaceOfBody().inverse();
+  const Pose T_body = PlaceOfTorso().inverse();
   double farthest_m = 0.0;
   for (const Eigen::Vector3f& p : scene.cloud.points) {
     const Eigen::Vector3f in_body = (T_body * p.cast<double>()).cast<float>();
-    farthest_m = std::max(farthest_m, std::abs(double{Body().grid->Distance(in_body)}));
+    farthest_m = std::max(farthest_m, std::abs(double{Torso().grid->Distance(in_body)}));
   }
   return {farthest_m, scene.cloud.size()};
 }
 
 double LowestOfBody() {
   double lowest_m = 0.0;
-  for (const Eigen::Vector3f& vertex : Body().surface.vertices)
-    lowest_m = std::min(lowest_m, (PlaceOfBody() * vertex.cast<double>()).z());
+  for (const Eigen::Vector3f& vertex : Torso().surface.vertices)
+    lowest_m = std::min(lowest_m, (PlaceOfTorso() * vertex.cast<double>()).z());
   return lowest_m;
 }
 
@@ -147,7 +135,7 @@ TEST(PlannedSceneTest, WithoutOneExternalContourAPersonChooses) {
   EXPECT_TRUE(Refusal({.quirks = {CtQuirk::kNoExternal}}).Is(say::planning::kNoExternalPerhaps));
   const Message several = Refusal({.quirks = {CtQuirk::kSeveralExternal}});
   EXPECT_TRUE(several.Is(say::planning::kSeveralExternal));
-  EXPECT_THAT(several.English(), testing::HasSubstr("the largest is BODY"));
+  EXPECT_THAT(several.English(), ::testing::HasSubstr("the largest is BODY"));
   for (const CtQuirk quirk : {CtQuirk::kNoExternal, CtQuirk::kSeveralExternal})
     EXPECT_EQ(Import({.quirks = {quirk}}, {.roi = "BODY"}).planning->roi, "BODY");
   EXPECT_TRUE(Refusal({}, {.roi = "body"}).Is(say::planning::kNoSuchRoi));
