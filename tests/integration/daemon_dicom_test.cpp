@@ -149,7 +149,8 @@ TEST_F(DaemonDicomTest, WhatWasReceivedIsListedAndImportedByAPersonOnly) {
   EXPECT_EQ(mixed.status, 409) << mixed.body;
   EXPECT_EQ(mixed.json()["error_message"]["id"], "store.planning_patient_of");
 
-  // Neither the state folder nor the journal names the patient. While plumbd runs, files come and go.
+  // Neither the state folder nor the journal names the patient. plumbd is stopped first: while it
+  // runs, files come and go.
   EXPECT_EQ(plumbd_->Stop(), 0);
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "state")) {
     if (!entry.is_regular_file()) continue;
