@@ -12,7 +12,6 @@
 
 #include <Eigen/Core>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
@@ -25,6 +24,7 @@
 #include "algo/motion/region.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/scene.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "algo/base/units.hpp"
-#include "algo/comparison/correction_words.hpp"
+#include "algo/comparison/direction_words.hpp"
 
 namespace plumb {
 namespace {

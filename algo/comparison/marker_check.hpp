@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "algo/acceptance/verdict.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/scene.hpp"
+#include "algo/verdict/verdict.hpp"
 
 namespace plumb {
 

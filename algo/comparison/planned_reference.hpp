@@ -9,7 +9,6 @@
 
 #include <Eigen/Core>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/comparison/calibrated_room.hpp"
@@ -17,6 +16,7 @@
 #include "algo/comparison/scene_alignment.hpp"
 #include "algo/types/point_cloud.hpp"
 #include "algo/types/scene.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

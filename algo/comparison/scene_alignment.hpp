@@ -9,12 +9,12 @@
 
 #include <Eigen/Core>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/marker.hpp"
 #include "algo/types/scene.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

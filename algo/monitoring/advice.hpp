@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/names.hpp"
 #include "algo/base/pose.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

@@ -12,7 +12,6 @@
 
 #include <Eigen/Core>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
 #include "algo/base/pose.hpp"
@@ -22,6 +21,7 @@
 #include "algo/monitoring/rest_statistics.hpp"
 #include "algo/monitoring/sensor_at_rest.hpp"
 #include "algo/types/frame.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

@@ -5,8 +5,8 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
-#include "daemon/export_formats/mesh_file.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/mesh_formats/mesh_file.hpp"
 #include "words/cli.hpp"
 
 namespace plumb {

@@ -9,9 +9,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/verdict/gates.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "daemon/result/axis_names.hpp"
 #include "daemon/result/stored_result.hpp"

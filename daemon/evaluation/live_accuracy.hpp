@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/monitoring/monitor.hpp"
+#include "algo/verdict/gates.hpp"
 #include "daemon/evaluation/accuracy.hpp"
 #include "daemon/evaluation/number_errors.hpp"
 

@@ -8,7 +8,7 @@
 #include <stop_token>
 #include <string>
 
-#include "algo/acceptance/gates.hpp"
+#include "algo/verdict/gates.hpp"
 #include "drivers/simulator/suites/endless_live.hpp"
 
 namespace plumb {

@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <optional>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/comparison/correction.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

@@ -18,11 +18,11 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
 #include "algo/base/names.hpp"
 #include "algo/base/parse_number.hpp"
+#include "algo/verdict/gates.hpp"
 #include "words/stored_file.hpp"
 
 namespace plumb::stored {

@@ -4,9 +4,9 @@
 
 #include <optional>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/message.hpp"
 #include "algo/types/scene.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

@@ -17,9 +17,9 @@
 
 #include <fmt/format.h>
 
-#include "algo/acceptance/number_judgement.hpp"
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/verdict/number_judgement.hpp"
 #include "daemon/sheets/paper.hpp"
 #include "daemon/sheets/print_text.hpp"
 #include "drivers/files/image_file.hpp"

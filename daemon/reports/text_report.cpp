@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "algo/acceptance/shown_row.hpp"
 #include "algo/base/units.hpp"
 #include "algo/base/utf8.hpp"
+#include "algo/verdict/shown_row.hpp"
 #include "daemon/result/shown_rows.hpp"
 #include "words/number.hpp"
 #include "words/result.hpp"

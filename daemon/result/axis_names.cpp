@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "algo/acceptance/shown_row.hpp"
+#include "algo/verdict/shown_row.hpp"
 #include "words/result.hpp"
 
 namespace plumb {

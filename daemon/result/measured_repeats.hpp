@@ -7,9 +7,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "algo/acceptance/repeatability.hpp"
 #include "algo/comparison/comparison.hpp"
 #include "algo/types/scene.hpp"
+#include "algo/verdict/repeatability.hpp"
 
 namespace plumb {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "algo/acceptance/shown_row.hpp"
+#include "algo/verdict/shown_row.hpp"
 #include "daemon/result/stored_result.hpp"
 
 namespace plumb {

@@ -15,9 +15,9 @@
 #include <Eigen/Core>
 #include <nlohmann/json_fwd.hpp>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/pose.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "algo/planning/ct_skin.hpp"
-#include "daemon/export_formats/mesh_file.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/mesh_formats/mesh_file.hpp"
 #include "drivers/dicom/planning_files.hpp"
 #include "tests/integration/command_line.hpp"
 #include "tests/unit/dicom/small_files.hpp"

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "algo/acceptance/verdict.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
+#include "algo/verdict/verdict.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {

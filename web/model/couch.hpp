@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "algo/acceptance/shown_row.hpp"
 #include "algo/base/message.hpp"
+#include "algo/verdict/shown_row.hpp"
 #include "web/model/numbers.hpp"
 #include "web/model/scan.hpp"
 #include "web/model/wall_clock.hpp"

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "algo/acceptance/default_tolerance.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
+#include "algo/verdict/default_tolerance.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "algo/acceptance/shown_row.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/names.hpp"
+#include "algo/verdict/shown_row.hpp"
 #include "web/model/check.hpp"
 #include "web/model/numbers.hpp"
 #include "web/model/reference.hpp"

@@ -16,7 +16,7 @@ export const kFraction = { min: 1, max: 999, step: 1 };
 /// For how long a result is shown as one to act on (web/model/scan.hpp).
 export const kResult = { valid_s: 120 };
 
-/// Where no plan states one (algo/acceptance/default_tolerance.hpp).
+/// Where no plan states one (algo/verdict/default_tolerance.hpp).
 export const kTolerance = { shift_mm: 3, rotation_deg: 1 };
 
 export const kName = { maxlength: 32 };

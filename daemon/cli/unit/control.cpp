@@ -18,10 +18,10 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
+#include "algo/verdict/gates.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/language.hpp"

@@ -14,7 +14,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/dicom/result_export.hpp"
-#include "daemon/export_formats/mesh_file.hpp"
+#include "daemon/mesh_formats/mesh_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/dicom/small_files.hpp"

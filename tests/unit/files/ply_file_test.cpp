@@ -9,7 +9,7 @@
 #include <string>
 
 #include "algo/base/errors.hpp"
-#include "daemon/export_formats/mesh_file.hpp"
+#include "daemon/mesh_formats/mesh_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"

@@ -67,14 +67,13 @@ TEST(DocumentsTest, WhatTheGuidesNameIsThere) {
 }
 
 TEST(DocumentsTest, AFileOrNameThatIsGoneIsFound) {
-  EXPECT_THAT(Check("`algo/acceptance/gates.cpp` (`Decide`) and `verdict.hpp`").missing,
+  EXPECT_THAT(Check("`algo/verdict/gates.cpp` (`Decide`) and `verdict.hpp`").missing,
               ::testing::IsEmpty());
-  EXPECT_THAT(
-      Check("`algo/acceptance/judge.cpp`; `algo/acceptance/gates.cpp` (`Resolve`), "
-            "`vertict.cpp`")
-          .missing,
-      ::testing::ElementsAre("algo/acceptance/judge.cpp", "algo/acceptance/gates.cpp: Resolve",
-                             "algo/acceptance/vertict.cpp"));
+  EXPECT_THAT(Check("`algo/verdict/judge.cpp`; `algo/verdict/gates.cpp` (`Resolve`), "
+                    "`vertict.cpp`")
+                  .missing,
+              ::testing::ElementsAre("algo/verdict/judge.cpp", "algo/verdict/gates.cpp: Resolve",
+                                     "algo/verdict/vertict.cpp"));
 }
 
 /// Every paper of the project, relative to its root.

@@ -7,7 +7,7 @@
 #include <regex>
 #include <set>
 
-#include "algo/acceptance/default_tolerance.hpp"
+#include "algo/verdict/default_tolerance.hpp"
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/model/limits.hpp"
 #include "web/model/scan.hpp"

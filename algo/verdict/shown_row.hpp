@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "algo/acceptance/gates.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algo/comparison/correction_words.hpp"
+#include "algo/comparison/direction_words.hpp"
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algo/acceptance/shown_row.hpp"
+#include "algo/verdict/shown_row.hpp"
 
 #include <cmath>
 

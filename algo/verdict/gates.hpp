@@ -12,11 +12,11 @@
 
 #include <Eigen/Core>
 
-#include "algo/acceptance/default_tolerance.hpp"
-#include "algo/acceptance/number_judgement.hpp"
-#include "algo/acceptance/verdict.hpp"
 #include "algo/base/message.hpp"
 #include "algo/base/units.hpp"
+#include "algo/verdict/default_tolerance.hpp"
+#include "algo/verdict/number_judgement.hpp"
+#include "algo/verdict/verdict.hpp"
 
 namespace plumb {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algo/acceptance/gates.hpp"
+#include "algo/verdict/gates.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algo/acceptance/repeatability.hpp"
+#include "algo/verdict/repeatability.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "algo/acceptance/gates.hpp"
 #include "algo/base/message.hpp"
+#include "algo/verdict/gates.hpp"
 
 namespace plumb {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/export_formats/mesh_file.hpp"
+#include "daemon/mesh_formats/mesh_file.hpp"
 
 #include <fmt/format.h>
 
