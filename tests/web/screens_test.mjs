@@ -283,9 +283,9 @@ async function plannedPatient(code, site) {
   return { id, draft, scan };
 }
 
-const app = readFileSync(new URL('../../web/page/app.js', import.meta.url), 'utf8');
+const app = readFileSync(new URL('../../web/page/screens/all_screens.js', import.meta.url), 'utf8');
 const routes = [...app.matchAll(/^ {2}(\w+): \{ show: /gm)].map(([, name]) => name);
-check(routes.length >= 11, `routes of app.js: ${routes}`);
+check(routes.length >= 11, `routes of all_screens.js: ${routes}`);
 
 h.tell('swift');
 await h.step('before anybody has an account', async () => {

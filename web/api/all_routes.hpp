@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All routes. The API under /api/v1: JSON in, JSON and files out. web/openapi.yaml describes it.
+// All routes. The API under /api/v1: JSON in, JSON and files out. web/openapi.yaml describes it. A
+// route stands in the file of its subject beside this one, and asks an interface of web/service.
 #pragma once
 
 #include <chrono>
@@ -38,6 +39,9 @@ void AddResultPage(Routes& routes, const Services& services);
 
 /// Adds the reports as PDF files, and the numbers of a patient as CSV and JSON.
 void AddExportRoutes(Routes& routes, const Services& services);
+
+/// Adds the profile of the sensor and the judgement of repeated sweeps.
+void AddSensorRoutes(Routes& routes, const Services& services);
 
 /// Adds the statistics of set-up, of a patient and of all sites, the latter as CSV, too.
 void AddStatisticsRoutes(Routes& routes, const Services& services);

@@ -85,6 +85,7 @@ class HttpServer::Impl {
     AddMonitorApi(routes, services);
     AddResultPage(routes, services);
     AddExportRoutes(routes, services);
+    AddSensorRoutes(routes, services);
     AddStatisticsRoutes(routes, services);
     AddRoomCalibrationRoutes(routes, services);
     LimitDisplays(router_, services);

@@ -11,43 +11,12 @@ import { mayLeave } from './leave.js';
 import { drafts } from './plan_drafts.js';
 import { adoptPreferences, applyTheme, looks } from './preferences.js';
 import { listenToScanners } from './scanner.js';
-import { showAudit } from './screens/audit.js';
-import { showCheck } from './screens/check.js';
+import { kScreens } from './screens/all_screens.js';
 import { stateHere } from './screens/common.js';
 import { showFault, showFirstPassword, showLogin } from './screens/login.js';
-import { showMonitor } from './monitoring/monitor.js';
-import { showMonitoringRecord } from './monitoring/monitoring_record.js';
-import { showPatient, showPatients } from './screens/patients.js';
-import { showPlan } from './screens/plan/plan.js';
 import { quickLogIn, quickPeople, rememberQuickPeople } from './screens/quick_login.js';
-import { showResult } from './screens/result.js';
-import { showScan } from './screens/scan.js';
-import { showSettings } from './screens/settings.js';
-import { showStatistics } from './screens/patient/statistics.js';
-import { showStatus } from './screens/status.js';
-import { showUpdate } from './screens/update.js';
-import { showRepeats } from './set_up/repeats.js';
-import { showUsers } from './screens/users.js';
 import { followReference, followSession, forgetSession } from './treatment.js';
 import { S, said } from './words.js';
-
-const kScreens = {
-  status: { show: showStatus, permission: 'view', nav: true },
-  patients: { show: showPatients, permission: 'view', nav: true },
-  statistics: { show: showStatistics, permission: 'view', parent: 'patients' },
-  patient: { show: showPatient, permission: 'view', parent: 'patients' },
-  plan: { show: showPlan, permission: 'view', parent: 'patients' },
-  scan: { show: showScan, permission: 'view', nav: true },
-  result: { show: showResult, permission: 'view', nav: true },
-  monitor: { show: showMonitor, permission: 'view', nav: true },
-  monitoring: { show: showMonitoringRecord, permission: 'view', parent: 'monitor' },
-  check: { show: showCheck, permission: 'view', nav: true },
-  users: { show: showUsers, permission: 'login', nav: true },
-  audit: { show: showAudit, permission: 'audit', nav: true },
-  settings: { show: showSettings, permission: 'view', nav: true },
-  repeats: { show: showRepeats, permission: 'view', parent: 'settings' },
-  update: { show: showUpdate, permission: 'view', nav: true },
-};
 
 const kAskAgain_ms = 3000;
 const kUseEvery_s = 30;
