@@ -1,11 +1,19 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# The Snakemake workflow over many small sweeps, killed three times: none is lost, none made twice.
-#   workflow.py PLUMB SWEEPS FRAMES
-# The sweeps are windows of two simulated ones, so that each has another content.
+"""The Snakemake workflow over many small sweeps, killed three times: none is lost, none made twice.
+
+  workflow.py PLUMB SWEEPS FRAMES             on this machine, two jobs at a time
+  workflow.py PLUMB SWEEPS FRAMES --slurm     on a Slurm of two nodes (slurm_host.py), as root
+  workflow.py PLUMB SWEEPS FRAMES --speed-up  killed never; wall times with one and with two jobs
+
+The sweeps are windows of two simulated ones, so that each has another content.
+"""
+import argparse
+import contextlib
 import csv
 import os
 import pathlib
+import re
 import resource
 import shutil
 import signal
@@ -14,7 +22,9 @@ import sys
 import tempfile
 import time
 
-SNAKEFILE = pathlib.Path(__file__).resolve().parents[2] / "toolchain" / "workflow" / "Snakefile"
+from slurm_host import NODES, SlurmHost
+
+WORKFLOW = pathlib.Path(__file__).resolve().parents[2] / "toolchain" / "workflow"
 LONGEST_WAIT_S = 3000
 SKIPPED = 77
 
@@ -59,20 +69,51 @@ def finished(folder):
     return found
 
 
-def start(plumb, folder, *options):
-    command = ["snakemake", "--snakefile", SNAKEFILE, "--cores", "2", "--keep-going", "--quiet",
-               "all", "--config", f"plumb={plumb}"]  # fmt: skip
-    command[3:3] = options
+class Here:
+    """Jobs as processes of this machine."""
+
+    environment = dict(os.environ)
+
+    def __init__(self, jobs=2):
+        self.options = ["--cores", str(jobs), "--keep-going", "--rerun-incomplete"]
+
+    def kill_jobs(self):
+        """Nothing is left of them: they are killed with Snakemake."""
+
+
+class OnSlurm:
+    """Jobs of Slurm, by the profile that the workflow's README gives."""
+
+    def __init__(self, slurm, folder):
+        self.environment = slurm.environment
+        profile = folder / "profile"
+        profile.mkdir()
+        text = (WORKFLOW / "README.md").read_text().partition("## On Slurm")[2]
+        lines = re.search(r"(?:^    .*\n)+", text, re.MULTILINE).group()
+        (profile / "config.yaml").write_text(lines.replace("\n    ", "\n").removeprefix("    "))
+        self.options = ["--profile", str(profile)]
+        self._kills = 0
+
+    def kill_jobs(self):
+        """The first time they go on without Snakemake, as after a cut connection."""
+        self._kills += 1
+        if self._kills > 1:
+            subprocess.run(["scancel", "--user=root"], env=self.environment, check=True)
+
+
+def start(plumb, folder, runner, *options):
     log = open(folder / "log", "a")
     return subprocess.Popen(
-        command, cwd=folder, stdout=log, stderr=log, start_new_session=True,
-        env={**os.environ, "XDG_CACHE_HOME": str(folder / "cache")},
+        ["snakemake", "--snakefile", WORKFLOW / "Snakefile", *runner.options, *options, "--quiet",
+         "all", "--config", f"plumb={plumb}"],
+        cwd=folder, stdout=log, stderr=log, start_new_session=True,
+        env={**runner.environment, "XDG_CACHE_HOME": str(folder / "cache")},
     )  # fmt: skip
 
 
-def kill_at(plumb, folder, count):
+def kill_at(plumb, folder, runner, count):
     """Kills everything as soon as so many scenes are there."""
-    run = start(plumb, folder, "--rerun-incomplete")
+    run = start(plumb, folder, runner)
     end = time.monotonic() + LONGEST_WAIT_S
     while len(finished(folder)) < count:
         assert run.poll() is None, (folder / "log").read_text()
@@ -80,40 +121,83 @@ def kill_at(plumb, folder, count):
         time.sleep(0.01)
     os.killpg(run.pid, signal.SIGKILL)
     run.wait()
-    assert start(plumb, folder, "--unlock").wait() == 0, (folder / "log").read_text()
-    return finished(folder)
+    there = finished(folder)
+    runner.kill_jobs()
+    assert start(plumb, folder, runner, "--unlock").wait() == 0, (folder / "log").read_text()
+    return there
 
 
-def main(plumb, count, frames):
+def finish(plumb, folder, runner):
+    run = start(plumb, folder, runner)
+    assert run.wait(LONGEST_WAIT_S) == 0, (folder / "log").read_text()
+
+
+def check_killed_workflow(plumb, folder, runner, sweeps):
+    count = len(sweeps)
+    before = {}
+    for part in (0.2, 0.5, 0.8):
+        there = kill_at(plumb, folder, runner, max(1, int(part * count)))
+        # Nothing that was finished before an earlier kill was touched.
+        assert {name: there.get(name) for name in before} == before
+        assert len(there) < count, "the last kill came too late"
+        before = there
+    finish(plumb, folder, runner)
+    there = finished(folder)
+    assert {name: there.get(name) for name in before} == before
+    with open(folder / "scenes" / "scenes.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["input"] for row in rows] == [str(sweep) for sweep in sweeps], "one is lost"
+    assert {row["exit_code"] for row in rows} == {"0"}
+    outputs = [row["output"] for row in rows]
+    assert len(set(outputs)) == count and set(outputs) == set(there), "one is there twice"
+    left = [path.name for path in (folder / "scenes").iterdir() if ".plumb-" in path.name]
+    assert not left, left
+
+
+def measure_speed_up(plumb, folder):
+    wall_s = []
+    for jobs in (1, 2):
+        for made in ("scenes", "work", ".snakemake"):
+            shutil.rmtree(folder / made, ignore_errors=True)
+        began = time.monotonic()
+        finish(plumb, folder, Here(jobs))
+        wall_s.append(time.monotonic() - began)
+        print(f"{jobs} at a time: {wall_s[-1]:.0f} s")
+    print(f"two jobs are {wall_s[0] / wall_s[1]:.2f} times as fast as one")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("plumb", type=lambda path: pathlib.Path(path).resolve())
+    parser.add_argument("sweeps", type=int)
+    parser.add_argument("frames", type=int)
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--slurm", action="store_true")
+    how.add_argument("--speed-up", action="store_true")
+    options = parser.parse_args()
     if not shutil.which("snakemake"):
         print("snakemake is not installed")
         return SKIPPED
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, contextlib.ExitStack() as stack:
         folder = pathlib.Path(name)
-        sweeps = make_sweeps(plumb, folder, count, frames)
-        before = {}
-        for part in (0.2, 0.5, 0.8):
-            there = kill_at(plumb, folder, max(1, int(part * count)))
-            # Nothing that was finished before an earlier kill was touched.
-            assert {name: there.get(name) for name in before} == before
-            assert len(there) < count, "the last kill came too late"
-            before = there
-        run = start(plumb, folder, "--rerun-incomplete")
-        assert run.wait(LONGEST_WAIT_S) == 0, (folder / "log").read_text()
-        there = finished(folder)
-        assert {name: there.get(name) for name in before} == before
-        with open(folder / "scenes" / "scenes.csv", newline="") as file:
-            rows = list(csv.DictReader(file))
-        assert [row["input"] for row in rows] == [str(sweep) for sweep in sweeps], "one is lost"
-        assert {row["exit_code"] for row in rows} == {"0"}
-        outputs = [row["output"] for row in rows]
-        assert len(set(outputs)) == count and set(outputs) == set(there), "one is there twice"
-        left = [path.name for path in (folder / "scenes").iterdir() if ".plumb-" in path.name]
-        assert not left, left
+        sweeps = make_sweeps(options.plumb, folder, options.sweeps, options.frames)
+        if options.speed_up:
+            measure_speed_up(options.plumb, folder)
+        else:
+            slurm = stack.enter_context(SlurmHost(folder)) if options.slurm else None
+            runner = OnSlurm(slurm, folder) if slurm else Here()
+            began = time.monotonic()
+            check_killed_workflow(options.plumb, folder, runner, sweeps)
+            print(f"{time.monotonic() - began:.0f} s with three kills")
+            for node in NODES if slurm else ():
+                log = (folder / "slurm" / f"{node}.log").read_text()
+                assert "Launching batch job" in log, f"{node} had no work"
+                print(f"{node}: {log.count('Launching batch job')} jobs")
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(f"{count} sweeps of {frames} frames: {used.ru_utime + used.ru_stime:.0f} CPU seconds")
+    print(f"{options.sweeps} sweeps of {options.frames} frames: "
+          f"{used.ru_utime + used.ru_stime:.0f} CPU seconds of this script's programs")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(pathlib.Path(sys.argv[1]).resolve(), int(sys.argv[2]), int(sys.argv[3])))
+    sys.exit(main())
