@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kMostGroups = 32;  // Of each role.
 constexpr std::string_view kPlaceOfName = "{name}";
+constexpr std::string_view kPlaceOfPerson = "{person}";
 
 // Scheme and host only: a path, a filter or a name of a user has no place there.
 bool IsDirectoryUrl(const std::string& text) {
@@ -46,8 +47,12 @@ DirectorySettings ReadDirectorySettings(Section section) {
                say::config::ExpectedPersonFilter(std::string(kPlaceOfName)),
                [](const std::string& text) { return IsFilter(text) && HasName(text); });
   section.Take("groups_base", settings.groups_base, say::config::ExpectedEntry(), IsShortText);
-  section.Take("groups_filter", settings.groups_filter, say::config::ExpectedFilter("{person}"),
-               IsFilter);
+  // Without the person in it all groups would be everybody's.
+  section.Take(
+      "groups_filter", settings.groups_filter,
+      say::config::ExpectedFilter(std::string(kPlaceOfPerson)), [](const std::string& text) {
+        return IsFilter(text) && (HasName(text) || text.find(kPlaceOfPerson) != std::string::npos);
+      });
   section.TakeNames("engineers", settings.engineers, say::config::ExpectedGroups(), kMostGroups);
   section.TakeNames("physicists", settings.physicists, say::config::ExpectedGroups(), kMostGroups);
   section.TakeNames("technicians", settings.technicians, say::config::ExpectedGroups(),

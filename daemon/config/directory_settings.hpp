@@ -17,7 +17,7 @@ struct DirectorySettings {
   /// "ldapi://SOCKET" with %2F for each slash.
   std::string url;
   std::filesystem::path trusted;  ///< Certificates, PEM; empty: those of the system.
-  /// As which a person logs in there; {name} stands for the name that was typed.
+  /// The name with which a person logs in there; {name} stands for what was typed.
   std::string person;
   /// Where to look for the person's entry after that, and by which filter with {name}. Empty:
   /// `person` is the entry itself.

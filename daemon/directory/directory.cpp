@@ -16,7 +16,7 @@ bool Directory::Ask(const std::string& name, std::string password,
                     std::function<void(const web::DirectoryAnswer&)> done) {
   return questions_.Post([this, name, password = std::move(password),
                           done = alive_.WhileAlive(std::move(done))]() mutable {
-    const web::DirectoryAnswer answer = AskLdap(settings_, name, password);
+    const web::DirectoryAnswer answer = AskLdap(settings_, name, password, stop_.get_token());
     sodium_memzero(password.data(), password.size());
     loop_.Post("answer of the directory", [answer, done] { done(answer); });
   });

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <stop_token>
 #include <string>
 
 #include "daemon/config/directory_settings.hpp"
@@ -14,11 +15,14 @@
 namespace plumb {
 
 /// Used on the loop's thread. One question at a time: people who log in wait for each other, and
-/// other requests for none of them. On destruction it waits for the question that is open.
+/// other requests for none of them. Destruction ends the question that is open.
 class Directory {
  public:
   /// @param loop  Outlives this object.
   Directory(EventLoop& loop, DirectorySettings settings);
+  ~Directory() { stop_.request_stop(); }
+  Directory(const Directory&) = delete;
+  Directory& operator=(const Directory&) = delete;
 
   /// As web::AskDirectory.
   [[nodiscard]] bool Ask(const std::string& name, std::string password,
@@ -28,7 +32,8 @@ class Directory {
   EventLoop& loop_;
   DirectorySettings settings_;
   AliveFlag alive_;
-  WorkThread questions_{8};
+  std::stop_source stop_;
+  WorkThread questions_{8};  // last: its thread uses the others
 };
 
 }  // namespace plumb

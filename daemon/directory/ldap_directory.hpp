@@ -3,6 +3,7 @@
 // person's groups.
 #pragma once
 
+#include <stop_token>
 #include <string>
 
 #include "daemon/config/directory_settings.hpp"
@@ -10,10 +11,12 @@
 
 namespace plumb {
 
-/// Waits for the network, at most some ten seconds. An empty password never matches: a server would
-/// take it for a visitor who gives no name. SIGPIPE must be ignored, as the loop does. Thread-safe;
-/// throws only std::bad_alloc.
+/// Waits for the network: at most ten seconds once the server's name is known, some seconds for the
+/// name. An empty password never matches: a server would take it for a visitor who gives no name.
+/// SIGPIPE must be ignored, as the loop does. Thread-safe; does not throw.
+/// @param stop  Ends the question; the answer is then a failure.
 [[nodiscard]] web::DirectoryAnswer AskLdap(const DirectorySettings& settings,
-                                           const std::string& name, const std::string& password);
+                                           const std::string& name, const std::string& password,
+                                           const std::stop_token& stop);
 
 }  // namespace plumb

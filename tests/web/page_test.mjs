@@ -772,7 +772,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByText('No backup has been made yet.').waitFor();
   await engineer.getByRole('button', { name: 'Back up now' }).click();
   await engineer.getByText(/Last backup: .*, by engineer\./).waitFor();
-  await engineer.getByText('Nobody has noted that a backup was verified.').waitFor();
+  await engineer.getByText('No verification of a backup has been noted yet.').waitFor();
   await engineer.getByRole('button', { name: 'Note: verified now' }).click();
   await engineer.getByText(/A backup was last verified: .*, by engineer\./).waitFor();
   h.tell('nobackup');

@@ -315,7 +315,8 @@ OwnProof Accounts::ReadProof(Fields& fields, const char* password) {
           .second_factor = OptionalCode(fields, "second_factor")};
 }
 
-void Accounts::VerifyPassword(const User& user, std::string password, const Respond& respond,
+void Accounts::VerifyPassword(const User& user, std::string password,
+                              const std::vector<std::string>& counters, const Respond& respond,
                               std::function<void(bool)> done) {
   if (!IsInDirectory(user.password_hash)) {
     const bool accepted =
@@ -325,12 +326,12 @@ void Accounts::VerifyPassword(const User& user, std::string password, const Resp
   }
   if (!options_.ask_directory)
     return respond(ErrorResponse(503, say::web::DirectoryNotConfigured()));
-  AskDirectoryOf(user.name, std::move(password), respond,
-                 [user, done, respond](const DirectoryAnswer& answer) {
-                   if (!answer.failure.empty())
-                     return respond(ErrorResponse(503, say::web::DirectoryAway(answer.failure)));
-                   if (answer.matches && answer.role != user.role)
+  AskDirectoryOf(user.name, std::move(password), counters, respond,
+                 [this, user, done, respond](const DirectoryAnswer& answer) {
+                   if (answer.matches && answer.role != user.role) {
+                     EndAllOf(user.name);
                      return respond(ErrorResponse(403, say::web::RoleChangedInDirectory()));
+                   }
                    done(answer.matches);
                  });
 }
@@ -342,7 +343,7 @@ void Accounts::VerifyOwn(const Request& request, OwnProof proof, const Message& 
   // A separate counter, so that guesses at the login do not keep logged-in users from signing.
   const std::vector<std::string> counters = {"own " + user->name};
   if (auto refusal = CountGuess(counters)) return respond(std::move(*refusal));
-  VerifyPassword(*user, std::move(proof.password), respond,
+  VerifyPassword(*user, std::move(proof.password), counters, respond,
                  [this, user = *user, wrong, counters, second_factor = proof.second_factor,
                   actor = request.actor(), session = request.session, respond,
                   then = std::move(then)](bool matches) {
@@ -452,8 +453,7 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
                         // The permissions of an account are fixed at login: its sessions end,
                         // including the user's own.
                         if (done.result == ChangeResult::kDone) {
-                          sessions_.EndAllOf(name, nullptr);
-                          quick_.EndAllOf(name);
+                          EndAllOf(name);
                         }
                         respond(ChangeResponse(done));
                       }));

@@ -103,6 +103,9 @@ class Accounts : public SessionLookup {
   [[nodiscard]] Response DescribePresence(const Request& request);
   /// Time until the next guess, or nothing; the guess is then counted.
   [[nodiscard]] std::optional<Response> CountGuess(const std::vector<std::string>& counters);
+  void TakeGuessBack(const std::vector<std::string>& counters);
+  /// Ends what is open of a person: sessions, and log-ins by PIN or badge.
+  void EndAllOf(const std::string& name);
   /// Takes the proof from the body. @param password  Name of the field with the password.
   [[nodiscard]] static OwnProof ReadProof(Fields& fields, const char* password);
   /// Calls `then` if the person has no second factor, or if `given` is right; it is then used up.
@@ -129,10 +132,13 @@ class Accounts : public SessionLookup {
   void EndSession(const Request& request, const Respond& respond);
   void EndOtherSessions(const Request& request, const Respond& respond);
   /// Calls `done` unless this object is destroyed, and answers if that throws or the queue is full.
-  void AskDirectoryOf(const std::string& name, std::string password, const Respond& respond,
+  /// The same where the directory gave no answer; what `counters` counted was no guess then.
+  void AskDirectoryOf(const std::string& name, std::string password,
+                      const std::vector<std::string>& counters, const Respond& respond,
                       std::function<void(const DirectoryAnswer&)> done);
   /// Of a logged-in user; calls `done`, or answers that it cannot be told.
-  void VerifyPassword(const User& user, std::string password, const Respond& respond,
+  void VerifyPassword(const User& user, std::string password,
+                      const std::vector<std::string>& counters, const Respond& respond,
                       std::function<void(bool matches)> done);
   /// Checks the password of a logged-in user, and the second factor of one who has it; calls `then`
   /// if they are correct.

@@ -125,17 +125,34 @@ std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& cou
   return std::nullopt;
 }
 
-void Accounts::AskDirectoryOf(const std::string& name, std::string password, const Respond& respond,
+void Accounts::TakeGuessBack(const std::vector<std::string>& counters) {
+  for (const std::string& counter : counters) limiter_.TakeBack(counter);
+}
+
+void Accounts::EndAllOf(const std::string& name) {
+  sessions_.EndAllOf(name, nullptr);
+  quick_.EndAllOf(name);
+}
+
+void Accounts::AskDirectoryOf(const std::string& name, std::string password,
+                              const std::vector<std::string>& counters, const Respond& respond,
                               std::function<void(const DirectoryAnswer&)> done) {
   const bool asked =
       options_.ask_directory(name, std::move(password),
-                             [alive = std::weak_ptr(alive_), respond,
+                             [this, alive = std::weak_ptr(alive_), counters, respond,
                               done = std::move(done)](const DirectoryAnswer& answer) {
-                               if (!alive.expired())
-                                 RespondGuarded(
+                               if (alive.expired()) return;
+                               if (answer.failure.empty())
+                                 return RespondGuarded(
                                      "directory", [&] { done(answer); }, respond);
+                               // No guess: it must not delay people who have an account of the
+                               // unit's own.
+                               TakeGuessBack(counters);
+                               respond(ErrorResponse(503, say::web::DirectoryAway(answer.failure)));
                              });
-  if (!asked) respond(BusyWithPasswords());
+  if (asked) return;
+  TakeGuessBack(counters);
+  respond(BusyWithPasswords());
 }
 
 void Accounts::LogIn(const Request& request, LogInForm form, const Respond& respond) {
@@ -158,7 +175,7 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
   }
   const Actor actor{form.name, request.address};
   if (options_.ask_directory && IsName(form.name) && (!user || IsInDirectory(stored)))
-    return AskDirectoryOf(form.name, std::move(password), respond,
+    return AskDirectoryOf(form.name, std::move(password), counters, respond,
                           [=, this, counters = counters](const DirectoryAnswer& answer) {
                             FinishDirectoryLogIn(actor, answer, form, counters, respond);
                           });
@@ -176,10 +193,10 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
 void Accounts::FinishDirectoryLogIn(const Actor& actor, const DirectoryAnswer& answer,
                                     const LogInForm& form, const std::vector<std::string>& counters,
                                     const Respond& respond) {
-  if (!answer.failure.empty())
-    return respond(ErrorResponse(503, say::web::DirectoryAway(answer.failure)));
   if (!answer.matches) return FinishLogIn(actor, {}, form, counters, respond);
   if (!answer.role) {
+    TakeGuessBack(counters);
+    EndAllOf(actor.user);
     audit_.Log(actor, "login.failed", "", say::audit::NoRoleInDirectory());
     return respond(ErrorResponse(403, say::web::NoRoleInDirectory()));
   }
@@ -189,8 +206,7 @@ void Accounts::FinishDirectoryLogIn(const Actor& actor, const DirectoryAnswer& a
   const Done done = WhileAlive([=, this](const Change& change) {
     if (change.result != ChangeResult::kDone) return respond(ChangeResponse(change));
     // The permissions of sessions are those of their log-in.
-    sessions_.EndAllOf(actor.user, nullptr);
-    quick_.EndAllOf(actor.user);
+    EndAllOf(actor.user);
     FinishLogIn(actor, kInDirectory, form, counters, respond);
   });
   if (known) {

@@ -39,4 +39,11 @@ void LoginLimiter::Failed(const std::string& key, TimePoint now, std::size_t mos
   if (times.size() > most) times.pop_front();
 }
 
+void LoginLimiter::TakeBack(const std::string& key) {
+  const auto found = failures_.find(key);
+  if (found == failures_.end()) return;
+  found->second.pop_back();
+  if (found->second.empty()) failures_.erase(found);
+}
+
 }  // namespace plumb::web

@@ -23,6 +23,8 @@ class LoginLimiter {
                                           std::size_t most = kMaxFailures) const;
   void Failed(const std::string& key, TimePoint now, std::size_t most = kMaxFailures);
   void Succeeded(const std::string& key) { failures_.erase(key); }
+  /// The newest failure was none: what was tried could not be checked.
+  void TakeBack(const std::string& key);
 
  private:
   void MakeRoom(TimePoint now);

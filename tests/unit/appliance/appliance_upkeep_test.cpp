@@ -80,7 +80,7 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
     return ids;
   }
   static constexpr const char* kVerificationDue =
-      "Nobody has opened an encrypted backup for half a year";
+      "No verification of an encrypted backup has been noted for half a year";
   /// The first one was made 184 days ago.
   void LetABackupBeOld() const {
     constexpr std::int64_t kDays_us = 184LL * 24 * 3600 * 1'000'000;

@@ -113,6 +113,11 @@ TEST(ConfigTest, ADirectoryNeedsWhoAsksWhereAndWhichGroups) {
   EXPECT_THAT(ErrorOf("[directory]\nperson = \"uid=anna\"\n"), HasSubstr("a text with {name}"));
   EXPECT_THAT(ErrorOf("[directory]\ngroups_filter = \"member={person}\"\n"),
               HasSubstr("(member={person})"));
+  EXPECT_THAT(ErrorOf("[directory]\ngroups_filter = \"(objectClass=groupOfNames)\"\n"),
+              HasSubstr("(member={person})"))
+      << "each group would be everybody's";
+  EXPECT_EQ(ErrorOf(url + person + base + groups + "groups_filter = \"(memberUid={name})\"\n"),
+            "no error");
   EXPECT_THAT(ErrorOf(url + person + base + groups + "people_base = \"dc=example\"\n"),
               HasSubstr("belong together"));
 }

@@ -6,12 +6,16 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
 #include <memory>
+#include <semaphore>
 
 #include <fmt/format.h>
 
 #include "daemon/directory/ldap_directory.hpp"
+#include "tests/support/fake_peer.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/skip.hpp"
@@ -117,7 +121,7 @@ class LdapTest : public ::testing::Test {
   }
   [[nodiscard]] web::DirectoryAnswer Ask(const std::string& name,
                                          const std::string& password = kPassword) const {
-    return AskLdap(settings_, name, password);
+    return AskLdap(settings_, name, password, {});
   }
   static std::string Text(const web::DirectoryAnswer& answer) {
     if (!answer.failure.empty()) return "failure: " + answer.failure.English();
@@ -150,8 +154,8 @@ TEST_F(LdapTest, WhatAPersonTypesIsNoPartOfTheQuestion) {
   settings_.people_filter = "(|(uid={name})(title={name}))";
   settings_.person = "uid=anna,ou=people,dc=clinic,dc=example";
   EXPECT_EQ(Text(Ask("marie")), "physicist") << "as whom one logs in is not who one is";
-  EXPECT_THAT(Text(Ask("*")), HasSubstr("0 entries have this name"));
-  EXPECT_THAT(Text(Ask("two")), HasSubstr("2 entries have this name"));
+  EXPECT_THAT(Text(Ask("*")), HasSubstr("0 entries of this name"));
+  EXPECT_THAT(Text(Ask("two")), HasSubstr("2 entries of this name"));
 }
 
 TEST_F(LdapTest, WithoutTlsNothingIsSaid) {
@@ -173,7 +177,55 @@ TEST_F(LdapTest, AServerThatIsAwayOrNeverSpeaksIsAFailureAndNoWrongPassword) {
   settings_.url = url;
   EXPECT_EQ(Text(Ask("anna")), "technician");
   ::kill(server_, SIGSTOP);
-  EXPECT_THAT(Text(Ask("anna")), HasSubstr("failure"));
+  EXPECT_THAT(Text(Ask("anna")), HasSubstr("does not answer"));
+}
+
+TEST_F(LdapTest, WhatTheConfigurationHasWrongIsSaidAndIsNoWrongPassword) {
+  const DirectorySettings right = settings_;
+  settings_.trusted = InFolder("missing.pem");
+  EXPECT_THAT(Text(Ask("anna")), HasSubstr("missing.pem, by which"));
+  settings_ = right;
+  settings_.groups_base = "ou=gruops,dc=clinic,dc=example";
+  EXPECT_THAT(Text(Ask("anna")), HasSubstr("refuses how the configuration has it asked"));
+  settings_ = right;
+  settings_.person = "{name}@clinic.example";  // as Active Directory takes it
+  EXPECT_THAT(Text(Ask("anna")), HasSubstr("refuses how the configuration has it asked"));
+}
+
+TEST_F(LdapTest, AnAnswerWithoutEndIsNotTaken) {
+  constexpr std::size_t kMost = 64 << 20;  // what lies in buffers of the network is far less
+  std::atomic<std::size_t> taken = 0;
+  testing::FakePeer peer([&](testing::PeerConnection& connection) {
+    connection.ReadBytes(8);
+    // A message of 600 MB.
+    if (!connection.Write(std::string("\x30\x84\x23\xc3\x46\x00", 6))) return;
+    const std::string part(1 << 16, '\0');
+    while (taken < kMost && connection.Write(part)) taken += part.size();
+  });
+  settings_.url = fmt::format("ldap://127.0.0.1:{}", peer.port());
+  EXPECT_THAT(Text(Ask("anna")), HasSubstr("does not answer"));
+  EXPECT_LT(taken, kMost);
+}
+
+TEST_F(LdapTest, AnAskerThatGoesEndsTheQuestion) {
+  std::binary_semaphore is_asked(0);
+  std::atomic<int> questions = 0;
+  testing::FakePeer silent([&](testing::PeerConnection& connection) {
+    ++questions;
+    is_asked.release();
+    connection.ReadTo("never");
+  });
+  settings_.url = fmt::format("ldaps://127.0.0.1:{}", silent.port());
+  EventLoop loop;
+  auto directory = std::make_unique<Directory>(loop, settings_);
+  for (int i = 0; i < 4; ++i)
+    ASSERT_TRUE(directory->Ask("anna", kPassword, [](const web::DirectoryAnswer&) {}));
+  is_asked.acquire();
+  const auto begun = std::chrono::steady_clock::now();
+  directory.reset();
+  // One question alone would take ten seconds.
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(8));
+  EXPECT_EQ(questions, 1) << "those that wait are not asked any more";
 }
 
 TEST_F(LdapTest, TheLoopHearsTheAnswer) {
