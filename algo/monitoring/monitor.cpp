@@ -43,20 +43,15 @@ constexpr double kHurry_s = 9.0;
 constexpr double kTooLate_s = 10.0;
 constexpr double kFirstTry_s = 5.0;
 constexpr double kTryAgain_s = 0.25;
-// What depth alone says of the motion from the sweep to the zero: of a body that lay still up to
-// 8.0 mm and 0.53 deg (21 zeros of 7 simulated units). What is said of the sweep does not hold at a
-// zero that is farther from it.
+// Motion between the sweep and the zero according to depth alone: up to 8.0 mm and 0.53 deg for a
+// body that lay still (21 zeros of 7 simulated units). Beyond these limits the result of the sweep
+// no longer applies.
 constexpr double kMovedSinceScan_m = 15 * kMillimetre;
 constexpr double kTurnedSinceScan_rad = 1.5 * kDegree;
 
-/// By any sensor of the set.
-template <class Sensors>
-bool HasMovedSinceScan(const Sensors& sensors, const SensorSet& set, const Vector3d& body_m) {
-  return std::ranges::any_of(set, [&](std::size_t i) {
-    const Pose& T = sensors[i].at_rest.since_scan().T;
-    return (T * body_m - body_m).norm() > kMovedSinceScan_m ||
-           RotationAngle(T) > kTurnedSinceScan_rad;
-  });
+bool HasMovedSinceScan(const Pose& T_since_scan, const Vector3d& body_m) {
+  return (T_since_scan * body_m - body_m).norm() > kMovedSinceScan_m ||
+         RotationAngle(T_since_scan) > kTurnedSinceScan_rad;
 }
 
 }  // namespace
@@ -207,6 +202,10 @@ void Monitor::TakeZeros(bool last) {
     frames += sensor.at_rest.still_times_s().size();
   }
   const std::size_t num_zeroed = zeroed.size();
+  // For good, whichever of the sensors see the body later.
+  moved_since_scan_ = std::ranges::any_of(zeroed, [this](const auto& one) {
+    return HasMovedSinceScan(one.second->since_scan().T, scene_.centroid_m);
+  });
   if (!zeroed.empty()) rest_fits_.emplace(std::move(zeroed), scene_.centroid_m);
   no_zero_ = !rest_fits_ || rest_fits_->size() == 0;
   if (no_zero_) return;
@@ -363,18 +362,25 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
   const Matrix6d covariance = CovarianceOf(*fit, set, frames);
   line.since_zero =
       NumbersOfMotion(T_motion, covariance, scene_.centroid_m, options_.T_iec_reference);
-  const bool holds = !HasMovedSinceScan(sensors_, set, scene_.centroid_m);
-  if (options_.accepted && holds) line.against_reference = AgainstReference(T_motion, covariance);
-  if (options_.accepted && !holds) line.reason = BlindReason::kNoZero;
-  double sum_m = 0, breathing = 0;
-  for (std::size_t i = 0; i < set.size(); ++i) {
-    Sensor& one = sensors_[set[i]];
-    one.modes_m = fit->views[i].modes_m;
-    if (!one.at_rest.breathing()) continue;
-    sum_m += one.at_rest.breathing()->Belly_m(one.modes_m);
-    breathing += 1;
+  if (options_.accepted) {
+    if (moved_since_scan_)
+      line.reason = BlindReason::kNoZero;
+    else
+      line.against_reference = AgainstReference(T_motion, covariance);
   }
-  if (breathing > 0) line.breathing_m = sum_m / breathing;
+  for (std::size_t i = 0; i < set.size(); ++i) sensors_[set[i]].modes_m = fit->views[i].modes_m;
+  line.breathing_m = Breathing_m(set);
+}
+
+std::optional<double> Monitor::Breathing_m(const SensorSet& set) const {
+  double sum_m = 0, count = 0;
+  for (const std::size_t i : set) {
+    const Sensor& sensor = sensors_[i];
+    if (!sensor.at_rest.breathing()) continue;
+    sum_m += sensor.at_rest.breathing()->Belly_m(sensor.modes_m);
+    count += 1;
+  }
+  return count > 0 ? std::optional(sum_m / count) : std::nullopt;
 }
 
 std::pair<Pose, std::size_t> Monitor::MeanMotion(double time_s, const MotionFit& fit,

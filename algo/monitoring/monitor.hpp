@@ -30,14 +30,14 @@ template <>
 inline constexpr auto kNamesOf<MonitorState> = NamesUpTo<MonitorState::kMovedSensor>(
     {"mounting", "zeroing", "monitoring", "blind", "moved_sensor"});
 
-/// Why a frame gives no numbers.
+/// Why a frame gives no numbers, or none against the reference.
 enum class BlindReason : std::uint8_t {
   kNone,
   kCovered,    ///< Less than 60 % of the region of the zero is seen.
   kWeak,       ///< A direction is determined less than half as well as at the zero.
   kMisfit,     ///< The surface fits much worse than at the zero.
   kUnguarded,  ///< Too few markers for 10 s: the sensor may have moved unnoticed.
-  kNoZero,     ///< The surface of the scene was not found in the image.
+  kNoZero,     ///< The body was not found where it was scanned; with numbers since zero: elsewhere.
 };
 template <>
 inline constexpr auto kNamesOf<BlindReason> =
@@ -169,6 +169,8 @@ class Monitor {
   /// Since zero, over the last frames that agree with the newest; and their number.
   [[nodiscard]] std::pair<Pose, std::size_t> MeanMotion(double time_s, const MotionFit& fit,
                                                         const RestStatistics& at_rest);
+  /// Mean of the sensors of a set that see a breathing; nothing without one.
+  [[nodiscard]] std::optional<double> Breathing_m(const SensorSet& set) const;
   [[nodiscard]] LiveNumbers AgainstReference(const Pose& T_motion,
                                              const Matrix6d& covariance) const;
 
@@ -179,6 +181,7 @@ class Monitor {
   Stage stage_ = Stage::kMounting;
   std::optional<double> first_s_, mounted_since_s_, zeroing_since_s_, zero_tried_s_, zero_time_s_;
   bool no_zero_ = false;
+  bool moved_since_scan_ = false;  ///< By any sensor that was zeroed.
   std::optional<RestFits> rest_fits_;
   std::size_t fits_at_a_time_ = 1;
   std::map<SensorSet, RestStatistics> at_rest_;

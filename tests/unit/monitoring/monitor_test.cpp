@@ -31,10 +31,10 @@ class MonitorTest : public testing::Test {
   void AddSensor(double side) {
     sensors_.push_back(std::make_unique<RestFrames>(*scene_, side, 7U + sensors_.size()));
   }
-  void Begin() {
+  void Begin(const MonitorOptions& options = {}) {
     std::vector<StreamInfo> infos;
     for (const auto& sensor : sensors_) infos.push_back(sensor->info());
-    monitor_ = std::make_unique<Monitor>(*scene_, infos, MonitorOptions{});
+    monitor_ = std::make_unique<Monitor>(*scene_, infos, options);
   }
   /// Until a time; the sensors take turns.
   std::vector<MonitorLine> RunUntil(double end_s) {
@@ -52,10 +52,19 @@ class MonitorTest : public testing::Test {
     }
     return lines;
   }
-  void Move(const Eigen::Vector3d& shift_m) {
+  void BeginAgainstReference() {
+    MonitorOptions options;
+    options.accepted = AcceptedMotion{.centroid_m = test::MiddleOfBody()};
+    options.judges_reference = true;
+    Begin(options);
+  }
+  static Pose Shifted(const Eigen::Vector3d& shift_m) {
     Pose T = Pose::Identity();
     T.translation() = shift_m;
-    for (const auto& sensor : sensors_) sensor->Move(T);
+    return T;
+  }
+  void Move(const Eigen::Vector3d& shift_m) {
+    for (const auto& sensor : sensors_) sensor->Move(Shifted(shift_m));
   }
   static double CpuOfThread_s() {
     timespec now{};
@@ -75,24 +84,43 @@ class MonitorTest : public testing::Test {
 };
 
 TEST_F(MonitorTest, ABodyThatWasMovedSinceItsSweepHasNoNumbersAgainstTheReference) {
-  for (const double shift_m : {0.005, 0.030}) {
+  const auto turned = [](double angle_deg) {
+    Vector6d twist = Vector6d::Zero();
+    twist[2] = angle_deg * kDegree;
+    return PoseAbout(test::MiddleOfBody(), twist);
+  };
+  // On both sides of 15 mm and of 1.5 deg.
+  for (const auto& [T_motion, is_near] :
+       {std::pair(Shifted({0.0135, 0.0, 0.0}), true), std::pair(Shifted({0.0165, 0.0, 0.0}), false),
+        std::pair(turned(1.3), true), std::pair(turned(1.7), false)}) {
     sensors_.clear();
     time_s_ = 0;
     AddSensor(1.0);
-    Move({shift_m, 0.0, 0.0});
-    MonitorOptions options;
-    options.accepted = AcceptedMotion{.centroid_m = test::MiddleOfBody()};
-    options.judges_reference = true;
-    monitor_ = std::make_unique<Monitor>(*scene_, std::vector{sensors_[0]->info()}, options);
-    const std::vector<MonitorLine> lines = RunUntil(14.0);
-    const bool is_near = shift_m < 0.01;
-    EXPECT_TRUE(lines.back().since_zero) << shift_m;
-    EXPECT_EQ(lines.back().against_reference.has_value(), is_near) << shift_m;
+    sensors_[0]->Move(T_motion);
+    BeginAgainstReference();
+    const std::vector<MonitorLine> lines = RunUntil(12.0);
+    EXPECT_TRUE(lines.back().since_zero) << T_motion.matrix();
+    EXPECT_EQ(lines.back().against_reference.has_value(), is_near) << T_motion.matrix();
     EXPECT_EQ(lines.back().reason, is_near ? BlindReason::kNone : BlindReason::kNoZero);
     const auto is_in = [](const MonitorLine& line) { return line.advice == LiveAdvice::kIn; };
     EXPECT_EQ(std::ranges::any_of(lines, is_in), is_near)
         << "the result of the sweep does not hold where the body lies now";
   }
+}
+
+TEST_F(MonitorTest, TheSensorThatSawTheBodyMovedSinceItsSweepNeedNotSeeItAnyMore) {
+  AddSensor(1.0);
+  AddSensor(-1.0);
+  // The sensors disagree by their own errors.
+  sensors_[0]->Move(Shifted({0.0165, 0.0, 0.0}));
+  sensors_[1]->Move(Shifted({0.0135, 0.0, 0.0}));
+  BeginAgainstReference();
+  ASSERT_FALSE(RunUntil(112.0).back().against_reference);
+  covered_ = 0;
+  const std::vector<MonitorLine> covered = RunUntil(113.5);
+  EXPECT_EQ(covered.back().sensors_used, 1);
+  EXPECT_TRUE(covered.back().since_zero);
+  EXPECT_FALSE(covered.back().against_reference);
 }
 
 TEST_F(MonitorTest, OneSensorFollowsTheBodyAndNoFrameTakesLong) {
