@@ -2,21 +2,31 @@
 // Whether something keeps the wall clock right.
 #pragma once
 
+#include <sys/timex.h>
+
+#include <chrono>
 #include <filesystem>
 #include <functional>
 
-struct timex;
-
 namespace plumb {
 
-/// Asks as adjtimex(2) does: at least 0, or -1 where it refuses.
-using AskKernelClock = std::function<int(timex& state)>;
+/// Whether systemd-timedated says so. Waits for the system bus.
+[[nodiscard]] bool IsKeptByTimedated(std::chrono::milliseconds patience);
+
+/// Who is asked.
+struct AskClock {
+  /// As adjtimex(2): at least 0, or -1 where it refuses. In plumbd's sandbox (ProtectClock=) no
+  /// process may ask the kernel.
+  std::function<int(timex& state)> kernel = [](timex& state) { return ::adjtimex(&state); };
+  /// Instead of a kernel that refuses.
+  std::function<bool()> timedated = [] { return IsKeptByTimedated(std::chrono::seconds(5)); };
+};
 
 /// Whether a time server has set the clock since the machine started. systemd-timesyncd leaves a
-/// note; other programs (chrony, ntpd, ptp4l) tell the kernel. May take seconds.
+/// note; other programs (chrony, ntpd, ptp4l) tell the kernel. May take five seconds.
 /// @param note  The file that systemd-timesyncd writes when a server answers for the first time.
 [[nodiscard]] bool IsClockKept(
     const std::filesystem::path& note = "/run/systemd/timesync/synchronized",
-    const AskKernelClock& ask = {});
+    const AskClock& ask = {});
 
 }  // namespace plumb

@@ -433,6 +433,7 @@ void StorageUpkeep::AskForVerification() {
   ticks_to_verification_ = kMaintenanceTicks;
   const ApplianceConfig& config = config_.appliance;
   const bool is_encrypted = !config.backup_folder.empty() && !config.backup_recipients.empty();
+  if (!is_encrypted && std::exchange(is_verification_due_, false)) notify_(web::EventKind::kStatus);
   if (!is_encrypted || !storage_.IsUsable() || stop_.stop_requested()) return;
   (void)reads_.Post([this] {
     try {
