@@ -401,7 +401,8 @@ void Appliance::OnTick() {
   upkeep_.Tick(IsRunning());
   button_.Tick();
   WatchRest();
-  FollowReference();
+  // The reference of the session, and what is known of the room, are stored data.
+  if (notices_.data_changes() != followed_changes_) FollowReference();
   LookForMessages();
   TellPeers();
 }

@@ -163,7 +163,8 @@ class Appliance : private StorageUser {
   const Message& not_archived_;
   SensorThread& sensors_;
   OutlineWatch& outline_;
-  Message space_fault_;  ///< Why no scan can be stored although the store works.
+  std::uint64_t followed_changes_ = 0;  ///< Notices::data_changes() at FollowReference().
+  Message space_fault_;                 ///< Why no scan can be stored although the store works.
   ScanState state_;
   Message sensor_fault_, scan_fault_, rolled_back_;
   CurrentScan scan_;

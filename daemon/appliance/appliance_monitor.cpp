@@ -93,12 +93,18 @@ void Appliance::WatchRest() {
 /// Whose outline the camera's picture shows: that of the reference which the open session compares
 /// with, and never that of another patient.
 void Appliance::FollowReference() {
+  followed_changes_ = notices_.data_changes();
   if (store_ == nullptr || !session_.IsOpen() || session_.purpose() != ScanPurpose::kFraction)
     return outline_.Follow({});
   try {
     const std::optional<Reference> reference = store_->references.OfSession(session_.id());
     if (!reference) return outline_.Follow({});
-    OutlineJob job{.scene = store_->folders.Scan(reference->scan_id) / "scene"};
+    OutlineJob job{.scene = store_->folders.Scan(reference->scan_id) / "scene",
+                   .reference = reference->id};
+    job.is_of_other_room = [state = storage_.state(), patient = session_.patient_id(),
+                            scan = reference->scan_id] {
+      return RoomOfImport(state, patient, scan).has_value();
+    };
     job.check_reference = [&store = store_,
                            scan = reference->scan_id](const std::stop_token& stop) {
       return store->integrity.Check(scan, /*scene_only=*/true, stop);

@@ -54,7 +54,7 @@ Message OneSensor(const std::vector<MonitorSensor>& sensors) {
 
 }  // namespace
 
-LiveMonitoring::LiveMonitoring(EventLoop& loop, const Notices& notices, WorkThread& store_thread)
+LiveMonitoring::LiveMonitoring(EventLoop& loop, Notices& notices, WorkThread& store_thread)
     : loop_(loop), notices_(notices), store_thread_(store_thread) {
   tick_ = loop_.MakeTimer("monitoring", [this] { OnTick(); });
 }

@@ -38,7 +38,7 @@ class LiveMonitoring {
   };
 
   /// The arguments are borrowed. @param store_thread  Waits for the thread of an ended session.
-  LiveMonitoring(EventLoop& loop, const Notices& notices, WorkThread& store_thread);
+  LiveMonitoring(EventLoop& loop, Notices& notices, WorkThread& store_thread);
   ~LiveMonitoring();
   LiveMonitoring(const LiveMonitoring&) = delete;
   LiveMonitoring& operator=(const LiveMonitoring&) = delete;
@@ -79,7 +79,7 @@ class LiveMonitoring {
   void Tell();
 
   EventLoop& loop_;
-  const Notices& notices_;
+  Notices& notices_;
   WorkThread& store_thread_;
   Hooks hooks_;
   std::function<void(bool)> gate_;

@@ -33,8 +33,11 @@ void Notices::SetWatchers(std::function<void(const std::string&)> listener) {
   watchers_ = std::move(listener);
 }
 
-void Notices::TellPage(web::EventKind kind) const {
-  if (kind == web::EventKind::kData) data_changed_();
+void Notices::TellPage(web::EventKind kind) {
+  if (kind == web::EventKind::kData) {
+    ++data_changes_;
+    data_changed_();
+  }
   if (page_) Guarded("the page", [&] { page_(kind); });
 }
 

@@ -2,6 +2,7 @@
 // Passes the events of the appliance on to the page and to the watchers of the control socket.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -21,11 +22,14 @@ class Notices {
   /// Gets each event as one JSON object ({"event", "time", ...}).
   void SetWatchers(std::function<void(const std::string& line)> listener);
 
-  void TellPage(web::EventKind kind) const;
+  void TellPage(web::EventKind kind);
+  /// How often stored data has changed.
+  [[nodiscard]] std::uint64_t data_changes() const { return data_changes_; }
   void TellWatchers(const nlohmann::json& event) const;
 
  private:
   const std::function<void()> data_changed_;
+  std::uint64_t data_changes_ = 0;
   std::function<void(web::EventKind)> page_;
   std::function<void(const std::string&)> watchers_;
 };

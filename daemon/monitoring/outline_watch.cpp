@@ -22,6 +22,8 @@ constexpr int kPreviewQuality = 70;
 constexpr std::chrono::milliseconds kOutlineEvery{500};
 // An older picture is not shown as a current one; a page that shows it asks more often than this.
 constexpr double kOutlineHolds_s = 1.5;
+// After a failure: a disk may have been away for a moment.
+constexpr std::chrono::seconds kTryAgain{10};
 
 bool AreSame(const MarkerMap& a, const MarkerMap& b) {
   return std::ranges::equal(a, b, [](const auto& one, const auto& other) {
@@ -51,7 +53,9 @@ OutlineWatch::~OutlineWatch() {
 void OutlineWatch::Follow(OutlineJob job) {
   {
     const std::lock_guard lock(mutex_);
-    if (job.scene == wanted_.scene && AreSame(job.markers_iec, wanted_.markers_iec)) return;
+    if (job.scene == wanted_.scene && job.reference == wanted_.reference &&
+        AreSame(job.markers_iec, wanted_.markers_iec))
+      return;
     wanted_ = std::move(job);
     newest_.reset();
     ++turn_;
@@ -74,21 +78,30 @@ std::shared_ptr<const OutlinedPicture> OutlineWatch::Newest() {
 
 void OutlineWatch::Run(const std::stop_token& stop) {
   GiveWayToScans();
+  bool has_failed = false;
   for (std::uint64_t turn = 0; !stop.stop_requested();) {
     OutlineJob job;
     {
       std::unique_lock lock(mutex_);
-      if (!wake_.wait(lock, stop, [&] { return turn_ != turn; })) return;
+      const auto is_another = [&] { return turn_ != turn; };
+      if (has_failed)
+        wake_.wait_for(lock, stop, kTryAgain, is_another);
+      else
+        wake_.wait(lock, stop, is_another);
+      if (stop.stop_requested()) return;
+      has_failed = has_failed && !is_another();
       turn = turn_;
       job = wanted_;
     }
     if (job.scene.empty()) continue;
     try {
       Look(job, turn, stop);
+      has_failed = false;
     } catch (const Interrupted&) {
     } catch (const std::exception& error) {
       // The picture is shown without it; the comparison will say what is wrong with the reference.
-      Log(LogLevel::kWarning, MessageOf(error).English());
+      if (!has_failed) Log(LogLevel::kWarning, MessageOf(error).English());
+      has_failed = true;
     }
   }
 }
@@ -102,6 +115,7 @@ bool OutlineWatch::AwaitInterest(std::uint64_t turn, const std::stop_token& stop
 
 void OutlineWatch::Look(const OutlineJob& job, std::uint64_t turn, const std::stop_token& stop) {
   if (!AwaitInterest(turn, stop)) return;
+  if (job.is_of_other_room && job.is_of_other_room()) return;
   std::optional<BodyOutline> outline;
   {
     const Scene scene = ReadApprovedScene(job.scene, job.check_reference, stop);
@@ -111,14 +125,18 @@ void OutlineWatch::Look(const OutlineJob& job, std::uint64_t turn, const std::st
   }
   std::optional<std::int64_t> last;
   while (AwaitInterest(turn, stop)) {
+    const Intrinsics camera = sensors_.snapshot().info.intrinsics;
     const std::optional<Frame> frame = sensors_.latest();
-    if (frame && frame->index != last) {
+    // Of one unit: another one may just have been plugged in.
+    const bool fits = frame && frame->color_rgb.cols == camera.width;
+    if (fits && frame->index != last) {
       last = frame->index;
       OutlinedPicture picture{.jpeg = PreviewJpeg(frame->color_rgb),
+                              .reference = job.reference,
                               .lines = {},
                               .is_placed = false,
                               .at_s = SteadySeconds()};
-      const auto lines = outline->In(frame->color_rgb, sensors_.snapshot().info.intrinsics);
+      const auto lines = outline->In(frame->color_rgb, camera);
       picture.is_placed = lines.has_value();
       picture.lines = lines.value_or(OutlineLines());
       const std::lock_guard lock(mutex_);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The outline of the reference over the camera's picture, so that people lie as they lay.
+// The outline of the reference over the camera's picture, so that a person can be laid in the same
+// posture.
 #pragma once
 
 #include <condition_variable>
@@ -25,8 +26,12 @@ namespace plumb {
 /// Whose outline is wanted.
 struct OutlineJob {
   std::filesystem::path scene = {};  ///< Folder; empty: no outline is wanted.
+  std::string reference = {};        ///< Whose scene it is.
   /// As ScanJob has it. On the watch's thread.
   std::function<Message(const std::stop_token&)> check_reference = {};
+  /// Whether the reference was scanned in another room, whose markers say nothing here. On the
+  /// watch's thread.
+  std::function<bool()> is_of_other_room = {};
   /// Where the room's markers are for a planning CT, which has none of its own.
   MarkerMap markers_iec = {};
 };
@@ -34,6 +39,7 @@ struct OutlineJob {
 /// A picture and what belongs over it.
 struct OutlinedPicture {
   std::string jpeg;
+  std::string reference;   ///< OutlineJob::reference.
   OutlineLines lines;      ///< Empty also where the body is not in the picture.
   bool is_placed = false;  ///< Whether markers say where the camera is.
   double at_s = 0.0;       ///< Steady time.

@@ -30,8 +30,7 @@ class StoreAccess {
  public:
   /// Everything is borrowed and outlives this object. No `done` is called after its end.
   /// @param changes  The store's thread.
-  StoreAccess(EventLoop& loop, const StorageWatch& storage, WorkThread& changes,
-              const Notices& notices)
+  StoreAccess(EventLoop& loop, const StorageWatch& storage, WorkThread& changes, Notices& notices)
       : loop_(loop), storage_(storage), changes_(changes), notices_(notices) {}
 
   /// Whether there is a store to read.
@@ -93,7 +92,7 @@ class StoreAccess {
   EventLoop& loop_;
   const StorageWatch& storage_;
   WorkThread& changes_;
-  const Notices& notices_;
+  Notices& notices_;
   AliveFlag alive_;
 };
 

@@ -41,7 +41,10 @@ class WebAppliance final : public web::ApplianceService {
   std::optional<CameraOutline> Outline() override {
     const auto picture = outline_.Newest();
     if (!picture) return std::nullopt;
-    CameraOutline outline{.jpeg = picture->jpeg, .lines = {}, .is_placed = picture->is_placed};
+    CameraOutline outline{.jpeg = picture->jpeg,
+                          .reference = picture->reference,
+                          .lines = {},
+                          .is_placed = picture->is_placed};
     for (const auto& line : picture->lines) {
       auto& points = outline.lines.emplace_back();
       for (const Eigen::Vector2f& p : line) points.emplace_back(p.x(), p.y());

@@ -195,7 +195,7 @@ class WebSensorProfiles final : public web::SensorProfileService {
   Appliance& appliance_;
   const Config& config_;
   UnitProfiles& profiles_;
-  const Notices& notices_;
+  Notices& notices_;
   web::BackgroundWork& background_;
   StoreAccess& store_;
 };

@@ -54,7 +54,7 @@ namespace plumb {
                                                              std::function<void()> accepted);
 [[nodiscard]] std::unique_ptr<web::SensorProfileService> MakeWebSensorProfiles(
     Appliance& appliance, SharedParts& shared, web::BackgroundWork& background, StoreAccess& store);
-[[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(const Notices& notices,
+[[nodiscard]] std::unique_ptr<web::SettingsService> MakeWebSettings(Notices& notices,
                                                                     StoreAccess& store);
 
 /// Owns the services, one class for each subject. Used on the loop's thread.

@@ -31,7 +31,7 @@ Message CheckSettings(const SettingsChange& change) {
 
 class WebSettings final : public web::SettingsService {
  public:
-  WebSettings(const Notices& notices, StoreAccess& store) : notices_(notices), store_(store) {}
+  WebSettings(Notices& notices, StoreAccess& store) : notices_(notices), store_(store) {}
 
   Settings GetSettings() override {
     return store_.Read(&Store::settings, [](SettingsStore& settings) { return settings.Get(); });
@@ -68,13 +68,13 @@ class WebSettings final : public web::SettingsService {
   }
 
  private:
-  const Notices& notices_;
+  Notices& notices_;
   StoreAccess& store_;
 };
 
 }  // namespace
 
-std::unique_ptr<web::SettingsService> MakeWebSettings(const Notices& notices, StoreAccess& store) {
+std::unique_ptr<web::SettingsService> MakeWebSettings(Notices& notices, StoreAccess& store) {
   return std::make_unique<WebSettings>(notices, store);
 }
 

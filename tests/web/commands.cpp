@@ -109,13 +109,15 @@ void ObeySensor(FakeAppliance& service, const std::string& name, std::istream& w
     const std::vector<std::uint8_t> jpeg = EncodeJpeg(picture, 70);
     service.preview = std::make_shared<const std::string>(jpeg.begin(), jpeg.end());
   }
-  if (name == "outline") {  // placed, waits, outside, or none
+  if (name == "outline") {  // placed, waits, outside, other (of another reference), or none
     std::string what;
     words >> what;
     service.outline.reset();
     if (what != "none" && service.preview) {
       CameraOutline& outline = service.outline.emplace();
       outline.jpeg = *service.preview;
+      if (const auto& session = service.status.session; session && session->reference)
+        outline.reference = what == "other" ? "another" : session->reference->id;
       outline.is_placed = what != "waits";
       if (what == "placed")
         outline.lines = {{{0.3F, 0.2F}, {0.7F, 0.25F}, {0.8F, 0.7F}, {0.25F, 0.75F}, {0.3F, 0.2F}},

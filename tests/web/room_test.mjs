@@ -200,11 +200,12 @@ await h.step('the outline of the reference lies over the picture, for the postur
   await anna.setViewportSize({ width: 390, height: 844 });
   await h.look(anna, 'scan-phone-outline');
   await anna.setViewportSize({ width: 1280, height: 800 });
-  h.tell('outline none');
-  for (const page of [anna, room]) {
-    await page.locator('.lying').waitFor({ state: 'hidden' });
-    await page.locator('.preview img').waitFor();
+  for (const what of ['other', 'placed', 'none']) {  // one of another patient is never shown
+    h.tell(`outline ${what}`);
+    for (const page of [anna, room])
+      await page.locator('.lying').waitFor({ state: what === 'placed' ? 'visible' : 'hidden' });
   }
+  for (const page of [anna, room]) await page.locator('.preview img').waitFor();
   h.tell('outline placed');
 });
 

@@ -25,11 +25,11 @@ namespace plumb::web {
 namespace {
 
 Json OutlineJson(const CameraOutline& outline) {
-  const auto short_form = [](float share) { return std::round(share * 1e4) / 1e4; };
+  const auto rounded = [](float share) { return std::round(share * 1e4) / 1e4; };
   Json lines = Json::array();
   for (const auto& line : outline.lines) {
     Json& points = lines.emplace_back(Json::array());
-    for (const auto& [x, y] : line) points.push_back({short_form(x), short_form(y)});
+    for (const auto& [x, y] : line) points.push_back({rounded(x), rounded(y)});
   }
   std::string picture(
       sodium_base64_ENCODED_LEN(outline.jpeg.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
@@ -37,7 +37,10 @@ Json OutlineJson(const CameraOutline& outline) {
                     reinterpret_cast<const unsigned char*>(outline.jpeg.data()),
                     outline.jpeg.size(), sodium_base64_VARIANT_ORIGINAL);
   picture.pop_back();  // its zero byte
-  return {{"picture", picture}, {"lines", lines}, {"is_placed", outline.is_placed}};
+  return {{"picture", picture},
+          {"reference", outline.reference},
+          {"lines", lines},
+          {"is_placed", outline.is_placed}};
 }
 
 void AddApplianceRoutes(Routes& routes, ApplianceService& appliance) {

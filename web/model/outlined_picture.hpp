@@ -10,6 +10,7 @@ namespace plumb {
 
 struct CameraOutline {
   std::string jpeg;
+  std::string reference;  ///< Its id: the session may have another one by the time it is shown.
   /// Points as shares of the picture's width and height; a line that is no ring ends at the
   /// picture's border.
   std::vector<std::vector<std::pair<float, float>>> lines;

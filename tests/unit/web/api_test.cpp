@@ -79,14 +79,16 @@ TEST_F(ApiTest, TheOutlineComesWithThePictureToWhichItBelongs) {
   EXPECT_EQ(technician.Get(place).status, 404) << "no reference";
   loop_->Do([&] {
     service_.outline = {.jpeg = std::string("\xff\xd8\0\x01", 4),
+                        .reference = "R-7",
                         .lines = {{{0.25F, 1.0F / 3}, {0.5F, 1.0F}}, {{0.0F, 0.0F}}},
                         .is_placed = true};
   });
   EXPECT_EQ(technician.Get(place).json(),
             nlohmann::json({{"picture", "/9gAAQ=="},
+                            {"reference", "R-7"},
                             {"lines", {{{0.25, 0.3333}, {0.5, 1.0}}, {{0.0, 0.0}}}},
                             {"is_placed", true}}));
-  loop_->Do([&] { service_.outline = CameraOutline{.jpeg = "x", .lines = {}}; });
+  loop_->Do([&] { service_.outline = CameraOutline{.jpeg = "x", .reference = {}, .lines = {}}; });
   const nlohmann::json unplaced = technician.Get(place).json();
   EXPECT_EQ(unplaced["lines"], nlohmann::json::array());
   EXPECT_EQ(unplaced["is_placed"], false);

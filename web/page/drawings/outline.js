@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The outline of the reference over the camera's picture: how to lie as one lay.
+// The outline of the reference over the camera's picture, so that a person can be laid in the same
+// posture.
 import { clear, h, hint, svg } from '../dom.js';
 import { S } from '../words.js';
 
@@ -11,7 +12,7 @@ export function referenceOutline(picture) {
     drawing.toggleAttribute('hidden', true);
     note.hidden = true;
   };
-  const draw = ({ lines, is_placed: isPlaced }, status) => {
+  const draw = ({ lines, is_placed: isPlaced }, version) => {
     const text = S.status;
     const { naturalWidth: width, naturalHeight: height } = picture;
     // As the picture is fitted into its box.
@@ -20,7 +21,6 @@ export function referenceOutline(picture) {
       `${i ? 'L' : 'M'}${(x * width).toFixed(1)} ${(y * height).toFixed(1)}`).join(''));
     clear(drawing, ['halo', 'line'].map((part) =>
       svg('path', { class: part, d: path.join('') })));
-    const { version } = status.session.reference;
     const words = !isPlaced ? text.outlineWaits
       : lines.length ? text.outline(version) : text.outlineOutside;
     drawing.setAttribute('aria-label', words);

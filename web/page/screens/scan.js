@@ -51,7 +51,10 @@ export function preview() {
         if (found.ok) {
           const one = await found.json();
           await show(new Blob([bytesOf(one.picture)], { type: 'image/jpeg' }));
-          outline.draw(one, live.status);
+          // The session may be another one by now.
+          const { reference } = live.status?.session ?? {};
+          if (reference?.id === one.reference) outline.draw(one, reference.version);
+          else outline.hide();
           return kOutlineEvery_ms;
         }
         noOutline = now();
