@@ -13,12 +13,14 @@
 #include "algo/render/color_scale.hpp"
 #include "algo/render/picture_words.hpp"
 #include "algo/types/height_map.hpp"
+#include "algo/verdict/default_tolerance.hpp"
 
 namespace plumb {
 
 struct ErrorImageOptions {
-  double tolerance_m = 3 * kMillimetre;  ///< Tolerance of the signed scale; > 0.
-  bool paper_colors = false;             ///< The paper's scale: |e|, blue at 0, red at 10 cm.
+  double tolerance_m =
+      kDefaultShiftTolerance_mm * kMillimetre;  ///< Tolerance of the signed scale; > 0.
+  bool paper_colors = false;  ///< The paper's scale: |e|, blue at 0, red at 10 cm.
   std::string subtitle = {};
   const HeightMap* relief =
       nullptr;  ///< Heights on the same grid, whose shape shades the colours slightly.

@@ -12,12 +12,13 @@
 #include "algo/base/units.hpp"
 #include "algo/render/picture_words.hpp"
 #include "algo/types/height_map.hpp"
+#include "algo/verdict/default_tolerance.hpp"
 
 namespace plumb {
 
 struct OverlayImageOptions {
   /// Surfaces closer than this are drawn as one (violet); > 0.
-  double tolerance_m = 3 * kMillimetre;
+  double tolerance_m = kDefaultShiftTolerance_mm * kMillimetre;
   std::string subtitle = {};
   /// 1 for cells inside the region, on the same grid; the picture is cropped to it and 10 cm around
   /// it.

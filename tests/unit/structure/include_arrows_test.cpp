@@ -54,7 +54,7 @@ const Arrows kAllowed = {
     {"algo/monitoring",
      {"algo/base", "algo/types", "algo/markers", "algo/surface", "algo/verdict", "algo/motion",
       "algo/comparison", "algo/sensor_model"}},
-    {"algo/render", {"algo/base", "algo/types"}},
+    {"algo/render", {"algo/base", "algo/types", "algo/verdict"}},
 
     {"drivers", {"algo/base", "algo/types"}},
     {"drivers/files", {"algo/base"}},
@@ -99,7 +99,7 @@ const Arrows kAllowed = {
     {"web/api",
      {"algo/base", "web/model", "web/service", "web/security", "web/http", "web/exchange",
       "web/page"}},
-    {"web/api/exports", {"algo/base", "web/model", "web/exchange", "web/api"}},
+    {"web/api/exports", {"web/model", "web/exchange", "web/api"}},
     {"web/api/planning", {"algo/base", "web/model", "web/http", "web/exchange", "web/api"}},
     {"web/api/watching",
      {"algo/base", "web/http", "web/model", "web/security", "web/exchange", "web/api"}},
