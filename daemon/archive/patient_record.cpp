@@ -12,6 +12,7 @@
 #include "daemon/archive/summed_folder.hpp"
 #include "daemon/database/store_json.hpp"
 #include "daemon/scan_files/scan_files.hpp"
+#include "web/model/limits.hpp"
 #include "words/backup.hpp"
 
 namespace plumb {
@@ -20,7 +21,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxRows = 200'000, kMaxText = std::size_t{64} << 10,
-                      kMaxJson = std::size_t{4} << 20;
+                      kMaxJson = std::size_t{4} << 20,
+                      kMaxPhotoText = 4 * (kMaxPhoto / 3 + 1);  // base64
 constexpr std::int64_t kMaxInteger = std::int64_t{1} << 53;  // sufficient for times in nanoseconds
 
 struct Query {
@@ -98,8 +100,8 @@ void CheckValue(const std::string& table, const ColumnOf& column, const Json& va
     return;
   }
   const bool is_json = column.name == "json" || column.name == "plan";
-  if (!value.is_string() ||
-      value.get_ref<const std::string&>().size() > (is_json ? kMaxJson : kMaxText) ||
+  const std::size_t most = is_json ? kMaxJson : column.name == "photo" ? kMaxPhotoText : kMaxText;
+  if (!value.is_string() || value.get_ref<const std::string&>().size() > most ||
       value.get_ref<const std::string&>().find('\0') != std::string::npos ||
       (!is_json && !IsPlainText(value.get_ref<const std::string&>(), /*allow_lines=*/true)))
     Refuse(table, column.name, say::backup::RecordNoText());

@@ -56,6 +56,7 @@ struct Prefix {
 constexpr std::array kPrefixes = {
     Prefix{"view.patient", kPatient},
     Prefix{"view.photo", kPatient},
+    Prefix{"view.drawing", kPatient},
     Prefix{"view.reference", kReference},
     Prefix{"view.scan", kScan},
     Prefix{"download.numbers", kPatient},

@@ -227,9 +227,13 @@ ALTER TABLE sessions ADD COLUMN reference_id INTEGER REFERENCES refs(id) ON DELE
 ALTER TABLE refs ADD COLUMN source TEXT NOT NULL DEFAULT 'sweep';
 ALTER TABLE refs ADD COLUMN patient_hash TEXT NOT NULL DEFAULT '';
 ALTER TABLE sessions ADD COLUMN chosen_at_version INTEGER NOT NULL DEFAULT 0;
--- How a patient is set up, and a photo taken with the sensor: JPEG, base64.
+-- How a patient is set up, what was drawn, and a photo taken with the sensor: JPEG, base64. The photo
+-- is the last column: what stands behind it cannot be read without it.
 ALTER TABLE patients ADD COLUMN immobilisation TEXT NOT NULL DEFAULT '';
 ALTER TABLE patients ADD COLUMN alert TEXT NOT NULL DEFAULT '';
+ALTER TABLE patients ADD COLUMN sheet_revision INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE patients ADD COLUMN drawing TEXT NOT NULL DEFAULT '';
+ALTER TABLE patients ADD COLUMN has_photo INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE patients ADD COLUMN photo TEXT NOT NULL DEFAULT '';
 -- The posture that plans of a site begin with, and what is said to whoever sweeps.
 ALTER TABLE templates ADD COLUMN posture TEXT NOT NULL DEFAULT '';

@@ -191,13 +191,10 @@ Settings ParseSettings(const std::string& text) {
 }
 
 std::string CouchJson(const CouchProfile& couch) {
-  StoredJson json = {{"version", couch.version},
-                     {"name", couch.name},
-                     {"num_axes", couch.num_axes},
-                     {"is_in_cm", couch.is_in_cm},
-                     {"hides_rest", couch.hides_rest},
-                     {"signed_by", couch.signed_by},
-                     {"signed_at", ToStored(couch.signed_at)}};
+  StoredJson json = {{"version", couch.version},       {"name", couch.name},
+                     {"num_axes", couch.num_axes},     {"is_in_cm", couch.is_in_cm},
+                     {"hides_rest", couch.hides_rest}, {"wraps", couch.wraps},
+                     {"signed_by", couch.signed_by},   {"signed_at", ToStored(couch.signed_at)}};
   for (std::size_t i = 0; i < kNumberAxes.size(); ++i) json[ReversesKey(i)] = couch.reverses.at(i);
   return json.dump();
 }
@@ -213,6 +210,7 @@ CouchProfile ParseCouch(const std::string& text) {
     stored.Fail(say::store::ValueOutOfRange("num_axes", couch.num_axes, 3, 6));
   couch.is_in_cm = stored.Flag("is_in_cm");
   couch.hides_rest = stored.Flag("hides_rest");
+  if (stored.Find("wraps") != nullptr) couch.wraps = stored.Flag("wraps");
   couch.signed_by = stored.Text("signed_by");
   couch.signed_at =
       FromStored(static_cast<std::int64_t>(stored.Number("signed_at", {-kMaxNumber, kMaxNumber})));

@@ -27,7 +27,7 @@ namespace plumb {
 [[nodiscard]] Settings ParseSettings(const std::string& text);
 
 [[nodiscard]] std::string CouchJson(const CouchProfile& couch);
-/// All must be present and valid. @throws DataError stating what is wrong.
+/// All but "wraps" must be present, and all valid. @throws DataError stating what is wrong.
 [[nodiscard]] CouchProfile ParseCouch(const std::string& text);
 
 /// The list entry of a result.json. @throws DataError as ParseResult()

@@ -4,6 +4,10 @@
 #include <sodium.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <fmt/format.h>
 
 #include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_refusal.hpp"
@@ -24,7 +28,7 @@ const std::string kPatientColumns =
     " (SELECT id FROM refs WHERE refs.patient_id = patients.id AND approved_by = '' AND version > "
     "   (SELECT ifnull(max(version), 0) FROM refs AS r WHERE r.patient_id = patients.id AND "
     "r.approved_by <> '') ORDER BY version DESC LIMIT 1), note, archived, immobilisation, alert, "
-    "photo <> '' FROM patients ";
+    "has_photo, drawing <> '', sheet_revision FROM patients ";
 
 /// The newest session for fractions of patient ?1, if it can be resumed: closed since ?2.
 constexpr const char* kResumable =
@@ -34,6 +38,28 @@ constexpr const char* kResumable =
 
 std::int64_t ResumableSince() {
   return StoredNow() - std::int64_t{kResumable_h} * 3600 * 1'000'000;
+}
+
+/// "X,Y,B;" for each point, in thousandths of the picture; B is 1 where a line begins.
+std::string TextOfDrawing(const std::vector<DrawnPoint>& points) {
+  std::string text;
+  for (const auto& [x, y, begins] : points)
+    text += fmt::format("{},{},{};", std::lround(1000 * x), std::lround(1000 * y), begins ? 1 : 0);
+  return text;
+}
+
+/// Nothing for what an imported record may hold instead.
+std::vector<DrawnPoint> DrawingOf(const std::string& text) {
+  std::vector<DrawnPoint> points;
+  for (const char* at = text.c_str(); *at != '\0';) {
+    int x = 0, y = 0, begins = 0, length = 0;
+    if (std::sscanf(at, "%4d,%4d,%1d;%n", &x, &y, &begins, &length) != 3 || length == 0 || x < 0 ||
+        x > 1000 || y < 0 || y > 1000 || points.size() == kMaxDrawnPoints)
+      return {};
+    points.push_back({.x = x / 1000.0, .y = y / 1000.0, .begins = begins == 1});
+    at += length;
+  }
+  return points;
 }
 
 Patient ReadPatient(const Statement& row) {
@@ -48,6 +74,8 @@ Patient ReadPatient(const Statement& row) {
           .immobilisation = row.Text(9),
           .alert = row.Text(10),
           .has_photo = row.Integer(11) != 0,
+          .has_drawing = row.Integer(12) != 0,
+          .sheet_revision = static_cast<int>(row.Integer(13)),
           .archived = row.Integer(8) != 0};
 }
 
@@ -165,10 +193,36 @@ void PatientStore::SetPhoto(const Actor& actor, const std::string& id, const std
                     sodium_base64_VARIANT_ORIGINAL);
   stored.pop_back();  // the zero at its end
   StoreChange change(database_);
-  change->Run("UPDATE patients SET photo = ? WHERE id = ? AND id > 0", stored, number);
+  change->Run(
+      "UPDATE patients SET photo = ?, has_photo = ?, drawing = '', sheet_revision = sheet_revision "
+      "+ 1 WHERE id = ? AND id > 0",
+      stored, std::int64_t{jpeg.empty() ? 0 : 1}, number);
   if (change->num_changed() == 0)
     throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
   change.Log(actor, jpeg.empty() ? "patient.photo_remove" : "patient.photo", id, {});
+  change.Commit();
+}
+
+std::vector<DrawnPoint> PatientStore::Drawing(const std::string& id) {
+  return DrawingOf(
+      database_.ForRows()
+          ->FirstText("SELECT drawing FROM patients WHERE id = ? AND id > 0", ParseId(id))
+          .value_or(""));
+}
+
+void PatientStore::SetDrawing(const Actor& actor, const std::string& id,
+                              const std::vector<DrawnPoint>& points, int revision) {
+  const std::int64_t number = RequireId(id, "patient");
+  StoreChange change(database_);
+  const auto stored =
+      change->FirstInteger("SELECT sheet_revision FROM patients WHERE id = ? AND id > 0", number);
+  if (!stored) throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
+  if (*stored != revision) throw StoreRefusal(ChangeResult::kConflict, say::store::SheetChanged());
+  change->Run(
+      "UPDATE patients SET drawing = ?, sheet_revision = sheet_revision + 1 WHERE id = ? AND id > "
+      "0",
+      TextOfDrawing(points), number);
+  change.Log(actor, points.empty() ? "patient.drawing_remove" : "patient.drawing", id, {});
   change.Commit();
 }
 

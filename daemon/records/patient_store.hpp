@@ -32,7 +32,13 @@ class PatientStore {
   /// JPEG; nothing if there is none, or if it is not one.
   [[nodiscard]] std::optional<std::string> Photo(const std::string& id);
   /// kInvalid for more than kMaxPhoto bytes. @param jpeg  Empty: it is removed.
+  /// A drawing goes with the picture that it was made over.
   void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg);
+  /// Nothing if what is stored is no drawing.
+  [[nodiscard]] std::vector<DrawnPoint> Drawing(const std::string& id);
+  /// Kept to a thousandth of the picture. kConflict unless `revision` is Patient::sheet_revision.
+  void SetDrawing(const Actor& actor, const std::string& id, const std::vector<DrawnPoint>& points,
+                  int revision);
   /// kConflict while a session of the patient is open.
   void Archive(const Actor& actor, const std::string& id, bool archived);
 

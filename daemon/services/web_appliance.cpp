@@ -2,16 +2,37 @@
 // The page's service for the state of the appliance and its button.
 #include "daemon/services/web_services.hpp"
 
+#include <cstdint>
 #include <utility>
+#include <vector>
+
+#include <opencv2/imgproc.hpp>
 
 #include "daemon/files/compact_map.hpp"
 #include "daemon/monitoring/outline_watch.hpp"
+#include "drivers/files/image_file.hpp"
+#include "web/model/limits.hpp"
 
 namespace plumb {
 
 namespace {
 
 constexpr auto kPreviewEvery = std::chrono::milliseconds(200);
+constexpr int kPhotoColumns = 1280;
+
+/// With less quality where it would be too large.
+std::string PhotoJpeg(const cv::Mat& color_rgb) {
+  cv::Mat picture = color_rgb;
+  if (picture.cols > kPhotoColumns)
+    cv::resize(color_rgb, picture, {kPhotoColumns, color_rgb.rows * kPhotoColumns / color_rgb.cols},
+               0, 0, cv::INTER_AREA);
+  std::vector<std::uint8_t> jpeg;
+  for (const int quality : {85, 70, 50, 30}) {
+    jpeg = EncodeJpeg(picture, quality);
+    if (jpeg.size() <= kMaxPhoto) break;
+  }
+  return {jpeg.begin(), jpeg.end()};
+}
 
 class WebAppliance final : public web::ApplianceService {
  public:
@@ -36,6 +57,12 @@ class WebAppliance final : public web::ApplianceService {
     preview_at_ = now;
     preview_index_ = frame->index;
     return preview_;
+  }
+
+  std::function<std::string()> Photographer() override {
+    const std::optional<Frame> frame = sensors_.latest();
+    if (!frame) return {};
+    return [picture = frame->color_rgb] { return PhotoJpeg(picture); };
   }
 
   std::optional<CameraOutline> Outline() override {

@@ -70,10 +70,22 @@ class WebPatients final : public web::PatientService {
                        [&](PatientStore& patients) { return patients.Photo(id); });
   }
 
-  void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
+  void SetPhoto(const Actor& actor, const std::string& id, std::function<std::string()> take,
                 Done done) override {
+    store_.Write(&Store::patients, std::move(done), [=](PatientStore& patients) {
+      patients.SetPhoto(actor, id, take ? take() : std::string());
+    });
+  }
+
+  std::vector<DrawnPoint> Drawing(const std::string& id) override {
+    return store_.Read(&Store::patients,
+                       [&](PatientStore& patients) { return patients.Drawing(id); });
+  }
+
+  void SetDrawing(const Actor& actor, const std::string& id, const std::vector<DrawnPoint>& points,
+                  int revision, Done done) override {
     store_.Write(&Store::patients, std::move(done),
-                 [=](PatientStore& patients) { patients.SetPhoto(actor, id, jpeg); });
+                 [=](PatientStore& patients) { patients.SetDrawing(actor, id, points, revision); });
   }
 
   void ArchivePatient(const Actor& actor, const std::string& id, bool archived,

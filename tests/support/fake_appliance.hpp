@@ -112,6 +112,10 @@ class FakeAppliance : public web::BackgroundWork,
   Status GetStatus() override;
   Health GetHealth() override { return health; }
   std::shared_ptr<const std::string> Preview() override { return preview; }
+  std::function<std::string()> Photographer() override {
+    if (!preview) return {};
+    return [picture = preview] { return *picture; };
+  }
   std::optional<CameraOutline> Outline() override { return outline; }
   std::shared_ptr<const std::string> SweptSurface() override {
     return status.state == ApplianceState::kScanning ? surface : nullptr;
@@ -163,8 +167,11 @@ class FakeAppliance : public web::BackgroundWork,
     const auto found = photos_.find(id);
     return found == photos_.end() ? std::nullopt : std::optional(found->second);
   }
-  void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
+  void SetPhoto(const Actor& actor, const std::string& id, std::function<std::string()> take,
                 Done done) override;
+  std::vector<DrawnPoint> Drawing(const std::string& id) override { return drawings_[id]; }
+  void SetDrawing(const Actor& actor, const std::string& id, const std::vector<DrawnPoint>& points,
+                  int revision, Done done) override;
   void ArchivePatient(const Actor& actor, const std::string& id, bool archived, Done done) override;
   void WipePatient(const Actor& actor, const std::string& id, Done done) override;
   void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
@@ -336,6 +343,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::map<std::string, Preferences> preferences_;
   std::map<std::string, int> num_fractions_;
   std::map<std::string, std::string> photos_;
+  std::map<std::string, std::vector<DrawnPoint>> drawings_;
   std::map<std::string, TreatmentSession> sessions_;  ///< By id: all that were opened.
 };
 

@@ -95,15 +95,31 @@ void FakeAppliance::ChangePatient(const Actor& actor, const std::string& id,
   Finish(done, Refused(ChangeResult::kNotFound, "there is no such patient"));
 }
 
-void FakeAppliance::SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
-                             Done done) {
+void FakeAppliance::SetPhoto(const Actor& actor, const std::string& id,
+                             std::function<std::string()> take, Done done) {
   Patient* patient = PatientOf(id);
   if (patient == nullptr)
     return Finish(done, Refused(ChangeResult::kNotFound, "there is no such patient"));
-  patient->has_photo = !jpeg.empty();
+  patient->has_photo = static_cast<bool>(take);
+  patient->has_drawing = false;
+  ++patient->sheet_revision;
   photos_.erase(id);
-  if (!jpeg.empty()) photos_[id] = jpeg;
-  Did(actor, jpeg.empty() ? "patient.photo_remove" : "patient.photo", id, done);
+  drawings_.erase(id);
+  if (take) photos_[id] = take();
+  Did(actor, take ? "patient.photo" : "patient.photo_remove", id, done);
+}
+
+void FakeAppliance::SetDrawing(const Actor& actor, const std::string& id,
+                               const std::vector<DrawnPoint>& points, int revision, Done done) {
+  Patient* patient = PatientOf(id);
+  if (patient == nullptr)
+    return Finish(done, Refused(ChangeResult::kNotFound, "there is no such patient"));
+  if (patient->sheet_revision != revision)
+    return Finish(done, Refused(ChangeResult::kConflict, say::store::SheetChanged()));
+  patient->has_drawing = !points.empty();
+  ++patient->sheet_revision;
+  drawings_[id] = points;
+  Did(actor, points.empty() ? "patient.drawing_remove" : "patient.drawing", id, done);
 }
 
 void FakeAppliance::ArchivePatient(const Actor& actor, const std::string& id, bool archived,

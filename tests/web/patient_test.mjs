@@ -63,6 +63,7 @@ await h.step('alert and immobilisation are shown where it is confirmed who is th
   });
   await session.getByText('pacemaker on the left').waitFor();
   await session.getByText('wing board 3, knee rest B').waitFor();
+  await session.getByRole('img', { name: 'Body of the reference, from above' }).waitFor();
   equal((await ok(anna, `patients/${patient}`)).alert, 'pacemaker on the left', 'what is stored');
 });
 
@@ -82,9 +83,83 @@ await h.step('a photo is taken with the sensor on purpose, and removed', async (
   await bob.goto(`${h.url}#/patient/${patient}`);
   await bob.locator('.set-up-photo').first().waitFor();
   await h.look(bob, 'set-up-sheet-phone');
+});
+
+const drawing = (page) => onSheet(page).getByRole('application', { name: 'Drawing' });
+const drawn = async (page) => (await ok(page, `patients/${patient}/drawing`)).points;
+/// The lines and dots that are seen in a picture.
+const seen = (place) => place.locator('.drawn.over').count();
+
+await h.step('it is drawn on, by mouse and by keys, and seen where it is confirmed', async () => {
+  await onSheet(anna).getByText('Draw on it…').click();
+  await drawing(anna).scrollIntoViewIfNeeded();
+  const box = await drawing(anna).boundingBox();
+  const at = (x, y) => [box.x + x * box.width, box.y + y * box.height];
+  for (const [from, to] of [[[0.2, 0.5], [0.4, 0.5]], [[0.6, 0.2], [0.6, 0.9]]]) {
+    await anna.mouse.move(...at(...from));
+    await anna.mouse.down();
+    await anna.mouse.move(...at(...to), { steps: 4 });
+    await anna.mouse.up();
+  }
+  equal(await seen(drawing(anna)), 2, 'two lines');
+  await onSheet(anna).getByRole('button', { name: 'Undo' }).click();
+  equal(await seen(drawing(anna)), 1, 'one is taken back');
+  await drawing(anna).focus();
+  for (const key of ['ArrowRight', 'Shift+ArrowUp', 'Enter', 'Enter', 'u']) {
+    await anna.keyboard.press(key);
+  }
+  await anna.locator('#status', { hasText: 'Dot 3 is set' }).waitFor();
+  await h.look(anna, 'set-up-drawing');
+  await onSheet(anna).getByRole('button', { name: 'Save the drawing' }).click();
+  await onSheet(anna).locator('.set-up .set-up-picture .drawn.over').nth(1)
+    .waitFor({ state: 'attached' });
+  const points = await drawn(anna);
+  equal(points.filter(([, , begins]) => begins === 1).length, 2, 'a line and a dot');
+  check(points.slice(0, -1).every(([x, y]) => x > 0.19 && x < 0.41 && Math.abs(y - 0.5) < 0.01),
+    `the line lies where it was drawn: ${JSON.stringify(points)}`);
+  equal(JSON.stringify(points.at(-1)), '[0.52,0.4,1]', 'the dot');
+  const session = anna.locator('section', {
+    has: anna.getByRole('heading', { name: 'Session', exact: true }),
+  });
+  await session.locator('.drawn.over').nth(1).waitFor({ state: 'attached' });
+});
+
+await h.step('by finger, on a phone; what somebody else has drawn meanwhile is not overwritten',
+  async () => {
+  const touch = await h.person('touch', { width: 360, height: 740 },
+    { hasTouch: true });
+  await h.logIn(touch, 'bob');
+  await touch.goto(`${h.url}#/patient/${patient}`);
+  await onSheet(touch).getByText('Draw on it…').tap();
+  await drawing(touch).locator('.drawn.over').nth(1).waitFor({ state: 'attached' });
+  await drawing(touch).scrollIntoViewIfNeeded();
+  const box = await drawing(touch).boundingBox();
+  await touch.touchscreen.tap(box.x + 0.9 * box.width, box.y + 0.5 * box.height);
+  equal(await seen(drawing(touch)), 3, 'a dot where it was touched');
+  await h.look(touch, 'set-up-drawing-phone');
+  await ok(anna, `patients/${patient}/drawing`, 'PUT', { points: [],
+    sheet_revision: (await ok(anna, `patients/${patient}`)).sheet_revision });
+  await onSheet(touch).getByRole('button', { name: 'Save the drawing' }).tap();
+  await touch.getByRole('alert').getByText('changed by somebody else meanwhile').waitFor();
+  equal(await seen(drawing(touch)), 3, 'what was drawn is still there');
+  equal((await drawn(anna)).length, 0, 'and nothing was overwritten');
+  await touch.context().close();
+});
+
+await h.step('a drawing goes with its photo; without one it lies over the outline of a body',
+  async () => {
+  await ok(anna, `patients/${patient}/drawing`, 'PUT', { points: [[0.5, 0.5, 1]],
+    sheet_revision: (await ok(anna, `patients/${patient}`)).sheet_revision });
   await onSheet(anna).getByRole('button', { name: 'Remove the photo' }).click();
-  await photo.waitFor({ state: 'detached' });
+  await onSheet(anna).locator('img.set-up-photo').waitFor({ state: 'detached' });
   equal((await h.api(anna, `patients/${patient}/photo`)).status, 404, 'it is gone');
+  equal((await drawn(anna)).length, 0, 'and what was drawn over it');
+  await onSheet(anna).getByText('Draw on it…').click();
+  await drawing(anna).focus();
+  await anna.keyboard.press('Enter');
+  await onSheet(anna).getByRole('button', { name: 'Save the drawing' }).click();
+  await onSheet(anna).locator('.set-up svg.set-up-photo').waitFor();
+  await h.look(anna, 'set-up-drawing-outline');
 });
 
 await h.step('mean and deviation over the fractions', async () => {

@@ -351,6 +351,7 @@ await h.step('accepting outside tolerance takes a reason and the password', asyn
   await h.look(anna, 'accept-outside', { axe: false });
   await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
   await anna.getByText(/^▲ Accepted outside tolerance by anna, .*20.*: swelling/).waitFor();
+  await room.locator('.room-accepted', { hasText: '▲ Accepted by anna' }).waitFor(kSlow);
   const { entries } = await ok(bob, 'audit?limit=20', 'GET');
   check(entries.some(({ action }) => action === 'scan.accept_outside'), 'it is in the log');
 });
@@ -367,6 +368,7 @@ await h.step('in tolerance: one tap accepts, and nothing commands a move', async
   }
   await anna.getByRole('button', { name: 'Accept', exact: true }).click();
   await anna.getByText('Accepted by anna').waitFor();
+  await room.locator('.room-accepted', { hasText: '✓ Accepted by anna' }).waitFor(kSlow);
   // An old result: the note is read from 3 m; nothing is green or ticked, and nothing says what to
   // do.
   await room.locator('.room-result:not(.is-old) .verdict.in_tolerance').waitFor();

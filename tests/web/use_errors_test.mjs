@@ -216,7 +216,17 @@ async () => {
   const six = { version: 1, name: 'Couch 2', num_axes: 6, is_in_cm: false, hides_rest: false,
     ...Object.fromEntries(['vertical', 'longitudinal', 'lateral', 'pitch', 'roll', 'yaw'].map(
       (name) => [`reverses_${name}`, false])) };
-  equal((await h.api(bob, 'couch', 'POST', { ...six, password: h.password })).status, 201, 'back');
+  equal((await h.api(bob, 'couch', 'POST', { ...six, is_in_cm: true, wraps: true,
+    password: h.password })).status, 201, 'one without readings below zero');
+  await anna.getByText('995 cm stands for −5 cm').waitFor();
+  await anna.getByText('Couch readings: what to set').click();
+  for (const [field, reading, words] of [['Lateral (cm)', '995', 'Lateral: set to 995.0 cm'],
+    ['Yaw (°)', '1.5', 'Yaw: set to 357.5 °'], ['Yaw (°)', '-1', 'a number in °']]) {
+    await anna.getByLabel(field).fill(reading);
+    await anna.getByText(words).waitFor();
+  }
+  equal((await h.api(bob, 'couch', 'POST', { ...six, version: 2, password: h.password })).status,
+    201, 'back');
 });
 
 await h.step('a result of an earlier session of the same patient is not valid in the next one, '

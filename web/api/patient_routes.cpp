@@ -80,14 +80,44 @@ void AddPhotoRoutes(Routes& routes, PatientService& patients, ApplianceService& 
       .Discloses("view.photo");
   routes.Write("POST", "/api/v1/patients/{id}/photo", Permission::kPatients, BodyKind::kNone,
                [&patients, &appliance](const Request& request, const Done& done) {
-                 const auto picture = appliance.Preview();
-                 if (!picture)
+                 auto take = appliance.Photographer();
+                 if (!take)
                    return done(Refused(ChangeResult::kConflict, say::web::NoCameraImage()));
-                 patients.SetPhoto(request.actor(), request.arguments[0], *picture, done);
+                 patients.SetPhoto(request.actor(), request.arguments[0], std::move(take), done);
                });
   routes.Write("DELETE", "/api/v1/patients/{id}/photo", Permission::kPatients, BodyKind::kNone,
                [&patients](const Request& request, const Done& done) {
                  patients.SetPhoto(request.actor(), request.arguments[0], {}, done);
+               });
+}
+
+std::vector<DrawnPoint> DrawnIn(Fields& fields) {
+  std::vector<DrawnPoint> points;
+  for (const auto& point : fields.Points("points", 3, kMaxDrawnPoints)) {
+    for (const double value : point)
+      if (!(value >= 0 && value <= 1)) throw DataError(say::web::FieldRange("points", 0, 1, value));
+    points.push_back({.x = point[0], .y = point[1], .begins = point[2] > 0.5});
+  }
+  return points;
+}
+
+void AddDrawingRoutes(Routes& routes, PatientService& patients) {
+  routes
+      .ReadInBackground("/api/v1/patients/{id}/drawing", Permission::kView,
+                        [&patients](const Request& request) {
+                          Json points = Json::array();
+                          for (const auto& [x, y, begins] : patients.Drawing(request.arguments[0]))
+                            points.push_back({x, y, begins ? 1 : 0});
+                          return JsonResponse({{"points", std::move(points)}});
+                        })
+      .Discloses("view.drawing");
+  routes.Write("PUT", "/api/v1/patients/{id}/drawing", Permission::kPatients, BodyKind::kJson,
+               [&patients](const Request& request, const Done& done) {
+                 Fields fields(request.body);
+                 const std::vector<DrawnPoint> points = DrawnIn(fields);
+                 const int revision = fields.Integer("sheet_revision", 0, 999'999'999);
+                 fields.Finish();
+                 patients.SetDrawing(request.actor(), request.arguments[0], points, revision, done);
                });
 }
 
@@ -216,6 +246,7 @@ void AddReferenceRoutes(Routes& routes, ReferenceService& references) {
 void AddPatientApi(Routes& routes, const Services& services) {
   AddPatientRoutes(routes, services.patients);
   AddPhotoRoutes(routes, services.patients, services.appliance);
+  AddDrawingRoutes(routes, services.patients);
   AddSessionRoutes(routes, services.patients);
   AddCourseRoutes(routes, services.patients, services.references, services.scans);
   AddTemplateRoutes(routes, services.settings);

@@ -174,6 +174,7 @@ CouchProfile ReadCouch(Fields& fields) {
   if (!IsCouchAxes(couch.num_axes)) throw DataError(say::web::FieldCouchAxes());
   couch.is_in_cm = fields.Flag("is_in_cm");
   couch.hides_rest = fields.Flag("hides_rest");
+  if (fields.Has("wraps")) couch.wraps = fields.Flag("wraps");
   for (std::size_t i = 0; i < kNumberAxes.size(); ++i)
     couch.reverses.at(i) = fields.Flag((std::string("reverses_") + kNumberAxes.at(i).name).c_str());
   return couch;

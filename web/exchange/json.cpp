@@ -258,6 +258,7 @@ Json CouchJson(const CouchProfile& couch) {
                {"num_axes", couch.num_axes},
                {"is_in_cm", couch.is_in_cm},
                {"hides_rest", couch.hides_rest},
+               {"wraps", couch.wraps},
                {"signed_by", TextOrNull(couch.signed_by)},
                {"signed_at", couch.version > 0 ? Json(couch.signed_at) : Json(nullptr)},
                {"axes", Json::object()}};
@@ -266,7 +267,8 @@ Json CouchJson(const CouchProfile& couch) {
     json["axes"][kNumberAxes.at(i).name] = {{"factor", axis.factor},
                                             {"unit", axis.unit},
                                             {"digits", axis.digits},
-                                            {"moves", axis.moves}};
+                                            {"moves", axis.moves},
+                                            {"period", axis.period}};
   }
   PutMessages(json, "note", CouchNotes(couch));
   PutMessage(json, "apply", CouchApply(couch));
@@ -373,6 +375,8 @@ void to_json(Json& json, const Patient& patient) {
           {"immobilisation", patient.immobilisation},
           {"alert", patient.alert},
           {"has_photo", patient.has_photo},
+          {"has_drawing", patient.has_drawing},
+          {"sheet_revision", patient.sheet_revision},
           {"archived", patient.archived},
           {"last_session", nullptr}};
   if (const auto& last = patient.last_session) {

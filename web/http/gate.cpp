@@ -40,11 +40,14 @@ Response AnswerOf(std::string_view name, const std::exception& error) {
 
 }  // namespace
 
-bool Gate::IsOwnPage(const Request& request) const {
+Message Gate::WhyNotOwnPage(const Request& request) const {
   const std::string_view site = request.Header("sec-fetch-site");
-  if (!site.empty() && site != "same-origin" && site != "none") return false;
-  const std::string_view origin = request.Header("origin");
-  return origin.empty() || IsSameOrigin(origin, request.Header("host"), tls_);
+  if (!site.empty() && site != "same-origin" && site != "none") return say::web::OtherSite();
+  const std::string_view origin = request.Header("origin"), host = request.Header("host");
+  if (origin.empty() || IsSameOrigin(origin, host, tls_)) return {};
+  // The cookies of such a browser would not be kept to TLS.
+  if (!tls_ && IsSameOrigin(origin, host, /*tls=*/true)) return say::web::ProxyWithoutTls();
+  return say::web::OtherSite();
 }
 
 Response Gate::NotLoggedIn() const {
@@ -95,7 +98,8 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
     request.session.reset();  // for pages that show more to logged-in users
   }
   if (request.method != "GET") {
-    if (!IsOwnPage(request)) return ErrorResponse(403, say::web::OtherSite());
+    if (Message why = WhyNotOwnPage(request); !why.empty())
+      return ErrorResponse(403, std::move(why));
     if (route.permission != Permission::kNone &&
         !IsSameSecret(request.Header("x-csrf-token"), request.session->csrf_token)) {
       return ErrorResponse(403, say::web::WrongToken());

@@ -48,7 +48,8 @@ class Gate {
   }
 
  private:
-  [[nodiscard]] bool IsOwnPage(const Request& request) const;
+  /// Why a change is refused that no page of this unit has asked for; empty if one has.
+  [[nodiscard]] Message WhyNotOwnPage(const Request& request) const;
   [[nodiscard]] Response NotLoggedIn() const;
 
   const Router& router_;

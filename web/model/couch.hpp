@@ -30,6 +30,8 @@ struct CouchProfile {
   std::array<bool, 6> reverses = {};  ///< In the order of kNumberAxes: counts against IEC 61217.
   /// Leaves out what the couch cannot apply while that is in tolerance.
   bool hides_rest = false;
+  /// Its display has no readings below zero: 995 cm stands for -5 cm, 359 degrees for -1.
+  bool wraps = false;
   std::string signed_by = {};
   WallClock::time_point signed_at = {};
 };
@@ -44,6 +46,7 @@ struct CouchAxis {
   const char* unit = "mm";
   int digits = 1;  ///< Behind the point, at most.
   bool moves = true;
+  std::optional<double> period = {};  ///< Where readings begin at zero again; not of a correction.
 };
 
 /// As it follows a number: no space before the sign of degrees.
@@ -57,9 +60,12 @@ struct CouchAxis {
   constexpr std::size_t kYaw = 5;
   const bool moves =
       axis.is_shift() || couch.num_axes == 6 || (couch.num_axes == 4 && number == kYaw);
-  if (!axis.is_shift()) return {.factor = sign, .unit = "\u00b0", .digits = 2, .moves = moves};
-  if (couch.is_in_cm) return {.factor = sign / 10, .unit = "cm", .digits = 2, .moves = moves};
-  return {.factor = sign, .unit = "mm", .digits = 1, .moves = moves};
+  const auto period = [&](double at) { return couch.wraps ? std::optional(at) : std::nullopt; };
+  if (!axis.is_shift())
+    return {.factor = sign, .unit = "\u00b0", .digits = 2, .moves = moves, .period = period(360)};
+  if (couch.is_in_cm)
+    return {.factor = sign / 10, .unit = "cm", .digits = 2, .moves = moves, .period = period(1000)};
+  return {.factor = sign, .unit = "mm", .digits = 1, .moves = moves, .period = period(10000)};
 }
 
 /// A row of a result as the couch counts it.
@@ -117,6 +123,7 @@ struct CouchRow {
   notes.push_back(say::result::CouchCounts(couch.name));
   if (!reversed.empty()) notes.push_back(say::result::CouchReverses(std::move(reversed)));
   if (!unmoved.empty()) notes.push_back(say::result::CouchLeaves(std::move(unmoved)));
+  if (couch.wraps) notes.push_back(say::result::CouchWraps());
   if (couch.hides_rest && couch.num_axes < 6) notes.push_back(say::result::CouchHides());
   return notes;
 }

@@ -38,7 +38,8 @@ inline constexpr Limits kIdleLogout_min{.entered = {1, 240}, .stored = {1, 100'0
 /// Lengths of texts in bytes. A name is that of an account, a display, or a patient (its code).
 inline constexpr std::size_t kMaxName = 32, kMaxSite = 64, kMaxNote = 500;
 /// Photo of a set-up sheet, as JPEG.
-inline constexpr std::size_t kMaxPhoto = std::size_t{40} << 10;
+inline constexpr std::size_t kMaxPhoto = std::size_t{160} << 10;
+inline constexpr std::size_t kMaxDrawnPoints = 3000;
 inline constexpr std::size_t kMinReason = 3, kMaxReason = 200;
 /// Of a structure set and of a plan, each; a file of a planning CT is smaller.
 inline constexpr std::uint64_t kMaxPlanningFile = std::uint64_t{64} << 20;

@@ -46,10 +46,20 @@ struct Patient {
   std::string immobilisation = {};  ///< The set-up sheet: devices and how they are set.
   std::string alert = {};           ///< What has to be known before the patient is set up.
   bool has_photo = false;           ///< PatientService::Photo() has one.
+  bool has_drawing = false;         ///< PatientService::Drawing() has one.
+  int sheet_revision = 0;           ///< Grows with every photo and every drawing.
   bool archived = false;            ///< Not in the list and not to be opened; nothing is deleted.
   /// The newest session for fractions, if scans were completed in it and it was closed in the last
   /// kResumable_h hours. Not set in lists.
   std::optional<EndedSession> last_session = {};
+};
+
+/// A point of what people draw on the set-up sheet: over the photo, or over the outline of a body
+/// where there is none.
+struct DrawnPoint {
+  double x = 0.0, y = 0.0;  ///< Fractions of the picture's width and height, from its top left.
+  bool begins = true;       ///< A line; one without more points is a mark.
+  bool operator==(const DrawnPoint&) const = default;
 };
 
 /// People write these about a patient's course.

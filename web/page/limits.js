@@ -19,6 +19,9 @@ export const kResult = { valid_s: 120 };
 /// Where no plan states one (algo/verdict/default_tolerance.hpp).
 export const kTolerance = { shift_mm: 3, rotation_deg: 1 };
 
+/// Of a drawing on the set-up sheet.
+export const kDrawing = { points: 3000 };
+
 export const kName = { maxlength: 32 };
 export const kSite = { maxlength: 64 };
 export const kNote = { maxlength: 500 };

@@ -33,6 +33,9 @@ class ApplianceService {
   /// The newest camera picture as a small JPEG (at most 320 pixels wide, at most 5 per second);
   /// null when the sensor delivers none.
   [[nodiscard]] virtual std::shared_ptr<const std::string> Preview() = 0;
+  /// Makes a JPEG of the newest camera picture, in all its pixels up to 1280 columns, and at most
+  /// kMaxPhoto bytes if that is possible; on any thread. Empty when the sensor delivers none.
+  [[nodiscard]] virtual std::function<std::string()> Photographer() = 0;
   /// A picture twice a second with the outline of the reference that the open session compares
   /// with, as long as somebody asks; nothing without such a reference, during a daily check, and
   /// when the sensor delivers no picture.

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,9 +34,17 @@ class PatientService {
                              const std::optional<CourseNotes>& shown, Done done) = 0;
   /// The photo of the set-up sheet as JPEG; nothing if there is none (background).
   [[nodiscard]] virtual std::optional<std::string> Photo(const std::string& id) = 0;
-  /// @param jpeg  At most kMaxPhoto bytes; empty: the photo is removed.
-  virtual void SetPhoto(const Actor& actor, const std::string& id, const std::string& jpeg,
-                        Done done) = 0;
+  /// What was drawn over another picture goes with it.
+  /// @param take  Makes the JPEG, at most kMaxPhoto bytes, where it holds up nothing. Empty: the
+  ///        photo is removed.
+  virtual void SetPhoto(const Actor& actor, const std::string& id,
+                        std::function<std::string()> take, Done done) = 0;
+  /// What was drawn on the set-up sheet; empty if nothing (background).
+  [[nodiscard]] virtual std::vector<DrawnPoint> Drawing(const std::string& id) = 0;
+  /// @param points  At most kMaxDrawnPoints; none: the drawing is removed.
+  /// @param revision  Patient::sheet_revision as the person has seen it; kConflict for another one.
+  virtual void SetDrawing(const Actor& actor, const std::string& id,
+                          const std::vector<DrawnPoint>& points, int revision, Done done) = 0;
   /// Moves the patient to the archive or back. kConflict while a session of the patient is open.
   virtual void ArchivePatient(const Actor& actor, const std::string& id, bool archived,
                               Done done) = 0;

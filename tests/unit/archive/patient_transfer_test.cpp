@@ -201,6 +201,24 @@ TEST_F(PatientTransferTest, ComesWithEverythingAndByteIdenticalFiles) {
   EXPECT_THAT(FilesBelow(there() / "imports"), IsEmpty()) << "wiped with the patient";
 }
 
+TEST_F(PatientTransferTest, PhotoAndDrawingOfTheSetUpSheetComeAlong) {
+  const std::string jpeg = "\xFF\xD8" + std::string(kMaxPhoto - 2, '\0');
+  const std::vector<DrawnPoint> drawn(kMaxDrawnPoints, {1.0, 0.999, false});
+  {
+    Store store(here());
+    store.patients.SetPhoto(kAnna, patient_, jpeg);
+    store.patients.SetDrawing(kAnna, patient_, drawn, 1);
+  }
+  (void)ExportPatient(here(), "P-7", out());
+  (void)ImportPatient(out(), there());
+  Store to(there());
+  const auto patient = to.patients.FindByCode("P-7");
+  ASSERT_TRUE(patient);
+  EXPECT_TRUE(patient->has_photo);
+  EXPECT_EQ(to.patients.Photo(patient->id), jpeg) << "the largest there is";
+  EXPECT_EQ(to.patients.Drawing(patient->id), drawn);
+}
+
 TEST_F(PatientTransferTest, GoesRoundAndIsTheSame) {
   (void)ExportPatient(here(), "P-7", out());
   EXPECT_TRUE(ImportPatient(out(), here()).was_there) << "where it came from";

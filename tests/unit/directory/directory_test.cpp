@@ -8,8 +8,8 @@
 
 #include <atomic>
 #include <chrono>
-#include <fstream>
 #include <memory>
+#include <optional>
 #include <semaphore>
 
 #include <fmt/format.h>
@@ -17,107 +17,29 @@
 #include "daemon/directory/ldap_directory.hpp"
 #include "tests/support/fake_peer.hpp"
 #include "tests/support/free_port.hpp"
-#include "tests/support/process.hpp"
 #include "tests/support/skip.hpp"
+#include "tests/support/slapd.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace plumb::test {
 namespace {
 
-namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr const char* kServer = "/usr/sbin/slapd";
-constexpr const char* kPassword = "a long password";
-
-constexpr const char* kPeople = R"(dn: dc=clinic,dc=example
-objectClass: dcObject
-objectClass: organization
-o: clinic
-dc: clinic
-
-dn: ou=people,dc=clinic,dc=example
-objectClass: organizationalUnit
-ou: people
-
-dn: ou=groups,dc=clinic,dc=example
-objectClass: organizationalUnit
-ou: groups
-
-{}
-dn: cn=physicists,ou=groups,dc=clinic,dc=example
-objectClass: groupOfNames
-cn: physicists
-member: uid=marie,ou=people,dc=clinic,dc=example
-
-dn: cn=therapists,ou=groups,dc=clinic,dc=example
-objectClass: groupOfNames
-cn: therapists
-member: uid=marie,ou=people,dc=clinic,dc=example
-member: uid=anna,ou=people,dc=clinic,dc=example
-)";
-
-std::string PersonEntry(const std::string& uid, const std::string& title) {
-  return fmt::format(
-      "dn: uid={0},ou=people,dc=clinic,dc=example\nobjectClass: inetOrgPerson\nuid: {0}\n"
-      "cn: {0}\nsn: {0}\ntitle: {1}\nuserPassword: {2}\n\n",
-      uid, title, kPassword);
-}
+constexpr const char* kPassword = testing::Slapd::kPassword;
 
 class LdapTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!fs::exists(kServer)) PLUMB_SKIP("there is no slapd");
+    if (!testing::Slapd::IsInstalled()) PLUMB_SKIP("there is no slapd");
     ::signal(SIGPIPE, SIG_IGN);
-    ASSERT_EQ(Shell("openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=directory "
-                    "-addext subjectAltName=IP:127.0.0.1 -keyout key.pem -out cert.pem"),
-              0);
-    fs::create_directory(InFolder("data"));
-    Write("slapd.conf",
-          fmt::format("include /etc/ldap/schema/core.schema\n"
-                      "include /etc/ldap/schema/cosine.schema\n"
-                      "include /etc/ldap/schema/inetorgperson.schema\n"
-                      "modulepath /usr/lib/ldap\nmoduleload back_mdb\n"
-                      "TLSCertificateFile {0}/cert.pem\nTLSCertificateKeyFile {0}/key.pem\n"
-                      "pidfile {0}/slapd.pid\nargsfile {0}/slapd.args\n"
-                      "database mdb\nmaxsize 8388608\nsuffix \"dc=clinic,dc=example\"\n"
-                      "directory {0}/data\n",
-                      folder_.path().string()));
-    Write("people.ldif",
-          fmt::format(kPeople, PersonEntry("anna", "one") + PersonEntry("marie", "two") +
-                                   PersonEntry("visitor", "two")));
-    ASSERT_EQ(Shell("/usr/sbin/slapadd -f slapd.conf -l people.ldif"), 0);
-    settings_.url = fmt::format("ldaps://127.0.0.1:{}", tls_port_);
-    settings_.trusted = InFolder("cert.pem");
-    settings_.person = "uid={name},ou=people,dc=clinic,dc=example";
-    settings_.groups_base = "ou=groups,dc=clinic,dc=example";
+    server_.emplace(folder_.path());
+    settings_.url = server_->tls_url();
+    settings_.trusted = server_->certificate();
+    settings_.person = testing::Slapd::kPerson;
+    settings_.groups_base = testing::Slapd::kGroups;
     settings_.physicists = {"CN=Physicists, OU=groups,dc=clinic,dc=example"};  // written otherwise
     settings_.technicians = {"cn=therapists,ou=groups,dc=clinic,dc=example"};
-    StartServer();
-  }
-
-  /// It goes to the background once it answers.
-  void StartServer() {
-    const RunResult started = plumb::Run(
-        {kServer, "-f", InFolder("slapd.conf"), "-h",
-         fmt::format("ldaps://127.0.0.1:{} ldap://127.0.0.1:{}", tls_port_, plain_port_)});
-    ASSERT_EQ(started.exit_code, 0) << started.err;
-    std::ifstream(InFolder("slapd.pid")) >> server_;
-    ASSERT_GT(server_, 0);
-  }
-  ~LdapTest() override {
-    if (server_ > 0) ::kill(server_, SIGKILL);
-  }
-
-  [[nodiscard]] std::string InFolder(const char* name) const {
-    return (folder_.path() / name).string();
-  }
-  void Write(const char* name, const std::string& text) const {
-    std::ofstream(InFolder(name)) << text;
-  }
-  [[nodiscard]] int Shell(const std::string& command) const {
-    return std::system(
-        fmt::format("cd {} && {} >log 2>&1", folder_.path().string(), command).c_str());
   }
   [[nodiscard]] web::DirectoryAnswer Ask(const std::string& name,
                                          const std::string& password = kPassword) const {
@@ -130,9 +52,8 @@ class LdapTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  const int tls_port_ = testing::FreePort(), plain_port_ = testing::FreePort();
+  std::optional<testing::Slapd> server_;
   DirectorySettings settings_;
-  pid_t server_ = 0;
 };
 
 TEST_F(LdapTest, TheRoleIsThatOfTheFirstListWithOneOfTheGroups) {
@@ -159,30 +80,29 @@ TEST_F(LdapTest, WhatAPersonTypesIsNoPartOfTheQuestion) {
 }
 
 TEST_F(LdapTest, WithoutTlsNothingIsSaid) {
-  settings_.url = fmt::format("ldap://127.0.0.1:{}", plain_port_);
+  settings_.url = server_->plain_url();
   EXPECT_EQ(Text(Ask("anna")), "technician") << "TLS begins before the password is sent";
-  const fs::path trusted = std::exchange(settings_.trusted, fs::path());
+  const auto trusted = std::exchange(settings_.trusted, {});
   EXPECT_THAT(Text(Ask("anna")), HasSubstr("failure")) << "the authority is not trusted";
-  settings_.url = fmt::format("ldaps://127.0.0.1:{}", tls_port_);
+  settings_.url = server_->tls_url();
   EXPECT_THAT(Text(Ask("anna")), HasSubstr("failure"));
   settings_.trusted = trusted;
-  settings_.url = fmt::format("ldaps://localhost:{}", tls_port_);
+  settings_.url = fmt::format("ldaps://localhost:{}", server_->tls_port());
   EXPECT_THAT(Text(Ask("anna")), HasSubstr("failure")) << "another name than the certificate's";
 }
 
 TEST_F(LdapTest, AServerThatIsAwayOrNeverSpeaksIsAFailureAndNoWrongPassword) {
-  const std::string url = settings_.url;
   settings_.url = fmt::format("ldaps://127.0.0.1:{}", testing::FreePort());
   EXPECT_THAT(Text(Ask("anna")), HasSubstr("Can't contact LDAP server"));
-  settings_.url = url;
+  settings_.url = server_->tls_url();
   EXPECT_EQ(Text(Ask("anna")), "technician");
-  ::kill(server_, SIGSTOP);
+  server_->Freeze();
   EXPECT_THAT(Text(Ask("anna")), HasSubstr("does not answer"));
 }
 
 TEST_F(LdapTest, WhatTheConfigurationHasWrongIsSaidAndIsNoWrongPassword) {
   const DirectorySettings right = settings_;
-  settings_.trusted = InFolder("missing.pem");
+  settings_.trusted = "/nowhere/missing.pem";
   EXPECT_THAT(Text(Ask("anna")), HasSubstr("missing.pem, by which"));
   settings_ = right;
   settings_.groups_base = "ou=gruops,dc=clinic,dc=example";

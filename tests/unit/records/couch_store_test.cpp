@@ -20,7 +20,8 @@ TEST(CouchStoreTest, TheProfileThatWasReadIsReplacedAndHolds) {
                      .num_axes = 4,
                      .is_in_cm = true,
                      .reverses = {true, false, false, false, false, true},
-                     .hides_rest = true};
+                     .hides_rest = true,
+                     .wraps = true};
   EXPECT_EQ(store->couch.Sign(kSigner, couch), "1");
   EXPECT_THROW(store->couch.Sign(kSigner, couch), StoreRefusal) << "version 1 is in force";
 
@@ -32,6 +33,7 @@ TEST(CouchStoreTest, TheProfileThatWasReadIsReplacedAndHolds) {
   EXPECT_EQ(kept.num_axes, 4);
   EXPECT_TRUE(kept.is_in_cm);
   EXPECT_TRUE(kept.hides_rest);
+  EXPECT_TRUE(kept.wraps);
   EXPECT_EQ(kept.reverses, couch.reverses);
   EXPECT_EQ(kept.signed_by, "eve");
   EXPECT_LT(WallClock::now() - kept.signed_at, std::chrono::minutes(1));

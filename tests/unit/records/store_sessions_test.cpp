@@ -18,6 +18,7 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::IsEmpty;
 using testing::kAnna;
 using testing::kBert;
 using ::testing::SizeIs;
@@ -346,6 +347,38 @@ TEST_F(StoreSessionsTest, TheSetUpSheetIsKeptApartFromTheLogAndGoesWithThePatien
   store.patients.SetPhoto(kBert, patient, "");
   EXPECT_FALSE(store.patients.Photo(patient));
   EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "patient.photo_remove");
+}
+
+TEST_F(StoreSessionsTest, ADrawingBelongsToThePictureThatItWasMadeOver) {
+  const std::string jpeg = std::string("\xFF\xD8\xFF", 3);
+  const std::vector<DrawnPoint> drawn = {{0.25, 0.5, true}, {0.3, 0.517, false}, {1.0, 0.0, true}};
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "thorax");
+  const auto revision = [&] { return store.patients.Find(patient)->sheet_revision; };
+  EXPECT_THAT(store.patients.Drawing(patient), IsEmpty());
+  store.patients.SetPhoto(kAnna, patient, jpeg);
+  const int seen = revision();
+  store.patients.SetDrawing(kBert, patient, drawn, seen);
+  EXPECT_EQ(store.patients.Drawing(patient), drawn);
+  EXPECT_TRUE(store.patients.Find(patient)->has_drawing);
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "patient.drawing");
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(), "");
+  EXPECT_EQ(RefusalOf([&] { store.patients.SetDrawing(kAnna, patient, {}, seen); }),
+            ChangeResult::kConflict)
+      << "somebody else has drawn meanwhile";
+  store.patients.SetPhoto(kAnna, patient, jpeg);
+  EXPECT_THAT(store.patients.Drawing(patient), IsEmpty()) << "another picture";
+  EXPECT_EQ(RefusalOf([&] { store.patients.SetDrawing(kBert, patient, drawn, seen + 1); }),
+            ChangeResult::kConflict)
+      << "drawn over the picture before";
+  store.patients.SetDrawing(kBert, patient, drawn, revision());
+  store.patients.SetDrawing(kBert, patient, {}, revision());
+  EXPECT_FALSE(store.patients.Find(patient)->has_drawing);
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "patient.drawing_remove");
+  for (const char* other : {"<svg>", "1,2", "2000,1,1;", "-1,0,1;", "5,5,1;x"}) {
+    store.database().ForChanges()->Run("UPDATE patients SET drawing = ?", std::string(other));
+    EXPECT_THAT(store.patients.Drawing(patient), IsEmpty()) << other;
+  }
 }
 
 TEST_F(StoreSessionsTest, AnArchivedPatientKeepsEverythingAndIsNotOpened) {

@@ -188,6 +188,8 @@ TEST_F(ApiTest, ChangesFromOtherSitesAreRefusedEvenWithTheToken) {
   EXPECT_EQ(client.Post("/api/v1/press").status, 403);
   client.extra_headers = {{"Sec-Fetch-Site", "cross-site"}};
   EXPECT_EQ(client.Post("/api/v1/press").status, 403);
+  client.extra_headers = {{"Origin", "https://127.0.0.1:" + std::to_string(port_)}};
+  EXPECT_THAT(client.Post("/api/v1/press").body, HasSubstr("have the proxy use https"));
   client.extra_headers = {{"Origin", "http://127.0.0.1:" + std::to_string(port_)},
                           {"Sec-Fetch-Site", "same-origin"}};
   EXPECT_EQ(client.Post("/api/v1/press").status, 200);

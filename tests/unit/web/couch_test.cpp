@@ -99,6 +99,18 @@ TEST(CouchTest, WhatTheCouchCannotDoIsSaidAndNeverHiddenOutsideTolerance) {
   EXPECT_FALSE(CouchRows(unsure, couch)[4].is_hidden) << "not surely within";
 }
 
+TEST(CouchTest, ReadingsWithoutValuesBelowZeroBeginAtZeroAgain) {
+  CouchProfile couch = Reversed();
+  EXPECT_EQ(CouchAxisOf(couch, 0).period, std::nullopt);
+  couch.wraps = true;
+  EXPECT_EQ(CouchAxisOf(couch, 0).period, 1000.0) << "cm";
+  EXPECT_EQ(CouchAxisOf(couch, 5).period, 360.0);
+  EXPECT_THAT(CouchNotes(couch)[3].English(), HasSubstr("995 cm stands for"));
+  EXPECT_DOUBLE_EQ(*CouchRows(Move(), couch)[5].value, 1.8) << "a correction has its sign";
+  couch.is_in_cm = false;
+  EXPECT_EQ(CouchAxisOf(couch, 0).period, 10000.0) << "mm";
+}
+
 TEST(CouchTest, InAnUnknownRoomNothingIsOfTheCouch) {
   ResultSummary unknown = Move();
   for (std::size_t i = 0; i < unknown.axes.size(); ++i) unknown.axes[i] = AxisName(i);

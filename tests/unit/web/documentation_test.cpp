@@ -120,6 +120,7 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
   EXPECT_THAT(Stated(page, "kTolerance", "shift_mm"), ElementsAre(kDefaultShiftTolerance_mm));
   EXPECT_THAT(Stated(page, "kTolerance", "rotation_deg"),
               ElementsAre(kDefaultRotationTolerance_deg));
+  EXPECT_THAT(Stated(page, "kDrawing", "points"), ElementsAre(kMaxDrawnPoints));
   EXPECT_THAT(Stated(page, "kReason", "minlength"), ElementsAre(kMinReason));
   EXPECT_THAT(Stated(api, "reason", "minLength"), ElementsAre(kMinReason));
   EXPECT_THAT(Stated(page, "kNewPassword", "minlength"), ElementsAre(web::kMinPassword));

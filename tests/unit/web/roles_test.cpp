@@ -60,6 +60,8 @@ const std::map<std::string, std::string> kWhoMay = {
     {"GET /api/v1/patients/{id}/photo", "TPE"},
     {"POST /api/v1/patients/{id}/photo", "TP"},
     {"DELETE /api/v1/patients/{id}/photo", "TP"},
+    {"GET /api/v1/patients/{id}/drawing", "TPE"},
+    {"PUT /api/v1/patients/{id}/drawing", "TP"},
     {"DELETE /api/v1/patients/{id}", "P"},
     {"POST /api/v1/patients/{id}/open", "TPE"},
     {"POST /api/v1/patients/{id}/planning", "P"},

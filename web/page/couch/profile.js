@@ -17,6 +17,7 @@ function profileForm(couch) {
   const axes = select(text.axes, `${couch.num_axes}`, {});
   const unit = select({ mm: 'mm', cm: 'cm' }, couch.is_in_cm ? 'cm' : 'mm', {});
   const hides = checkbox(text.hides, couch.hides_rest, {});
+  const wraps = checkbox(text.wraps, couch.wraps, {});
   const reverses = kAxes.map((axis) => ({
     axis,
     ...checkbox(text.ways[axis.name], couch.axes[axis.name].factor < 0, {}),
@@ -26,6 +27,7 @@ function profileForm(couch) {
       await post('couch', {
         version: couch.version, name: name.value.trim(), num_axes: Number(axes.value),
         is_in_cm: unit.value === 'cm', hides_rest: hides.box.checked,
+        wraps: wraps.box.checked,
         ...Object.fromEntries(reverses.map(({ axis, box }) =>
           [`reverses_${axis.name}`, box.checked])),
         ...sign(),
@@ -35,7 +37,7 @@ function profileForm(couch) {
     field(text.name, name), field(text.numAxes, axes), field(text.unit, unit),
     h('fieldset', { class: 'reverses' }, h('legend', {}, text.reverses),
       hint(text.reversesHint), reverses.map(({ element }) => element)),
-    hides.element));
+    wraps.element, hides.element));
 }
 
 /// @returns the card, and what ends it.

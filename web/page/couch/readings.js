@@ -6,28 +6,34 @@ import { kAxes } from '../numbers.js';
 import { S } from '../words.js';
 import { couchAxis, couchVersion } from './axes.js';
 
-const kMax = { cm: 300, mm: 3000 };
+const kMax = { cm: 300, mm: 3000, '°': 360 };
 
 /// A reading as people type it: nothing where it is not a number that a couch could show.
-export function readingOf(text, unit = 'cm') {
+/// @param period  Where its readings begin at zero again, if they do.
+export function readingOf(text, { unit = 'cm', period = null } = {}) {
   const words = text.trim().replace(',', '.').replace('−', '-');
   if (!/^[+-]?\d{1,4}(\.\d{1,2})?$/.test(words)) return null;
   const value = Number(words);
+  if (period !== null) return value >= 0 && value < period ? value : null;
   return Math.abs(value) <= kMax[unit] ? value : null;
 }
 
 /// How couches show what they read: to the millimetre. Centimetres where no profile says otherwise.
 const kUnsigned = { factor: 0.1, unit: 'cm', digits: 1 };
 function scaleOf(axis) {
-  const { factor, unit } = couchAxis(axis);
-  return couchVersion() ? { factor, unit, digits: unit === 'cm' ? 1 : 0 } : kUnsigned;
+  if (!couchVersion()) return kUnsigned;
+  const { factor, unit, period } = couchAxis(axis);
+  return { factor, unit, period, digits: unit === 'mm' ? 0 : 1 };
 }
 
 /// The value to set the axis to; a shift that is not known to differ from nothing leaves the axis
 /// where it is.
-export function targetOf(reading, { value, still }, { factor, digits }) {
+export function targetOf(reading, { value, still }, { factor, digits, period = null }) {
   const scale = 10 ** digits;
-  return Math.round(scale * (reading + (still ? 0 : value * factor))) / scale;
+  const target = Math.round(scale * (reading + (still ? 0 : value * factor)));
+  // Rounded before: 999.96 is 0.0, and never 1000.0.
+  const turn = period === null ? null : scale * period;
+  return (turn === null ? target : ((target % turn) + turn) % turn) / scale;
 }
 
 /// Only for a result that commands moves, and where the room's axes are known.
@@ -35,16 +41,18 @@ export function couchReadings({ result, details }) {
   const text = S.result;
   const roomKnown = live.status?.room?.known && details?.body?.room_known !== false;
   if (result?.verdict !== 'move' || !roomKnown) return null;
-  const shifts = result.numbers.filter((row, i) => kAxes[i].shift && row.value !== null);
-  if (!shifts.length) return null;
-  const rows = shifts.map((shift) => {
+  // What a couch turns is told where its profile says how it counts turns.
+  const moved = result.numbers.filter((row, i) => row.value !== null
+    && (kAxes[i].shift || (couchVersion() > 0 && couchAxis(kAxes[i]).moves)));
+  if (!moved.length) return null;
+  const rows = moved.map((shift) => {
     const scale = scaleOf(kAxes.find(({ name }) => name === shift.name));
     const input = h('input', {
       inputmode: 'decimal', autocomplete: 'off', maxlength: 8, size: 8,
     });
     const target = h('output', { class: 'couch-target', 'aria-live': 'polite' });
     input.addEventListener('input', () => {
-      const reading = readingOf(input.value, scale.unit);
+      const reading = readingOf(input.value, scale);
       const bad = input.value.trim() !== '' && reading === null;
       input.setAttribute('aria-invalid', String(bad));
       if (bad) clear(target, text.couchBad(scale.unit));

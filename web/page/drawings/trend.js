@@ -90,9 +90,12 @@ function chart(axis, fractions, limit, isTitled) {
       }),
       fraction.first !== fraction.last && first.value !== null && mark(first, i, false),
       mark(last, i, true)]),
-    points.filter((p) => p.i % every === 0).map(({ i, fraction }) => svg('text', {
-      x: x(i), y: kHeight - 6, class: 'tick middle',
-    }, localDay(fraction.last.started_at)))));
+    // Several fractions of one day have one label.
+    points.filter((p) => p.i % every === 0)
+      .map(({ i, fraction }) => ({ i, day: localDay(fraction.last.started_at) }))
+      .filter(({ day }, k, labels) => day !== labels[k - 1]?.day)
+      .map(({ i, day }) =>
+        svg('text', { x: x(i), y: kHeight - 6, class: 'tick middle' }, day))));
 }
 
 /// @param scans  Newest first.

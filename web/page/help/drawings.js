@@ -16,6 +16,10 @@ const bodyFromAbove = () => [rect(30, 55, 300, 70, 'couch', 8), ellipse(66, 90, 
   rect(86, 66, 124, 48, 'body', 20), rect(200, 68, 112, 18, 'body', 9),
   rect(200, 94, 112, 18, 'body', 9)];
 
+/// For what is drawn on it.
+export const bodyOutline = (properties) =>
+  svg('svg', { viewBox: '10 40 340 100', 'aria-hidden': 'true', ...properties }, bodyFromAbove());
+
 /// On both sides, one about every 35 cm.
 const markers = () => [40, 110, 180, 250, 320].flatMap((x, i) => [
   rect(x - 7, i % 2 ? 22 : 28, 14, 14, 'marker', 0),

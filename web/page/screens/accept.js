@@ -25,8 +25,12 @@ function outsideForm(scan, reload) {
   const text = S.result;
   const isUnsure = scan.result.verdict === 'unsure';
   const label = isUnsure ? text.acceptUnsure : text.acceptOutside;
-  const reason = h('input', { required: true, autocomplete: 'off', ...kReason });
+  const reason = h('input', {
+    required: true, autocomplete: 'off', list: 'usual-reasons', ...kReason,
+  });
   return h('details', { class: 'accept-outside' }, h('summary', {}, `${label}…`),
+    h('datalist', { id: 'usual-reasons' },
+      Object.values(text.usualReasons).map((words) => h('option', { value: words }))),
     hint(text.acceptOutsideHint),
     signedForm({ class: 'form inline' }, async (sign) => {
       await post(`scans/${scan.id}/accept-outside`, { reason: reason.value.trim(), ...sign() });
@@ -112,7 +116,7 @@ function nextStep({ scan, draft }) {
   if (scan.purpose !== 'reference' || scan.outcome !== 'done' || !draft) return null;
   const words = draft.approved_by ? '' : `${text.draftSaved(draft.version)} ${text.draftNext} `;
   return h('p', { class: 'lead next-step' }, words,
-    h('a', { class: 'button', href: `#/plan/${draft.id}` }, text.draftLink));
+    may('plan') && h('a', { class: 'button', href: `#/plan/${draft.id}` }, text.draftLink));
 }
 
 /// Calls tick() when the validity may have changed.

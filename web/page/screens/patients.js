@@ -5,6 +5,8 @@ import {
   action, card, clear, done, enable, field, form, h, hint, localTime, redraw, row, say, signedTime,
   select, table, warn,
 } from '../dom.js';
+import { silhouette } from '../drawings/silhouette.js';
+import { guardLeaving } from '../leave.js';
 import { kFraction, kName, kNote, kReason, kSite } from '../limits.js';
 import { numbersLine, toleranceOf } from '../numbers.js';
 import { lookOf, plainCode } from '../scanner.js';
@@ -12,7 +14,7 @@ import { signedForm } from '../signed_form.js';
 import { S, said } from '../words.js';
 import { closeSession, openPatient, resumeSession } from '../treatment.js';
 import { sourceVersion } from './captured.js';
-import { photosTaken, setUpCard, setUpNote } from './patient/set_up_sheet.js';
+import { setUpCard, setUpNote } from './patient/set_up_sheet.js';
 import { courseStatistics } from './patient/statistics.js';
 import { planningUpload } from './planning.js';
 import {
@@ -226,7 +228,8 @@ function openButtons(patient, references) {
   let chosen = '';  // by a person: a session that is resumed goes on with its own otherwise
   choice?.addEventListener('change', () => { chosen = choice.value; });
   const compare = choice ? field(S.session.compareWith, choice) : h('div', {});
-  const confirm = h('p', { class: 'lead' }, text.confirmWho(patient.code));
+  const confirm = h('p', { class: 'lead who-confirmed' }, text.confirmWho(patient.code),
+    silhouette(newest[0]));
   const sheet = setUpNote(patient) ?? h('div', {});
   const why = field(text.reason, reason);
   const { last_session: last } = patient;
@@ -397,14 +400,15 @@ export async function showPatient(place, id) {
   let approved;
   let told;
   let buttons = null;
+  const isDrawing = () => setUp.querySelector('[data-edited]') !== null;
   /// The button that begins a session is the primary one only where this patient's is not open.
   const weigh = () => opening.querySelector('.start-session')
     ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
   const load = async () => {
     const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
       get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
-    const onSheet = JSON.stringify([patient.alert, patient.immobilisation, patient.has_photo,
-      photosTaken(id)]);
+    const onSheet = JSON.stringify([patient.alert, patient.immobilisation,
+      patient.sheet_revision]);
     // A reason that was typed stays as long as nothing else is offered.
     const opens = `${patient.approved_reference_id} ${patient.archived} ${
       patient.last_session?.id} ${patient.last_session?.fraction} ${onSheet} ${
@@ -421,7 +425,8 @@ export async function showPatient(place, id) {
       clear(heading, patient.code, ' ', h('small', {}, patient.site));
       clear(about, aboutPatient(patient, load));
     }
-    if (sheetShown !== onSheet) {
+    // Somebody may be drawing, and is told when it is saved that the sheet has changed.
+    if (sheetShown !== onSheet && !isDrawing()) {
       sheetShown = onSheet;
       clear(setUp, setUpCard(patient, load));
     }
@@ -466,9 +471,14 @@ export async function showPatient(place, id) {
   };
   drawSession();
   await load();
-  return live.listen((kind) => {
+  guardLeaving(isDrawing);
+  const stop = live.listen((kind) => {
     if (kind === 'status') drawSession();
     if (kind === 'status' || kind === 'connection') buttons?.draw();
     if (kind === 'data' || kind === 'result') load().catch((error) => warn(error.message));
   });
+  return () => {
+    guardLeaving(null);
+    stop();
+  };
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The screen in the room: one address that follows the button by itself. Sees, and changes nothing.
 import {
-  currentSession, get, live, loadSession, may, now, setLoggedOffHandler, since_s,
+  currentSession, get, getOrNull, live, loadSession, may, now, setLoggedOffHandler, since_s,
 } from '../api.js';
 import { couchVersion } from '../couch/axes.js';
 import { clear, h, hint, say } from '../dom.js';
@@ -13,8 +13,8 @@ import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseTheme } from '../preferences.js';
 import { S, saidEach } from '../words.js';
 import {
-  ageText, faultWords, findings, flagList, isAdvice, isCold, lastKnownNote, minutesOf, partsOf,
-  sentence, sidesOf,
+  acceptanceMark, ageText, faultWords, findings, flagList, isAdvice, isCold, lastKnownNote,
+  minutesOf, partsOf, sentence, sidesOf,
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { askMonitor, monitorView } from '../monitoring/monitor.js';
@@ -194,6 +194,19 @@ function result() {
   let note = null;
   let judge = () => {};
   let age = () => {};
+  let id = null;
+  // Whoever stands at the couch sees that the position was accepted on another screen.
+  const accepted = h('p', { class: 'room-accepted', role: 'status' });
+  const showAcceptance = (scan) => {
+    accepted.textContent = scan?.accepted_by
+      ? `${acceptanceMark(scan)} ${S.result.acceptedBy(scan.accepted_by)}` : '';
+  };
+  live.listen((kind) => {
+    if (kind !== 'data' || id === null) return;
+    getOrNull(`scans/${id}`).then((scan) => {
+      if (scan && scan.id === id) showAcceptance(scan);
+    });
+  });
   const map = async (data, box) => {
     const { scan, reference } = data;
     if (!data.details?.alignment || !reference) return;
@@ -244,11 +257,13 @@ function result() {
       ago.textContent = Number.isFinite(seconds) ? S.room.scanned(ageText(seconds)) : '';
     };
     age();
+    id = scan.id;
+    showAcceptance(scan);
     clear(place, note.element, strip, !scan.result && flagList(scan, quality),
       reasons.length > 1 && h('ul', { class: 'room-reasons' },
         reasons.slice(1, 1 + kReasonsBelow).map((reason) => h('li', {}, reason))),
       h('div', { class: 'room-answer' }, six,
-      h('div', { class: 'room-side' }, box, posture(scan), ago)));
+      h('div', { class: 'room-side' }, box, posture(scan), accepted, ago)));
     await map(data, box).catch(() => {});
     if (scan.result) say(S.result.verdicts[scan.result.verdict] ?? '');
   };
@@ -261,6 +276,7 @@ function result() {
         note = null;
         judge = () => {};
         age = () => {};
+        id = null;
         clear(place);
         if (scan) load(scan, key);
       }

@@ -46,6 +46,7 @@ export function preview() {
   };
   const stop = repeat(async () => {
     try {
+      if (!live.status?.sensor.present) throw new Error();  // there is none to ask for
       if (hasOutline(live.status) && !(noOutline && since_s(noOutline) < kOutlineAgain_s)) {
         const found = await fetchPicture('preview/outline');
         if (found.ok) {

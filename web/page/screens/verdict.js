@@ -39,10 +39,11 @@ export function identity({ scan, patient, reference, received }) {
   const age = h('strong', {});
   const item = (label, ...value) => h('div', {}, h('dt', {}, label), h('dd', {}, ...value));
   const sinceScan = item(text.age, age);
+  const scansSoFar = h('small', {});
   const element = h('dl', { class: 'identity' },
     item(text.patient, h('strong', { class: 'code' },
       patient ? h('a', { href: `#/patient/${patient.id}` }, patient.code) : S.none)),
-    scan.fraction && item(text.fraction, `${scan.fraction}`),
+    scan.fraction && item(text.fraction, `${scan.fraction}`, scansSoFar),
     item(text.reference, reference
       ? `${reference.source === 'planning_ct' ? sourceVersion(reference)
         : text.version(reference.version)}, ${localTime(reference.created_at)}` : S.none),
@@ -50,6 +51,10 @@ export function identity({ scan, patient, reference, received }) {
     sinceScan);
   const tick = () => {
     const seconds = ageOf(scan, received);
+    // How often this session has been scanned by now.
+    const { session } = live.status ?? {};
+    const isOpen = session && session.id === scan.session_id;
+    scansSoFar.textContent = isOpen ? ` · ${S.session.scans(session.num_scans)}` : '';
     sinceScan.hidden = !Number.isFinite(seconds);
     if (!sinceScan.hidden) age.textContent = ageText(seconds);
   };

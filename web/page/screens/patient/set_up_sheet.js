@@ -1,25 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// The set-up sheet of a patient: alert, immobilisation, and a photo that the sensor took when a
-// person asked for it.
+// The set-up sheet of a patient: alert, immobilisation, a photo that the sensor took when a person
+// asked for it, and what was drawn on it.
 import { get, live, may, post, put, removeFor } from '../../api.js';
 import { action, card, done, enable, field, form, h, hint } from '../../dom.js';
 import { kNote } from '../../limits.js';
 import { S } from '../../words.js';
-
-/// A photo that was taken again has another address, or the browser would show the one before.
-const photo = (patient, times) => h('img', {
-  class: 'set-up-photo', alt: S.setUp.photoAlt,
-  src: `/api/v1/patients/${patient.id}/photo?taken=${times}`,
-});
-const taken = new Map();  // how often, by patient
-export const photosTaken = (id) => taken.get(id) ?? 0;
+import { drawingForm, setUpPicture } from './set_up_drawing.js';
 
 /// Where it is confirmed who is on the couch; null where the sheet is empty.
 export function setUpNote(patient) {
-  const { alert, immobilisation: devices, has_photo: hasPhoto } = patient;
-  if (!alert && !devices && !hasPhoto) return null;
+  const { alert, immobilisation: devices } = patient;
+  const picture = setUpPicture(patient);
+  if (!alert && !devices && !picture) return null;
   return h('div', { class: 'set-up' },
-    hasPhoto && photo(patient, photosTaken(patient.id)), h('div', {},
+    picture, h('div', {},
       alert && h('p', { class: 'lead caution' }, alert),
       devices && h('p', {}, h('strong', {}, S.setUp.devices), ` ${devices}`)));
 }
@@ -36,7 +30,6 @@ export function setUpCard(patient, reload) {
   const plain = (input) => input.value.replace(/\s+/g, ' ').trim();
   const take = action(patient.has_photo ? text.photoAgain : text.photoTake, async () => {
     await post(`patients/${patient.id}/photo`);
-    taken.set(patient.id, photosTaken(patient.id) + 1);
     done(text.photoTaken);
     await reload();
   }, {});
@@ -56,6 +49,6 @@ export function setUpCard(patient, reload) {
     h('div', { class: 'row' }, take, patient.has_photo && action(text.photoRemove, async () => {
       await removeFor(`patients/${patient.id}/photo`);
       await reload();
-    }, {})));
+    }, {})), drawingForm(patient, reload));
   return card(text.title, setUpNote(patient), write, ofPhoto);
 }
