@@ -3,6 +3,7 @@
 // starts each time, its page says what is wrong, and nothing that it does not understand is
 // deleted.
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <map>
@@ -51,7 +52,10 @@ class Damage {
   std::pair<std::string, fs::path> Do(const fs::path& state) {
     // Half of the rounds meet the database, which everything else hangs on.
     std::vector<fs::path> files = FilesBelow(state);
-    const fs::path file = Below(2) == 0 ? fs::path("plumb.db") : files[Below(files.size())];
+    return Do(state, Below(2) == 0 ? fs::path("plumb.db") : files[Below(files.size())]);
+  }
+
+  std::pair<std::string, fs::path> Do(const fs::path& state, const fs::path& file) {
     static constexpr const char* kWays[] = {"flipped bytes", "shortened",     "emptied",
                                             "zeroed a page", "swapped pages", "made a folder",
                                             "removed",       "dangling link", "text instead"};
@@ -181,6 +185,63 @@ TEST_F(DaemonDamageTest, StartsFromEveryDamagedStateSaysWhatIsWrongAndDeletesNot
   fmt::print(
       "{} damaged states: {} start and work, {} start and say what is wrong, {} files lost\n",
       Rounds(), outcomes["works"], outcomes["says what is wrong"], lost);
+}
+
+/// Gives the state folder of one that was killed; rows of five patients stand in its log of writes
+/// alone.
+fs::path MakeKilledState(const fs::path& folder) {
+  fs::create_directories(folder);
+  Plumbd plumbd(folder);
+  EXPECT_TRUE(plumbd.WaitUntilUp()) << plumbd.log();
+  HttpClient engineer = plumbd.MakeFirstAccount(), tom(plumbd.port());
+  EXPECT_EQ(engineer.LogIn("engineer", kPassword), 200);
+  EXPECT_TRUE(test::AddAccount(plumbd.port(), engineer, "tom", "technician"));
+  EXPECT_EQ(tom.LogIn("tom", kPassword), 200);
+  plumbd.WaitFor("the log of writes to be emptied",
+                 [&](const json&) { return fs::file_size(plumbd.state() / "plumb.db-wal") == 0; });
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(tom.Post("/api/v1/patients", {{"code", fmt::format("K{}", i)}, {"site", ""}}).status,
+              201);
+  plumbd.Signal(SIGKILL);
+  EXPECT_EQ(plumbd.Wait(), -SIGKILL);
+  EXPECT_GT(fs::file_size(plumbd.state() / "plumb.db-wal"), 0U);
+  return plumbd.state();
+}
+
+TEST_F(DaemonDamageTest, NoDamageToTheLogOfWritesTakesARowSilently) {
+  const fs::path whole = MakeKilledState(folder_ / "whole");
+  const int rounds = (Rounds() + 1) / 2;
+  int refused = 0;
+  for (int round = 0; round < rounds; ++round) {
+    const fs::path here = folder_ / "damaged", log = here / "state" / "plumb.db-wal";
+    fs::remove_all(here);
+    fs::create_directories(here);
+    fs::copy(whole, here / "state", fs::copy_options::recursive);
+    const std::string what =
+        Damage(static_cast<unsigned>(round)).Do(here / "state", "plumb.db-wal").first;
+    SCOPED_TRACE(fmt::format("round {}, {}", round, what));
+    const auto bytes = [&] {
+      return fs::is_regular_file(log) ? ReadWholeFile(log, 1 << 30) : std::vector<std::uint8_t>();
+    };
+    const std::vector<std::uint8_t> damaged = bytes();
+    Plumbd plumbd(here);
+    ASSERT_TRUE(plumbd.WaitUntilUp()) << plumbd.log();
+    HttpClient tom(plumbd.port());
+    EXPECT_EQ(tom.Get("/api/v1/session").json()["setup_required"], false);
+    if (tom.Get("/health").status == 200) {
+      ASSERT_EQ(tom.LogIn("tom", kPassword), 200);
+      const std::string codes = tom.Get("/api/v1/patients").body;
+      for (int i = 0; i < 5; ++i)
+        EXPECT_THAT(codes, ::testing::HasSubstr(fmt::format("\"K{}\"", i)));
+    } else {
+      ++refused;
+      EXPECT_NE(plumbd.Status()["reason"], "");
+      EXPECT_EQ(bytes(), damaged) << "it is evidence, and may be repaired";
+    }
+    EXPECT_EQ(plumbd.Stop(), 0) << plumbd.log();
+  }
+  EXPECT_GT(refused, 0);
+  fmt::print("{} damaged logs of writes: {} refused, no row lost silently\n", rounds, refused);
 }
 
 }  // namespace

@@ -259,6 +259,23 @@ TEST_F(DaemonWebTest, OffLoopbackItIsServedByTlsWithACertificateOfItsOwnThatStay
   EXPECT_THAT(none.err, HasSubstr("holds no authority"));
 }
 
+TEST_F(DaemonWebTest, ALargeFileGoesOutInFewTurnsOfTheLoop) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  HttpClient engineer = plumbd.MakeFirstAccount();
+  const std::string scan = plumbd.ScanOnce()["last_result"]["scan"];
+  const auto turns = [&] { return plumbd.Status()["loop"]["turns"].get<std::size_t>(); };
+  const std::size_t before = turns();
+  const HttpAnswer mesh = engineer.Get("/api/v1/scans/" + scan + "/files/mesh.ply");
+  const std::size_t taken = turns() - before;
+  ASSERT_EQ(mesh.status, 200);
+  ASSERT_EQ(mesh.body.size(), fs::file_size(folder_ / "state/scans" / scan / "scene/mesh.ply"));
+  // The loop's timer ends at most a thousand turns each second.
+  constexpr std::size_t kLeastBytesATurn = 50'000;
+  EXPECT_LT(taken, 100 + mesh.body.size() / kLeastBytesATurn);
+}
+
 TEST_F(DaemonWebTest, AProvisionedDisplaySeesChangesNothingAndStaysRemoved) {
   const std::string key = std::string(60, '0') + "beef";
   std::ofstream(folder_ / "display.key") << key << '\n';

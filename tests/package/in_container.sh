@@ -54,6 +54,23 @@ await "page after the upgrade" '*"status":"ok"*' 20 health
 check "the service was started again" "yes" \
   "$([ "$(systemctl show plumbd -p MainPID --value)" != "$before" ] && echo yes)"
 
+# The older packages get the database from before a conversion back, which lies where one of 0.2.0
+# was converted.
+data=/var/lib/plumb
+systemctl stop plumbd.socket plumbd.service
+install -d -o plumb -g plumb "$data/before-checksums"
+cp -p "$data/plumb.db" "$data/before-checksums/plumb.db"
+systemctl start plumbd.socket plumbd.service
+await "page before going back" '*"status":"ok"*' 20 health
+check "the older packages" 0 "$(apt --allow-downgrades -o Dpkg::Options::=--force-confold install \
+  /debs/old/plumbd_*.deb /debs/old/plumb_*.deb)"
+await "page of the older package" '*"status":"ok"*' 20 health
+check "the newer database is kept beside the one that is back" "yes" \
+  "$([ -s "$data/before-restore-1/plumb.db" ] && echo yes)"
+check "upgrade again" 0 \
+  "$(apt -o Dpkg::Options::=--force-confold install /debs/new/plumbd_*.deb /debs/new/plumb_*.deb)"
+await "page after the second upgrade" '*"status":"ok"*' 20 health
+
 check "remove" 0 "$(apt remove plumbd)"
 check "the service is gone" "inactive" "$(systemctl is-active plumbd.service)"
 check "the socket is gone" "inactive" "$(systemctl is-active plumbd.socket)"

@@ -57,7 +57,8 @@ convert
 : >calls
 echo true >rauc
 run roll-back
-check "the system before gets its own database" '^old old=new systemctl stop plumbd.service$' \
+check "the system before gets its own database, and nothing starts this one again" \
+  '^old old=new systemctl stop plumbd.socket plumbd.service$' \
   "$(cat state/plumb.db) old=$(cat state/before-restore-1/plumb.db) $(head -1 calls)"
 check "and nothing that goes with the other" '^before-restore-1 plumb.db $' \
   "$(cd state && echo * | tr '\n' ' ')"
@@ -69,6 +70,11 @@ convert
 touch state/before-checksums/good
 run roll-back
 check "a release that has been good keeps what it stored" '^new$' "$(cat state/plumb.db)"
+convert
+: >calls
+run put-back
+check "a package of the version before gets it, and nothing restarts" \
+  '^0 old systemctl stop plumbd.socket plumbd.service$' "$code $(cat state/plumb.db calls | xargs)"
 rm -rf state/*
 
 rm gate/good

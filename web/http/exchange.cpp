@@ -3,6 +3,7 @@
 
 #include <microhttpd.h>
 
+#include <memory>
 #include <utility>
 
 #include "algo/base/errors.hpp"
@@ -84,6 +85,42 @@ bool Exchange::HasWholeUpload() {
   if (!writing) return true;
   Suspend();
   return false;
+}
+
+std::optional<std::size_t> Exchange::NextPiece(std::uint64_t at, std::span<char> into) {
+  if (fetch_failed) return std::nullopt;
+  if (!fetched.empty()) {
+    const std::size_t count = fetched.copy(into.data(), into.size());
+    fetched.erase(0, count);
+    return count;
+  }
+  try {
+    if (const auto count = response->file->ReadAtOnce(at, into)) return count;
+  } catch (const IoError&) {
+    return std::nullopt;
+  }
+  Fetch(at, into.size());
+  return 0;
+}
+
+void Exchange::Fetch(std::uint64_t at, std::size_t most) {
+  const auto bytes = std::make_shared<std::string>();
+  const auto work = [file = response->file, bytes, at, most] {
+    try {
+      *bytes = file->Read(at, most);
+    } catch (const IoError&) {
+      bytes->clear();
+    }
+  };
+  Suspend();
+  const auto done = [weak = weak_from_this(), bytes] {
+    const auto alive = weak.lock();
+    if (!alive) return;
+    alive->fetched = std::move(*bytes);
+    alive->fetch_failed = alive->fetched.empty();
+    alive->Resume();
+  };
+  if (!background.RunInBackground(BackgroundPool::kFiles, work, done)) done();
 }
 
 }  // namespace plumb::web

@@ -2,10 +2,12 @@
 // One request with its answer.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -45,6 +47,8 @@ struct Exchange : std::enable_shared_from_this<Exchange> {
   std::uint64_t uploaded = 0;  ///< Bytes of a file received so far.
   std::string unwritten;       ///< Those not yet passed to the disk.
   bool writing = false;        ///< A piece is being written.
+  std::string fetched;         ///< The next piece of a file that the disk has been waited for.
+  bool fetch_failed = false;
 
   void Suspend();
   void Resume();
@@ -54,8 +58,12 @@ struct Exchange : std::enable_shared_from_this<Exchange> {
   [[nodiscard]] bool TakeBody(std::string_view bytes);
   /// True once the whole file is on the disk; otherwise the connection waits.
   [[nodiscard]] bool HasWholeUpload();
+  /// The next piece of the file that is the answer; 0: the connection waits until the disk has
+  /// given it. Nothing if it cannot be read.
+  [[nodiscard]] std::optional<std::size_t> NextPiece(std::uint64_t at, std::span<char> into);
 
  private:
+  void Fetch(std::uint64_t at, std::size_t most);
   void WriteUpload();
   void HaveWritten(const Message& failure);
 };

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -53,16 +54,16 @@ std::string_view Request::Header(const std::string& name) const {
 }
 
 OpenFile::OpenFile(const std::filesystem::path& file)
-    : fd_(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)) {
-  if (fd_ < 0) throw IoError(say::web::CannotOpen(file.filename().string(), std::strerror(errno)));
+    : name_(file.filename().string()),
+      fd_(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)) {
+  if (fd_ < 0) throw IoError(say::web::CannotOpen(name_, std::strerror(errno)));
   struct stat info {};
   if (fstat(fd_, &info) != 0 || !S_ISREG(info.st_mode)) {
     close(fd_);
-    throw IoError(say::web::NoRegularFile(file.filename().string()));
+    throw IoError(say::web::NoRegularFile(name_));
   }
   size_ = static_cast<std::uint64_t>(info.st_size);
-  // Sending happens on the loop in small pieces; the file is prefetched so that they come from
-  // memory.
+  // Sending happens on the loop, from memory.
   posix_fadvise(fd_, 0, 0, POSIX_FADV_WILLNEED);
 }
 
@@ -70,7 +71,24 @@ OpenFile::~OpenFile() {
   if (fd_ >= 0) close(fd_);
 }
 
-int OpenFile::Release() { return std::exchange(fd_, -1); }
+std::size_t OpenFile::Checked(std::ptrdiff_t count) const {
+  if (count > 0) return static_cast<std::size_t>(count);
+  throw IoError(say::web::CannotOpen(name_, std::strerror(count < 0 ? errno : EIO)));
+}
+
+std::optional<std::size_t> OpenFile::ReadAtOnce(std::uint64_t at, std::span<char> into) const {
+  const iovec part{into.data(), into.size()};
+  const ssize_t count = preadv2(fd_, &part, 1, static_cast<off_t>(at), RWF_NOWAIT);
+  // Some file systems never tell what is in memory.
+  if (count < 0 && (errno == EAGAIN || errno == EOPNOTSUPP)) return std::nullopt;
+  return Checked(count);
+}
+
+std::string OpenFile::Read(std::uint64_t at, std::size_t most) const {
+  std::string bytes(most, '\0');
+  bytes.resize(Checked(pread(fd_, bytes.data(), most, static_cast<off_t>(at))));
+  return bytes;
+}
 
 Response ErrorResponse(int status, const Message& why) {
   using Json = nlohmann::ordered_json;

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -66,10 +68,16 @@ class OpenFile {
   OpenFile(const OpenFile&) = delete;
   OpenFile& operator=(const OpenFile&) = delete;
   [[nodiscard]] std::uint64_t size() const { return size_; }
-  /// The caller closes it.
-  [[nodiscard]] int Release();
+  /// What is in memory of it there, how many bytes; nothing if the disk has to be waited for.
+  /// @throws IoError if it cannot be read, or has become shorter.
+  [[nodiscard]] std::optional<std::size_t> ReadAtOnce(std::uint64_t at, std::span<char> into) const;
+  /// (background) Waits for the disk. @throws IoError as above
+  [[nodiscard]] std::string Read(std::uint64_t at, std::size_t most) const;
 
  private:
+  [[nodiscard]] std::size_t Checked(std::ptrdiff_t count) const;
+
+  std::string name_;
   int fd_ = -1;
   std::uint64_t size_ = 0;
 };

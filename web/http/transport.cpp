@@ -11,6 +11,7 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <cstring>
 
 #include "algo/base/errors.hpp"
@@ -28,6 +29,12 @@ constexpr std::size_t kMaxPath = 256;
 constexpr std::size_t kMaxQueryFields = 8;
 constexpr std::size_t kMaxHeaders = 64;
 constexpr std::size_t kStreamBlock = 4096;
+/// Of a file, one piece is sent in each run of the library. Each answer with a file has room for
+/// one.
+constexpr std::size_t kFileBlock = 128 << 10;
+/// Over TLS a run of the library sends no more than 16 KiB, and the loop's timer takes 1 ms to the
+/// next turn: so there are runs for this long.
+constexpr std::chrono::microseconds kRunsATurn{200};
 
 std::string AddressOf(MHD_Connection* connection) {
   const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
@@ -300,6 +307,12 @@ struct Transport::Callbacks {
     return static_cast<ssize_t>(count);
   }
 
+  static ssize_t ReadFile(void* cls, std::uint64_t at, char* buffer, std::size_t max) {
+    const auto count =
+        (*static_cast<std::shared_ptr<Exchange>*>(cls))->NextPiece(at, {buffer, max});
+    return count ? static_cast<ssize_t>(*count) : MHD_CONTENT_READER_END_WITH_ERROR;
+  }
+
   static void FreeStream(void* cls) { delete static_cast<std::shared_ptr<Exchange>*>(cls); }
 
   static MHD_Response* MakeStream(Transport& transport, Exchange& exchange) {
@@ -358,8 +371,9 @@ struct Transport::Callbacks {
       if (MHD_Response* stream = MakeStream(transport, exchange)) return stream;
     }
     if (response.file) {
-      const std::uint64_t size = response.file->size();
-      return MHD_create_response_from_fd64(size, response.file->Release());
+      auto held = std::make_unique<std::shared_ptr<Exchange>>(exchange.shared_from_this());
+      return MHD_create_response_from_callback(response.file->size(), kFileBlock, ReadFile,
+                                               held.release(), FreeStream);
     }
     if (!response.constant_body.empty()) {
       return MHD_create_response_from_buffer(response.constant_body.size(),
@@ -452,7 +466,10 @@ void Transport::Run() {
 
 void Transport::RunLibrary() {
   serving = this;
-  MHD_run(daemon_);
+  const auto until = std::chrono::steady_clock::now() + kRunsATurn;
+  do {
+    MHD_run(daemon_);
+  } while (timeout() == std::chrono::milliseconds(0) && std::chrono::steady_clock::now() < until);
   serving = nullptr;
 }
 

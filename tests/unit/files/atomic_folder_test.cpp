@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <cerrno>
 #include <chrono>
 #include <fstream>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
@@ -169,9 +171,9 @@ TEST(AtomicFolderTest, ClearsWhatAKilledProcessLeftButNothingInUse) {
 TEST(AtomicFolderTest, TheDisksRefusalIsAnIoErrorThatSaysWhatToDo) {
   EXPECT_THAT(MessageOf<IoError>([] { AtomicFolder("/proc/plumb/out", Kind()); }),
               HasSubstr("/proc/plumb/out"));
-  EXPECT_THAT(
-      DescribeWriteError("a/b", ENOSPC).English(),
-      AllOf(HasSubstr("cannot write a/b"), HasSubstr("No space left"), HasSubstr("free space")));
+  for (const auto& [error, why] : {std::pair(ENOSPC, "No space left"), {EDQUOT, "quota exceeded"}})
+    EXPECT_THAT(DescribeWriteError("a/b", error).English(),
+                AllOf(HasSubstr("cannot write a/b"), HasSubstr(why), HasSubstr("free space")));
 }
 
 TEST(AtomicFolderTest, ADiskThatFillsUpLeavesNothing) {

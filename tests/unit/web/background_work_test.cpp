@@ -1,13 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 // What takes its time is done beside the loop: lists, files, and writing what is sent. Here the
 // work stands still until the test does it.
+#include <dlfcn.h>
 #include <gmock/gmock.h>
+#include <sys/uio.h>
 
 #include <atomic>
+#include <cerrno>
+#include <fstream>
 #include <thread>
 
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/web/web_fixture.hpp"
+
+namespace {
+
+std::atomic<bool> is_nothing_in_memory = false;
+
+}  // namespace
+
+/// In place of the C library's: on some disks nothing is in memory.
+extern "C" ssize_t preadv2(int fd, const iovec* parts, int count, off_t at, int flags) {
+  static auto* const kNext = reinterpret_cast<decltype(&preadv2)>(dlsym(RTLD_NEXT, "preadv2"));
+  if (!is_nothing_in_memory) return kNext(fd, parts, count, at, flags);
+  errno = EAGAIN;
+  return -1;
+}
 
 namespace plumb::test {
 namespace {
@@ -39,6 +57,25 @@ class AsideTest : public WebTest {
   }
   void WaitUntilHeld() {
     while (NumHeld() == 0) std::this_thread::yield();
+  }
+
+  /// A file of this size for the page, on a disk that is waited for. @return Its path there.
+  std::string MakeFile(std::size_t bytes) {
+    std::filesystem::create_directories(folder_ / "scan/scene");
+    std::ofstream(folder_ / "scan/scene/mesh.ply") << std::string(bytes, 'm');
+    loop_->Do([&] {
+      Scan scan;
+      scan.id = "s1";
+      scan.outcome = ScanOutcome::kDone;
+      scan.folder = folder_ / "scan";
+      service_.scans.push_back(scan);
+    });
+    is_nothing_in_memory = true;
+    return "/api/v1/scans/s1/files/mesh.ply";
+  }
+  void TearDown() override {
+    is_nothing_in_memory = false;
+    WebTest::TearDown();
   }
 
   testing::TempFolder folder_;
@@ -83,6 +120,46 @@ TEST_F(AsideTest, TooManyListsAtOnceAreRefused) {
   const HttpAnswer answer = engineer_->Get("/api/v1/scans");
   EXPECT_EQ(answer.status, 503);
   EXPECT_NE(answer.Header("retry-after"), "");
+}
+
+TEST_F(AsideTest, AFileThatTheDiskHasToGiveKeepsNobodyWaiting) {
+  constexpr std::size_t kBytes = 1'000'000;
+  const std::string path = MakeFile(kBytes);
+  const std::string cookie = engineer_->cookie;
+  std::atomic<bool> has_arrived = false;
+  HttpAnswer file;
+  std::jthread asking([&] {
+    HttpClient other(port_);
+    other.cookie = cookie;
+    file = other.Get(path);
+    has_arrived = true;
+  });
+  std::size_t pieces = 0;
+  while (!has_arrived && pieces < 1000) {
+    if (NumHeld() == 0) continue;
+    ASSERT_EQ(engineer_->Get("/health").status, 200) << "the disk stands still";
+    const std::size_t done = DoHeld();
+    EXPECT_LE(done, 1U) << "one piece at a time";
+    pieces += done;
+  }
+  asking.join();
+  EXPECT_EQ(file.status, 200);
+  EXPECT_EQ(file.body, std::string(kBytes, 'm'));
+  EXPECT_GE(pieces, 8U);
+}
+
+TEST_F(AsideTest, AFileThatEndsTooSoonEndsItsConnectionOnly) {
+  const std::string path = MakeFile(1'000'000);
+  HttpConnection connection(port_);
+  connection.Send("GET " + path + " HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer_->cookie +
+                  "\r\n\r\n");
+  WaitUntilHeld();
+  DoHeld();  // it is opened
+  WaitUntilHeld();
+  std::filesystem::resize_file(folder_ / "scan/scene/mesh.ply", 0);
+  DoHeld();
+  EXPECT_TRUE(connection.IsClosedBySoon());
+  EXPECT_EQ(engineer_->Get("/health").status, 200);
 }
 
 TEST_F(AsideTest, AnUploadGoesNoFasterThanTheDiskAndKeepsNobodyWaiting) {
