@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kSamePlace_m = 0.01 * kMillimetre;
 constexpr double kSameHeight_m = 1e-6;
+constexpr double kBesideCut_m = 15 * kMillimetre;
 constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
 double Lowest(const FlatContour& contour) {
@@ -57,8 +58,9 @@ std::vector<ContourSlice> Joined(std::vector<ContourSlice> slices) {
       joined.push_back(std::move(slice));
       continue;
     }
-    auto& into = joined.back().contours;
-    std::move(slice.contours.begin(), slice.contours.end(), std::back_inserter(into));
+    ContourSlice& into = joined.back();
+    std::ranges::move(slice.contours, std::back_inserter(into.contours));
+    std::ranges::copy(slice.cuts, std::back_inserter(into.cuts));
   }
   return joined;
 }
@@ -180,15 +182,35 @@ std::vector<double> Tops(const ContourSlice& slice, const GridShape& grid) {
   return tops;
 }
 
+// The same without what lies beside the cuts of the slice.
+std::vector<double> UncutTops(const ContourSlice& slice, const ContourSurfaceOptions& options,
+                              ContourSurface& result) {
+  const GridShape& grid = result.heights.grid;
+  const double lowest = result.support_m + options.above_support_m;
+  std::vector<double> tops = Tops(slice, grid);
+  bool is_cut = false;
+  for (const Eigen::Vector2d& cut : slice.cuts) {
+    int column = std::max(0, static_cast<int>((cut.x() - kBesideCut_m - grid.x_min) / grid.step));
+    for (; column < grid.width && grid.x_centre(column) < cut.x() + kBesideCut_m; ++column) {
+      double& top = tops[static_cast<std::size_t>(column)];
+      if (!(std::abs(top - cut.y()) < kBesideCut_m)) continue;
+      is_cut = is_cut || top > lowest;
+      top = kNowhere;
+    }
+  }
+  result.cut_slices += is_cut ? 1 : 0;
+  return tops;
+}
+
 void FillRows(const std::vector<ContourSlice>& slices, const ContourSurfaceOptions& options,
               ContourSurface& result) {
   HeightMap& map = result.heights;
   const double widest = std::min(options.max_spacing_m, 1.5 * result.spacing_m);
-  std::vector<double> before, after = Tops(slices[1], map.grid);
+  std::vector<double> before, after = UncutTops(slices[1], options, result);
   // The first and the last slice take no part.
   for (std::size_t i = 1; i + 2 < slices.size(); ++i) {
     before = std::move(after);
-    after = Tops(slices[i + 1], map.grid);
+    after = UncutTops(slices[i + 1], options, result);
     const double y = slices[i].y_m, gap = slices[i + 1].y_m - y;
     if (gap > widest) continue;
     for (int row = 0; row < map.grid.height; ++row) {
@@ -250,7 +272,6 @@ double StraightSide(const ContourSlice& slice, double side, double height_m) {
 void MaskCutSides(const std::vector<ContourSlice>& slices, const ContourSurfaceOptions& options,
                   ContourSurface& result) {
   constexpr std::size_t kFewestSlices = 3;
-  constexpr double kBeside_m = 15 * kMillimetre;
   HeightMap& map = result.heights;
   for (const double side : {-1.0, 1.0}) {
     std::vector<std::pair<double, double>> cuts;  // y, x
@@ -265,7 +286,7 @@ void MaskCutSides(const std::vector<ContourSlice>& slices, const ContourSurfaceO
       for (const auto& [cut_y, cut_x] : cuts) {
         if (std::abs(cut_y - y) > result.spacing_m) continue;
         for (int column = 0; column < map.grid.width; ++column) {
-          if (std::abs(map.grid.x_centre(column) - cut_x) < kBeside_m)
+          if (std::abs(map.grid.x_centre(column) - cut_x) < kBesideCut_m)
             map.at(row, column) = std::numeric_limits<float>::quiet_NaN();
         }
       }
@@ -274,6 +295,13 @@ void MaskCutSides(const std::vector<ContourSlice>& slices, const ContourSurfaceO
 }
 
 }  // namespace
+
+FlatContour InPlane(const std::vector<Eigen::Vector3d>& points) {
+  FlatContour flat;
+  flat.reserve(points.size());
+  for (const Eigen::Vector3d& p : points) flat.emplace_back(p.x(), p.y());
+  return flat;
+}
 
 double AreaOf(const FlatContour& contour) {
   double twice = 0.0;

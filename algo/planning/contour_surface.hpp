@@ -18,6 +18,9 @@ using FlatContour = std::vector<Eigen::Vector2d>;
 struct ContourSlice {
   double y_m = 0.0;  ///< Place of the slice.
   std::vector<FlatContour> contours;
+  /// Points at which the images end and the body may not. What lies within 15 mm of one, across
+  /// and in height, is no part of the surface.
+  std::vector<Eigen::Vector2d> cuts = {};
 };
 
 struct ContourSurfaceOptions {
@@ -42,17 +45,21 @@ struct ContourSurface {
   std::size_t holes = 0;        ///< Contours inside another one.
   std::size_t gaps = 0;         ///< Places where slices are missing; nothing is interpolated there.
   bool cut_at_side = false;     ///< Arms or shoulders end at the edge of the field of view.
+  std::size_t cut_slices = 0;   ///< Slices whose cuts took a part of the surface.
 };
 
 /// Each column of each slice takes its topmost crossing by the even-odd rule, so that holes and
 /// keyholes need no care (a contour that a slice has twice counts once), and rows between
 /// neighbouring slices are interpolated. Empty remain: the first and the last slice, which are the
-/// ends of the scan; rows in a gap; steps; what is not higher than the couch; and the field of
-/// view's edges.
+/// ends of the scan; rows in a gap; steps; what is not higher than the couch; the field of view's
+/// edges; and what lies beside a cut.
 /// @param slices  In any order. Those at one place (to 0.01 mm) are joined.
 /// @throws std::invalid_argument with fewer than three places, or none with an area.
 [[nodiscard]] ContourSurface SurfaceFromAbove(std::vector<ContourSlice> slices,
                                               const ContourSurfaceOptions& options = {});
+
+/// Points of one slice without their place along the body.
+[[nodiscard]] FlatContour InPlane(const std::vector<Eigen::Vector3d>& points);
 
 /// Area, positive whichever way it turns.
 [[nodiscard]] double AreaOf(const FlatContour& contour);

@@ -13,12 +13,12 @@
 namespace plumb {
 namespace {
 
-// Of the outermost part of a slice. Its first centimetre may be rounded, and where it is as wide as
-// this, a flank of a body rises by more than 1 cm.
+// The outermost 4 cm of a slice are examined, without the first centimetre, which may be rounded.
+// Over the other 3 cm the flank of a body rises by more than 1 cm.
 constexpr double kEdge_m = 10 * kMillimetre, kBin_m = 6 * kMillimetre;
 constexpr std::size_t kBins = 5;
 constexpr double kLevel_m = 3 * kMillimetre;
-constexpr double kLeastShare = 0.3;  // of the slices, on either side
+constexpr double kLeastShare = 1.0 / 3.0;  // of the slices, on one side or both
 constexpr double kMostSag_m = 5 * kMillimetre;
 
 using SlicePoints = std::vector<Eigen::Vector2d>;
@@ -50,13 +50,16 @@ std::optional<double> CouchTop(const std::vector<ContourSlice>& slices) {
       points.insert(points.end(), contour.begin(), contour.end());
   }
   std::vector<double> heights;
+  std::size_t num_level = 0;
   for (const auto& [place, points] : places) {
+    const std::size_t before = heights.size();
     for (const double side : {-1.0, 1.0}) {
       if (const auto height = LevelSide(points, side)) heights.push_back(*height);
     }
+    num_level += heights.size() > before ? 1 : 0;
   }
   const double least = kLeastShare * static_cast<double>(places.size());
-  if (heights.empty() || static_cast<double>(heights.size()) < least) return std::nullopt;
+  if (heights.empty() || static_cast<double>(num_level) < least) return std::nullopt;
   const double low = TakeQuantile(heights, 0.1), high = TakeQuantile(heights, 0.9);
   if (high - low > kMostSag_m) return std::nullopt;
   return high;

@@ -5,12 +5,14 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/statistics.hpp"
+#include "algo/planning/contour_surface.hpp"
 #include "words/planning.hpp"
 
 namespace plumb {
@@ -22,20 +24,30 @@ constexpr std::size_t kMostSkinPoints = 4'000'000;
 // Noise, not parts of a body; a wrist has twenty times as much.
 constexpr double kLeastPart_mm2 = 100.0;
 
-/// An image within a border of air, so that every contour is closed.
+/// An image within a border of nothing, so that every contour is closed.
 class BorderedImage {
  public:
-  BorderedImage(const CtImage& image, double threshold_hu)
+  struct Contour {
+    std::vector<Eigen::Vector3d> points;
+    std::vector<Eigen::Vector3d> cuts;  ///< Those points beyond which nothing was measured.
+  };
+
+  BorderedImage(const CtImage& image, float threshold_hu)
       : image_(image),
         threshold_hu_(threshold_hu),
         width_(image.columns + 2),
         height_(image.rows + 2),
-        hu_(Size(), static_cast<float>(kAir_hu)),
-        is_inside_(Size(), 1) {
+        hu_(Size(), static_cast<float>(kNothing_hu)),
+        kinds_(Size(), kInside) {
     for (int row = 0; row < image.rows; ++row)
       std::copy_n(image.hu.begin() + std::ptrdiff_t{row} * image.columns, image.columns,
                   hu_.begin() + std::ptrdiff_t{row + 1} * width_ + 1);
-    Flood();
+    ClearSurroundings();
+    CloseRow(1);
+    CloseRow(image.rows);
+    kinds_[0] = kBeyond;
+    Flood(kBeyond, static_cast<float>(kLeastMeasured_hu));
+    Flood(kAir, threshold_hu);
   }
 
   /// Calls visit(contour) for each, with points in the axes of the CT.
@@ -43,13 +55,13 @@ class BorderedImage {
   void ForEachContour(const Visit& visit) {
     std::vector<std::int32_t> next = Linked();
     for (std::size_t start = 0; start < next.size(); ++start) {
-      std::vector<Eigen::Vector3d> contour;
+      Contour contour;
       auto at = static_cast<std::int32_t>(start);
       while (next[static_cast<std::size_t>(at)] >= 0) {
-        contour.push_back(PointOn(at));
+        AddPoint(at, contour);
         at = std::exchange(next[static_cast<std::size_t>(at)], -1);
       }
-      if (contour.size() >= 3) visit(std::move(contour));
+      if (contour.points.size() >= 3) visit(std::move(contour));
     }
   }
 
@@ -57,18 +69,53 @@ class BorderedImage {
   [[nodiscard]] std::vector<double>& steps() { return steps_; }
 
  private:
+  enum Kind : std::uint8_t { kInside, kBeyond, kAir };
+
   [[nodiscard]] std::size_t Size() const {
     return static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   }
 
-  // The air around the body. What it does not reach is inside.
-  void Flood() {
-    std::vector<std::size_t> open = {0};
-    is_inside_[0] = 0;
+  // Those of a round field of view have one value where no padding value marks them. The circle may
+  // be a little smaller than the image.
+  void ClearSurroundings() {
+    constexpr double kRim = 0.97;
+    constexpr auto kNothing = static_cast<float>(kNothing_hu);
+    const float value = image_.hu.front();
+    if (image_.rows != image_.columns || value >= threshold_hu_) return;
+    const double middle = 0.5 * (width_ - 1), radius = 0.5 * image_.columns;
+    std::vector<std::size_t> around;
+    for (std::size_t i = 0; i < hu_.size(); ++i) {
+      const auto width = static_cast<std::size_t>(width_);
+      const double from_middle = std::hypot(static_cast<double>(i % width) - middle,
+                                            static_cast<double>(i / width) - middle);
+      if (hu_[i] == value && from_middle > kRim * radius)
+        around.push_back(i);
+      else if (hu_[i] != kNothing && from_middle > radius)
+        return;
+    }
+    for (const std::size_t i : around) hu_[i] = kNothing;
+  }
+
+  // Where the first or the last row cuts the body it closes a lung, too, that is open there.
+  void CloseRow(int row) {
+    const auto from = hu_.begin() + std::ptrdiff_t{row} * width_, to = from + width_;
+    const auto is_tissue = [&](float hu) { return hu >= threshold_hu_; };
+    const auto first = std::find_if(from, to, is_tissue);
+    const auto last =
+        std::find_if(std::reverse_iterator(to), std::reverse_iterator(first), is_tissue);
+    for (auto hu = first; hu < last.base(); ++hu) *hu = std::max(*hu, threshold_hu_);
+  }
+
+  // From everything that was reached before: what is darker and connected with it. What is never
+  // reached is inside.
+  void Flood(Kind kind, float below_hu) {
+    std::vector<std::size_t> open;
+    for (std::size_t i = 0; i < kinds_.size(); ++i)
+      if (kinds_[i] != kInside) open.push_back(i);
     const auto width = static_cast<std::size_t>(width_);
     const auto reach = [&](std::size_t i) {
-      if (is_inside_[i] == 0 || hu_[i] >= threshold_hu_) return;
-      is_inside_[i] = 0;
+      if (kinds_[i] != kInside || hu_[i] >= below_hu) return;
+      kinds_[i] = kind;
       open.push_back(i);
     };
     while (!open.empty()) {
@@ -103,36 +150,34 @@ class BorderedImage {
   }
 
   [[nodiscard]] bool Inside(std::int32_t pixel) const {
-    return is_inside_[static_cast<std::size_t>(pixel)] != 0;
+    return kinds_[static_cast<std::size_t>(pixel)] == kInside;
   }
 
-  Eigen::Vector3d PointOn(std::int32_t edge) {
-    const std::int32_t first = edge / 2, second = first + (edge % 2 == 0 ? 1 : width_);
-    const double a = hu_[static_cast<std::size_t>(first)];
-    const double b = hu_[static_cast<std::size_t>(second)];
-    const double share = std::clamp((threshold_hu_ - a) / (b - a), 0.0, 1.0);
-    steps_.push_back(std::abs(b - a) /
-                     (edge % 2 == 0 ? image_.column_spacing_mm : image_.row_spacing_mm));
-    const double column = first % width_ - 1 + (edge % 2 == 0 ? share : 0.0);
-    const double row = first / width_ - 1 + (edge % 2 == 0 ? 0.0 : share);
-    return image_.origin_mm + image_.along_row * (column * image_.column_spacing_mm) +
-           image_.along_column * (row * image_.row_spacing_mm);
+  void AddPoint(std::int32_t edge, Contour& contour) {
+    const auto first = static_cast<std::size_t>(edge / 2);
+    const std::size_t second = first + (edge % 2 == 0 ? 1 : static_cast<std::size_t>(width_));
+    const double a = hu_[first], b = hu_[second];
+    const bool is_cut = kinds_[first] == kBeyond || kinds_[second] == kBeyond;
+    const double share = is_cut ? 0.5 : std::clamp((double{threshold_hu_} - a) / (b - a), 0.0, 1.0);
+    const double column = edge / 2 % width_ - 1 + (edge % 2 == 0 ? share : 0.0);
+    const double row = edge / 2 / width_ - 1 + (edge % 2 == 0 ? 0.0 : share);
+    contour.points.emplace_back(image_.origin_mm +
+                                image_.along_row * (column * image_.column_spacing_mm) +
+                                image_.along_column * (row * image_.row_spacing_mm));
+    if (is_cut)
+      contour.cuts.push_back(contour.points.back());
+    else
+      steps_.push_back(std::abs(b - a) /
+                       (edge % 2 == 0 ? image_.column_spacing_mm : image_.row_spacing_mm));
   }
 
   const CtImage& image_;
-  const double threshold_hu_;
+  const float threshold_hu_;
   const int width_, height_;
   std::vector<float> hu_;
-  std::vector<std::uint8_t> is_inside_;
+  std::vector<Kind> kinds_;
   std::vector<double> steps_;
 };
-
-double Area_mm2(const std::vector<Eigen::Vector3d>& contour) {
-  double twice = 0.0;
-  for (std::size_t i = 0, j = contour.size() - 1; i < contour.size(); j = i++)
-    twice += contour[j].x() * contour[i].y() - contour[i].x() * contour[j].y();
-  return std::abs(0.5 * twice);
-}
 
 bool IsAxial(const CtImage& image) {
   const auto along = [](const Eigen::Vector3d& direction, int axis) {
@@ -160,8 +205,9 @@ void CtSkin::RequireSameSeries(const CtImage& image, const std::string& name) co
 
 void CtSkin::Add(const CtImage& image, const std::string& name) {
   const double widest_mm = std::max(image.column_spacing_mm, image.row_spacing_mm);
-  const double narrowest_mm = std::min(image.column_spacing_mm, image.row_spacing_mm);
-  if (!(narrowest_mm > 0.05 && widest_mm <= kMostPixel_mm && image.rows > 0 && image.columns > 0 &&
+  const auto is_pixel = [](double side_mm) { return side_mm > 0.05 && side_mm <= kMostPixel_mm; };
+  if (!(is_pixel(image.column_spacing_mm) && is_pixel(image.row_spacing_mm) && image.rows > 0 &&
+        image.columns > 0 &&
         image.hu.size() ==
             static_cast<std::size_t>(image.rows) * static_cast<std::size_t>(image.columns)))
     throw DataError(say::planning::ImagePixels(name, widest_mm, kMostPixel_mm));
@@ -177,14 +223,18 @@ void CtSkin::Add(const CtImage& image, const std::string& name) {
   file_ = image.file;
   roi_.frame_of_reference_uid = image.file.frame_of_reference_uid;
   pixel_mm_ = std::max(pixel_mm_, widest_mm);
-  BorderedImage bordered(image, threshold_hu_);
-  bordered.ForEachContour([&](std::vector<Eigen::Vector3d> contour) {
-    if (Area_mm2(contour) < kLeastPart_mm2) return;
+  std::vector<Eigen::Vector3d> cuts_mm;
+  BorderedImage bordered(image, static_cast<float>(threshold_hu_));
+  bordered.ForEachContour([&](BorderedImage::Contour contour) {
+    if (AreaOf(InPlane(contour.points)) < kLeastPart_mm2) return;
     // Exactly in the plane of the slice, although the directions may be off by a rounding.
-    for (Eigen::Vector3d& p : contour) p.z() = image.origin_mm.z();
-    num_points_ += contour.size();
-    roi_.contours.push_back({.kind = "CLOSED_PLANAR", .points_mm = std::move(contour)});
+    for (auto* points : {&contour.points, &contour.cuts})
+      for (Eigen::Vector3d& p : *points) p.z() = image.origin_mm.z();
+    num_points_ += contour.points.size();
+    roi_.contours.push_back({.kind = "CLOSED_PLANAR", .points_mm = std::move(contour.points)});
+    cuts_mm.insert(cuts_mm.end(), contour.cuts.begin(), contour.cuts.end());
   });
+  if (!cuts_mm.empty()) cuts_mm_.push_back(std::move(cuts_mm));
   if (num_points_ > kMostSkinPoints)
     throw DataError(say::planning::ImagesRagged(static_cast<std::int64_t>(kMostSkinPoints)));
   if (!bordered.steps().empty()) steepness_.push_back(TakeQuantile(bordered.steps(), 0.5));

@@ -18,8 +18,9 @@ inline constexpr double kSkinThreshold_hu = -300.0;
 inline constexpr std::size_t kMostCtImages = 2000;
 
 /// Takes one image after the other, of which only the contours stay: what air cannot reach from the
-/// image's edge is inside, so that lungs are no holes; what the edge of the image cuts is closed
-/// along it. The couch is still part of it (see couch_top.hpp).
+/// image's edge is inside, so that lungs are no holes; what the edge of the image, or of its
+/// measured pixels, cuts is closed along it, and the cuts are noted. The couch is still part of it
+/// (see couch_top.hpp).
 class CtSkin {
  public:
   explicit CtSkin(double threshold_hu = kSkinThreshold_hu);
@@ -33,6 +34,10 @@ class CtSkin {
   [[nodiscard]] double threshold_hu() const { return threshold_hu_; }
   /// Its name states the threshold.
   [[nodiscard]] const PlannedRoi& roi() const { return roi_; }
+  /// Of each image that ends within something: the points of its contours that lie at that edge.
+  [[nodiscard]] const std::vector<std::vector<Eigen::Vector3d>>& cuts_mm() const {
+    return cuts_mm_;
+  }
   [[nodiscard]] const PlanningFile& file() const { return file_; }
   [[nodiscard]] const std::string& position() const { return position_; }
   [[nodiscard]] double pixel_mm() const { return pixel_mm_; }
@@ -44,6 +49,7 @@ class CtSkin {
 
   double threshold_hu_;
   PlannedRoi roi_;
+  std::vector<std::vector<Eigen::Vector3d>> cuts_mm_;
   PlanningFile file_;
   std::string series_uid_, position_;
   double pixel_mm_ = 0.0;

@@ -27,9 +27,7 @@ bool HasContours(const PlannedRoi& roi) {
 double SizeOf(const PlannedRoi& roi) {
   double sum = 0.0;
   for (const PlannedContour& contour : roi.contours) {
-    FlatContour flat;
-    for (const Eigen::Vector3d& p : contour.points_mm) flat.emplace_back(p.x(), p.y());
-    if (flat.size() >= 3) sum += AreaOf(flat);
+    if (contour.points_mm.size() >= 3) sum += AreaOf(InPlane(contour.points_mm));
   }
   return sum;
 }
@@ -144,12 +142,12 @@ void RequireUsablePlan(const StructureSet& structures, const TreatmentPlan& plan
 }
 
 void RequireImagesOfPlan(const CtSkin& images, const TreatmentPlan& plan,
-                         const PlannedPlace& place) {
+                         PatientPosture planned_posture) {
   const PlanningFile &image = images.file(), &planned = plan.file;
   if (image.patient_id != planned.patient_id ||
       (planned.patient_id.empty() && image.patient_name != planned.patient_name))
     throw DataError(say::planning::ImagesOtherPatient());
-  const std::string posture(Name(place.posture));
+  const std::string posture(Name(planned_posture));
   if (!images.position().empty() && images.position() != posture)
     throw DataError(say::planning::ImagesPosition(images.position(), posture));
 }

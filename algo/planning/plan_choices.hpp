@@ -32,7 +32,7 @@ void RequireUsablePlan(const StructureSet& structures, const TreatmentPlan& plan
 void RequireUsablePlan(const TreatmentPlan& plan, std::vector<Message>& warnings);
 /// Refuses images of another patient or position than the plan's.
 void RequireImagesOfPlan(const CtSkin& images, const TreatmentPlan& plan,
-                         const PlannedPlace& place);
+                         PatientPosture planned_posture);
 /// A frame that a file does not state cannot differ, but one of contour and structure set and the
 /// plan's must be stated.
 void RequireOneFrame(const StructureSet& structures, const PlannedRoi& roi,

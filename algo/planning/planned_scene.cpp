@@ -26,10 +26,10 @@ constexpr std::int64_t kFewestSlices = 5;
 // Of images: what is smaller is a tube or a cable. A couch sags, and its top is no exact plane.
 constexpr double kLeastImagePart_m2 = 500e-6, kAboveCouch_m = 3 * kMillimetre;
 // The skin that a camera sees may be that of another threshold: half-way between air and tissue,
-// or as far on the other side.
-constexpr double kThresholdHalf_hu = 200.0;
+// or as far on the other side; at least as far away as the second number.
+constexpr double kHalfWay_hu = -500.0, kLeastThreshold_hu = 200.0;
 constexpr double kPixelHalf = 0.2;         // of a pixel: twice the standard deviation of slices
-constexpr double kMostThreshold_mm = 3.0;  // Stated for images too blurred to show the skin.
+constexpr double kMostThreshold_mm = 3.0;  // More, and the images do not show where the skin is.
 
 // A contour of a slice in IEC axes; nothing for what is no part of a surface, such as a point.
 void AddSlice(const PlannedRoi& roi, const PlannedContour& contour, const Eigen::Matrix3d& R,
@@ -59,7 +59,7 @@ std::int64_t CountPlaces(const std::vector<ContourSlice>& slices) {
   return static_cast<std::int64_t>(places.size());
 }
 
-void Warn(const ContourSurface& surface, std::vector<Message>& warnings) {
+void Warn(const ContourSurface& surface, std::int64_t num_slices, std::vector<Message>& warnings) {
   const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
   if (surface.spacing_m > kWideSpacing_m + kFlat_mm * kMillimetre)
     warnings.push_back(say::planning::SpacingWide(surface.spacing_m / kMillimetre));
@@ -70,7 +70,10 @@ void Warn(const ContourSurface& surface, std::vector<Message>& warnings) {
     warnings.push_back(say::planning::CouchParts(count(surface.couch_parts)));
   if (surface.repeated > 0)
     warnings.push_back(say::planning::ContoursRepeated(count(surface.repeated)));
-  if (surface.cut_at_side) warnings.push_back(say::planning::CutAtSide());
+  if (surface.cut_slices > 0)
+    warnings.push_back(say::planning::ImagesCut(count(surface.cut_slices), num_slices));
+  else if (surface.cut_at_side)
+    warnings.push_back(say::planning::CutAtSide());
 }
 
 std::vector<ContourSlice> SlicesOf(const PlannedRoi& roi, const PlannedPlace& place) {
@@ -101,11 +104,14 @@ ContourSurface SurfaceOf(const std::string& name, std::vector<ContourSlice> slic
   return surface;
 }
 
-// Top of the couch as a planning system has drawn it.
-std::optional<double> DrawnCouch(const StructureSet& structures, const PlannedPlace& place) {
+// Top of the couch as a planning system has drawn it, in the frame of the images.
+std::optional<double> DrawnCouch(const StructureSet& structures, const CtSkin& images,
+                                 const PlannedPlace& place) {
   std::vector<double> tops;
   for (const PlannedRoi& roi : structures.rois) {
-    if (roi.type != "SUPPORT") continue;
+    const std::string& frame = roi.frame_of_reference_uid;
+    if (roi.type != "SUPPORT" || (!frame.empty() && frame != images.roi().frame_of_reference_uid))
+      continue;
     for (const ContourSlice& slice : SlicesOf(roi, place)) {
       double top = slice.contours.front().front().y();
       for (const Eigen::Vector2d& p : slice.contours.front()) top = std::max(top, p.y());
@@ -116,18 +122,41 @@ std::optional<double> DrawnCouch(const StructureSet& structures, const PlannedPl
   return TakeQuantile(tops, 0.5);
 }
 
+// Along its normal, 95 %, for the threshold.
+double ThresholdHalf_mm(const CtSkin& images) {
+  const double half_hu =
+      std::max(kLeastThreshold_hu, std::abs(images.threshold_hu() - kHalfWay_hu));
+  const double half_mm = half_hu / std::max(images.Steepness(), 1.0);
+  if (half_mm > kMostThreshold_mm)
+    throw DataError(say::planning::ImagesBlurred(images.Steepness(), images.threshold_hu(), half_mm,
+                                                 kMostThreshold_mm));
+  return half_mm;
+}
+
+void AddCuts(const CtSkin& images, const PlannedPlace& place, std::vector<ContourSlice>& slices) {
+  const Eigen::Matrix3d R = IecFromPatient(place.posture);
+  for (const std::vector<Eigen::Vector3d>& points_mm : images.cuts_mm()) {
+    ContourSlice& slice = slices.emplace_back();
+    for (const Eigen::Vector3d& p_mm : points_mm) {
+      const Eigen::Vector3d p_m = kMillimetre * (R * (p_mm - place.isocentre_mm));
+      slice.y_m = p_m.y();
+      slice.cuts.emplace_back(p_m.x(), p_m.z());
+    }
+  }
+}
+
 ContourSurface SurfaceOfImages(const CtSkin& images, const std::optional<StructureSet>& structures,
                                const PlannedPlace& place, Scene& scene) {
   std::vector<ContourSlice> slices = SlicesOf(images.roi(), place);
-  std::optional<double> couch = structures ? DrawnCouch(*structures, place) : std::nullopt;
+  std::optional<double> couch = structures ? DrawnCouch(*structures, images, place) : std::nullopt;
   if (!couch) couch = CouchTop(slices);
   if (couch) RemoveBelow(*couch + kAboveCouch_m, slices);
   scene.warnings.push_back(couch ? say::planning::CouchRemoved(*couch / kMillimetre)
                                  : say::planning::CouchNotFound());
+  AddCuts(images, place, slices);
   ContourSurface surface = SurfaceOf(images.roi().name, std::move(slices),
                                      {.min_area_m2 = kLeastImagePart_m2}, *scene.planning);
-  const double threshold_mm =
-      std::min(kMostThreshold_mm, kThresholdHalf_hu / std::max(images.Steepness(), 1.0));
+  const double threshold_mm = ThresholdHalf_mm(images);
   const double pixels_mm = kPixelHalf * images.pixel_mm();
   scene.planning->skin_u95_m = std::hypot(threshold_mm, pixels_mm) * kMillimetre;
   scene.warnings.push_back(say::planning::SkinOfImages(images.threshold_hu(), threshold_mm,
@@ -175,7 +204,7 @@ Scene MakePlannedScene(const StructureSet& structures, const TreatmentPlan& plan
   const ContourSurface surface = SurfaceOf(roi.name, SlicesOf(roi, place), {}, source);
   source.roi = roi.name;
   FillSource(plan, place, surface, source);
-  Warn(surface, scene.warnings);
+  Warn(surface, source.slices, scene.warnings);
   scene.warnings.push_back(say::planning::SkinUnknown(source.skin_u95_m / kMillimetre));
   SetSurface(surface, scene);
   return scene;
@@ -183,9 +212,14 @@ Scene MakePlannedScene(const StructureSet& structures, const TreatmentPlan& plan
 
 Scene MakePlannedScene(const std::optional<StructureSet>& structures, const TreatmentPlan& plan,
                        const CtSkin& images, const PlanningChoice& choice) {
-  if (structures && (choice.roi || HasExternal(*structures)))
-    return MakePlannedScene(*structures, plan, choice);
-  if (choice.roi) throw DataError(say::planning::NoContours());
+  if (structures && (choice.roi || HasExternal(*structures))) {
+    Scene drawn = MakePlannedScene(*structures, plan, choice);
+    RequireImagesOfPlan(images, plan, drawn.planning->posture);
+    RequireOneFrame(*structures, images.roi(), plan);
+    drawn.warnings.push_back(say::planning::ImagesNotUsed(drawn.planning->roi));
+    return drawn;
+  }
+  if (choice.roi) throw DataError(say::planning::RoiOfNone(*choice.roi));
   Scene scene;
   scene.frame = SceneFrame::kIec;
   if (structures) {
@@ -196,14 +230,14 @@ Scene MakePlannedScene(const std::optional<StructureSet>& structures, const Trea
     scene.warnings.push_back(say::planning::ImagesByFrame());
   }
   const PlannedPlace place = ChoosePlace(plan, choice.beam, scene.warnings);
-  RequireImagesOfPlan(images, plan, place);
+  RequireImagesOfPlan(images, plan, place.posture);
   RequireOneFrame(structures.value_or(StructureSet()), images.roi(), plan);
 
   PlanningSource& source = scene.planning.emplace();
   const ContourSurface surface = SurfaceOfImages(images, structures, place, scene);
   source.roi = images.roi().name;
   FillSource(plan, place, surface, source);
-  Warn(surface, scene.warnings);
+  Warn(surface, source.slices, scene.warnings);
   SetSurface(surface, scene);
   return scene;
 }

@@ -25,8 +25,9 @@ struct PlanningChoice {
                                      const PlanningChoice& choice = {});
 
 /// The same with the images of the CT, whose skin is taken where the structure set has no external
-/// contour and none is chosen, or where there is no structure set. The couch is removed: by the
-/// structure set's contour of it, otherwise by its shape.
+/// contour and none is chosen, or where there is no structure set; otherwise a warning says that
+/// they are not used. The couch is removed: by the structure set's contour of it, otherwise by its
+/// shape.
 [[nodiscard]] Scene MakePlannedScene(const std::optional<StructureSet>& structures,
                                      const TreatmentPlan& plan, const CtSkin& images,
                                      const PlanningChoice& choice = {});

@@ -20,9 +20,13 @@ struct CtImage {
   /// Directions in which the columns of a row, and the rows, follow each other.
   Eigen::Vector3d along_row = Eigen::Vector3d::UnitX(), along_column = Eigen::Vector3d::UnitY();
   double column_spacing_mm = 0.0, row_spacing_mm = 0.0;  ///< From column to column, row to row.
-  std::vector<float> hu;  ///< Row by row. Pixels without a measurement are as air.
+  /// Row by row.
+  std::vector<float> hu;
 };
 
 inline constexpr double kAir_hu = -1000.0;
+/// Pixels without a measurement, such as those outside a round field of view, have kNothing_hu. No
+/// measured pixel at the edge of an image is below kLeastMeasured_hu: it would be darker than air.
+inline constexpr double kNothing_hu = -3000.0, kLeastMeasured_hu = -1500.0;
 
 }  // namespace plumb

@@ -82,7 +82,7 @@ Scene Reconstruct(const Suite& suite, const std::string& name, const Config& con
     const std::filesystem::path images = planning / "images";
     const Scene planned =
         std::filesystem::exists(images)
-            ? ReadPlanningWithImages({}, plan, {images}, kSkinThreshold_hu, {})
+            ? ReadPlanningWithImages({}, plan, {images}, kSkinThreshold_hu, {}, context.stop)
             : ReadPlanning({.structures = planning / "structures.dcm", .plan = plan}, {}).scene;
     WriteScene(planned, folder);
     return planned;

@@ -67,14 +67,14 @@ std::string TextOf(const Scene& scene, const ImportDicomArguments& options,
   return text;
 }
 
-Scene Read(const ImportDicomArguments& options, Progress& progress) {
+Scene Read(const ImportDicomArguments& options, const std::stop_token& stop, Progress& progress) {
   const std::vector<std::filesystem::path>& files = options.files;
   if (options.images.empty())
     return ReadPlanning({.structures = files.front(), .plan = files.back()}, options.choice).scene;
   std::optional<std::filesystem::path> structures;
   if (files.size() > 1) structures = files.front();
   return ReadPlanningWithImages(
-      structures, files.back(), options.images, options.threshold_hu, options.choice,
+      structures, files.back(), options.images, options.threshold_hu, options.choice, stop,
       [&](std::size_t count) {
         // How many there will be is not known.
         progress.Update(say::cli::ReadingDicom(),
@@ -88,7 +88,7 @@ int Run(const ImportDicomArguments& options, const CommandContext& context) {
   { const AtomicFolder check(options.out, SceneOutput()); }  // rejects a bad place before the work
   Progress progress(context.language);
   progress.Update(say::cli::ReadingDicom(), 0.1);
-  Scene scene = Read(options, progress);
+  Scene scene = Read(options, context.stop, progress);
   CompareWithEarlierPlan(options.out, scene);
   progress.Update(say::cli::Writing(), 0.9);
   WriteScene(scene, options.out, context.stop);
@@ -107,11 +107,16 @@ Command AddImportDicom(CLI::App& app) {
       ->required()
       ->expected(1, 2)
       ->type_name("[STRUCTURES] PLAN");
-  app.add_option("--images", options->images,
-                 "CT images, or folders of them: the skin is taken from them where the structure "
-                 "set has no external contour")
-      ->type_name("CT");
+  CLI::Option* const images =
+      app.add_option("--images", options->images,
+                     "Folder of CT images, or one of them; may be repeated. The skin is taken from "
+                     "them where the structure set has no external contour")
+          ->expected(1)
+          ->allow_extra_args(false)  // what follows is the plan
+          ->take_all()
+          ->type_name("CT");
   app.add_option("--threshold", options->threshold_hu, "Hounsfield units of the skin in the images")
+      ->needs(images)
       ->check(CLI::Range(-900.0, 0.0))
       ->capture_default_str()
       ->type_name("HU");

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "drivers/dicom/planning_files.hpp"
@@ -25,13 +26,14 @@ ReadPlan ReadPlanning(const PlanningFiles& files, const PlanningChoice& choice) 
 
 Scene ReadPlanningWithImages(const std::optional<fs::path>& structures, const fs::path& plan,
                              const std::vector<fs::path>& images, double threshold_hu,
-                             const PlanningChoice& choice,
+                             const PlanningChoice& choice, const std::stop_token& stop,
                              const std::function<void(std::size_t)>& progress) {
   const TreatmentPlan planned = ReadTreatmentPlan(plan);
   std::optional<StructureSet> drawn;
   if (structures) drawn = ReadStructureSet(*structures);
   CtSkin skin(threshold_hu);
   ForEachCtImage(images, [&](const CtImage& image, const std::string& name) {
+    CheckStop(stop);
     skin.Add(image, name);
     if (progress) progress(skin.num_images());
   });

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -35,10 +36,12 @@ struct ReadPlan {
 /// (see MakePlannedScene()). Takes some 0.1 s an image.
 /// @param images  Files and folders; see ForEachCtImage().
 /// @param progress  Called with the number of images that were read.
+/// @throws Interrupted on a stop request, which is noticed between two images.
 [[nodiscard]] Scene ReadPlanningWithImages(const std::optional<std::filesystem::path>& structures,
                                            const std::filesystem::path& plan,
                                            const std::vector<std::filesystem::path>& images,
                                            double threshold_hu, const PlanningChoice& choice,
+                                           const std::stop_token& stop,
                                            const std::function<void(std::size_t)>& progress = {});
 
 /// Says it among the warnings of `scene` if the scene in that folder, which it follows, is of a

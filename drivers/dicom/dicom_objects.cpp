@@ -30,6 +30,8 @@ std::string_view Trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
+std::string NameOf(const DcmTagKey& tag) { return tag.toString().c_str(); }
+
 /// One level of a data set, with the character set of the whole.
 class Item {
  public:
@@ -91,11 +93,16 @@ class Item {
     return number;
   }
   [[nodiscard]] std::optional<Eigen::Vector3d> Point(const DcmTagKey& tag) const {
-    const std::vector<double> numbers = Numbers(tag);
-    if (numbers.empty()) return std::nullopt;
-    if (numbers.size() != 3)
-      throw DataError(say::dicom::NoPoint(NameOf(tag), static_cast<std::int64_t>(numbers.size())));
-    return Eigen::Vector3d(numbers.data());
+    if (Numbers(tag).empty()) return std::nullopt;
+    return Eigen::Vector3d(Required(tag, 3).data());
+  }
+  /// As many numbers as expected.
+  [[nodiscard]] std::vector<double> Required(const DcmTagKey& tag, std::int64_t expected) const {
+    std::vector<double> numbers = Numbers(tag);
+    const auto found = static_cast<std::int64_t>(numbers.size());
+    if (found == 0) throw DataError(say::dicom::Missing(NameOf(tag)));
+    if (found != expected) throw DataError(say::dicom::NumbersWrong(NameOf(tag), found, expected));
+    return numbers;
   }
 
   /// Values of 16 bits, such as pixels; borrowed from the data set.
@@ -143,8 +150,6 @@ class Item {
   }
 
  private:
-  static std::string NameOf(const DcmTagKey& tag) { return tag.toString().c_str(); }
-
   [[nodiscard]] std::string_view Raw(const DcmTagKey& tag) const {
     DcmElement* element = nullptr;
     if (item_.findAndGetElement(tag, element).bad() || element == nullptr) return {};
@@ -277,7 +282,7 @@ struct PixelScale {
   }
   [[nodiscard]] float Hu(Uint16 word) const {
     const std::int64_t value = Stored(word);
-    return static_cast<float>(nothing == value ? kAir_hu
+    return static_cast<float>(nothing == value ? kNothing_hu
                                                : slope * static_cast<double>(value) + intercept);
   }
 };
@@ -286,9 +291,10 @@ PixelScale ScaleOf(const Item& set) {
   const auto expect = [&](const DcmTagKey& tag, std::int64_t found, std::int64_t least,
                           std::int64_t most) {
     if (found < least || found > most)
-      throw DataError(say::dicom::ImageFormat(tag.toString().c_str(), std::to_string(found)));
+      throw DataError(say::dicom::ImageFormat(NameOf(tag), std::to_string(found)));
     return found;
   };
+  expect(DCM_NumberOfFrames, set.Whole(DCM_NumberOfFrames).value_or(1), 1, 1);
   expect(DCM_SamplesPerPixel, set.Word(DCM_SamplesPerPixel, 1), 1, 1);
   expect(DCM_BitsAllocated, set.Word(DCM_BitsAllocated, 0), 16, 16);
   PixelScale scale;
@@ -296,20 +302,15 @@ PixelScale ScaleOf(const Item& set) {
   expect(DCM_HighBit, set.Word(DCM_HighBit, 0), scale.bits - 1, scale.bits - 1);
   scale.is_signed = expect(DCM_PixelRepresentation, set.Word(DCM_PixelRepresentation, -1), 0, 1);
   if (const auto nothing = set.Padding()) scale.nothing = scale.Stored(*nothing);
-  const auto slope = set.Number(DCM_RescaleSlope), intercept = set.Number(DCM_RescaleIntercept);
-  if (!slope || !intercept || !(std::abs(*slope) > 1e-6 && std::abs(*slope) < 1e3) ||
-      !(std::abs(*intercept) < 1e5))
-    throw DataError(
-        say::dicom::ImageFormat(DCM_RescaleSlope.toString().c_str(), set.Text(DCM_RescaleSlope)));
-  scale.slope = *slope;
-  scale.intercept = *intercept;
+  const auto scaled_by = [&](const DcmTagKey& tag, double least, double most) {
+    const double value = set.Required(tag, 1).front();
+    if (!(std::abs(value) >= least && std::abs(value) < most))
+      throw DataError(say::dicom::ImageScale(NameOf(tag), set.Text(tag)));
+    return value;
+  };
+  scale.slope = scaled_by(DCM_RescaleSlope, 1e-6, 1e3);
+  scale.intercept = scaled_by(DCM_RescaleIntercept, 0.0, 1e5);
   return scale;
-}
-
-Eigen::Vector3d Required(const Item& set, const DcmTagKey& tag) {
-  const auto point = set.Point(tag);
-  if (!point) throw DataError(say::dicom::NoPoint(tag.toString().c_str(), 0));
-  return *point;
 }
 
 CtImage ImageOf(const Item& set) {
@@ -318,17 +319,12 @@ CtImage ImageOf(const Item& set) {
   image.position = set.Text(DCM_PatientPosition);
   image.rows = static_cast<int>(set.Word(DCM_Rows, 0));
   image.columns = static_cast<int>(set.Word(DCM_Columns, 0));
-  for (const auto& [tag, side] :
-       {std::pair(DCM_Rows, image.rows), std::pair(DCM_Columns, image.columns)}) {
-    if (side < 1 || side > kMostImageSide)
-      throw DataError(say::dicom::ImageFormat(tag.toString().c_str(), std::to_string(side)));
-  }
-  image.origin_mm = Required(set, DCM_ImagePositionPatient);
-  const std::vector<double> directions = set.Numbers(DCM_ImageOrientationPatient);
-  const std::vector<double> spacing = set.Numbers(DCM_PixelSpacing);
-  if (directions.size() != 6 || spacing.size() != 2)
-    throw DataError(say::dicom::NoPoint(DCM_ImageOrientationPatient.toString().c_str(),
-                                        static_cast<std::int64_t>(directions.size())));
+  const auto is_side = [](int side) { return side >= 1 && side <= kMostImageSide; };
+  if (!is_side(image.rows) || !is_side(image.columns))
+    throw DataError(say::dicom::ImageSize(image.columns, image.rows, kMostImageSide));
+  image.origin_mm = Eigen::Vector3d(set.Required(DCM_ImagePositionPatient, 3).data());
+  const std::vector<double> directions = set.Required(DCM_ImageOrientationPatient, 6);
+  const std::vector<double> spacing = set.Required(DCM_PixelSpacing, 2);
   image.along_row = Eigen::Vector3d(directions.data());
   image.along_column = Eigen::Vector3d(directions.data() + 3);
   image.row_spacing_mm = spacing[0];

@@ -11,8 +11,8 @@
 
 namespace plumb {
 
-/// Neither a structure set, a plan nor a CT image: a file of another kind, of which only this much
-/// is read.
+/// A file without a structure set, a plan, an image or its fault is of another kind, of which only
+/// the rest is read.
 struct PlanningContent {
   PlanningFile file;
   std::string modality;  ///< Such as "RTSTRUCT", as the file states it.

@@ -45,7 +45,8 @@ std::vector<fs::path> DicomFilesIn(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
     if (IsDicomFile(at->path())) files.push_back(at->path());
-  if (error || files.empty()) throw DataError(say::dicom::NoImages(folder.string()));
+  if (error) throw DataError(say::dicom::Damaged(folder.string(), say::dicom::CannotRead()));
+  if (files.empty()) throw DataError(say::dicom::NoImages(folder.string()));
   std::ranges::sort(files);
   return files;
 }

@@ -73,13 +73,17 @@ TEST_F(PlanningCtTest, ImagesTakeThePlaceOfAContourThatIsMissing) {
   const RunResult both = Import(options, {"--images", folder_ / "ct", "--json"});
   ASSERT_EQ(both.exit_code, 0) << both.err;
   EXPECT_EQ(json::parse(both.out).at("planning").at("roi"), "CT -300 HU");
-  const RunResult images = Plumb({"import-dicom", folder_ / "plan.dcm", "--images", folder_ / "ct",
+  const RunResult images = Plumb({"import-dicom", "--images", folder_ / "ct", folder_ / "plan.dcm",
                                   "--threshold", "-500", "--out", folder_ / "planned"});
   ASSERT_EQ(images.exit_code, 0) << images.err;
   EXPECT_THAT(images.out, HasSubstr("CT -500 HU"));
   EXPECT_THAT(images.out, HasSubstr("the couch, whose top lies at"));
   const double top_m = ReadScene(folder_ / "planned").cloud.points.front().z();
   EXPECT_NEAR(top_m, 0.1, 0.0005);
+  const RunResult unused = Import({}, {"--images", folder_ / "ct"});
+  EXPECT_EQ(unused.exit_code, 0) << unused.err;
+  EXPECT_THAT(unused.out,
+              HasSubstr("the CT images were not used: the surface is that of the contour BODY"));
   // One image of another series spoils all of them, and leaves nothing behind.
   CtImage other = SmallImages(options).front();
   other.series_uid = "2.25.3";

@@ -53,6 +53,7 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
       {"import-dicom", "structures.dcm", "--out", "x"},
       {"import-dicom", "structures.dcm", "plan.dcm"},
       {"import-dicom", "plan.dcm", "--images", "ct", "--threshold", "300", "--out", "x"},
+      {"import-dicom", "structures.dcm", "plan.dcm", "--threshold", "-500", "--out", "x"},
       {"export-dicom", "result", "--reference", "a", "--current", "b"},
       {"export-dicom", "result", "--reference", "a", "--out", "x"},
       {"export-dicom", "result", "--reference", "a", "--current", "b", "--out", "x",

@@ -91,10 +91,12 @@ TEST(DamagedFilesTest, FiveHundredDamagedImagesAreReadOrRefused) {
                               Damaged(bytes.substr(0, facts), random) + bytes.substr(facts));
     try {
       const PlanningContent content = ReadDicomFile(file);
+      if (content.image) {
+        CtSkin skin;
+        skin.Add(*content.image, "image");
+        EXPECT_LE(skin.roi().contours.size(), images.front().hu.size());
+      }
       content.image ? ++read : ++refused;
-      CtSkin skin;
-      skin.Add(content.image.value_or(images.front()), "image");
-      EXPECT_LE(skin.roi().contours.size(), images.front().hu.size());
     } catch (const DataError& error) {
       ++refused;
       EXPECT_EQ(std::string(error.what()).find("crashed"), std::string::npos)

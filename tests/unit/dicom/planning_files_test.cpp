@@ -10,8 +10,10 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <stop_token>
 
 #include "algo/base/errors.hpp"
+#include "daemon/planning/planning_import.hpp"
 #include "drivers/dicom/lock_down.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/dicom/small_files.hpp"
@@ -146,48 +148,84 @@ TEST_F(PlanningFilesTest, AnImageIsReadAsItWasWritten) {
     ASSERT_NEAR(read.hu[i], std::max(-1024.0F, written.hu[i]), 0.51);
 }
 
-// Signed pixels, a padding value, and what is refused: each by one value of the file.
-TEST_F(PlanningFilesTest, PixelsAreWhatTheFileSaysOrRefused) {
+using namespace std::string_literals;
+
+std::string Word(int value) {
+  return {static_cast<char>(value & 0xFF), static_cast<char>(value >> 8)};
+}
+
+// The tag of group 28, from which on a change counts its bytes.
+std::string Tag28(int element) { return "\x28\0"s + Word(element); }
+
+std::string Changed(std::string bytes, const std::string& tag, std::size_t at,
+                    const std::string& value) {
+  const std::size_t found = bytes.find(tag);
+  EXPECT_NE(found, std::string::npos) << tag;
+  return bytes.replace(found + at, value.size(), value);
+}
+
+TEST_F(PlanningFilesTest, PixelsAreSignedAndScaledAsTheFileSays) {
+  const CtImage image = SmallImages().front();
+  std::string bytes = DicomBytes(image);
+  bytes.replace(bytes.size() - 4, 4, Word(0xFFF) + Word(0x7FF));  // the last two pixels
+  const auto last_two = [&](const std::string& changed) {
+    const auto read = ReadDicomFile(Write("i.dcm", changed)).image;
+    EXPECT_TRUE(read);
+    return read ? std::vector(read->hu.end() - 2, read->hu.end()) : std::vector<float>();
+  };
+  EXPECT_THAT(last_two(bytes), ::testing::ElementsAre(4095 - 1024, 2047 - 1024));
+  const std::string is_signed = Changed(bytes, Tag28(0x103) + "US", 8, Word(1));
+  EXPECT_THAT(last_two(is_signed), ::testing::ElementsAre(-1 - 1024, 2047 - 1024));
+  EXPECT_THAT(last_two(Changed(bytes, Tag28(0x1053), 8, "2 ")),
+              ::testing::ElementsAre(2 * 4095 - 1024, 2 * 2047 - 1024));
+  // A padding value, signed as the pixels are, stands for pixels without a measurement.
+  for (const auto& [of, type] : {std::pair(bytes, "US"s), std::pair(is_signed, "SS"s)}) {
+    std::string padded = of;
+    padded.insert(padded.find(Tag28(0x1052)), Tag28(0x120) + type + Word(2) + Word(0xFFF));
+    EXPECT_THAT(last_two(padded), ::testing::ElementsAre(kNothing_hu, 2047 - 1024)) << type;
+  }
+}
+
+// Each by one value of the file, with that value as the cause.
+TEST_F(PlanningFilesTest, ImagesThatCannotBeUsedAreRefusedWithTheCause) {
   const CtImage image = SmallImages().front();
   const std::string bytes = DicomBytes(image);
-  const auto changed = [&](const std::string& tag, std::size_t at, const std::string& value) {
-    std::string copy = bytes;
-    const std::size_t found = copy.find(tag);
-    EXPECT_NE(found, std::string::npos) << tag;
-    return copy.replace(found + at, value.size(), value);
-  };
-  const auto word = [](int value) {
-    return std::string{static_cast<char>(value & 0xFF), static_cast<char>(value >> 8)};
-  };
-  using namespace std::string_literals;
-  // 12 bits that are signed: 2048 and more are negative.
-  const auto is_signed =
-      ReadDicomFile(Write("i.dcm", changed("\x28\0\x03\x01US"s, 8, word(1)))).image;
-  ASSERT_TRUE(is_signed);
-  EXPECT_NEAR(is_signed->hu.front(), image.hu.front(), 0.51);
-  const auto steeper = ReadDicomFile(Write("i.dcm", changed("\x28\0\x53\x10"s, 8, "2 "))).image;
-  ASSERT_TRUE(steeper);
-  EXPECT_NEAR(steeper->hu.front(), 2 * (image.hu.front() + 1024) - 1024, 1.1);
-  const auto refused = [&](const std::string& changed_bytes) {
-    const auto file = Write("i.dcm", changed_bytes);
+  namespace d = say::dicom;
+  const auto refused = [&](const std::string& changed, const MessageId& why,
+                           const std::string& in_words) {
+    const auto file = Write("i.dcm", changed);
     EXPECT_THROW(ForEachCtImage({file}, [](const CtImage&, const std::string&) {}), DataError);
+    const PlanningContent described = ReadDicomFile(file);  // all the same
+    EXPECT_EQ(described.modality, "CT");
+    EXPECT_EQ(described.file.frame_of_reference_uid, "2.25.52");
+    EXPECT_TRUE(described.image_fault.Is(why)) << described.image_fault.English();
+    EXPECT_THAT(described.image_fault.English(), ::testing::HasSubstr(in_words));
   };
-  refused(changed("\x28\0\0\x01US"s, 8, word(8)));     // bits allocated
-  refused(changed("\x28\0\x02\x01US"s, 8, word(15)));  // high bit
-  refused(changed("\x28\0\x02\0US"s, 8, word(3)));     // colours
-  refused(changed("\x28\0\x10\0US"s, 8, word(4000)));  // rows
-  refused(changed("\x28\0\x10\0US"s, 8, word(image.rows + 1)));
-  refused(changed("\x28\0\x53\x10"s, 8, "0 "));  // slope
-  refused(bytes.substr(0, bytes.size() - 400));
-  const std::string compressed =
-      changed("1.2.840.10008.1.2.1\0"s, 0, "1.2.840.10008.1.2.5\0"s);  // RLE
-  refused(compressed);
-  // It is described all the same.
-  const PlanningContent described =
-      ReadDicomFile(Write("i.dcm", changed("\x28\0\x53\x10"s, 8, "0 ")));
-  EXPECT_EQ(described.modality, "CT");
-  EXPECT_EQ(described.file.frame_of_reference_uid, "2.25.52");
-  EXPECT_TRUE(described.image_fault.Is(say::dicom::kImageFormat));
+  const auto word = [&](int element, int value) {
+    return Changed(bytes, Tag28(element) + "US", 8, Word(value));
+  };
+  // In the place of an element another one of its group, which says nothing.
+  const auto without = [&](const std::string& tag) { return Changed(bytes, tag, 2, Word(0x1FF)); };
+  refused(word(0x100, 8), d::kImageFormat, "(0028,0100) is 8");
+  refused(word(0x102, 15), d::kImageFormat, "(0028,0102) is 15");
+  refused(word(0x02, 3), d::kImageFormat, "(0028,0002) is 3");
+  refused(word(0x10, 4000), d::kImageSize, "x4000 pixels");
+  refused(word(0x10, image.rows + 1), d::kImageCut, "pixels");
+  refused(Changed(bytes, Tag28(0x1053), 8, "0 "), d::kImageScale, "(0028,1053) is \"0\"");
+  refused(without(Tag28(0x1053)), d::kMissing, "(0028,1053)");
+  refused(without(Tag28(0x1052)), d::kMissing, "(0028,1052)");
+  refused(without(Tag28(0x30)), d::kMissing, "(0028,0030)");
+  refused(without("\x20\0\x32\0"s), d::kMissing, "(0020,0032)");
+  refused(without("\x20\0\x37\0"s), d::kMissing, "(0020,0037)");
+  std::string frames = bytes;
+  frames.insert(frames.find(Tag28(0x10)), Tag28(0x08) + "IS" + Word(2) + "2 ");
+  refused(frames, d::kImageFormat, "(0028,0008) is 2");
+  for (const std::string& damaged :
+       {bytes.substr(0, bytes.size() - 400),
+        Changed(bytes, "1.2.840.10008.1.2.1\0"s, 0, "1.2.840.10008.1.2.5\0"s)}) {  // RLE
+    const auto file = Write("i.dcm", damaged);
+    EXPECT_THROW(ForEachCtImage({file}, [](const CtImage&, const std::string&) {}), DataError);
+  }
 }
 
 TEST_F(PlanningFilesTest, ImagesAreFoundInFoldersBesideTheirPlan) {
@@ -216,6 +254,24 @@ TEST_F(PlanningFilesTest, ImagesAreFoundInFoldersBesideTheirPlan) {
   const auto empty = folder_.path() / "empty";
   std::filesystem::create_directory(empty);
   EXPECT_THROW(ForEachCtImage({empty}, visit), DataError);
+}
+
+TEST_F(PlanningFilesTest, AStopRequestEndsTheReadingOfImages) {
+  const auto plan = Write("plan.dcm", DicomBytes(SmallCt().second));
+  std::vector<std::filesystem::path> files;
+  for (const CtImage& image : SmallImages())
+    files.push_back(Write(std::to_string(files.size()), DicomBytes(image)));
+  std::stop_source stop;
+  std::size_t num_read = 0;
+  const auto read = [&] {
+    return ReadPlanningWithImages({}, plan, files, -300, {}, stop.get_token(),
+                                  [&](std::size_t count) {
+                                    num_read = count;
+                                    stop.request_stop();
+                                  });
+  };
+  EXPECT_THROW((void)read(), Interrupted);
+  EXPECT_EQ(num_read, 1U);
 }
 
 TEST_F(PlanningFilesTest, ATruncatedFileIsNeverHalfOfOne) {

@@ -69,9 +69,9 @@ Scene SceneOf(const CtFiles& files, double threshold_hu = kSkinThreshold_hu) {
   return MakePlannedScene(files.structures, files.plan, skin);
 }
 
-Message RefusalOf(const CtFiles& files) {
+Message RefusalOf(const CtFiles& files, double threshold_hu = kSkinThreshold_hu) {
   try {
-    (void)SceneOf(files);
+    (void)SceneOf(files, threshold_hu);
   } catch (const DataError& error) {
     return error.message();
   }
@@ -104,6 +104,7 @@ TEST(CtSkinTest, InEveryPositionTheSkinLiesWhereTheBodyDoesAndTheCouchIsGone) {
     EXPECT_THAT(scene.warnings, Warns(say::planning::kCouchRemoved));
     EXPECT_THAT(scene.warnings, Warns(say::planning::kSkinOfImages));
     EXPECT_THAT(scene.warnings, Warns(say::planning::kImagesByFrame));
+    EXPECT_THAT(scene.warnings, Not(Warns(say::planning::kImagesCut)));
     EXPECT_EQ(scene.planning->roi, "CT -300 HU");
     EXPECT_EQ(Name(scene.planning->posture), position);
     // The interval of the skin covers that, and is not much wider.
@@ -112,14 +113,107 @@ TEST(CtSkinTest, InEveryPositionTheSkinLiesWhereTheBodyDoesAndTheCouchIsGone) {
   }
 }
 
+// Without the rows and columns beyond those that stay.
+CtImage Cropped(const CtImage& image, int first_row, int last_row, int first_column) {
+  CtImage cropped = image;
+  cropped.rows = last_row + 1 - first_row;
+  cropped.columns = image.columns - first_column;
+  cropped.origin_mm += first_row * image.row_spacing_mm * image.along_column +
+                       first_column * image.column_spacing_mm * image.along_row;
+  cropped.hu.clear();
+  for (int row = first_row; row <= last_row; ++row) {
+    const auto from = image.hu.begin() + std::ptrdiff_t{row} * image.columns;
+    cropped.hu.insert(cropped.hu.end(), from + first_column, from + image.columns);
+  }
+  return cropped;
+}
+
+// The same image with its rows in the opposite order.
+CtImage UpsideDown(const CtImage& image) {
+  CtImage turned = image;
+  turned.origin_mm += (image.rows - 1) * image.row_spacing_mm * image.along_column;
+  turned.along_column = -image.along_column;
+  for (int row = 0; row < image.rows; ++row)
+    std::copy_n(image.hu.begin() + std::ptrdiff_t{row} * image.columns, image.columns,
+                turned.hu.end() - std::ptrdiff_t{row + 1} * image.columns);
+  return turned;
+}
+
+// What is left of a surface is on the body, and it is said that a part is left out.
+void ExpectTrueButLess(const Scene& scene, const Scene& whole) {
+  EXPECT_THAT(scene.warnings, Warns(say::planning::kImagesCut));
+  EXPECT_LT(scene.cloud.size() + 1000, whole.cloud.size());
+  ASSERT_GT(scene.cloud.size(), 300U);
+  const std::vector<double> off = OffBody(scene);
+  EXPECT_GT(off.front(), -0.005);  // as of whole images
+  EXPECT_LT(off.back(), 0.002);
+}
+
+TEST(CtSkinTest, ABodyThatIsCutAtTheTopHasNoFlatSkinThere) {
+  const CtFiles files = FilesOf(Region());
+  const Scene whole = SceneOf(files);
+  for (const int rows : {40, 60}) {  // 33 and 57 mm of the body
+    for (const bool is_turned : {false, true}) {
+      CtFiles cut = files;
+      for (CtImage& image : cut.images) {
+        image = Cropped(image, rows, image.rows - 1, 0);
+        if (is_turned) image = UpsideDown(image);
+      }
+      const Scene scene = SceneOf(cut);
+      ExpectTrueButLess(scene, whole);
+      EXPECT_GT(scene.planning->skin_u95_m, 0.95 * whole.planning->skin_u95_m);
+    }
+  }
+}
+
+TEST(CtSkinTest, ARoundFieldOfViewCutsTheBodyAsAnEdgeDoes) {
+  CtFiles files = FilesOf(Region());
+  const Scene whole = SceneOf(files);
+  for (CtImage& image : files.images) {
+    for (int row = 0; row < image.rows; ++row)
+      for (int column = 0; column < image.columns; ++column)
+        if (std::hypot(row - 0.5 * image.rows, column - 0.5 * image.columns) > 0.52 * image.rows)
+          image.hu[static_cast<std::size_t>(row) * static_cast<std::size_t>(image.columns) +
+                   static_cast<std::size_t>(column)] = static_cast<float>(kNothing_hu);
+  }
+  ExpectTrueButLess(SceneOf(files), whole);
+}
+
+TEST(CtSkinTest, ASideThatIsCutIsNoSurfaceWhateverTissueLiesThere) {
+  CtFiles files = FilesOf(Region());
+  const Scene whole = SceneOf(files);
+  for (CtImage& image : files.images) {
+    image = Cropped(image, 0, image.rows - 1, 135);
+    for (int row = 0; row < image.rows; ++row) {
+      float& hu = image.hu[static_cast<std::size_t>(row) * static_cast<std::size_t>(image.columns)];
+      if (hu > -200) hu = row % 32 < 16 ? 700.0F : -100.0F;  // bone and fat
+    }
+  }
+  const Scene scene = SceneOf(files);
+  ExpectTrueButLess(scene, whole);
+  const CtImage& image = files.images.front();
+  const auto edge = static_cast<float>(1e-3 * image.origin_mm.x());  // HFS, isocentre at x = 72.53
+  for (const Eigen::Vector3f& p : scene.cloud.points) ASSERT_GT(p.x(), edge - 0.0725F + 0.010F);
+}
+
 TEST(CtSkinTest, TheThresholdMovesTheSkinAndTheBlurWidensItsInterval) {
   const CtFiles files = FilesOf(Region());
-  const std::vector<double> darker = OffBody(SceneOf(files, -800)), skin = OffBody(SceneOf(files));
+  const Scene at_800 = SceneOf(files, -800);
+  const std::vector<double> darker = OffBody(at_800), skin = OffBody(SceneOf(files));
   EXPECT_GT(darker[darker.size() / 2], skin[skin.size() / 2] + 0.0004);
+  // 300 HU from half-way in place of 200 HU. Measured: 0.68 and 0.52 mm.
+  EXPECT_GT(at_800.planning->skin_u95_m, 1.2 * SceneOf(files).planning->skin_u95_m);
   const Scene blurred = SceneOf(FilesOf(Region(), {.blur_mm = 1.5}));
   EXPECT_GT(blurred.planning->skin_u95_m, 1.5 * SceneOf(files).planning->skin_u95_m);
   const Scene coarse = SceneOf(FilesOf(Region(), {.pixel_mm = 2.4}));
   EXPECT_GT(coarse.planning->skin_u95_m, 1.2 * SceneOf(files).planning->skin_u95_m);
+}
+
+// The limit is 3 mm for 200 HU: 67 HU/mm.
+TEST(CtSkinTest, ImagesThatDoNotShowTheSkinAreRefused) {
+  EXPECT_TRUE(RefusalOf(FilesOf(Region(), {.blur_mm = 3.5})).empty());
+  const CtFiles blurred = FilesOf(Region(), {.blur_mm = 7.0});
+  EXPECT_TRUE(RefusalOf(blurred).Is(say::planning::kImagesBlurred));
 }
 
 TEST(CtSkinTest, WithoutACouchBesideTheBodyThatIsSaid) {
@@ -148,12 +242,37 @@ TEST(CtSkinTest, AContourOfTheCouchCountsMoreThanItsShape) {
   const Scene drawn = SceneOf(files);
   EXPECT_NEAR(drawn.planning->support_m, by_shape.planning->support_m + 0.023, 0.001);
   EXPECT_THAT(drawn.warnings, Not(Warns(say::planning::kImagesByFrame)));
+  // In another frame of reference its height says nothing.
+  couch.frame_of_reference_uid = "2.25.53";
+  EXPECT_NEAR(SceneOf(files).planning->support_m, by_shape.planning->support_m, 1e-9);
 }
 
-TEST(CtSkinTest, AnExternalContourIsTakenWhereThereIsOne) {
+TEST(CtSkinTest, WithAnExternalContourImagesAreCheckedAndSaidToBeUnused) {
   CtFiles files = FilesOf(Region());
   files.structures = simulated::MakePlanningCt(Torso().surface, PlaceOfTorso(), Region()).first;
-  EXPECT_EQ(SceneOf(files).planning->roi, "BODY");
+  const Scene scene = SceneOf(files);
+  EXPECT_EQ(scene.planning->roi, "BODY");
+  EXPECT_THAT(scene.warnings, Warns(say::planning::kImagesNotUsed));
+  for (CtImage& image : files.images) image.position = "HFP";
+  EXPECT_TRUE(RefusalOf(files).Is(say::planning::kImagesPosition));
+  for (CtImage& image : files.images) image.file.patient_id = "X";
+  EXPECT_TRUE(RefusalOf(files).Is(say::planning::kImagesOtherPatient));
+  files = FilesOf(Region());
+  files.structures = simulated::MakePlanningCt(Torso().surface, PlaceOfTorso(), Region()).first;
+  for (CtImage& image : files.images) image.file.frame_of_reference_uid = "2.25.53";
+  EXPECT_TRUE(RefusalOf(files).Is(say::planning::kOtherFrame));
+}
+
+TEST(CtSkinTest, AChosenContourNeedsAStructureSet) {
+  const CtFiles files = FilesOf(Region());
+  CtSkin skin;
+  for (const CtImage& image : files.images) skin.Add(image, "image");
+  try {
+    (void)MakePlannedScene(std::nullopt, files.plan, skin, {.roi = "BODY"});
+    FAIL() << "it was taken";
+  } catch (const DataError& error) {
+    EXPECT_TRUE(error.message().Is(say::planning::kRoiOfNone)) << error.what();
+  }
 }
 
 TEST(CtSkinTest, AMissingImageIsAGap) {
@@ -188,6 +307,7 @@ TEST(CtSkinTest, ImagesThatDoNotBelongTogetherAreRefused) {
   refused(words::kImageTilted, [](CtFiles& f) { f.images[3].along_column = {0, 0.98, 0.2}; });
   refused(words::kImageTilted, [](CtFiles& f) { f.images[3].along_row = {0, 0, 1}; });
   refused(words::kImagePixels, [](CtFiles& f) { f.images[3].row_spacing_mm = 0; });
+  refused(words::kImagePixels, [](CtFiles& f) { f.images[3].row_spacing_mm = std::nan(""); });
   refused(words::kImagePixels, [](CtFiles& f) { f.images[3].hu.pop_back(); });
   refused(words::kImagesOtherPatient, all([](CtImage& i) { i.file.patient_id = "X"; }));
   refused(words::kOtherFrame, all([](CtImage& i) { i.file.frame_of_reference_uid = "2.25.53"; }));
@@ -210,15 +330,17 @@ CtImage Drawn(const std::function<bool(double x, double y)>& is_body) {
   return image;
 }
 
-std::vector<double> AreasOf(const CtImage& image) {
+CtSkin SkinOf(const CtImage& image) {
   CtSkin skin;
   skin.Add(image, "image");
+  return skin;
+}
+
+std::vector<double> AreasOf(const CtImage& image) {
+  const CtSkin skin = SkinOf(image);
   std::vector<double> areas;
-  for (const PlannedContour& contour : skin.roi().contours) {
-    FlatContour flat;
-    for (const Eigen::Vector3d& p : contour.points_mm) flat.emplace_back(p.x(), p.y());
-    areas.push_back(AreaOf(flat));
-  }
+  for (const PlannedContour& contour : skin.roi().contours)
+    areas.push_back(AreaOf(InPlane(contour.points_mm)));
   std::ranges::sort(areas);
   return areas;
 }
@@ -240,6 +362,53 @@ TEST(CtSkinTest, TheEdgeOfTheImageClosesWhatItCuts) {
   const std::vector<double> areas = AreasOf(Drawn([](double x, double) { return x < 50; }));
   ASSERT_EQ(areas.size(), 1U);
   EXPECT_NEAR(areas[0], 50 * 120, 100);
+}
+
+// Where the edge lies does not depend on the tissue, nor does it say how steep the skin is.
+TEST(CtSkinTest, WhatTheEdgeCutsIsStraightWhateverIsCut) {
+  const auto in_body = [](double x, double y) { return std::hypot(x, y - 60) < 40; };
+  CtImage image = Drawn(in_body);
+  for (std::size_t row = 0; row < 120; ++row) {
+    float& hu = image.hu[200 * row];
+    if (hu > -500) hu = row % 20 < 10 ? 1500.0F : -100.0F;
+  }
+  const CtSkin skin = SkinOf(image);
+  ASSERT_EQ(skin.cuts_mm().size(), 1U);
+  EXPECT_EQ(skin.cuts_mm().front().size(), 79U);
+  for (const Eigen::Vector3d& p : skin.cuts_mm().front()) EXPECT_DOUBLE_EQ(p.x(), -0.5);
+  EXPECT_DOUBLE_EQ(skin.Steepness(), 1000.0);
+  EXPECT_TRUE(
+      SkinOf(Drawn([&](double x, double y) { return in_body(x - 60, y); })).cuts_mm().empty());
+}
+
+TEST(CtSkinTest, ALungThatTheFirstRowOpensIsNoHole) {
+  const CtSkin skin = SkinOf(Drawn([](double x, double y) {
+    const double r = std::hypot(x - 100, y);
+    return r < 45 && r > 15;
+  }));
+  ASSERT_EQ(skin.roi().contours.size(), 1U);
+  EXPECT_NEAR(AreaOf(InPlane(skin.roi().contours.front().points_mm)),
+              std::numbers::pi * 45 * 45 / 2, 60);
+  // The whole row from side to side, 56 to 144.
+  EXPECT_EQ(skin.cuts_mm().front().size(), 89U);
+}
+
+TEST(CtSkinTest, ARoundFieldOfViewNeedsNoPaddingValue) {
+  // Of 200 pixels, and a body that reaches across its edge.
+  CtImage image = Drawn([](double x, double y) { return x < 60 && y > 70; });
+  image.rows = 200;
+  image.hu.resize(std::size_t{200} * 200, -1000.0F);
+  for (std::size_t i = 0; i < image.hu.size(); ++i)
+    if (std::hypot(static_cast<double>(i % 200) - 99.5, static_cast<double>(i / 200) - 99.5) > 99)
+      image.hu[i] = -1024.0F;
+  const CtSkin skin = SkinOf(image);
+  ASSERT_EQ(skin.cuts_mm().size(), 1U);
+  EXPECT_GT(skin.cuts_mm().front().size(), 40U);
+  for (const Eigen::Vector3d& p : skin.cuts_mm().front())
+    EXPECT_NEAR(std::hypot(p.x() - 99.5, p.y() - 99.5), 99, 1.0);
+  // With another value in a corner the circle is a part of the picture.
+  image.hu.back() = -1000.0F;
+  EXPECT_TRUE(SkinOf(image).cuts_mm().empty());
 }
 
 TEST(CtSkinTest, PixelsThatTouchByACornerAreApart) {
@@ -272,6 +441,11 @@ TEST(CouchTopTest, OnlyALevelSideAlongTheScanIsACouch) {
   EXPECT_NEAR(*CouchTop(slices(on_couch)), 0.05, 1e-6);
   EXPECT_FALSE(CouchTop(
       slices([&](double x, int i) { return i % 10 == 0 ? on_couch(x, i) : round(x, i); })));
+  // A third of the 20 slices are 7; what both sides of a slice show counts once.
+  for (const int count : {6, 7}) {
+    const auto some = [&](double x, int i) { return i < count ? on_couch(x, i) : round(x, i); };
+    EXPECT_EQ(CouchTop(slices(some)).has_value(), count == 7);
+  }
   EXPECT_FALSE(CouchTop(slices([&](double x, int i) { return on_couch(x, i) + 0.01 * i; })));
   EXPECT_FALSE(CouchTop({}));
 }
