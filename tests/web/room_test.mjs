@@ -202,8 +202,9 @@ await h.step('the outline of the reference lies over the picture, for the postur
   await anna.setViewportSize({ width: 1280, height: 800 });
   for (const what of ['other', 'placed', 'none']) {  // one of another patient is never shown
     h.tell(`outline ${what}`);
-    for (const page of [anna, room])
+    for (const page of [anna, room]) {
       await page.locator('.lying').waitFor({ state: what === 'placed' ? 'visible' : 'hidden' });
+    }
   }
   for (const page of [anna, room]) await page.locator('.preview img').waitFor();
   h.tell('outline placed');
