@@ -77,7 +77,7 @@ TEST_F(PlanningCtTest, ImagesTakeThePlaceOfAContourThatIsMissing) {
                                   "--threshold", "-500", "--out", folder_ / "planned"});
   ASSERT_EQ(images.exit_code, 0) << images.err;
   EXPECT_THAT(images.out, HasSubstr("CT -500 HU"));
-  EXPECT_THAT(images.out, HasSubstr("the couch, whose top lies at"));
+  EXPECT_THAT(images.out, HasSubstr("the couch, whose top lies -100.0 mm above"));
   const double top_m = ReadScene(folder_ / "planned").cloud.points.front().z();
   EXPECT_NEAR(top_m, 0.1, 0.0005);
   const RunResult unused = Import({}, {"--images", folder_ / "ct"});
