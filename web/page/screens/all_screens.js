@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // The screens of the page by the name in their address. One with `nav` is in the menu.
 import { showMonitor } from '../monitoring/monitor.js';
+import { showMonitoringRecord } from '../monitoring/monitoring_record.js';
+import { showRepeats } from '../set_up/repeats.js';
 import { S } from '../words.js';
+import { showAudit } from './audit.js';
 import { showCheck } from './check.js';
+import { showStatistics } from './patient/statistics.js';
 import { showPatient, showPatients } from './patients.js';
-import { showPlan } from './plan/plan.js';
 import { showResult } from './result.js';
 import { showScan } from './scan.js';
 import { showSettings } from './settings.js';
 import { showStatus } from './status.js';
+import { showUpdate } from './update.js';
 import { showUsers } from './users.js';
 
 /// Loaded when it is opened for the first time, so that the first page is small.
@@ -16,13 +20,7 @@ const later = (load) => async (...given) => {
   const show = await load().catch(() => { throw new Error(S.noAnswer); });
   return show(...given);
 };
-const showAudit = later(async () => (await import('./audit.js')).showAudit);
-const showMonitoringRecord = later(
-  async () => (await import('../monitoring/monitoring_record.js')).showMonitoringRecord);
-const showRepeats = later(async () => (await import('../set_up/repeats.js')).showRepeats);
-const showStatistics = later(
-  async () => (await import('./patient/statistics.js')).showStatistics);
-const showUpdate = later(async () => (await import('./update.js')).showUpdate);
+const showPlan = later(async () => (await import('./plan/plan.js')).showPlan);
 
 export const kScreens = {
   status: { show: showStatus, permission: 'view', nav: true },
