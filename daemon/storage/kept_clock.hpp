@@ -23,7 +23,8 @@ struct AskClock {
 };
 
 /// Whether a time server has set the clock since the machine started. systemd-timesyncd leaves a
-/// note; other programs (chrony, ntpd, ptp4l) tell the kernel. May take five seconds.
+/// note; other programs (chrony, ntpd, ptp4l) tell the kernel. The call can block for up to five
+/// seconds.
 /// @param note  The file that systemd-timesyncd writes when a server answers for the first time.
 [[nodiscard]] bool IsClockKept(
     const std::filesystem::path& note = "/run/systemd/timesync/synchronized",

@@ -127,6 +127,13 @@ class DaemonNginxTest : public ::testing::Test {
         {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}});
   }
 
+  static void ExpectRefusedBy(const Nginx& nginx, const Plumbd& plumbd, const char* words) {
+    HttpClient browser = Browser(nginx);
+    const HttpAnswer refused = SetUpBy(browser, plumbd);
+    EXPECT_EQ(refused.status, 403);
+    EXPECT_THAT(refused.body, HasSubstr(words));
+  }
+
   testing::TempFolder folder_;
 };
 
@@ -162,11 +169,8 @@ TEST_F(DaemonNginxTest, ARefusalNamesTheProxyThatIsSetUpOtherwise) {
     const auto plumbd = Start("0.0.0.0:0");
     std::string site = Site(*plumbd);
     Replace(site, "proxy_set_header Host $host;", "");
-    const Nginx nginx(folder_ / "without-host", site);
-    HttpClient browser = Browser(nginx);
-    const HttpAnswer refused = SetUpBy(browser, *plumbd);
-    EXPECT_EQ(refused.status, 403);
-    EXPECT_THAT(refused.body, HasSubstr("behind a proxy, have it pass on the browser's Host"));
+    ExpectRefusedBy(Nginx(folder_ / "without-host", site), *plumbd,
+                    "behind a proxy, have it pass on the browser's Host");
     site = Site(*plumbd);
     Replace(site, "Host $host;", "Host another.clinic.example;");
     const Nginx elsewhere(folder_ / "other-name", site);
@@ -178,11 +182,8 @@ TEST_F(DaemonNginxTest, ARefusalNamesTheProxyThatIsSetUpOtherwise) {
   const auto plumbd = Start("127.0.0.1:0");
   std::string site = Site(*plumbd);
   Replace(site, "proxy_pass https:", "proxy_pass http:");
-  const Nginx nginx(folder_ / "without-tls", site);
-  HttpClient browser = Browser(nginx);
-  const HttpAnswer refused = SetUpBy(browser, *plumbd);
-  EXPECT_EQ(refused.status, 403);
-  EXPECT_THAT(refused.body, HasSubstr("have the proxy use https to the unit"));
+  ExpectRefusedBy(Nginx(folder_ / "without-tls", site), *plumbd,
+                  "have the proxy use https to the unit");
   EXPECT_EQ(plumbd->Stop(), 0);
 }
 

@@ -79,7 +79,7 @@ std::size_t OpenFile::Checked(std::ptrdiff_t count) const {
 std::optional<std::size_t> OpenFile::ReadAtOnce(std::uint64_t at, std::span<char> into) const {
   const iovec part{into.data(), into.size()};
   const ssize_t count = preadv2(fd_, &part, 1, static_cast<off_t>(at), RWF_NOWAIT);
-  // Some file systems never tell what is in memory.
+  // Some file systems cannot tell whether data is already in memory.
   if (count < 0 && (errno == EAGAIN || errno == EOPNOTSUPP)) return std::nullopt;
   return Checked(count);
 }

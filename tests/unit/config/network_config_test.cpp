@@ -88,7 +88,8 @@ TEST(ConfigTest, OtherUnitsNeedASecretAndTls) {
   };
   EXPECT_EQ(ErrorOf(units("https://plumb-b.example:8080") + secret), "no error");
   EXPECT_EQ(ErrorOf(units("http://127.0.0.1:8080") + secret), "no error");
-  EXPECT_EQ(ErrorOf("[peers]\n" + secret), "no error") << "answers, and asks nobody";
+  EXPECT_EQ(ErrorOf("[peers]\n" + secret), "no error")
+      << "this unit answers other units and queries none";
   EXPECT_THAT(ErrorOf(units("https://plumb-b.example:8080")), HasSubstr("peers.secret_file"));
   for (const char* wrong : {"http://plumb-b.example", "https://b.example/path", "plumb-b",
                             "https://u@b.example", "ftp://127.0.0.1"})

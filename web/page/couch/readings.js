@@ -41,7 +41,7 @@ export function couchReadings({ result, details }) {
   const text = S.result;
   const roomKnown = live.status?.room?.known && details?.body?.room_known !== false;
   if (result?.verdict !== 'move' || !roomKnown) return null;
-  // What a couch turns is told where its profile says how it counts turns.
+  // Rotations are listed only if the couch profile defines how the couch counts them.
   const moved = result.numbers.filter((row, i) => row.value !== null
     && (kAxes[i].shift || (couchVersion() > 0 && couchAxis(kAxes[i]).moves)));
   if (!moved.length) return null;
