@@ -17,7 +17,7 @@ check "a folder without tests: those that include its headers" 'plumb_test_track
 check "a test: itself" '^plumb_test_base $' "$(of tests/unit/base/pose_test.cpp)"
 check "a header of tests: those that include it, also by other headers" \
   'plumb_test_records ' "$(of tests/support/temp_folder.hpp)"
-check "several changes" '^plumb_test_verdict plumb_test_base $' \
+check "several changes" '^plumb_test_base plumb_test_verdict $' \
   "$(of tests/unit/base/pose_test.cpp algo/verdict/gates.cpp README.md)"
 check "a source without a unit test is named" '^no unit test belongs to daemon/none/x.cpp $' \
   "$(of daemon/none/x.cpp)"
