@@ -53,6 +53,8 @@ SimulatedSource::SimulatedSource(std::shared_ptr<const simulated::World> world,
   if (!world_) throw std::invalid_argument("simulated source needs a world");
   if (sweep.num_frames < 1 || !(sweep.rate_hz > 0) || !(sweep.rate_hz <= 60))
     throw std::invalid_argument("simulated sweep needs frames and a rate up to 60 Hz");
+  if (sweep.other_projector)
+    other_projector_.emplace(sweep.seed, unit_.color_written.width, unit_.color_written.height);
   info_.intrinsics = unit_.color_written;
   info_.depth_sensor = unit_.depth_sensor;
   info_.depth_noise = ClassOf(unit_.depth_sensor).noise;
@@ -99,6 +101,7 @@ void SimulatedSource::Take(Frame& frame, double color_time, double depth_time) {
       depth_camera_.Render(*world_at(depth_time, truth_.T_world_camera_at_depth), trajectory_,
                            depth_time, Hash(sweep_.seed, 53, index), warm_up);
   truth_.depth.registered.convertTo(frame.depth_m, CV_32F, 1.0 / unit_.depth_units_per_metre);
+  if (other_projector_) other_projector_->Disturb(depth_time, frame.depth_m);
 }
 
 std::optional<Frame> SimulatedSource::Next() {

@@ -10,6 +10,7 @@
 #include "algo/types/frame.hpp"
 #include "drivers/simulator/sensor/color_camera.hpp"
 #include "drivers/simulator/sensor/depth_camera.hpp"
+#include "drivers/simulator/sensor/other_projector.hpp"
 #include "drivers/simulator/sensor/sensor_unit.hpp"
 #include "drivers/simulator/world/scene_events.hpp"
 #include "drivers/simulator/world/trajectory.hpp"
@@ -31,6 +32,8 @@ struct SimulatedSweep {
   int color_every = 1;
   double lost_frames = 0.0;  ///< Probability of one, besides the unit's own.
   double late_frames = 0.0;  ///< Likewise: stamped late by most of a frame's time.
+  /// A second structured-light sensor shines on the same place.
+  bool other_projector = false;
 };
 
 /// True values for one frame. Times on the scale of the stamps, without their errors.
@@ -73,6 +76,7 @@ class SimulatedSource : public FrameSource {
   simulated::Trajectory trajectory_;
   simulated::ColorCamera color_camera_;
   simulated::DepthCamera depth_camera_;
+  std::optional<simulated::OtherProjector> other_projector_;
   StreamInfo info_;
   FrameTruth truth_;
   int next_ = 0;

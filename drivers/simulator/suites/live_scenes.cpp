@@ -19,7 +19,9 @@ using Eigen::Vector3d;
 constexpr double kLiveInterval_s = 100.0;
 constexpr double kColorRate_hz = 5.0;
 constexpr std::size_t kFirstOfTwo = 5;  // among LiveNames()
+constexpr std::size_t kCouchSteps = 1;
 constexpr std::size_t kFirstOfOthers = 7;
+constexpr std::size_t kProjector = 13;
 
 // Looks at the body from one side, its length along the image.
 Pose PlaceOfSensor(const Vector3d& at, double side, RandomStream& random) {
@@ -113,7 +115,7 @@ void AddOther(LiveScript& script, SensorAtPlace& place, std::size_t other) {
   }
   if (other == 2) script.sheet = {{15.0, 25.0}};
   if (other == 3) place.sway_m = 0.2 * kMillimetre;
-  if (other < 4) return;
+  if (other != 4 && other != 5) return;
   place.pushed_at_s = 20.0;
   place.T_before_after.translation() = (other == 4 ? 2.0 : 5.0) * kMillimetre * direction;
 }
@@ -128,9 +130,9 @@ std::shared_ptr<const SensorUnit> AnotherUnit(const SimulateOptions& options) {
 
 const std::vector<std::string>& LiveNames() {
   static const std::vector<std::string> names = {
-      "live_still",    "live_steps",      "live_passing",   "live_cough", "live_pushed",
-      "live_two_left", "live_two_right",  "live_dark",      "live_lossy", "live_sheet",
-      "live_sway",     "live_pushed_2mm", "live_pushed_5mm"};
+      "live_still",    "live_steps",      "live_passing",    "live_cough",    "live_pushed",
+      "live_two_left", "live_two_right",  "live_dark",       "live_lossy",    "live_sheet",
+      "live_sway",     "live_pushed_2mm", "live_pushed_5mm", "live_projector"};
   return names;
 }
 
@@ -163,7 +165,9 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
   };
   for (std::size_t i = 0; i < LiveNames().size(); ++i) {
     if (i > kFirstOfTwo && i < kFirstOfOthers) continue;
-    RandomStream random(Hash(options.seed, 131, i));
+    // The same as in the steps, so that the other projector's part can be seen.
+    const std::size_t like = i == kProjector ? kCouchSteps : i;
+    RandomStream random(Hash(options.seed, 131, like));
     LiveScript script{.exhaled = swept.body->grid, .chest = with_chest, .belly = with_belly};
     script.breaths = Breathe(random, options.live_s);
     script.lag_s = random.Uniform(0.2, 0.6);
@@ -171,7 +175,7 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
     script.centre = swept.T_world_body * swept.body->centroid;
     const double side = OneSide(random);
     SensorAtPlace place{.T_world_camera = PlaceOfSensor(script.centre, side, random)};
-    if (i == 1) AddSteps(script, random);
+    if (like == kCouchSteps) AddSteps(script, random);
     if (i == 2) AddPassing(script, place.T_world_camera, random);
     if (i == 3) AddCoughs(script, random);
     if (i == 4 || i == kFirstOfTwo) {
@@ -184,6 +188,7 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
     ScenePlan* const scene = add(i, shared, place);
     if (scene != nullptr && i == kFirstOfOthers + 1)
       scene->sweep.lost_frames = scene->sweep.late_frames = 0.1;
+    if (scene != nullptr && i == kProjector) scene->sweep.other_projector = true;
     if (i != kFirstOfTwo) continue;
     ScenePlan* right =
         add(i + 1, shared, {.T_world_camera = PlaceOfSensor(shared->centre, -side, random)});

@@ -20,7 +20,9 @@ namespace plumb::simulated {
 /// see the same: an arm covers the left one, which is pushed later, while the body moves. Then
 /// `live_dark` (the lights go off, and the body moves in the dark), `live_lossy` (frames are lost
 /// and late), `live_sheet` (a sheet is put on the chest), `live_sway` (the mount sways by 0.2 mm,
-/// twice a second), `live_pushed_2mm` and `live_pushed_5mm`.
+/// twice a second), `live_pushed_2mm`, `live_pushed_5mm` and
+/// `live_projector` (a second structured-light sensor shines on the same place, and the couch is
+/// moved in steps).
 void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options);
 
 /// Beside `rest` and `rest_moved`.
