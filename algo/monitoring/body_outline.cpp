@@ -110,9 +110,9 @@ OutlineLines OutlineOf(const TriangleMesh& body, const Pose& T_camera_mesh,
   return outline;
 }
 
-BodyOutline::BodyOutline(const Scene& scene, MarkerMap markers)
+BodyOutline::BodyOutline(const Scene& scene, const std::string& dictionary, MarkerMap markers)
     : markers_(std::move(markers)),
-      detector_(MarkerDictionary::ByName(scene.room_markers.dictionary)),
+      detector_(MarkerDictionary::ByName(dictionary)),
       body_(BodyMesh(scene)) {}
 
 std::optional<OutlineLines> BodyOutline::In(const cv::Mat& color, const Intrinsics& camera) const {

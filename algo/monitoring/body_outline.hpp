@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -29,10 +30,10 @@ inline constexpr std::size_t kMostOutlinePoints = 400;
 /// Finds that of one scene's body in single images. Not thread-safe.
 class BodyOutline {
  public:
+  /// @param dictionary  Of the room's markers; a planning CT names none.
   /// @param markers  Of the room, in the scene's frame.
-  /// @throws DataError if the scene has no height map or no body, std::invalid_argument for an
-  ///         unknown dictionary.
-  BodyOutline(const Scene& scene, MarkerMap markers);
+  /// @throws DataError if the scene has no height map or no body, or for an unknown dictionary.
+  BodyOutline(const Scene& scene, const std::string& dictionary, MarkerMap markers);
 
   /// Nothing where the markers do not say where the camera is, see PlaceByMarkers().
   /// @param color  CV_8UC3 of the camera's size.

@@ -120,6 +120,9 @@ class Appliance : private StorageUser {
   void FollowReference();
   void BeginSession();
   [[nodiscard]] ScanJob MakeJob(const Settings& settings);
+  /// Whether a stored scene is as it was stored; on the thread that uses it.
+  [[nodiscard]] std::function<Message(const std::stop_token&)> SceneCheck(
+      const std::string& scan) const;
   [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);
   void AddListeners(ScanCallbacks& callbacks);
   [[nodiscard]] ScanCallbacks MakeCallbacks(const NewScan& scan);

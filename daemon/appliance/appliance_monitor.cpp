@@ -50,9 +50,7 @@ MonitorJob Appliance::MakeMonitorJob() {
   // Another one than the scan was compared with is another question.
   if (!reference || reference->id != last_result_->reference_id) return job;
   job.reference_scene = store_->folders.Scan(reference->scan_id) / "scene";
-  job.check_reference = [this, scan = reference->scan_id](const std::stop_token& stop) {
-    return store_->integrity.Check(scan, /*scene_only=*/true, stop);
-  };
+  job.check_reference = SceneCheck(reference->scan_id);
   job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
   return job;
 }
@@ -105,10 +103,7 @@ void Appliance::FollowReference() {
                             scan = reference->scan_id] {
       return RoomOfImport(state, patient, scan).has_value();
     };
-    job.check_reference = [&store = store_,
-                           scan = reference->scan_id](const std::stop_token& stop) {
-      return store->integrity.Check(scan, /*scene_only=*/true, stop);
-    };
+    job.check_reference = SceneCheck(reference->scan_id);
     if (const auto room = room_.OfJob(); room && room->why_not.empty())
       job.markers_iec = room->markers_iec;
     outline_.Follow(std::move(job));

@@ -104,6 +104,13 @@ std::string Appliance::ScanKind() const {
   return std::string(is_unassigned ? "unassigned" : Name(scan_.purpose));
 }
 
+std::function<Message(const std::stop_token&)> Appliance::SceneCheck(
+    const std::string& scan) const {
+  return [&store = store_, scan](const std::stop_token& stop) {
+    return store->integrity.Check(scan, /*scene_only=*/true, stop);
+  };
+}
+
 ScanJob Appliance::MakeJob(const Settings& settings) {
   ScanJob job;
   const SensorSnapshot sensor = sensors_.snapshot();
@@ -128,9 +135,7 @@ ScanJob Appliance::MakeJob(const Settings& settings) {
   if (reference && scan_.purpose == ScanPurpose::kFraction) {
     scan_.reference_id = reference->id;
     job.reference_scene = store_->folders.Scan(reference->scan_id) / "scene";
-    job.check_reference = [this, scan = reference->scan_id](const std::stop_token& stop) {
-      return store_->integrity.Check(scan, /*scene_only=*/true, stop);
-    };
+    job.check_reference = SceneCheck(reference->scan_id);
     job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
     job.compare.now_s = SteadySeconds;
     job.room = room_.OfJob();

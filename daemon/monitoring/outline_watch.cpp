@@ -108,9 +108,10 @@ void OutlineWatch::Run(const std::stop_token& stop) {
 
 bool OutlineWatch::AwaitInterest(std::uint64_t turn, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  return wake_.wait(lock, stop, [&] {
-    return turn_ != turn || SteadySeconds() - asked_s_ < kOutlineHolds_s;
-  }) && turn_ == turn;
+  return wake_.wait(
+             lock, stop,
+             [&] { return turn_ != turn || SteadySeconds() - asked_s_ < kOutlineHolds_s; }) &&
+         turn_ == turn && !stop.stop_requested();
 }
 
 void OutlineWatch::Look(const OutlineJob& job, std::uint64_t turn, const std::stop_token& stop) {
@@ -121,7 +122,10 @@ void OutlineWatch::Look(const OutlineJob& job, std::uint64_t turn, const std::st
     const Scene scene = ReadApprovedScene(job.scene, job.check_reference, stop);
     const MarkerMap& markers = scene.planning ? job.markers_iec : scene.markers;
     if (markers.empty()) return;  // the room of a planning CT is not calibrated
-    outline.emplace(scene, markers);
+    outline.emplace(scene,
+                    scene.planning ? sensors_.snapshot().info.room_markers.dictionary
+                                   : scene.room_markers.dictionary,
+                    markers);
   }
   std::optional<std::int64_t> last;
   while (AwaitInterest(turn, stop)) {

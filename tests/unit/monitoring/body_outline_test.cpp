@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "algo/base/errors.hpp"
 #include "tests/support/rest_frames.hpp"
 #include "tests/support/synthetic_scene.hpp"
 
@@ -51,7 +52,7 @@ class BodyOutlineTest : public testing::Test {
   }
 
   const Scene scene_ = test::ScannedBody();
-  const BodyOutline outline_{scene_, scene_.markers};
+  const BodyOutline outline_{scene_, scene_.room_markers.dictionary, scene_.markers};
 };
 
 TEST_F(BodyOutlineTest, LiesAroundTheBodyWhereverTheCameraIs) {
@@ -111,12 +112,19 @@ TEST_F(BodyOutlineTest, IsUnknownWithFewerThanFourMarkersAndEmptyWhereTheBodyIsE
   Frame frame = frames.At(0.0);
   const Intrinsics camera = frames.info().intrinsics;
   ASSERT_TRUE(outline_.In(frame.color_rgb, camera));
+  // The camera sees them all; of the room so many are known.
+  const auto is_found_with = [&](std::size_t known) {
+    MarkerMap markers = scene_.markers;
+    while (markers.size() > known) markers.erase(std::prev(markers.end()));
+    return BodyOutline(scene_, scene_.room_markers.dictionary, markers)
+        .In(frame.color_rgb, camera)
+        .has_value();
+  };
+  EXPECT_TRUE(is_found_with(4));
+  EXPECT_FALSE(is_found_with(3));
+  EXPECT_FALSE(is_found_with(0)) << "a room without known markers";
   frame.color_rgb.setTo(cv::Scalar::all(90));
   EXPECT_FALSE(outline_.In(frame.color_rgb, camera));
-  Scene elsewhere = scene_;
-  elsewhere.markers.clear();
-  EXPECT_FALSE(BodyOutline(scene_, {}).In(frames.At(0.1).color_rgb, camera))
-      << "a room without known markers";
   Pose far = Pose::Identity();
   far.translation() = Vector3d(20.0, 0.0, 1.0);
   TriangleMesh body;
@@ -124,6 +132,22 @@ TEST_F(BodyOutlineTest, IsUnknownWithFewerThanFourMarkersAndEmptyWhereTheBodyIsE
   body.triangles = {{0, 1, 2}};
   EXPECT_TRUE(OutlineOf(body, far, camera).empty());
   EXPECT_FALSE(OutlineOf(body, Pose::Identity(), camera).empty());
+}
+
+TEST_F(BodyOutlineTest, OfAPlanningCtIsFoundByTheRoomsMarkers) {
+  Scene planned = scene_;
+  planned.planning.emplace();
+  planned.markers.clear();
+  planned.room_markers = RoomMarkers::Unknown();
+  RestFrames frames(scene_, 1.0, 3);
+  const Frame frame = frames.At(0.0);
+  const Intrinsics camera = frames.info().intrinsics;
+  const BodyOutline outline(planned, frames.info().room_markers.dictionary, scene_.markers);
+  const auto lines = outline.In(frame.color_rgb, camera);
+  ASSERT_TRUE(lines);
+  EXPECT_FALSE(lines->empty());
+  EXPECT_THROW(BodyOutline(planned, planned.room_markers.dictionary, scene_.markers), DataError)
+      << "of itself it names no markers";
 }
 
 TEST_F(BodyOutlineTest, IsCheap) {
