@@ -28,7 +28,7 @@ std::optional<double> LevelSide(const SlicePoints& points, double side) {
   double farthest = std::numeric_limits<double>::lowest();
   for (const Eigen::Vector2d& p : points) farthest = std::max(farthest, side * p.x());
   std::array<double, kBins> tops;
-  tops.fill(std::numeric_limits<double>::lowest());
+  tops.fill(-std::numeric_limits<double>::infinity());
   for (const Eigen::Vector2d& p : points) {
     const double bin = (farthest - side * p.x() - kEdge_m) / kBin_m;
     if (!(bin >= 0 && bin < static_cast<double>(kBins))) continue;
@@ -36,7 +36,8 @@ std::optional<double> LevelSide(const SlicePoints& points, double side) {
     top = std::max(top, p.y());
   }
   const auto [low, high] = std::ranges::minmax(tops);
-  if (!(high - low <= kLevel_m)) return std::nullopt;
+  // A part narrower than the first centimetre fills no bin.
+  if (!std::isfinite(low) || !(high - low <= kLevel_m)) return std::nullopt;
   return 0.5 * (low + high);
 }
 
@@ -63,6 +64,19 @@ std::optional<double> CouchTop(const std::vector<ContourSlice>& slices) {
   const double low = TakeQuantile(heights, 0.1), high = TakeQuantile(heights, 0.9);
   if (high - low > kMostSag_m) return std::nullopt;
   return high;
+}
+
+std::optional<double> FlatTop(const std::vector<ContourSlice>& structure) {
+  std::vector<double> tops;
+  for (const ContourSlice& slice : structure) {
+    double top = std::numeric_limits<double>::lowest();
+    for (const FlatContour& contour : slice.contours)
+      for (const Eigen::Vector2d& p : contour) top = std::max(top, p.y());
+    tops.push_back(top);
+  }
+  if (tops.empty() || TakeQuantile(tops, 0.9) - TakeQuantile(tops, 0.1) > kMostSag_m)
+    return std::nullopt;
+  return TakeMedian(tops);
 }
 
 void RemoveBelow(double height_m, std::vector<ContourSlice>& slices) {

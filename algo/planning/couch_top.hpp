@@ -15,6 +15,9 @@ namespace plumb {
 /// @param slices  With points at most 6 mm apart. Several may lie at one place.
 [[nodiscard]] std::optional<double> CouchTop(const std::vector<ContourSlice>& slices);
 
+/// Height of a structure whose top is at one height along the scan; nothing for another one.
+[[nodiscard]] std::optional<double> FlatTop(const std::vector<ContourSlice>& structure);
+
 /// Draws everything up to a height flat, so that it has no inside: the couch is gone, and a body
 /// that touches it ends there.
 void RemoveBelow(double height_m, std::vector<ContourSlice>& slices);

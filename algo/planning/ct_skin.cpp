@@ -18,7 +18,8 @@
 namespace plumb {
 namespace {
 
-constexpr double kAxial = 1e-3;  // of the directions' cosines: 0.5 mm over a body
+constexpr double kAxial = 1e-3;       // of the directions' cosines: 0.5 mm over a body
+constexpr double kFarthest_mm = 1e4;  // of an image from the origin, along each axis
 constexpr double kMostPixel_mm = 5.0;
 constexpr std::size_t kMostSkinPoints = 4'000'000;
 // Noise, not parts of a body; a wrist has twenty times as much.
@@ -215,8 +216,9 @@ void CtSkin::Add(const CtImage& image, const std::string& name) {
   RequireSameSeries(image, name);
   if (num_images() == kMostCtImages)
     throw DataError(say::planning::TooManyImages(static_cast<std::int64_t>(kMostCtImages)));
-  if (!(image.origin_mm.cwiseAbs().maxCoeff() < 1e4) ||
-      !places_.insert(std::llround(100 * image.origin_mm.z())).second)
+  if (!(image.origin_mm.cwiseAbs().maxCoeff() < kFarthest_mm))
+    throw DataError(say::planning::ImageFarOff(name, kFarthest_mm));
+  if (!places_.insert(std::llround(100 * image.origin_mm.z())).second)
     throw DataError(say::planning::ImageTwice(name, image.origin_mm.z()));
   series_uid_ = image.series_uid;
   position_ = image.position;

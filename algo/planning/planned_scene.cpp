@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "algo/base/errors.hpp"
-#include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
 #include "algo/planning/contour_surface.hpp"
 #include "algo/planning/couch_top.hpp"
@@ -104,22 +103,20 @@ ContourSurface SurfaceOf(const std::string& name, std::vector<ContourSlice> slic
   return surface;
 }
 
-// Top of the couch as a planning system has drawn it, in the frame of the images.
+// Top of the couch as a planning system has drawn it, in the frame of the images. It may be drawn
+// as several structures, such as the surface and the inside of a shell, beside cushions and head
+// rests: the highest of those that are flat along the scan counts.
 std::optional<double> DrawnCouch(const StructureSet& structures, const CtSkin& images,
                                  const PlannedPlace& place) {
-  std::vector<double> tops;
+  std::optional<double> highest;
   for (const PlannedRoi& roi : structures.rois) {
     const std::string& frame = roi.frame_of_reference_uid;
     if (roi.type != "SUPPORT" || (!frame.empty() && frame != images.roi().frame_of_reference_uid))
       continue;
-    for (const ContourSlice& slice : SlicesOf(roi, place)) {
-      double top = slice.contours.front().front().y();
-      for (const Eigen::Vector2d& p : slice.contours.front()) top = std::max(top, p.y());
-      tops.push_back(top);
-    }
+    if (const std::optional<double> top = FlatTop(SlicesOf(roi, place)))
+      highest = std::max(highest.value_or(*top), *top);
   }
-  if (tops.empty()) return std::nullopt;
-  return TakeQuantile(tops, 0.5);
+  return highest;
 }
 
 // Along its normal, 95 %, for the threshold.

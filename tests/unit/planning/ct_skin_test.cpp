@@ -242,8 +242,21 @@ TEST(CtSkinTest, AContourOfTheCouchCountsMoreThanItsShape) {
   const Scene drawn = SceneOf(files);
   EXPECT_NEAR(drawn.planning->support_m, by_shape.planning->support_m + 0.023, 0.001);
   EXPECT_THAT(drawn.warnings, Not(Warns(say::planning::kImagesByFrame)));
+  // Planning systems draw the inside of its shell, rails and cushions as structures of their own.
+  const auto add_support = [&](const std::string& name, double lower_mm, double rise_mm) {
+    PlannedRoi part = structures.rois.back();
+    part.name = name;
+    for (PlannedContour& contour : part.contours)
+      for (Eigen::Vector3d& p : contour.points_mm)
+        p.y() += lower_mm - (p.z() > -25 ? rise_mm : 0.0);  // HFS: y points down
+    structures.rois.insert(structures.rois.begin(), part);
+    return SceneOf(files).planning->support_m;
+  };
+  for (const auto& [name, lower_mm, rise_mm] :
+       {std::tuple{"inside", 8.0, 0.0}, {"rails", 60.0, 0.0}, {"cushion", -40.0, 30.0}})
+    EXPECT_NEAR(add_support(name, lower_mm, rise_mm), drawn.planning->support_m, 1e-9) << name;
   // In another frame of reference its height says nothing.
-  couch.frame_of_reference_uid = "2.25.53";
+  for (PlannedRoi& roi : structures.rois) roi.frame_of_reference_uid = "2.25.53";
   EXPECT_NEAR(SceneOf(files).planning->support_m, by_shape.planning->support_m, 1e-9);
 }
 
@@ -304,6 +317,7 @@ TEST(CtSkinTest, ImagesThatDoNotBelongTogetherAreRefused) {
   refused(words::kImagesMixed, [](CtFiles& f) { f.images.back().position = "FFS"; });
   refused(words::kImagesOtherPatient, [](CtFiles& f) { f.images.back().file.patient_id = "X"; });
   refused(words::kImageTwice, [](CtFiles& f) { f.images.push_back(f.images.front()); });
+  refused(words::kImageFarOff, [](CtFiles& f) { f.images.back().origin_mm.x() = -1e4; });
   refused(words::kImageTilted, [](CtFiles& f) { f.images[3].along_column = {0, 0.98, 0.2}; });
   refused(words::kImageTilted, [](CtFiles& f) { f.images[3].along_row = {0, 0, 1}; });
   refused(words::kImagePixels, [](CtFiles& f) { f.images[3].row_spacing_mm = 0; });
@@ -446,6 +460,12 @@ TEST(CouchTopTest, OnlyALevelSideAlongTheScanIsACouch) {
     const auto some = [&](double x, int i) { return i < count ? on_couch(x, i) : round(x, i); };
     EXPECT_EQ(CouchTop(slices(some)).has_value(), count == 7);
   }
+  // Slices through a finger or a cable say nothing of a couch, and hide none.
+  std::vector<ContourSlice> with_narrow = slices(on_couch);
+  for (const std::size_t i : {0U, 1U})
+    with_narrow[i].contours = {{{-0.004, 0.1}, {0.0, 0.104}, {0.004, 0.1}}};
+  ASSERT_TRUE(CouchTop(with_narrow));
+  EXPECT_NEAR(*CouchTop(with_narrow), 0.05, 1e-6);
   EXPECT_FALSE(CouchTop(slices([&](double x, int i) { return on_couch(x, i) + 0.01 * i; })));
   EXPECT_FALSE(CouchTop({}));
 }
