@@ -67,6 +67,16 @@ check "what was stored since stays" '^plumb.db plumb.db-mark plumb.db-seals plum
 run roll-back
 check "once" '^old$' "$(cat state/plumb.db)"
 convert
+printf '#!/bin/sh\ncase "$1" in */state/plumb.db-seals) exit 1 ;; esac\nexec /bin/mv "$@"\n' >bin/mv
+chmod +x bin/mv
+run put-back
+check "what cannot be put back as a whole stays as it was" \
+  '^1 new plumb.db plumb.db-mark plumb.db-seals plumb.db-wal $' \
+  "$code $(cat state/plumb.db) $(cd state && echo plumb.db* | tr '\n' ' ')"
+rm bin/mv
+run put-back
+check "until it can be" '^0 old$' "$code $(cat state/plumb.db)"
+convert
 touch state/before-checksums/good
 run roll-back
 check "a release that has been good keeps what it stored" '^new$' "$(cat state/plumb.db)"
