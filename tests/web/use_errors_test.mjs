@@ -218,10 +218,11 @@ async () => {
       (name) => [`reverses_${name}`, false])) };
   equal((await h.api(bob, 'couch', 'POST', { ...six, is_in_cm: true, wraps: true,
     password: h.password })).status, 201, 'one without readings below zero');
-  await anna.getByText('995 cm stands for −5 cm').waitFor();
+  await anna.getByText('995 cm (9950 mm) stands for −5 cm').waitFor();
   await anna.getByText('Couch readings: what to set').click();
   for (const [field, reading, words] of [['Lateral (cm)', '995', 'Lateral: set to 995.0 cm'],
-    ['Yaw (°)', '1.5', 'Yaw: set to 357.5 °'], ['Yaw (°)', '-1', 'a number in °']]) {
+    ['Yaw (°)', '1.5', 'Yaw: set to 357.5 °'], ['Yaw (°)', '-1', 'from 0 to below 360'],
+    ['Lateral (cm)', '1000', 'from 0 to below 1000']]) {
     await anna.getByLabel(field).fill(reading);
     await anna.getByText(words).waitFor();
   }

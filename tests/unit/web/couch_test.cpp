@@ -105,7 +105,7 @@ TEST(CouchTest, ReadingsWithoutValuesBelowZeroBeginAtZeroAgain) {
   couch.wraps = true;
   EXPECT_EQ(CouchAxisOf(couch, 0).period, 1000.0) << "cm";
   EXPECT_EQ(CouchAxisOf(couch, 5).period, 360.0);
-  EXPECT_THAT(CouchNotes(couch)[3].English(), HasSubstr("995 cm stands for"));
+  EXPECT_THAT(CouchNotes(couch)[3].English(), HasSubstr("995 cm (9950 mm) stands for"));
   EXPECT_DOUBLE_EQ(*CouchRows(Move(), couch)[5].value, 1.8) << "a correction has its sign";
   couch.is_in_cm = false;
   EXPECT_EQ(CouchAxisOf(couch, 0).period, 10000.0) << "mm";

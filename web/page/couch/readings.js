@@ -18,6 +18,11 @@ export function readingOf(text, { unit = 'cm', period = null } = {}) {
   return Math.abs(value) <= kMax[unit] ? value : null;
 }
 
+function whyNot({ unit, period = null }) {
+  const text = S.result;
+  return period === null ? text.couchBad(unit, kMax[unit]) : text.couchBadWraps(unit, period);
+}
+
 /// How couches show what they read: to the millimetre. Centimetres where no profile says otherwise.
 const kUnsigned = { factor: 0.1, unit: 'cm', digits: 1 };
 function scaleOf(axis) {
@@ -26,8 +31,8 @@ function scaleOf(axis) {
   return { factor, unit, period, digits: unit === 'mm' ? 0 : 1 };
 }
 
-/// The value to set the axis to; a shift that is not known to differ from nothing leaves the axis
-/// where it is.
+/// The value to set the axis to. A number that does not differ from zero by more than its
+/// uncertainty leaves the axis where it is.
 export function targetOf(reading, { value, still }, { factor, digits, period = null }) {
   const scale = 10 ** digits;
   const target = Math.round(scale * (reading + (still ? 0 : value * factor)));
@@ -45,8 +50,8 @@ export function couchReadings({ result, details }) {
   const moved = result.numbers.filter((row, i) => row.value !== null
     && (kAxes[i].shift || (couchVersion() > 0 && couchAxis(kAxes[i]).moves)));
   if (!moved.length) return null;
-  const rows = moved.map((shift) => {
-    const scale = scaleOf(kAxes.find(({ name }) => name === shift.name));
+  const rows = moved.map((number) => {
+    const scale = scaleOf(kAxes.find(({ name }) => name === number.name));
     const input = h('input', {
       inputmode: 'decimal', autocomplete: 'off', maxlength: 8, size: 8,
     });
@@ -55,17 +60,17 @@ export function couchReadings({ result, details }) {
       const reading = readingOf(input.value, scale);
       const bad = input.value.trim() !== '' && reading === null;
       input.setAttribute('aria-invalid', String(bad));
-      if (bad) clear(target, text.couchBad(scale.unit));
+      if (bad) clear(target, whyNot(scale));
       else if (reading === null) clear(target);
       else {
-        const value = targetOf(reading, shift, scale);
+        const value = targetOf(reading, number, scale);
         const shown = Math.abs(value).toFixed(scale.digits).replace('.', S.decimal);
-        clear(target, text.couchSet(text.axes[shift.name], `${value < 0 ? '−' : ''}${shown}`,
+        clear(target, text.couchSet(text.axes[number.name], `${value < 0 ? '−' : ''}${shown}`,
           scale.unit));
       }
     });
     return h('div', { class: 'couch-axis' },
-      field(`${text.axes[shift.name]} (${scale.unit})`, input), target);
+      field(`${text.axes[number.name]} (${scale.unit})`, input), target);
   });
   return h('details', { class: 'couch' }, h('summary', {}, text.couch),
     hint(couchVersion() ? text.couchHintProfile(live.status.couch.name) : text.couchHint),

@@ -15,9 +15,10 @@ import { showStatus } from './status.js';
 import { showUpdate } from './update.js';
 import { showUsers } from './users.js';
 
-/// Loaded when it is opened for the first time, so that the first page is small.
+/// Loaded when it is opened for the first time, so that the first page is small. A browser does not
+/// ask again for a module that it could not load.
 const later = (load) => async (...given) => {
-  const show = await load().catch(() => { throw new Error(S.noAnswer); });
+  const show = await load().catch(() => { throw new Error(S.noScreen); });
   return show(...given);
 };
 const showPlan = later(async () => (await import('./plan/plan.js')).showPlan);
