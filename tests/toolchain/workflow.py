@@ -11,6 +11,7 @@ The sweeps are windows of two simulated ones, so that each has another content.
 import argparse
 import contextlib
 import csv
+import json
 import os
 import pathlib
 import re
@@ -144,6 +145,11 @@ def check_killed_workflow(plumb, folder, runner, sweeps):
     finish(plumb, folder, runner)
     there = finished(folder)
     assert {name: there.get(name) for name in before} == before
+    # Each sweep is the work of its own job: the last step finds all scenes.
+    jobs = [json.loads((folder / "work" / f"{number}.jsonl").read_text()) for number in range(count)]
+    assert [job["input"] for job in jobs] == [str(sweep) for sweep in sweeps]
+    lines = (folder / "work" / "scenes.jsonl").read_text().splitlines()
+    assert len(lines) == count and all(json.loads(line)["reused"] for line in lines)
     with open(folder / "scenes" / "scenes.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["input"] for row in rows] == [str(sweep) for sweep in sweeps], "one is lost"
