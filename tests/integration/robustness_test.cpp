@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const std::string& Reference() { return SmallNames()[0]; }
+const std::string& ReferenceName() { return SmallNames()[0]; }
 
 class RobustnessTest : public CommandLineTest {
  protected:
@@ -40,25 +40,26 @@ class RobustnessTest : public CommandLineTest {
 
 TEST_F(RobustnessTest, TwoRunsGiveTheSameBytes) {
   ASSERT_EQ(
-      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "again"}).exit_code, 0);
-  ExpectSame(SmallScene(Reference()), folder_ / "again");
+      Plumb({"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "again"}).exit_code,
+      0);
+  ExpectSame(SmallScene(ReferenceName()), folder_ / "again");
 }
 
 TEST_F(RobustnessTest, OneProcessorGivesTheSameBytesAsTwo) {
-  ASSERT_EQ(
-      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "one"}, {.num_cpus = 1})
-          .exit_code,
-      0);
-  ASSERT_EQ(
-      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "two"}, {.num_cpus = 2})
-          .exit_code,
-      0);
+  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "one"},
+                  {.num_cpus = 1})
+                .exit_code,
+            0);
+  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "two"},
+                  {.num_cpus = 2})
+                .exit_code,
+            0);
   ExpectSame(folder_ / "one", folder_ / "two");
 }
 
 TEST_F(RobustnessTest, ThePaperPresetRepeatsToo) {
   for (const auto& [name, cpus] : {std::pair("one", 1), std::pair("two", 2)}) {
-    ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / name,
+    ASSERT_EQ(Plumb({"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / name,
                      "--preset", "paper"},
                     {.num_cpus = cpus})
                   .exit_code,
@@ -88,17 +89,17 @@ TEST_F(RobustnessTest, CtrlCEndsWith130AndLeavesNothing) {
     int signal;
   };
   const std::vector<Case> cases = {
-      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"},
+      {{"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "scene"},
        "tracking",
        SIGINT},
-      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"},
+      {{"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "scene"},
        "tracking",
        SIGTERM},
-      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--preset",
+      {{"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "scene", "--preset",
         "paper"},
        "tracking",
        SIGINT},
-      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--realtime"},
+      {{"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "scene", "--realtime"},
        "tracking",
        SIGINT},
       {{"simulate", "--suite", "nine", "--out", folder_ / "suite"}, "simulating", SIGINT},
@@ -150,15 +151,15 @@ TEST_F(RobustnessTest, AFullDiskIsExitOneAndLeavesNothing) {
   // The largest file of a scene is some megabytes; RLIMIT_FSIZE fails the write as a full disk
   // does.
   const RunResult scene =
-      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"},
+      Plumb({"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "scene"},
             {.max_file_bytes = 100'000});
   EXPECT_EQ(scene.exit_code, 1) << scene.err;
   EXPECT_THAT(scene.err, HasSubstr("cannot write"));
-  const RunResult result = Plumb(
-      {"compare", SmallScene(Reference()), SmallScene(Reference()), "--out", folder_ / "result"},
-      {.max_file_bytes = 100'000});
+  const RunResult result = Plumb({"compare", SmallScene(ReferenceName()),
+                                  SmallScene(ReferenceName()), "--out", folder_ / "result"},
+                                 {.max_file_bytes = 100'000});
   EXPECT_EQ(result.exit_code, 1) << result.err;
-  EXPECT_EQ(Plumb({"mesh", SmallScene(Reference()), "--out", folder_ / "mesh.ply"},
+  EXPECT_EQ(Plumb({"mesh", SmallScene(ReferenceName()), "--out", folder_ / "mesh.ply"},
                   {.max_file_bytes = 100'000})
                 .exit_code,
             1);
@@ -174,8 +175,9 @@ TEST_F(RobustnessTest, AForeignFolderIsNeverReplaced) {
   fs::create_directory(folder_ / "mine");
   WriteText(folder_ / "mine" / "thesis.tex", "years of work");
   EXPECT_NE(
-      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "mine"}).exit_code, 0);
-  EXPECT_NE(Plumb({"compare", SmallScene(Reference()), SmallScene(Reference()), "--out",
+      Plumb({"reconstruct", SmallRecording(ReferenceName()), "--out", folder_ / "mine"}).exit_code,
+      0);
+  EXPECT_NE(Plumb({"compare", SmallScene(ReferenceName()), SmallScene(ReferenceName()), "--out",
                    folder_ / "mine"})
                 .exit_code,
             0);
@@ -187,9 +189,9 @@ TEST_F(RobustnessTest, AForeignFolderIsNeverReplaced) {
 }
 
 TEST_F(RobustnessTest, AnOlderOutputIsReplaced) {
-  const fs::path scene = Copy(SmallScene(Reference()), "scene");
+  const fs::path scene = Copy(SmallScene(ReferenceName()), "scene");
   WriteText(scene / "trajectory.txt", "old");
-  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", scene}).exit_code, 0);
+  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(ReferenceName()), "--out", scene}).exit_code, 0);
   EXPECT_NE(ReadText(scene / "trajectory.txt"), "old");
   EXPECT_THAT(LeftBehind({"scene"}), IsEmpty());
 }
@@ -198,10 +200,10 @@ TEST_F(RobustnessTest, DamagedScenesAreRefused) {
   const auto refused = [this](const std::string& name,
                               const std::function<void(const fs::path&)>& damage,
                               const std::string& message) {
-    const fs::path scene = Copy(SmallScene(Reference()), name);
+    const fs::path scene = Copy(SmallScene(ReferenceName()), name);
     damage(scene);
     const RunResult result =
-        Plumb({"compare", SmallScene(Reference()), scene, "--out", folder_ / "result"});
+        Plumb({"compare", SmallScene(ReferenceName()), scene, "--out", folder_ / "result"});
     EXPECT_EQ(result.exit_code, 3) << name << ": " << result.err;
     EXPECT_THAT(result.err, HasSubstr(message)) << name;
     EXPECT_FALSE(fs::exists(folder_ / "result")) << name;
