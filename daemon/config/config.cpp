@@ -102,7 +102,8 @@ LoosestLimits LoosestFor(ConfigUse use) {
                     .max_side_error = 1,
                     .max_scale_error = 1,
                     .max_depth_error = 1,
-                    .min_views = 1},
+                    .min_views = 1,
+                    .min_seen_share = 0},
           .advice = {}};
 }
 
@@ -173,6 +174,8 @@ void ReadCheck(Section section, ConfigUse use, MarkerCheckLimits& limits) {
   section.Take("min_views", limits.min_views,
                say::config::ExpectedWholeNumber(loosest.min_views, 1000),
                [&](int n) { return n >= loosest.min_views && n <= 1000; });
+  section.TakeNumber("min_seen", limits.min_seen_share, loosest.min_seen_share, 1,
+                     say::config::AFraction());
   section.RejectUnknownKeys();
 }
 

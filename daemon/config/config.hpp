@@ -150,7 +150,8 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers,
 ///                    moved_marker_mm, moved_marker_sigmas, min_coverage, max_hole_mm,
 ///                    max_residual_p95_mm, max_lost_s, max_breathing_mm
-///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views
+///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views,
+///                    min_seen
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to IEC fixed frame,
 ///                    u95_mm, u95_deg, markers (folder of a scene of the same room)
 ///     [storage]      backup_folder, backup_hours, backup_recipients, backup_key_file

@@ -666,6 +666,15 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   const trends = (await anna.locator('.trend figcaption').allInnerTexts()).join('; ');
   check(!/\d\.\d{3}/.test(trends), `no digits beyond those measured: ${trends}`);
   await h.look(anna, 'check-passed', { axe: false });
+  // A marker at the edge that was not seen does not fail it, and is named.
+  h.tell('markerunseen');
+  await takeCheck();
+  const unseen = 'Marker 4 was not seen well and was not checked';
+  await anna.locator('.verdict.in_tolerance', { hasText: 'PASSED' }).locator('.caution')
+    .getByText(unseen).waitFor();
+  await h.look(anna, 'check-unseen', { axe: false });
+  await anna.goto(`${h.url}#/status`);
+  await anna.locator('.tile', { hasText: 'Daily check' }).getByText(unseen).waitFor();
   // One that passed, and the baseline is there: nothing is left to say to who took it.
   equal((await h.api(bob, 'checks/open', 'POST')).status, 200, 'bob takes one');
   h.tell('press');

@@ -529,6 +529,14 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await room.locator('.room-word', { hasText: 'READY' }).waitFor();
   await room.locator('.room-marks .bad', { hasText: 'Daily check failed' }).waitFor();
   equal(await room.getByText('Daily check passed').count(), 0, 'not passed');
+  // One that passed says which marker it did not see.
+  await ok(anna, 'checks/open', 'POST');
+  h.tell('markerunseen');
+  h.tell('press');
+  await room.locator('.verdict.in_tolerance', { hasText: 'DAILY CHECK: PASSED' })
+    .getByText('Marker 4 was not seen well').waitFor(kSlow);
+  await h.look(room, 'room-check-unseen', { fullPage: false });
+  await anna.getByText('Marker 4 was not seen well').first().waitFor(kSlow);
   h.tell('checked');  // a later check passes, so that a reference can be scanned
   // The next thing to press is the scan, not another session.
   await anna.goto(`${h.url}#/patient/${patient}`);

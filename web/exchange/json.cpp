@@ -195,6 +195,7 @@ Json CheckJson(const CheckRecord& check, WallClock::time_point now) {
       {"items", items},
       {"num_markers", check.num_markers}};
   PutMessages(json, "reason", check.reasons);
+  PutMessages(json, "caution", check.cautions);
   return json;
 }
 

@@ -249,7 +249,8 @@ TEST_F(GateTest, TheDailyCheckOfARealSensorMayBeStricterOnly) {
                                             {"side_percent", 3.0, 0.1},
                                             {"scale_percent", 0.5, 0.1},
                                             {"depth_percent", 3.0, 0.1},
-                                            {"min_views", 3.0, -1.0}}) {
+                                            {"min_views", 3.0, -1.0},
+                                            {"min_seen", 0.8, -0.1}}) {
     for (const ConfigUse use : {ConfigUse::kAppliance, ConfigUse::kSimulatedAppliance}) {
       EXPECT_EQ(Refusal("check", key, method, use), "");
       EXPECT_EQ(Refusal("check", key, method - looser, use), "");

@@ -13,7 +13,7 @@ import { markOf } from '../drawings/trend.js';
 import { markerHelp } from '../help/drawings.js';
 import { signedForm } from '../signed_form.js';
 import { S, said, saidEach } from '../words.js';
-import { sentence } from './common.js';
+import { cautionsOf, sentence } from './common.js';
 import { roomCard } from './room_calibration.js';
 
 const kIcons = { passed: '✓', failed: '▲', no_baseline: '?' };
@@ -51,7 +51,7 @@ function verdict(check, overdue) {
     h('p', { class: 'word' },
       h('span', { class: 'icon', 'aria-hidden': 'true' }, kIcons[check.status]),
       text.verdicts[check.status]),
-    h('p', { class: 'why' }, why),
+    h('p', { class: 'why' }, why), cautionsOf(check),
     h('p', { class: 'when' }, text.last(localTime(check.time), check.user)));
 }
 
