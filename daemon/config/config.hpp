@@ -42,7 +42,7 @@ struct ApplianceConfig {
   std::optional<double> quota_gb;
   /// First values of the page's settings, in force until somebody saves settings there.
   std::optional<double> auto_stop_s, scan_limit_s;
-  std::optional<bool> keep_recordings;
+  std::optional<bool> keep_recordings, code_check_character;
   double warm_up_min = 15.0;  ///< Time that the sensor must have been on before a reference scan.
   /// Age of a room's calibration beyond which it joins no planning CT and no other room; 0: none.
   double room_max_age_days = 400.0;
@@ -157,7 +157,8 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///     [storage]      backup_folder, backup_hours, backup_recipients, backup_key_file
 ///     [appliance]    state, control, calibration, sensor_serial, second_sensor_serial,
 ///                    fixed_sensors, sensor_profiles, quota_gb, auto_stop_s, scan_limit_s,
-///                    keep_recordings, warm_up_min, session_idle_min, room_max_age_days
+///                    keep_recordings, code_check_character, warm_up_min, session_idle_min,
+///                    room_max_age_days
 ///     [sensor]       driver, socket
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low

@@ -55,6 +55,11 @@ class WebPatients final : public web::PatientService {
 
   void AddPatient(const Actor& actor, const std::string& code, const std::string& site,
                   Done done) override {
+    const bool is_checked = store_.Read(&Store::settings, [](SettingsStore& settings) {
+      return settings.Get().code_check_character;
+    });
+    if (is_checked && !HasCheckCharacter(code))
+      return done(Refused(ChangeResult::kInvalid, say::store::PatientCodeCheck(code)));
     store_.Write(&Store::patients, std::move(done),
                  [=](PatientStore& patients) { return patients.Add(actor, code, site); });
   }

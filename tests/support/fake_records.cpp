@@ -59,6 +59,8 @@ std::optional<Patient> FakeAppliance::FindPatient(const std::string& id) {
 
 void FakeAppliance::AddPatient(const Actor& actor, const std::string& code, const std::string& site,
                                Done done) {
+  if (settings.code_check_character && !HasCheckCharacter(code))
+    return Finish(done, Refused(ChangeResult::kInvalid, say::store::PatientCodeCheck(code)));
   const auto plain = [](std::string text) {
     std::erase(text, '-');
     return text;

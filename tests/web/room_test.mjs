@@ -736,6 +736,36 @@ await h.step('where the settings ask for it, no sweep begins before the wristban
   const form = anna.locator('.wristband');
   await form.getByLabel('Wristband of P-0042').waitFor();
   equal(await start.getAttribute('aria-disabled'), 'true', 'the large button is off');
+await h.step('where the settings ask for it, a code has a check character', async () => {
+  await engineer.goto(`${h.url}#/settings`);
+  const asks = engineer.getByLabel('Codes of new patients end with a check character');
+  const save = async (isOn) => {
+    await asks.setChecked(isOn);
+    const kept = engineer.waitForResponse((answer) => answer.request().method() === 'PUT');
+    await engineer.getByRole('button', { name: 'Save', exact: true }).click();
+    equal((await kept).status(), 200, 'saved');
+  };
+  await save(true);
+  const alert = anna.getByRole('alert');
+  for (const wrong of ['P-0061', 'P-0061V', 'P-0016P']) {
+    await h.addPatient(anna, wrong);
+    await alert.getByText(`the last character of ${wrong} is not the check character`).waitFor();
+  }
+  equal((await ok(anna, 'patients', 'GET')).patients.length, 2, 'not added');
+  check(await wristband(anna, 'P0061W'), 'swallowed');
+  await alert.getByText('Scanned: P0061W. Its check character is wrong: scan it again.').waitFor();
+  check(await wristband(anna, 'p0061p'), 'swallowed');
+  await alert.getByText('Scanned: p0061p. No patient has this code.').waitFor();
+  check(await wristband(anna, 'P0050'), 'of before');
+  const asked = anna.getByRole('dialog', { name: 'This wristband is another patient’s' });
+  await asked.getByRole('button', { name: 'P-0042 is on the couch' }).click();
+  await h.addPatient(anna, 'P-0061P');
+  await anna.getByRole('heading', { name: 'P-0061P' }).waitFor();
+  await save(false);
+  check(await wristband(anna, 'P0061W'), 'swallowed');
+  await alert.getByText('Scanned: P0061W. No patient has this code.').waitFor();
+});
+
   await h.look(anna, 'wristband-asked', { fullPage: false });
   h.tell('press');  // by the button in the room
   const refused = await h.api(anna, 'scan/start', 'POST');
