@@ -208,6 +208,8 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
 
 void FakeAppliance::TellNewerReference() {
   if (!status.session || !status.session->reference) return;
+  status.session->reference_created_at =
+      FindReference(status.session->reference->id).value().created_at;
   status.session->newer_reference.reset();
   status.session->other_reference.reset();
   const Patient* patient = PatientOf(status.session->patient_id);

@@ -161,7 +161,15 @@ await h.step('one tap opens, confirms and leads to the sweep; the room says whos
   await openOnPage(anna, 'P-0042');
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).waitFor();
   await room.locator('.room-code', { hasText: 'P-0042' }).waitFor();
-  await room.locator('.room-fraction', { hasText: 'Fraction 1' }).waitFor();
+  // Which version is compared with, and of when.
+  const { session: { reference } } = await state();
+  const { references } = await ok(bob, `patients/${patient}/references`, 'GET');
+  const made = references.find(({ id }) => id === reference.id).created_at;
+  const day = new Date(made).toLocaleDateString('en-GB',
+    { year: 'numeric', month: 'short', day: '2-digit' });
+  const compared = `Reference version ${reference.version}, ${day}`;
+  await room.locator('.room-fraction', { hasText: 'Fraction 1' }).getByText(compared).waitFor();
+  await anna.locator('.who-line', { hasText: compared }).waitFor();
 });
 
 await h.step('the outline of the reference lies over the picture, for the posture', async () => {
