@@ -10,7 +10,7 @@ const kHeight = 150;
 const kLeft = 36;
 const kBottom = 22;
 const kAbove_m = 0.01;   // the skin is known as well as this
-const kFar_m = 0.5;
+const kFar_m = 0.5;     // kMostIsocentreAway_m of web/model/limits.hpp
 const kDown_m = 0.4;     // where no couch is seen: no body is thicker
 
 const isBody = (body, cell) => Boolean(body) && cell >= 0 && !Number.isNaN(body.values[cell]);
