@@ -123,7 +123,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   await map.press('Delete');
   equal(await bob.getByLabel('Isocentre x').inputValue(), '', 'no isocentre');
   // A marker that was laid at the lasers.
-  await bob.getByLabel('Marker at the lasers').selectOption('Marker 1');
+  await bob.getByLabel('Marker at the lasers').selectOption('1');
   await bob.getByRole('button', { name: 'Use its centre' }).click();
   const { markers } = await bob.evaluate(async () => {
     const get = async (path) => (await fetch(`/api/v1/${path}`)).json();
@@ -239,7 +239,7 @@ await h.step('corners by keys where the crosshair is, and one taken away by a fi
   const said = async (words) => {
     await tablet.locator('#status', { hasText: words }).waitFor({ state: 'attached' });
     return (await tablet.locator('#status').innerText())
-      .match(/x (\S+), y (\S+) m/).slice(1).map(Number);
+      .match(/x (\S+), y (\S+) mm/).slice(1).map(Number);
   };
   await map.press('Shift+ArrowLeft');
   await map.press('ArrowUp');
@@ -248,7 +248,7 @@ await h.step('corners by keys where the crosshair is, and one taken away by a fi
   equal((await said('Corner 1')).join(), cross.join(), 'the corner lies at the crosshair');
   await map.press('Shift+ArrowRight');
   await map.press('Enter');
-  equal((await said('Corner 2'))[0], Number((cross[0] + 0.05).toFixed(3)),
+  equal((await said('Corner 2'))[0], cross[0] + 50,
     'the next one 50 mm to the right');
   await map.press('Shift+ArrowUp');
   await map.press('Enter');
@@ -389,9 +389,9 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
   await map.scrollIntoViewIfNeeded();
   const read = async () => {
     const words = await anna.locator('.reading').innerText();
-    const [, value, x, y] = /^(.+)\s+at x (\S+), y (\S+) m$/.exec(words) ?? [];
+    const [, value, x, y] = /^(.+)\s+at x (\S+), y (\S+) mm$/.exec(words) ?? [];
     return { value, mm: Number(/^([+−]?[\d.]+) mm$/.exec(value)?.[1].replace('−', '-') ?? NaN),
-      x: Number(x), y: Number(y) };
+      x: Number(x) / 1000, y: Number(y) / 1000 };
   };
   const near = (found, expected, what) =>
     check(Math.abs(found - expected) < 0.0015, `${what}: ${expected.toFixed(3)}, found ${found}`);
