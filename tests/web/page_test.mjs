@@ -150,7 +150,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   await bob.getByRole('button',
     { name: 'Save this size, tolerance and posture as the template' }).click();
   await bob.getByText(
-    /^Region \d+(\.\d+)? × \d+(\.\d+)? cm \(x × y\) about the isocentre, ±4 mm, ±1°/).waitFor();
+    /^Region \d+ × \d+ mm \(x × y\) about the isocentre, ±4 mm, ±1°/).waitFor();
   const size = (await h.api(bob, 'templates')).body.templates[0];
   equal(size.site, 'thorax', 'of the site of the patient');
   equal([size.posture, size.hint].join(': '), 'HFS: begin at the feet, end above the chin',
@@ -688,6 +688,8 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
     'a check that passed is a circle in the trend');
   check(await anna.locator('.trend path.mark.outside').count() > 0,
     'one that failed has another shape');
+  equal(await anna.locator('.trend').first().locator('.tick.middle').count(), 1,
+    'several checks of one day have one label');
   await h.look(anna, 'check-failed', { axe: false });
   // A failed one becomes the baseline by no tap: what changes, a reason and the password.
   equal(await asBaseline.getByRole('button', { name: 'Set as baseline' }).isVisible(), false,

@@ -344,6 +344,10 @@ await h.step('while a sweep runs or is computed no older result looks valid', as
   await anna.getByText('A NEW SCAN IS RUNNING').waitFor({ state: 'detached', ...kSlow });
   await anna.locator('.number', { hasText: 'Lateral' }).getByText('−8.0').waitFor();
   equal(await anna.locator('.is-old').count(), 0, 'the new one is valid');
+  // What is within tolerance is applied with the rest, so it is not green either.
+  await anna.locator('.verdict .why', { hasText: 'Apply all six numbers below together' })
+    .waitFor();
+  equal(await anna.locator('.number.neutral').count(), 5, 'neither in nor out of what to do');
 });
 
 await h.step('accepting outside tolerance takes a reason and the password', async () => {
@@ -525,6 +529,14 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await anna.getByRole('button', { name: 'Close session' }).click();
   await asked.getByRole('button', { name: 'Close without acceptance' }).click();
   await anna.getByText('No session open').first().waitFor();
+  // One that passed says which marker it did not see.
+  await ok(anna, 'checks/open', 'POST');
+  h.tell('markerunseen');
+  h.tell('press');
+  await room.locator('.verdict.in_tolerance', { hasText: 'DAILY CHECK: PASSED' })
+    .getByText('Marker 4 was not seen well').waitFor(kSlow);
+  await h.look(room, 'room-check-unseen', { fullPage: false });
+  await anna.getByText('Marker 4 was not seen well').first().waitFor(kSlow);
   // A failed daily check stays in the corner, and the display is ready for the next session.
   await ok(anna, 'checks/open', 'POST');
   h.tell('markermoved');
@@ -537,14 +549,6 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await room.locator('.room-word', { hasText: 'READY' }).waitFor();
   await room.locator('.room-marks .bad', { hasText: 'Daily check failed' }).waitFor();
   equal(await room.getByText('Daily check passed').count(), 0, 'not passed');
-  // One that passed says which marker it did not see.
-  await ok(anna, 'checks/open', 'POST');
-  h.tell('markerunseen');
-  h.tell('press');
-  await room.locator('.verdict.in_tolerance', { hasText: 'DAILY CHECK: PASSED' })
-    .getByText('Marker 4 was not seen well').waitFor(kSlow);
-  await h.look(room, 'room-check-unseen', { fullPage: false });
-  await anna.getByText('Marker 4 was not seen well').first().waitFor(kSlow);
   h.tell('checked');  // a later check passes, so that a reference can be scanned
   // The next thing to press is the scan, not another session.
   await anna.goto(`${h.url}#/patient/${patient}`);
@@ -626,6 +630,8 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   // acknowledgement.
   await anna.locator('.who-line').waitFor();
   await anna.goto(`${h.url}#/status`);
+  await clara.goto(`${h.url}#/result/${(await state()).last_result.id}`);
+  await clara.locator('.verdict').waitFor();
   const second = await addPatient('P-0050');
   await ok(bob, `patients/${second}/open`, 'POST',
     { purpose: 'reference', reason: '', replaces: (await state()).session.id });
@@ -640,6 +646,9 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   await room.locator('.room-code', { hasText: 'P-0050' }).waitFor();
   const above = anna.getByRole('alert').getByText('Now: P-0050');
   await above.waitFor();
+  await clara.getByRole('alert').getByText('Now: P-0050').waitFor();
+  equal(await clara.evaluate(() => document.querySelector('dialog:modal') === null), true,
+    'who reads a result of the history is not held up');
   await h.look(anna, 'session-changed', { fullPage: false });
   await anna.reload();
   await above.waitFor();
@@ -654,7 +663,7 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   await anna.reload();
   await anna.locator('.who-line', { hasText: 'P-0050' }).waitFor();
   equal(await anna.locator('.session-alert').count(), 0, 'once');
-  await h.acknowledge(bob);
+  await h.acknowledge(bob, clara);
   // Opening another patient names the one whose session ends.
   await openOnPage(anna, 'P-0042');
   await anna.getByText('The session of P-0050 is open.').first().waitFor();
@@ -727,23 +736,6 @@ await h.step('a wristband is answered on every screen, and its Enter presses no 
   await anna.getByRole('alert').getByText('at most 32 characters; this one has 33').waitFor();
 });
 
-await h.step('where the settings ask for it, no sweep begins before the wristband is scanned',
-  async () => {
-  await engineer.goto(`${h.url}#/settings`);
-  await engineer.getByLabel('Ask for the wristband before each sweep').check();
-  await engineer.getByRole('button', { name: 'Save', exact: true }).click();
-  await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
-  // A new session: the room display shows no result, but what comes next.
-  await ok(anna, 'treatment/close', 'POST', { session_id: (await state()).session.id });
-  await h.acknowledge(anna, bob, clara);
-  await openOnPage(anna, 'P-0042');
-  await h.acknowledge(anna, bob, clara);
-  const { session } = await state();
-  await anna.goto(`${h.url}#/scan`);
-  const start = anna.locator('.giant');
-  const form = anna.locator('.wristband');
-  await form.getByLabel('Wristband of P-0042').waitFor();
-  equal(await start.getAttribute('aria-disabled'), 'true', 'the large button is off');
 await h.step('where the settings ask for it, a code has a check character', async () => {
   await engineer.goto(`${h.url}#/settings`);
   const asks = engineer.getByLabel('Codes of new patients end with a check character');
@@ -774,6 +766,23 @@ await h.step('where the settings ask for it, a code has a check character', asyn
   await alert.getByText('Scanned: P0061W. No patient has this code.').waitFor();
 });
 
+await h.step('where the settings ask for it, no sweep begins before the wristband is scanned',
+  async () => {
+  await engineer.goto(`${h.url}#/settings`);
+  await engineer.getByLabel('Ask for the wristband before each sweep').check();
+  await engineer.getByRole('button', { name: 'Save', exact: true }).click();
+  await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  // A new session: the room display shows no result, but what comes next.
+  await ok(anna, 'treatment/close', 'POST', { session_id: (await state()).session.id });
+  await h.acknowledge(anna, bob, clara);
+  await openOnPage(anna, 'P-0042');
+  await h.acknowledge(anna, bob, clara);
+  const { session } = await state();
+  await anna.goto(`${h.url}#/scan`);
+  const start = anna.locator('.giant');
+  const form = anna.locator('.wristband');
+  await form.getByLabel('Wristband of P-0042').waitFor();
+  equal(await start.getAttribute('aria-disabled'), 'true', 'the large button is off');
   await h.look(anna, 'wristband-asked', { fullPage: false });
   h.tell('press');  // by the button in the room
   const refused = await h.api(anna, 'scan/start', 'POST');

@@ -1006,6 +1006,16 @@ await h.step('an isocentre is in millimetres, seen from the side, and where it i
   };
   const doubt = clara.locator('.isocentre-doubt');
   const save = clara.getByRole('button', { name: 'Save plan' });
+  // Of each marker it is said where it lies; the middle of the first one is taken.
+  const markers = clara.getByLabel('Marker at the lasers');
+  const [first] = await markers.locator('option').allInnerTexts();
+  const [, x, y] = /^Marker \d+: x (−?\d+), y (−?\d+) mm$/.exec(first) ?? [];
+  await clara.getByRole('button', { name: 'Use its centre' }).click();
+  for (const [axis, value] of [['x', x], ['y', y]]) {
+    const taken = await clara.getByLabel(`Isocentre ${axis} (mm)`).inputValue();
+    check(Math.abs(Number(taken) - Number(value.replace('−', '-'))) <= 0.5,
+      `${axis} of ${first}: ${taken}`);
+  }
   await fill(600, 450, 40);  // in the middle of the body
   equal(await clara.locator('.side-view').count(), 2, 'two sections');
   equal(await doubt.count(), 0, 'nothing to doubt');
@@ -1049,16 +1059,6 @@ const totp = (secret, step) => engineer.evaluate(async ([base32, counter]) => {
   const letters = 'ABCDEFGHIJKLMNOPQRSTUVWXYZ234567';
   const bits = [...base32].map((one) => letters.indexOf(one).toString(2).padStart(5, '0')).join('');
   const key = new Uint8Array(bits.match(/.{8}/g).map((one) => parseInt(one, 2)));
-  // Of each marker it is said where it lies; the middle of the first one is taken.
-  const markers = clara.getByLabel('Marker at the lasers');
-  const [first] = await markers.locator('option').allInnerTexts();
-  const [, x, y] = /^Marker \d+: x (−?\d+), y (−?\d+) mm$/.exec(first) ?? [];
-  await clara.getByRole('button', { name: 'Use its centre' }).click();
-  for (const [axis, value] of [['x', x], ['y', y]]) {
-    const taken = await clara.getByLabel(`Isocentre ${axis} (mm)`).inputValue();
-    check(Math.abs(Number(taken) - Number(value.replace('−', '-'))) <= 0.5,
-      `${axis} of ${first}: ${taken}`);
-  }
   const hmac = await crypto.subtle.importKey('raw', key, { name: 'HMAC', hash: 'SHA-1' }, false,
     ['sign']);
   const message = new DataView(new ArrayBuffer(8));
