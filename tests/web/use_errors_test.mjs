@@ -953,7 +953,8 @@ await h.step('what a form does not accept is said at its field, in the language 
     await speak(language);
     const add = anna.locator('form', { has: anna.locator('[data-code]') });
     const code = add.locator('[data-code]');
-    const error = add.locator('.field', { has: code }).locator('.field-error');
+    const error = add.locator('.field', { has: anna.locator('[data-code]') })
+      .locator('.field-error');
     await add.locator('button').click();
     await error.getByText(empty).waitFor();
     check(await code.evaluate((one) => one === document.activeElement), 'it has the focus');
@@ -974,7 +975,8 @@ await h.step('what a form does not accept is said at its field, in the language 
   const limit = engineer.getByLabel('Longest sweep (s)');
   await limit.fill('601');
   await engineer.getByRole('button', { name: 'Save', exact: true }).click();
-  await engineer.locator('.field', { has: limit }).getByText('From 5 to 600.').waitFor();
+  await engineer.locator('.field', { hasText: 'Longest sweep (s)' }).getByText('From 5 to 600.')
+    .waitFor();
   await engineer.reload();
 });
 
