@@ -37,7 +37,7 @@ export function legend(tolerance_mm) {
       h('span', { class: 'key edge' }, text.regionOutline)));
 }
 
-const kProfile = { width: 420, height: 220, left: 42, bottom: 34, top: 8, right: 14 };
+const kProfile = { width: 420, height: 220, left: 42, bottom: 34, top: 8, right: 22 };
 
 /// Heights along a line through the cursor; both axes in millimetres, equally marked.
 function profile(grid, view, reference, deviation, cursor, along, compass) {
