@@ -31,6 +31,16 @@ double ScaleOf(const std::vector<std::pair<const SceneMarker*, const SceneMarker
   return spread_before > 0 ? std::sqrt(spread_now / spread_before) : kNotKnown;
 }
 
+std::int64_t CountOf(const std::vector<std::int64_t>& ids) {
+  return static_cast<std::int64_t>(ids.size());
+}
+
+/// As many of `count` as the share demands at least.
+std::size_t ShareOf(std::size_t count, double share) {
+  constexpr double kRounding = 1e-9;  // 0.8 of 5 are 4
+  return static_cast<std::size_t>(std::ceil(share * static_cast<double>(count) - kRounding));
+}
+
 class Checker {
  public:
   Checker(const Scene& scene, const std::optional<MarkerBaseline>& baseline,
@@ -68,23 +78,29 @@ class Checker {
   }
 
   void Seen() {
-    std::vector<int> missing;
+    std::vector<std::int64_t> missing;
     if (baseline_) {
       for (const auto& [id, marker] : baseline_->markers) {
         if (!seen_.contains(id)) missing.push_back(id);
       }
     }
-    const auto wanted =
-        baseline_ ? baseline_->markers.size() : static_cast<std::size_t>(limits_.min_markers);
-    const auto found = baseline_ ? wanted - missing.size() : seen_.size();
-    const std::vector<std::int64_t> ids(missing.begin(), missing.end());
+    const auto found = baseline_ ? baseline_->markers.size() - missing.size() : seen_.size();
+    const auto wanted = baseline_ ? ShareOf(baseline_->markers.size(), limits_.min_seen_share)
+                                  : static_cast<std::size_t>(limits_.min_markers);
+    const std::optional<int> reference = scene_.room_markers.reference;
+    const bool has_reference = !reference || seen_.contains(*reference);
     check_.items.push_back({"markers_seen", static_cast<double>(found), static_cast<double>(wanted),
-                            "", found >= wanted,
-                            ids.empty() ? Message() : say::check::Missing(ids)});
-    if (found >= wanted) return;
-    Fail(ids.empty() ? say::check::FewSeen(static_cast<std::int64_t>(found),
-                                           static_cast<std::int64_t>(wanted))
-                     : say::check::NotSeen(ids));
+                            "", found >= wanted && has_reference,
+                            missing.empty() ? Message() : say::check::Missing(missing)});
+    if (!has_reference) Fail(say::check::ReferenceNotSeen(*reference));
+    if (found >= wanted) {
+      if (!missing.empty())
+        check_.cautions.push_back(say::check::NotChecked(CountOf(missing), missing));
+      return;
+    }
+    Fail(missing.empty() ? say::check::FewSeen(static_cast<std::int64_t>(found),
+                                               static_cast<std::int64_t>(wanted))
+                         : say::check::NotSeen(CountOf(missing), missing));
   }
 
   bool SameMarkers() {
@@ -200,8 +216,8 @@ std::vector<Message> ChangesOfBaseline(const MarkerBaseline& baseline,
     if (!wanted.markers.contains(id)) gone.push_back(id);
   for (const auto& [id, marker] : wanted.markers)
     if (!baseline.markers.contains(id)) added.push_back(id);
-  if (!gone.empty()) changes.push_back(say::check::BaselineGone(gone));
-  if (!added.empty()) changes.push_back(say::check::BaselineNew(added));
+  if (!gone.empty()) changes.push_back(say::check::BaselineGone(CountOf(gone), gone));
+  if (!added.empty()) changes.push_back(say::check::BaselineNew(CountOf(added), added));
   const AlignmentOutcome outcome = AlignScenes(baseline.markers, wanted.markers, Preset::kBest, {},
                                                MarkerCheckLimits{}.min_markers);
   if (!outcome.alignment) {

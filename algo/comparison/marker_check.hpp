@@ -25,6 +25,9 @@ struct MarkerCheckLimits {
   double max_depth_error = 0.03;   ///< Depth scale from the sweep's own calibration, minus 1.
   int min_views = 3;               ///< With fewer views a marker counts as not seen.
   int min_markers = 3;             ///< Fewest markers without a baseline.
+  /// Of the baseline's markers. Each scan judges by itself which markers moved, so that those that
+  /// were not seen need not have been checked, as long as most of them were.
+  double min_seen_share = 0.8;
 };
 
 /// One quantity of a check.
@@ -41,6 +44,8 @@ struct MarkerCheck {
   MarkerCheckStatus status = MarkerCheckStatus::kFailed;
   std::vector<MarkerCheckItem> items;
   std::vector<Message> reasons;  ///< Complete sentences that state why the check did not pass.
+  /// Sentences about what was not checked without making it fail: markers that were not seen.
+  std::vector<Message> cautions = {};
 };
 
 /// The markers that a check accepted, with their dictionary and length.
@@ -57,7 +62,8 @@ struct MarkerBaseline {
 
 /// Compares the markers of a sweep with a baseline. A rigid motion of all markers together (another
 /// reference marker or starting position) is not an error. Never throws because of what a sweep
-/// contains; missing data is a failed item.
+/// contains; missing data is a failed item, and so is a missing reference marker. Other markers of
+/// the baseline may be missing up to a share, with a caution that names them.
 [[nodiscard]] MarkerCheck CheckMarkers(const Scene& scene,
                                        const std::optional<MarkerBaseline>& baseline,
                                        const MarkerCheckLimits& limits = {});

@@ -11,8 +11,9 @@ namespace plumb {
 
 /// Colour of cells where nothing was measured, in every picture; no scale uses it.
 inline constexpr Color kHoleColor = {150, 152, 156};
-/// Not measured inside the region; the same colour as on the page (web/page/drawings/maps.js).
-inline constexpr Color kRegionHoleColor = {176, 86, 196};
+/// Not measured inside the region: every second stripe, the others are white. Told apart without
+/// any colour, and as on the page (web/page/drawings/maps.js).
+inline constexpr Color kRegionHoleColor = {10, 10, 12};
 
 /// `fraction_of_b` of the way from `a` to `b`, which is from 0 to 1.
 [[nodiscard]] Color Mix(const Color& a, const Color& b, double fraction_of_b);

@@ -13,7 +13,7 @@
 namespace plumb {
 namespace {
 
-constexpr Color kRegionHoleDark = {88, 43, 98};
+constexpr Color kRegionHoleLight = {255, 255, 255};
 
 /// Weak shading keeps the legend readable: at most 14 % darker.
 constexpr double kErrorReliefStrength = 0.30;
@@ -55,14 +55,12 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
     for (int column = 0; column < cells.width; ++column) {
       const float e = difference.at(cells.y + row, cells.x + column);
       if (!std::isfinite(e)) {
-        // Holes in the region are hatched, so that they can be told apart from other unmeasured
-        // cells without relying on colour.
         const bool is_hole =
             !options.region_mask.empty() &&
             IsHole(difference, options.region_mask, cells.y + row, cells.x + column);
         const Color& color = !is_hole                  ? kHoleColor
                              : (row + column) % 12 < 6 ? kRegionHoleColor
-                                                       : kRegionHoleDark;
+                                                       : kRegionHoleLight;
         out[column] = cv::Vec3b(color[0], color[1], color[2]);
         continue;
       }

@@ -445,11 +445,12 @@ bool Appliance::WorkersAreAlive() const {
 void Appliance::StoreOpened(Store& store) {
   upkeep_.StoreOpened(store);
   const ApplianceConfig& given = parts_.config.appliance;
-  if ((given.auto_stop_s || given.scan_limit_s || given.keep_recordings) &&
+  if ((given.auto_stop_s || given.scan_limit_s || given.keep_recordings ||
+       given.code_check_character) &&
       store.settings.AreSaved())
     Log(LogLevel::kNotice,
-        "settings have been saved on the page: auto_stop_s, scan_limit_s and keep_recordings of "
-        "plumb.toml no longer have an effect");
+        "settings have been saved on the page: auto_stop_s, scan_limit_s, keep_recordings and "
+        "code_check_character of plumb.toml no longer have an effect");
   if (parts_.demo_patient.empty()) return;
   const auto found = store.patients.FindByCode(parts_.demo_patient);
   const std::string patient =

@@ -102,7 +102,8 @@ LoosestLimits LoosestFor(ConfigUse use) {
                     .max_side_error = 1,
                     .max_scale_error = 1,
                     .max_depth_error = 1,
-                    .min_views = 1},
+                    .min_views = 1,
+                    .min_seen_share = 0},
           .advice = {}};
 }
 
@@ -173,6 +174,8 @@ void ReadCheck(Section section, ConfigUse use, MarkerCheckLimits& limits) {
   section.Take("min_views", limits.min_views,
                say::config::ExpectedWholeNumber(loosest.min_views, 1000),
                [&](int n) { return n >= loosest.min_views && n <= 1000; });
+  section.TakeNumber("min_seen", limits.min_seen_share, loosest.min_seen_share, 1,
+                     say::config::AFraction());
   section.RejectUnknownKeys();
 }
 
@@ -214,8 +217,9 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
   const Message time = say::config::ExpectedRange(say::config::Seconds(), 0.1, 3600);
   section.Take("auto_stop_s", appliance.auto_stop_s, time, is_time);
   section.Take("scan_limit_s", appliance.scan_limit_s, time, is_time);
-  section.Take("keep_recordings", appliance.keep_recordings, say::config::ExpectedFlag(),
-               [](bool) { return true; });
+  for (const auto& [key, flag] : {std::pair("keep_recordings", &appliance.keep_recordings),
+                                  {"code_check_character", &appliance.code_check_character}})
+    section.Take(key, *flag, say::config::ExpectedFlag(), [](bool) { return true; });
   section.TakePath("state", appliance.state);
   section.TakePath("control", appliance.control);
   section.TakePath("calibration", appliance.calibration);
@@ -450,6 +454,8 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("appliance.scan_limit_s", in_use.appliance.scan_limit_s, next.appliance.scan_limit_s);
   keep("appliance.keep_recordings", in_use.appliance.keep_recordings,
        next.appliance.keep_recordings);
+  keep("appliance.code_check_character", in_use.appliance.code_check_character,
+       next.appliance.code_check_character);
   keep("appliance.sensor_serial", in_use.appliance.sensor_serial, next.appliance.sensor_serial);
   keep("appliance.second_sensor_serial", in_use.appliance.second_sensor_serial,
        next.appliance.second_sensor_serial);

@@ -42,7 +42,7 @@ struct ApplianceConfig {
   std::optional<double> quota_gb;
   /// First values of the page's settings, in force until somebody saves settings there.
   std::optional<double> auto_stop_s, scan_limit_s;
-  std::optional<bool> keep_recordings;
+  std::optional<bool> keep_recordings, code_check_character;
   double warm_up_min = 15.0;  ///< Time that the sensor must have been on before a reference scan.
   /// Age of a room's calibration beyond which it joins no planning CT and no other room; 0: none.
   double room_max_age_days = 400.0;
@@ -150,13 +150,15 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers,
 ///                    moved_marker_mm, moved_marker_sigmas, min_coverage, max_hole_mm,
 ///                    max_residual_p95_mm, max_lost_s, max_breathing_mm
-///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views
+///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views,
+///                    min_seen
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to IEC fixed frame,
 ///                    u95_mm, u95_deg, markers (folder of a scene of the same room)
 ///     [storage]      backup_folder, backup_hours, backup_recipients, backup_key_file
 ///     [appliance]    state, control, calibration, sensor_serial, second_sensor_serial,
 ///                    fixed_sensors, sensor_profiles, quota_gb, auto_stop_s, scan_limit_s,
-///                    keep_recordings, warm_up_min, session_idle_min, room_max_age_days
+///                    keep_recordings, code_check_character, warm_up_min, session_idle_min,
+///                    room_max_age_days
 ///     [sensor]       driver, socket
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low

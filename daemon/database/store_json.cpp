@@ -182,6 +182,8 @@ Settings ParseSettings(const std::string& text) {
   number("scan_limit_s", s.scan_limit_s, kScanLimit_s);
   if (stored.Find("keep_recordings") != nullptr) s.keep_recordings = stored.Flag("keep_recordings");
   if (stored.Find("scan_wristband") != nullptr) s.scan_wristband = stored.Flag("scan_wristband");
+  if (stored.Find("code_check_character") != nullptr)
+    s.code_check_character = stored.Flag("code_check_character");
   whole("retention_days", s.retention_days, kRetention_days);
   whole("idle_logout_min", s.idle_logout_min, kIdleLogout_min);
   if (stored.Find("accept_live") != nullptr) s.accept_live = stored.AcceptLive("accept_live");

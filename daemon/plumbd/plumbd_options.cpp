@@ -147,6 +147,7 @@ Settings FirstSettings(const ApplianceConfig& given) {
   first.auto_stop_s = given.auto_stop_s.value_or(first.auto_stop_s);
   first.scan_limit_s = given.scan_limit_s.value_or(first.scan_limit_s);
   first.keep_recordings = given.keep_recordings.value_or(first.keep_recordings);
+  first.code_check_character = given.code_check_character.value_or(first.code_check_character);
   return first;
 }
 

@@ -61,6 +61,8 @@ std::string CheckJson(const TakenCheck& taken) {
   Json json = {{"status", Name(taken.check.status)},
                {"reasons", EnglishTexts(reasons)},
                {"reason_messages", MessagesJson(reasons)},
+               {"cautions", EnglishTexts(taken.check.cautions)},
+               {"caution_messages", MessagesJson(taken.check.cautions)},
                {"items", Json::array()}};
   for (const MarkerCheckItem& item : taken.check.items) {
     const Message& note = item.note;
@@ -107,6 +109,8 @@ CheckRecord CheckIn(const std::string& check_json) {
     record.status = *status;
     record.reasons = MessagesFromJson(json.value("reason_messages", Json()),
                                       json.value("reasons", std::vector<std::string>()));
+    record.cautions = MessagesFromJson(json.value("caution_messages", Json()),
+                                       json.value("cautions", std::vector<std::string>()));
     record.num_markers = json.value("markers", Json::object()).size();
     for (const Json& item : json.value("items", Json::array())) {
       const Json value = item.value("value", Json());

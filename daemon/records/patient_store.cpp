@@ -371,7 +371,7 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
       "language FROM preferences WHERE user = opened_by), ''), kept.source, newest.source, "
       "other.id, "
       "other.version, other.source, newest.version > chosen_at_version, ifnull((SELECT hint FROM "
-      "templates WHERE templates.site = patients.site), '') FROM open "
+      "templates WHERE templates.site = patients.site), ''), kept.created_at FROM open "
       "JOIN patients ON patients.id = "
       "open.patient_id LEFT JOIN refs AS kept ON kept.id = ifnull(reference_id, newest_id) LEFT "
       "JOIN refs AS newest ON newest.id = newest_id LEFT JOIN refs AS other ON other.id = (SELECT "
@@ -395,7 +395,10 @@ std::optional<TreatmentSession> TreatmentStore::Opened() {
         };
         session.language = row.Text(13);
         session.sweep_hint = row.Text(20);
-        if (!row.IsNull(8)) session.reference = version(8, 14);
+        if (!row.IsNull(8)) {
+          session.reference = version(8, 14);
+          session.reference_created_at = FromStored(row.Integer(21));
+        }
         if (session.reference && row.Text(10) != session.reference->id && row.Integer(19) != 0)
           session.newer_reference = version(10, 15);
         if (!row.IsNull(16)) session.other_reference = version(16, 18);

@@ -54,7 +54,11 @@ Scene ReadApprovedScene(const std::filesystem::path& folder,
 std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Scene& reference,
                                    CompareOptions& compare) {
   if (reference.planning) compare.isocentre_m.reset();  // the origin of its frame
-  if (!room) return std::nullopt;
+  if (!room) {
+    if (reference.planning && !compare.T_iec_reference)
+      compare.why_no_room = say::room::NoneForPlan();
+    return std::nullopt;
+  }
   compare.T_iec_reference.reset();
   ResultRoom used{room->version, {}};
   if (!room->why_not.empty()) {

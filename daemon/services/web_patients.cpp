@@ -16,7 +16,7 @@
 #include "daemon/loop/log.hpp"
 #include "daemon/planning/patient_hash.hpp"
 #include "daemon/planning/planning_import.hpp"
-#include "daemon/reports/posture_doubt.hpp"
+#include "daemon/reports/plan_doubts.hpp"
 #include "daemon/reports/scan_quality.hpp"
 #include "daemon/services/patient_key.hpp"
 #include "words/scan.hpp"
@@ -55,6 +55,11 @@ class WebPatients final : public web::PatientService {
 
   void AddPatient(const Actor& actor, const std::string& code, const std::string& site,
                   Done done) override {
+    const bool is_checked = store_.Read(&Store::settings, [](SettingsStore& settings) {
+      return settings.Get().code_check_character;
+    });
+    if (is_checked && !HasCheckCharacter(code))
+      return done(Refused(ChangeResult::kInvalid, say::store::PatientCodeCheck(code)));
     store_.Write(&Store::patients, std::move(done),
                  [=](PatientStore& patients) { return patients.Add(actor, code, site); });
   }
@@ -294,7 +299,7 @@ class WebReferences final : public web::ReferenceService {
       if (const auto lasers = room_.LasersIn(markers))
         room.lasers_m = {lasers->x(), lasers->y(), lasers->z()};
       if (reference.approved_by.empty() && !reference.planned_by.empty())
-        room.contradicts_posture = ContradictsItsPosture(reference);
+        room.contradicts_posture = DoubtsOf(reference).posture;
       return room;
     } catch (const std::exception& error) {
       Log(LogLevel::kNotice,
@@ -389,21 +394,23 @@ class WebReferences final : public web::ReferenceService {
     if (is_sweep && scan && considered.reason.empty() &&
         !QualityOf(*scan, FilesOf(*scan), references_.warm_up_min()).cautions.empty())
       return done(AnswerOf(say::store::ReferenceNeedsReason()));
-    const auto contradicts = std::make_shared<bool>(false);
+    const auto doubts = std::make_shared<Doubts>();
     const auto work = [=, this] {
       try {
-        if (reference) *contradicts = ContradictsItsPosture(*reference);
+        if (reference) *doubts = DoubtsOf(*reference);
       } catch (const std::exception& error) {  // Approve() compares every file, and says it
         Log(LogLevel::kError,
             fmt::format("cannot read the scene of reference {}: {}", id, error.what()));
       }
     };
     const auto approve = [=, this] {
-      if (*contradicts && !considered.posture)
+      if (doubts->isocentre_away_m > kMostIsocentreAway_m)
+        return done(AnswerOf(say::store::ReferenceIsocentre(doubts->isocentre_away_m)));
+      if (doubts->posture && !considered.posture)
         return done(AnswerOf(say::store::ReferencePosture()));
       store_.Write(&Store::references, done, [=](ReferenceStore& references) {
         references.Approve(actor, id, revision, digest, /*two_users=*/true, considered.reason,
-                           /*posture_confirmed=*/*contradicts);
+                           /*posture_confirmed=*/doubts->posture);
       });
     };
     if (!background_.RunInBackground(web::BackgroundPool::kReads, work, approve))
@@ -411,15 +418,23 @@ class WebReferences final : public web::ReferenceService {
   }
 
  private:
-  /// Whether the surface speaks against the planned posture. Reads the whole scene.
-  bool ContradictsItsPosture(const Reference& reference) {
+  /// What of a plan the surface speaks against.
+  struct Doubts {
+    bool posture = false;
+    double isocentre_away_m = 0.0;  ///< From the surface.
+  };
+  /// Reads the whole scene.
+  Doubts DoubtsOf(const Reference& reference) {
     const std::optional<Scan> scan = ScanOf(reference.scan_id);
     const auto posture = Named<PatientPosture>(reference.plan.posture);
-    if (!posture || !scan || scan->folder.empty()) return false;
+    if (!scan || scan->folder.empty()) return {};
     const Scene scene = ReadScene(scan->folder / "scene");
     const std::optional<Pose> room =
         scene.planning ? std::optional(Pose::Identity()) : room_.AxesIn(scene.markers);
-    return room && ContradictsPosture(scene, *room, *posture);
+    Doubts doubts{.posture = room && posture && ContradictsPosture(scene, *room, *posture)};
+    if (reference.plan.isocentre_m)
+      doubts.isocentre_away_m = IsocentreAway_m(scene, *reference.plan.isocentre_m);
+    return doubts;
   }
 
   std::optional<Scan> ScanOf(const std::string& scan_id) {

@@ -111,6 +111,28 @@ TEST_F(DaemonPlanTest, ToleranceAndPostureThatWereApprovedAreUsed) {
       << "who lies on the belly has the left side where it was the right one";
 }
 
+// The body's skin is about 0.2 m above the reference marker's plane here.
+TEST_F(DaemonPlanTest, AnIsocentreFarFromEverythingIsNotSigned) {
+  const std::string path = "/api/v1/references/" + reference_;
+  const auto sign = [&](const json& isocentre_m) {
+    json plan = wide_;
+    plan["isocentre_m"] = isocentre_m;
+    plan["revision"] = planner_->Get(path).json()["revision"];
+    EXPECT_EQ(planner_->Put(path + "/plan", plan).status, 200);
+    const json draft = approver_->Get(path).json();
+    return approver_->Post(path + "/approve", {{"revision", draft["revision"]},
+                                               {"digest", draft["digest"]},
+                                               {"reason", "there is no check here"},
+                                               {"password", kPassword}});
+  };
+  for (const json& far : {json{44, 48, 12}, json{0.60, 0.25, 0.80}, json{0.60, 0.25, -0.80}}) {
+    const HttpAnswer refused = sign(far);
+    EXPECT_EQ(refused.status, 409) << far;
+    EXPECT_EQ(refused.json()["error_message"]["id"], "store.reference_isocentre") << far;
+  }
+  EXPECT_EQ(sign({0.60, 0.25, 0.55}).status, 200) << "asked about on the page, and signed";
+}
+
 TEST_F(DaemonPlanTest, RegionAndCouchMarkersThatWereApprovedAreUsed) {
   json plan = wide_;
   plan["region_m"] = {{0.50, 0.15}, {0.80, 0.15}, {0.80, 0.55}, {0.50, 0.55}};

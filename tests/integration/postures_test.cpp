@@ -11,7 +11,7 @@
 
 #include "algo/comparison/comparison.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
-#include "daemon/reports/posture_doubt.hpp"
+#include "daemon/reports/plan_doubts.hpp"
 #include "drivers/simulator/suites/suite_plan.hpp"
 #include "words/comparison.hpp"
 

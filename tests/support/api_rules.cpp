@@ -309,7 +309,7 @@ TEST_F(ApiRules, SettingsAreKeptAsTheyWereWrittenAndBounded) {
                        {"keep_recordings", true},   {"retention_days", 730},
                        {"idle_logout_min", 11},     {"accept_live", "signature"},
                        {"breath_window_mm", 5.0},   {"scan_wristband", true},
-                       {"paper", "Letter"}};
+                       {"paper", "Letter"},         {"code_check_character", true}};
   ASSERT_NE(engineer.Get("/api/v1/settings").json(), wanted);
   for (const char* role : {"technician", "physicist"})
     EXPECT_EQ(LoggedIn(role).Put("/api/v1/settings", wanted).status, 403) << role;
@@ -336,6 +336,28 @@ TEST_F(ApiRules, SettingsAreKeptAsTheyWereWrittenAndBounded) {
   EXPECT_EQ(engineer.Get("/api/v1/settings").json(), wanted);
 }
 
+TEST_F(ApiRules, ACodeWithAWrongCheckCharacterIsRefusedWhereTheSettingAsksForOne) {
+  HttpClient engineer = LoggedIn("engineer"), technician = LoggedIn("technician");
+  const auto add = [&](const char* code) {
+    return technician.Post("/api/v1/patients", {{"code", code}, {"site", ""}});
+  };
+  const auto ask = [&](bool asks) {
+    EXPECT_EQ(engineer.Put("/api/v1/settings", {{"code_check_character", asks}}).status, 200);
+  };
+  EXPECT_EQ(add("PX-0042").status, 201) << "nobody asks for it";
+  ask(true);
+  for (const char* wrong : {"PX-0043", "PX-0061U", "P0061X", "7"}) {
+    const HttpAnswer refused = add(wrong);
+    EXPECT_EQ(refused.status, 400) << wrong;
+    EXPECT_EQ(refused.json()["error_message"]["id"], "store.patient_code_check") << wrong;
+    EXPECT_THAT(refused.body, HasSubstr(wrong));
+  }
+  EXPECT_EQ(technician.Get("/api/v1/patients").json()["patients"].size(), 1U);
+  EXPECT_EQ(add("PX-0042u").status, 201) << "beside one of before";
+  ask(false);
+  EXPECT_EQ(add("PX-0043").status, 201);
+}
+
 TEST_F(ApiRules, ASettingThatIsNotSentStaysAsItIsStored) {
   HttpClient engineer = LoggedIn("engineer");
   json wanted = engineer.Get("/api/v1/settings").json();
@@ -347,6 +369,7 @@ TEST_F(ApiRules, ASettingThatIsNotSentStaysAsItIsStored) {
                                                                 {"scan_limit_s", 33.0},
                                                                 {"keep_recordings", true},
                                                                 {"scan_wristband", true},
+                                                                {"code_check_character", true},
                                                                 {"retention_days", 730},
                                                                 {"idle_logout_min", 11},
                                                                 {"accept_live", "signature"},

@@ -59,6 +59,8 @@ std::optional<Patient> FakeAppliance::FindPatient(const std::string& id) {
 
 void FakeAppliance::AddPatient(const Actor& actor, const std::string& code, const std::string& site,
                                Done done) {
+  if (settings.code_check_character && !HasCheckCharacter(code))
+    return Finish(done, Refused(ChangeResult::kInvalid, say::store::PatientCodeCheck(code)));
   const auto plain = [](std::string text) {
     std::erase(text, '-');
     return text;
@@ -206,6 +208,8 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
 
 void FakeAppliance::TellNewerReference() {
   if (!status.session || !status.session->reference) return;
+  status.session->reference_created_at =
+      FindReference(status.session->reference->id).value().created_at;
   status.session->newer_reference.reset();
   status.session->other_reference.reset();
   const Patient* patient = PatientOf(status.session->patient_id);

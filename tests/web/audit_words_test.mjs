@@ -30,7 +30,7 @@ const kPlan = JSON.stringify({ region_m: [[0, 0], [1, 0], [1, 1]], isocentre_m: 
 const kDetails = [
   ['check.done', 'passed', 'PASSED', 'SUPERADO'],
   ['check.done', 'failed', 'FAILED', 'NO SUPERADO'],
-  ['check.done', 'no_baseline', 'NO BASELINE', 'SIN BASE'],
+  ['check.done', 'no_baseline', 'NO BASELINE', 'SIN LÍNEA BASE'],
   ['scan.accept', 'in_tolerance', 'IN TOLERANCE', 'EN TOLERANCIA'],
   ['scan.accept', 'in_tolerance, vertical +0.20 mm, lateral -0.31 mm, yaw -0.10 deg',
     'IN TOLERANCE, Vertical +0.20 mm, Lateral −0.31 mm, Yaw −0.10°',

@@ -4,7 +4,7 @@
 // WORDS is the folder in which web/words/generate.py writes, TEST_PROGRAM the one of algo/base.
 import { spawnSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
-import { readCatalogues, wordsIn } from './page_words.mjs';
+import { kJargon, readCatalogues, wordsIn } from './page_words.mjs';
 
 const [words, program, file] = process.argv.slice(2);
 const catalogues = readCatalogues(words);
@@ -60,6 +60,26 @@ for (const [code, { texts, arguments: given }] of Object.entries(catalogues)) {
     }
   }
 }
+
+// Who treats patients reads no words of files and programs. These are texts of the command line, of
+// recordings that other programs made, of the configuration of sensors, of the first start, and of
+// what only engineers see.
+const kExperts = new RegExp(['cli|foreign|recording|stream|text_report|page\\.certificate',
+  'sensor\\.(driver_of_real|driver_of_simulated|unknown_driver|use_driver)',
+  'diagnosis\\.(cameras_or_size|cameras_unstated|depth_unit|depth_unit_unknown|unit_or_side)',
+  'backup\\.no_recipient', 'comparison\\.room_not_calibrated', 'messages\\.no_way',
+  'page\\.login\\.certificate', 'page\\.settings\\.(backup|messages)Hint',
+  'scene_file\\.poses_differ']
+  .map((one) => `^(${one})(\\.|$)`).join('|'));
+let experts = 0;
+for (const [code, { texts }] of Object.entries(catalogues)) {
+  for (const [id, text] of Object.entries(texts)) {
+    const word = kJargon.exec(text.replaceAll(/\{\w+(:[^,{}]+)?/g, '{'))?.[0];
+    if (word && kExperts.test(id)) ++experts;
+    else if (word) failures.push(`${code} ${id} says ${word}: ${text}`);
+  }
+}
+equal(experts > 0, true, 'some are for experts');
 
 // What is not known, and what came without a message, is the English that was sent.
 const { said, saidEach, textOf, wordOf } = page.en;

@@ -202,6 +202,15 @@ void ObeyRoom(FakeAppliance& service, const std::string& name, std::istream& wor
     check.num_markers = 12;
     service.next_check = check;
   }
+  if (name == "markerunseen") {
+    CheckRecord check;
+    check.status = MarkerCheckStatus::kPassed;
+    check.cautions = {say::check::NotChecked(1, {4})};
+    check.items = {{"markers_seen", 11, 10, "", true, say::check::Missing({4})},
+                   {"misfit", 0.84, 3, "mm", true, {}}};
+    check.num_markers = 11;
+    service.next_check = check;
+  }
   if (name == "room") {
     std::string what;
     words >> what;

@@ -89,7 +89,7 @@ await h.step('the map shows how the body lies now, and what of it is not seen', 
     const { head, feet, hidden } = await colours(page);
     check(head[0] > head[2] + 40, `orange where it is higher: ${head}`);
     check(feet[2] > feet[0] + 40, `blue where it is lower: ${feet}`);
-    check(hidden[2] > hidden[1] + 40 && hidden[0] > hidden[1], `hatched: ${hidden}`);
+    check(['255,255,255', '10,10,12'].includes(hidden.join()), `hatched: ${hidden}`);
   }
   await room.waitForFunction(() =>
     document.documentElement.scrollHeight <= window.innerHeight + 1);

@@ -19,5 +19,13 @@ export async function wordsIn(code, catalogue) {
   return words;
 }
 
+/// Words of files, programs and formats, in any of the languages, which mean nothing to who treats
+/// patients.
+export const kJargon = new RegExp(['T_iec', 'RAUC\\b', 'backup_folder', 'plumb\\.toml', 'SHA-256',
+  '\\[(iec|storage|messages|check|web|update|sensor)\\]', '[Kk]eyframe', 'Schlüsselbild',
+  'im[áa]gen(es)? clave', '[Ii]mages? clés?', '[Dd]epth[ _]scale', 'Tiefenskala',
+  'Maßstab der Tiefe', '[Ee]scala (de (la )?)?profundidad', '[ÉEée]chelle de (la )?profondeur']
+  .join('|'));
+
 /// Where the build puts the words, beside the modules that the tests are given.
 export const wordsBeside = (modules) => join(modules, '../../../words');

@@ -161,7 +161,15 @@ await h.step('one tap opens, confirms and leads to the sweep; the room says whos
   await openOnPage(anna, 'P-0042');
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).waitFor();
   await room.locator('.room-code', { hasText: 'P-0042' }).waitFor();
-  await room.locator('.room-fraction', { hasText: 'Fraction 1' }).waitFor();
+  // Which version is compared with, and of when.
+  const { session: { reference } } = await state();
+  const { references } = await ok(bob, `patients/${patient}/references`, 'GET');
+  const made = references.find(({ id }) => id === reference.id).created_at;
+  const day = new Date(made).toLocaleDateString('en-GB',
+    { year: 'numeric', month: 'short', day: '2-digit' });
+  const compared = `Reference version ${reference.version}, ${day}`;
+  await room.locator('.room-fraction', { hasText: 'Fraction 1' }).getByText(compared).waitFor();
+  await anna.locator('.who-line', { hasText: compared }).waitFor();
 });
 
 await h.step('the outline of the reference lies over the picture, for the posture', async () => {
@@ -336,6 +344,10 @@ await h.step('while a sweep runs or is computed no older result looks valid', as
   await anna.getByText('A NEW SCAN IS RUNNING').waitFor({ state: 'detached', ...kSlow });
   await anna.locator('.number', { hasText: 'Lateral' }).getByText('−8.0').waitFor();
   equal(await anna.locator('.is-old').count(), 0, 'the new one is valid');
+  // What is within tolerance is applied with the rest, so it is not green either.
+  await anna.locator('.verdict .why', { hasText: 'Apply all six numbers below together' })
+    .waitFor();
+  equal(await anna.locator('.number.neutral').count(), 5, 'neither in nor out of what to do');
 });
 
 await h.step('accepting outside tolerance takes a reason and the password', async () => {
@@ -517,6 +529,14 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await anna.getByRole('button', { name: 'Close session' }).click();
   await asked.getByRole('button', { name: 'Close without acceptance' }).click();
   await anna.getByText('No session open').first().waitFor();
+  // One that passed says which marker it did not see.
+  await ok(anna, 'checks/open', 'POST');
+  h.tell('markerunseen');
+  h.tell('press');
+  await room.locator('.verdict.in_tolerance', { hasText: 'DAILY CHECK: PASSED' })
+    .getByText('Marker 4 was not seen well').waitFor(kSlow);
+  await h.look(room, 'room-check-unseen', { fullPage: false });
+  await anna.getByText('Marker 4 was not seen well').first().waitFor(kSlow);
   // A failed daily check stays in the corner, and the display is ready for the next session.
   await ok(anna, 'checks/open', 'POST');
   h.tell('markermoved');
@@ -610,6 +630,8 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   // acknowledgement.
   await anna.locator('.who-line').waitFor();
   await anna.goto(`${h.url}#/status`);
+  await clara.goto(`${h.url}#/result/${(await state()).last_result.id}`);
+  await clara.locator('.verdict').waitFor();
   const second = await addPatient('P-0050');
   await ok(bob, `patients/${second}/open`, 'POST',
     { purpose: 'reference', reason: '', replaces: (await state()).session.id });
@@ -624,6 +646,9 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   await room.locator('.room-code', { hasText: 'P-0050' }).waitFor();
   const above = anna.getByRole('alert').getByText('Now: P-0050');
   await above.waitFor();
+  await clara.getByRole('alert').getByText('Now: P-0050').waitFor();
+  equal(await clara.evaluate(() => document.querySelector('dialog:modal') === null), true,
+    'who reads a result of the history is not held up');
   await h.look(anna, 'session-changed', { fullPage: false });
   await anna.reload();
   await above.waitFor();
@@ -638,7 +663,7 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   await anna.reload();
   await anna.locator('.who-line', { hasText: 'P-0050' }).waitFor();
   equal(await anna.locator('.session-alert').count(), 0, 'once');
-  await h.acknowledge(bob);
+  await h.acknowledge(bob, clara);
   // Opening another patient names the one whose session ends.
   await openOnPage(anna, 'P-0042');
   await anna.getByText('The session of P-0050 is open.').first().waitFor();
@@ -709,6 +734,36 @@ await h.step('a wristband is answered on every screen, and its Enter presses no 
   equal((await ok(anna, 'patients', 'GET')).patients.length, 2, 'not added');
   await h.addPatient(anna, 'P'.repeat(33));
   await anna.getByRole('alert').getByText('at most 32 characters; this one has 33').waitFor();
+});
+
+await h.step('where the settings ask for it, a code has a check character', async () => {
+  await engineer.goto(`${h.url}#/settings`);
+  const asks = engineer.getByLabel('Codes of new patients end with a check character');
+  const save = async (isOn) => {
+    await asks.setChecked(isOn);
+    const kept = engineer.waitForResponse((answer) => answer.request().method() === 'PUT');
+    await engineer.getByRole('button', { name: 'Save', exact: true }).click();
+    equal((await kept).status(), 200, 'saved');
+  };
+  await save(true);
+  const alert = anna.getByRole('alert');
+  for (const wrong of ['P-0061', 'P-0061V', 'P-0016P']) {
+    await h.addPatient(anna, wrong);
+    await alert.getByText(`the last character of ${wrong} is not the check character`).waitFor();
+  }
+  equal((await ok(anna, 'patients', 'GET')).patients.length, 2, 'not added');
+  check(await wristband(anna, 'P0061W'), 'swallowed');
+  await alert.getByText('Scanned: P0061W. Its check character is wrong: scan it again.').waitFor();
+  check(await wristband(anna, 'p0061p'), 'swallowed');
+  await alert.getByText('Scanned: p0061p. No patient has this code.').waitFor();
+  check(await wristband(anna, 'P0050'), 'of before');
+  const asked = anna.getByRole('dialog', { name: 'This wristband is another patient’s' });
+  await asked.getByRole('button', { name: 'P-0042 is on the couch' }).click();
+  await h.addPatient(anna, 'P-0061P');
+  await anna.getByRole('heading', { name: 'P-0061P' }).waitFor();
+  await save(false);
+  check(await wristband(anna, 'P0061W'), 'swallowed');
+  await alert.getByText('Scanned: P0061W. No patient has this code.').waitFor();
 });
 
 await h.step('where the settings ask for it, no sweep begins before the wristband is scanned',

@@ -11,7 +11,7 @@
 import { readFileSync } from 'node:fs';
 import { Harness, keepsPictures } from './harness.mjs';
 import { englishTexts, faultsOfLayout } from './layout_checks.mjs';
-import { readCatalogues, wordsBeside, wordsIn } from './page_words.mjs';
+import { kJargon, readCatalogues, wordsBeside, wordsIn } from './page_words.mjs';
 
 // The fifth shows only the screens whose names it matches.
 const [modules, server, folder, chromium, only] = process.argv.slice(2);
@@ -192,6 +192,7 @@ async function show(page, one, language) {
   equal(await page.locator(one.ready).first().isVisible(), true, `${one.name}: ${one.ready}`);
 }
 
+const kTreating = ['anna', 'reader', 'room'];
 const shown = new Set();
 async function look(one) {
   if (only && !new RegExp(only).test(one.name)) { shown.add(one.route); return; }
@@ -204,6 +205,10 @@ async function look(one) {
   for (const language of now === other ? [other, 'en'] : ['en', other]) {
     if (language !== now) await one.between?.(page);
     await timed('show', () => show(page, one, language));
+    if (kTreating.includes(one.who)) {
+      const word = kJargon.exec(await page.locator('main').textContent())?.[0];
+      if (word) h.failures.push(`${one.name}, ${language}: a technician reads “${word}”`);
+    }
     await lookAt(page, one, language);
     await restore(page);
     await one.also?.(page, language, language === other ? others : en);

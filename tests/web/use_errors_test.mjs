@@ -936,6 +936,51 @@ await h.step('buttons are large enough for hands in gloves', async () => {
   }
 });
 
+await h.step('what a form does not accept is said at its field, in the language of the page',
+  async () => {
+  const speak = async (code) => {
+    await anna.evaluate((language) => {
+      localStorage.setItem('plumb-language-anna', language);
+      window.dispatchEvent(new Event('plumb-language'));
+    }, code);
+    await anna.locator(`html[lang=${code}]`).waitFor();
+  };
+  await anna.goto(`${h.url}#/patients`);
+  for (const [language, empty, wrong] of [
+    ['de', 'Dieses Feld ist leer.', 'Nur Buchstaben ohne Umlaute'],
+    ['es', 'Este campo está vacío.', 'Solo letras sin acentos'],
+    ['fr', 'Ce champ est vide.', 'Seulement des lettres sans accents'],
+    ['en', 'This field is empty.', 'Only letters, digits']]) {
+    await speak(language);
+    const add = anna.locator('form', { has: anna.locator('[data-code]') });
+    const code = add.locator('[data-code]');
+    const error = add.locator('.field', { has: anna.locator('[data-code]') })
+      .locator('.field-error');
+    await add.locator('button').click();
+    await error.getByText(empty).waitFor();
+    check(await code.evaluate((one) => one === document.activeElement), 'it has the focus');
+    await code.fill('José');
+    equal(await error.count(), 0, 'it is being corrected');
+    await add.locator('button').click();
+    await error.getByText(wrong).waitFor();
+    equal(await code.getAttribute('aria-invalid'), 'true', 'for readers of screens, too');
+    const described = (await code.getAttribute('aria-describedby')).split(' ');
+    equal(described[0], await error.getAttribute('id'), 'and read with it');
+    await h.look(anna, `field-error-${language}`, { axe: language === 'en' });
+    await code.fill('');
+    equal(await code.getAttribute('aria-invalid'), null, 'no longer');
+  }
+  equal((await h.api(anna, 'patients')).body.patients.some(({ code }) => code === 'José'), false,
+    'nobody was added');
+  await engineer.goto(`${h.url}#/settings`);
+  const limit = engineer.getByLabel('Longest sweep (s)');
+  await limit.fill('601');
+  await engineer.getByRole('button', { name: 'Save', exact: true }).click();
+  await engineer.locator('.field', { hasText: 'Longest sweep (s)' }).getByText('From 5 to 600.')
+    .waitFor();
+  await engineer.reload();
+});
+
 await h.step('half an isocentre is refused at its field', async () => {
   for (const axis of ['x', 'y', 'z']) await clara.getByLabel(`Isocentre ${axis}`).fill('');
   await clara.getByLabel('Isocentre x').fill('500');
@@ -964,6 +1009,16 @@ await h.step('an isocentre is in millimetres, seen from the side, and where it i
   };
   const doubt = clara.locator('.isocentre-doubt');
   const save = clara.getByRole('button', { name: 'Save plan' });
+  // Of each marker it is said where it lies; the middle of the first one is taken.
+  const markers = clara.getByLabel('Marker at the lasers');
+  const [first] = await markers.locator('option').allInnerTexts();
+  const [, x, y] = /^Marker \d+: x (−?\d+), y (−?\d+) mm$/.exec(first) ?? [];
+  await clara.getByRole('button', { name: 'Use its centre' }).click();
+  for (const [axis, value] of [['x', x], ['y', y]]) {
+    const taken = await clara.getByLabel(`Isocentre ${axis} (mm)`).inputValue();
+    check(Math.abs(Number(taken) - Number(value.replace('−', '-'))) <= 0.5,
+      `${axis} of ${first}: ${taken}`);
+  }
   await fill(600, 450, 40);  // in the middle of the body
   equal(await clara.locator('.side-view').count(), 2, 'two sections');
   equal(await doubt.count(), 0, 'nothing to doubt');

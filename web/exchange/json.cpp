@@ -195,6 +195,7 @@ Json CheckJson(const CheckRecord& check, WallClock::time_point now) {
       {"items", items},
       {"num_markers", check.num_markers}};
   PutMessages(json, "reason", check.reasons);
+  PutMessages(json, "caution", check.cautions);
   return json;
 }
 
@@ -236,6 +237,8 @@ Json VersionJson(const std::optional<ReferenceVersion>& reference) {
 }
 
 Json SessionJson(const TreatmentSession& session) {
+  Json reference = VersionJson(session.reference);
+  if (session.reference_created_at) reference["created_at"] = *session.reference_created_at;
   return {{"id", session.id},
           {"patient_id", session.patient_id},
           {"patient_code", session.patient_code},
@@ -245,7 +248,7 @@ Json SessionJson(const TreatmentSession& session) {
           {"opened_by", session.opened_by},
           {"opened_at", session.opened_at},
           {"has_unaccepted", session.has_unaccepted},
-          {"reference", VersionJson(session.reference)},
+          {"reference", reference},
           {"newer_reference", VersionJson(session.newer_reference)},
           {"other_reference", VersionJson(session.other_reference)},
           {"language", TextOrNull(session.language)},

@@ -40,7 +40,8 @@ struct CheckRecord {
   MarkerCheckStatus status = MarkerCheckStatus::kFailed;
   std::vector<Message> reasons;
   std::vector<CheckItem> items;
-  std::size_t num_markers = 0;  ///< Markers that were seen well.
+  std::size_t num_markers = 0;         ///< Markers that were seen well.
+  std::vector<Message> cautions = {};  ///< Markers that were not seen.
 };
 
 /// The check whose marker positions are the baseline.

@@ -46,6 +46,8 @@ inline constexpr std::uint64_t kMaxPlanningFile = std::uint64_t{64} << 20;
 /// Name of a contour or a beam: the longest that DICOM permits, in bytes of UTF-8.
 inline constexpr std::size_t kMaxPlanningName = 4 * 64;
 inline constexpr int kMaxFraction = 999;
+/// From what was scanned. One that is farther away was typed in another unit.
+inline constexpr double kMostIsocentreAway_m = 0.5;
 
 /// How a position that live monitoring shows is accepted: by a sweep that confirms it, or by a
 /// person's signature on the live value.

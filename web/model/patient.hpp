@@ -22,6 +22,24 @@ namespace plumb {
   return plain;
 }
 
+/// Whether the last letter or digit of a code is the check character of those before it, by ISO/IEC
+/// 7064, MOD 37,36: one wrong character is always found, and so are nearly all that changed places.
+[[nodiscard]] inline bool HasCheckCharacter(std::string_view code) {
+  constexpr int kNone = -1, kLetters = 36;
+  int sum = kLetters, last = kNone, count = 0;
+  for (const char c : PlainPatientCode(code)) {
+    const int value = c >= '0' && c <= '9' ? c - '0' : c >= 'A' && c <= 'Z' ? c - 'A' + 10 : kNone;
+    if (value == kNone) continue;
+    if (last != kNone) {
+      const int rest = (sum + last) % kLetters;
+      sum = (rest == 0 ? kLetters : rest) * 2 % (kLetters + 1);
+    }
+    last = value;
+    ++count;
+  }
+  return count > 1 && (sum + last) % kLetters == 1;
+}
+
 /// For how long a closed session can go on.
 inline constexpr int kResumable_h = 12;
 
@@ -90,6 +108,7 @@ struct TreatmentSession {
   bool has_unaccepted = false;  ///< Nobody has accepted its newest result.
   /// What its scans are compared with. Not set while no reference is approved.
   std::optional<ReferenceVersion> reference = {};
+  std::optional<WallClock::time_point> reference_created_at = {};
   /// A newer one that was approved since, also since a person chose `reference`: used once a person
   /// says so.
   std::optional<ReferenceVersion> newer_reference = {};

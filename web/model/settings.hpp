@@ -18,9 +18,10 @@ struct Settings {
   bool couch_markers = false;   ///< For new references.
   double auto_stop_s = 10.0;    ///< Time without new coverage.
   double scan_limit_s = 60.0;
-  bool keep_recordings = false;  ///< Keep the raw frames of scans, with colour.
-  bool scan_wristband = false;   ///< Asked for before each sweep of a patient's session.
-  int retention_days = 0;        ///< Older scans are removed; 0: never. References are kept.
+  bool keep_recordings = false;       ///< Keep the raw frames of scans, with colour.
+  bool scan_wristband = false;        ///< Asked for before each sweep of a patient's session.
+  bool code_check_character = false;  ///< New codes of patients must have one.
+  int retention_days = 0;             ///< Older scans are removed; 0: never. References are kept.
   int idle_logout_min = 15;
   std::string accept_live{kBySweep};         ///< Or kBySignature.
   double breath_window_mm = 3.5;             ///< Of a breath hold.
@@ -42,6 +43,7 @@ void ForEachSetting(Change& change, Values& values, const Visit& visit) {
   visit("scan_limit_s", change.scan_limit_s, values.scan_limit_s, kScanLimit_s);
   visit("keep_recordings", change.keep_recordings, values.keep_recordings);
   visit("scan_wristband", change.scan_wristband, values.scan_wristband);
+  visit("code_check_character", change.code_check_character, values.code_check_character);
   visit("retention_days", change.retention_days, values.retention_days, kRetention_days);
   visit("idle_logout_min", change.idle_logout_min, values.idle_logout_min, kIdleLogout_min);
   visit("accept_live", change.accept_live, values.accept_live);
@@ -56,7 +58,7 @@ struct SettingsChange {
   std::optional<std::string> posture;
   std::optional<bool> couch_markers;
   std::optional<double> auto_stop_s, scan_limit_s;
-  std::optional<bool> keep_recordings, scan_wristband;
+  std::optional<bool> keep_recordings, scan_wristband, code_check_character;
   std::optional<int> retention_days, idle_logout_min;
   std::optional<std::string> accept_live;
   std::optional<double> breath_window_mm;

@@ -5,6 +5,7 @@ import {
   touchedAt,
 } from './api.js';
 import { action, clear, forgetWarning, h, hint, say, warn } from './dom.js';
+import { tellFieldErrors } from './field_errors.js';
 import { kNobody, languageOf, useLanguage } from './language.js';
 import { lastLogin, lastLoginWords } from './last_login.js';
 import { mayLeave } from './leave.js';
@@ -374,6 +375,7 @@ function listen() {
   });
 }
 
+tellFieldErrors();
 if (location.pathname === '/room') {
   import('./screens/room.js').then(({ showRoom }) => showRoom(main, { speak, applyTheme }))
     .catch(report);

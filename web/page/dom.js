@@ -206,6 +206,9 @@ export const localTime = (iso) => (iso ? new Date(iso).toLocaleString(S.locale, 
 /// in the appliance's zone and not in the browser's.
 export const signedTime = (iso) => (iso
   ? new Date(iso).toLocaleString(S.locale, { ...kMinute, timeZoneName: 'short' }) : '–');
+export const localDate = (iso) => (iso ? new Date(iso).toLocaleDateString(S.locale, {
+  year: 'numeric', month: 'short', day: '2-digit',
+}) : S.none);
 export const localDay = (iso) => (iso ? new Date(iso).toLocaleDateString(S.locale, {
   month: 'short', day: '2-digit',
 }) : '–');

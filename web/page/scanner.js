@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scanners of wristbands type a code and Enter, wherever the focus is: one listener for the whole
 // page takes such a burst, so that its Enter presses no button, and says whose wristband it is.
-import { currentSession, get, live, may } from './api.js';
+import {
+  currentSession, get, getOrNull, live, may,
+} from './api.js';
 import { action, done, h, warn } from './dom.js';
 import { confirmWristband } from './wristband.js';
 import { S } from './words.js';
@@ -16,6 +18,14 @@ export const plainCode = (code) => code.replace(/[\s-]/g, '').toUpperCase();
 export const lookOf = (code) => plainCode(code).replace(/[._]/g, '').replaceAll('O', '0')
   .replace(/[IL]/g, '1').replaceAll('S', '5').replaceAll('Z', '2').replaceAll('B', '8')
   .replace(/^0+(?=.)/, '');
+/// Whether the last letter or digit is the check character of those before it (ISO/IEC 7064,
+/// MOD 37,36): as HasCheckCharacter() of web/model/patient.hpp.
+export function hasCheckCharacter(code) {
+  const values = [...plainCode(code).replace(/[._]/g, '')].map((one) => parseInt(one, 36));
+  const last = values.pop();
+  const sum = values.reduce((before, value) => ((before + value) % 36 || 36) * 2 % 37, 36);
+  return values.length > 0 && (sum + last) % 36 === 1;
+}
 
 let box = null;
 
@@ -45,9 +55,12 @@ async function answer(code) {
   const exact = same.find((patient) => patient.code.toUpperCase() === code.toUpperCase());
   const found = exact ?? (same.length === 1 ? same[0] : null);
   const { session, state } = live.status ?? {};
-  if (!found) {
-    warn(same.length ? text.several(code, same.map((one) => one.code).join(', '))
-      : text.unknown(code));
+  if (!found && same.length) {
+    warn(text.several(code, same.map((one) => one.code).join(', ')));
+  } else if (!found) {
+    const settings = await getOrNull('settings');
+    const isMisread = settings?.code_check_character && !hasCheckCharacter(code);
+    warn((isMisread ? text.misread : text.unknown)(code));
   } else if (session?.patient_id === found.id) {
     warn('');
     if (live.status.wants_wristband && may('scan')) await confirmWristband(session, code);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/comparison/marker_check.hpp"
 #include "daemon/config/config.hpp"
 #include "tests/support/message_of.hpp"
 
@@ -68,6 +69,27 @@ host_names = ["plumb.local", "couch"]
   EXPECT_EQ(config.web.listen, "[::]:8443");
   EXPECT_EQ(config.web.tls_key, "/etc/plumb/key.pem");
   EXPECT_THAT(config.web.host_names, ElementsAre("plumb.local", "couch"));
+}
+
+TEST(ApplianceConfigTest, TheShareOfMarkersThatACheckMustSeeIsThatOfTheFile) {
+  Scene room;
+  room.room_markers = {.dictionary = "DICT_6X6_250", .length_m = 0.1};
+  room.calibration["depth_scale"] = 1.0;
+  for (int id = 0; id < 10; ++id) {
+    SceneMarker& marker = room.markers[id];
+    marker.num_views = 10;
+    marker.corners = CornersInMarkerFrame(0.1);
+    for (Eigen::Vector3d& corner : marker.corners)
+      corner += Eigen::Vector3d(0.3 * (id % 4), 0.3 * (id / 4), 0);
+  }
+  const MarkerBaseline baseline = BaselineOf(room);
+  room.markers.erase(9);
+  const auto status = [&](const std::string& text) {
+    return CheckMarkers(room, baseline, ParseConfig(text, "plumb.toml").check).status;
+  };
+  EXPECT_EQ(status(""), MarkerCheckStatus::kPassed);
+  EXPECT_EQ(status("[check]\nmin_seen = 0.9\n"), MarkerCheckStatus::kPassed);
+  EXPECT_EQ(status("[check]\nmin_seen = 0.91\n"), MarkerCheckStatus::kFailed);
 }
 
 TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {

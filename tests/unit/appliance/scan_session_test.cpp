@@ -151,6 +151,14 @@ TEST(TakeRoomTest, APlanningCtIsMetByTheRoomsMarkersWithTheSpreadOfTheCalibratio
   EXPECT_TRUE(compare.room_markers.contains(5));
   EXPECT_NEAR(compare.iec_u95_m.value_or(0), 0.005, 1e-12);
 
+  CompareOptions without;
+  EXPECT_FALSE(TakeRoom(std::nullopt, planned, without));
+  EXPECT_EQ(without.why_no_room, say::room::NoneForPlan()) << "no key of a file";
+  without = {};
+  without.T_iec_reference = Pose::Identity();
+  EXPECT_FALSE(TakeRoom(std::nullopt, planned, without));
+  EXPECT_TRUE(without.why_no_room.empty()) << "the configuration says where the room lies";
+
   RoomAxes old = room;
   old.too_old = Message::Verbatim("401 days");
   CompareOptions with_old;

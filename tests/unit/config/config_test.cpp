@@ -249,7 +249,8 @@ TEST_F(GateTest, TheDailyCheckOfARealSensorMayBeStricterOnly) {
                                             {"side_percent", 3.0, 0.1},
                                             {"scale_percent", 0.5, 0.1},
                                             {"depth_percent", 3.0, 0.1},
-                                            {"min_views", 3.0, -1.0}}) {
+                                            {"min_views", 3.0, -1.0},
+                                            {"min_seen", 0.8, -0.1}}) {
     for (const ConfigUse use : {ConfigUse::kAppliance, ConfigUse::kSimulatedAppliance}) {
       EXPECT_EQ(Refusal("check", key, method, use), "");
       EXPECT_EQ(Refusal("check", key, method - looser, use), "");
@@ -281,14 +282,20 @@ TEST(ConfigTest, FixedSensorsAreTwoSerialsAtMost) {
 
 TEST(ConfigTest, TheFirstSettingsMayBeGiven) {
   const ApplianceConfig none = ParseConfig("[appliance]\n", "t").appliance;
-  EXPECT_FALSE(none.auto_stop_s || none.scan_limit_s || none.keep_recordings);
+  EXPECT_FALSE(none.auto_stop_s || none.scan_limit_s || none.keep_recordings ||
+               none.code_check_character);
   const ApplianceConfig given =
-      ParseConfig("[appliance]\nauto_stop_s = 2.5\nscan_limit_s = 30\nkeep_recordings = true\n",
-                  "t")
+      ParseConfig(
+          "[appliance]\nauto_stop_s = 2.5\nscan_limit_s = 30\nkeep_recordings = true\n"
+          "code_check_character = true\n",
+          "t")
           .appliance;
   EXPECT_EQ(given.auto_stop_s, 2.5);
   EXPECT_EQ(given.scan_limit_s, 30.0);
   EXPECT_EQ(given.keep_recordings, true);
+  EXPECT_EQ(given.code_check_character, true);
+  EXPECT_THAT(ErrorOf("[appliance]\ncode_check_character = 1\n"),
+              HasSubstr("code_check_character"));
   EXPECT_THAT(ErrorOf("[appliance]\nauto_stop_s = 0\n"), HasSubstr("seconds from 0.1 to 3600"));
   EXPECT_THAT(ErrorOf("[appliance]\nresult_s = 60\n"), HasSubstr("unknown key 'result_s'"));
 }

@@ -86,13 +86,16 @@ TEST_F(UnusableConfigurationTest, AFileThatIsNoTomlGivesTheDefaults) {
 }
 
 TEST_F(UnusableConfigurationTest, TheFirstSettingsAreThoseOfTheFileWithinTheLimitsOfSettings) {
-  const Configured given =
-      Read("[appliance]\nauto_stop_s = 2.5\nscan_limit_s = 3600\nkeep_recordings = true\n");
+  const Configured given = Read(
+      "[appliance]\nauto_stop_s = 2.5\nscan_limit_s = 3600\nkeep_recordings = true\n"
+      "code_check_character = true\n");
   EXPECT_EQ(given.fault.English(), "");
   const Settings first = FirstSettings(given.config.appliance);
   EXPECT_EQ(first.auto_stop_s, 2.5);
   EXPECT_EQ(first.scan_limit_s, 3600);
   EXPECT_TRUE(first.keep_recordings);
+  EXPECT_TRUE(first.code_check_character);
+  EXPECT_FALSE(FirstSettings(ApplianceConfig{}).code_check_character);
   for (const auto& [key, limits] :
        {std::pair("auto_stop_s", kAutoStop_s), {"scan_limit_s", kScanLimit_s}}) {
     const auto fault = [&, key = key](double value) {

@@ -97,6 +97,8 @@ TEST_F(StoreSessionsTest, ASessionKeepsTheReferenceThatItWasOpenedWithUntilAPers
       store, store.references.Add(kAnna, testing::StoreScan(store, patient), "", {}));
   const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
   EXPECT_EQ(store.treatments.Opened()->reference, (ReferenceVersion{first, 1}));
+  EXPECT_EQ(store.treatments.Opened()->reference_created_at,
+            store.references.Find(first)->created_at);
   EXPECT_FALSE(store.treatments.Opened()->newer_reference);
   const std::string second = store.references.Plan(kAnna, first, 2, {});
   EXPECT_FALSE(store.treatments.Opened()->newer_reference) << "a draft is none";

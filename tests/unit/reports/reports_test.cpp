@@ -301,7 +301,7 @@ TEST_F(ReportsTest, ARowThatIsWorseThanItShouldBeIsACaution) {
   auto few = rows(region(0.9, 0.05));
   EXPECT_EQ(few["Frames lost"], Row("14 (5 %)", false)) << "4.7 %";
   EXPECT_EQ(few["Longest gap"], Row("0.7 s", true));
-  EXPECT_EQ(few["Depth scale correction"], Row("-0.46 %", false));
+  EXPECT_EQ(few["Correction of the sensor's depth"], Row("-0.46 %", false));
 }
 
 TEST_F(ReportsTest, ASceneThatCannotBeReadIsSaidAndNotUsed) {

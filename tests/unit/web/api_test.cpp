@@ -159,7 +159,10 @@ TEST_F(ApiTest, AReportComesInTheLanguageThatIsAskedFor) {
   const std::string path = "/api/v1/patients/" + patient + "/report.pdf";
   EXPECT_EQ(client.Get(path + "?language=" + std::string(Catalogues().back()->code)).status, 200);
   loop_->Do([&] { EXPECT_EQ(service_.report_language, Catalogues().back()->code); });
-  EXPECT_EQ(client.Get(path).status, 200);
+  const HttpAnswer english = client.Get(path);
+  EXPECT_EQ(english.status, 200);
+  EXPECT_EQ(english.Header("content-disposition"), "attachment; filename=\"plumb_course_P-1.pdf\"")
+      << "by the code that people know";
   loop_->Do([&] { EXPECT_EQ(service_.report_language, "en"); });
   const HttpAnswer unknown = client.Get(path + "?language=xx");
   EXPECT_EQ(unknown.status, 400);

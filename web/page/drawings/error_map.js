@@ -37,9 +37,9 @@ export function legend(tolerance_mm) {
       h('span', { class: 'key edge' }, text.regionOutline)));
 }
 
-const kProfile = { width: 420, height: 220, left: 42, bottom: 34, top: 8, right: 14 };
+const kProfile = { width: 420, height: 220, left: 42, bottom: 34, top: 8, right: 22 };
 
-/// Heights along a line through the cursor; both axes in centimetres, equally marked.
+/// Heights along a line through the cursor; both axes in millimetres, equally marked.
 function profile(grid, view, reference, deviation, cursor, along, compass) {
   const { width, height, left, bottom, top, right } = kProfile;
   const from = along === 0 ? view.x_min : view.y_max - view.height;
@@ -68,7 +68,7 @@ function profile(grid, view, reference, deviation, cursor, along, compass) {
   const ticks = (low_m, high_m, step) => Array.from(
     { length: Math.floor((high_m - low_m) / step + 1e-6) + 1 },
     (_, i) => (Math.ceil(low_m / step - 1e-6) + i) * step).filter((v) => v <= high_m + 1e-6);
-  const cm = (v) => fixed(100 * v, 0);
+  const mm = (v) => fixed(1000 * v, 0);
   const here = along === 0 ? cursor.x - from : cursor.y - from;
   const end = (at, anchor, way) => {
     const name = markToward(compass, along === 0 ? [way, 0] : [0, way]);
@@ -82,10 +82,10 @@ function profile(grid, view, reference, deviation, cursor, along, compass) {
   },
   ticks(from, from + length, 0.1).map((v) => [
     svg('line', { x1: x(v - from), x2: x(v - from), y1: top, y2: height - bottom, class: 'grid' }),
-    svg('text', { x: x(v - from), y: height - bottom + 14, class: 'tick middle' }, cm(v))]),
+    svg('text', { x: x(v - from), y: height - bottom + 14, class: 'tick middle' }, mm(v))]),
   ticks(low, high, 0.05).map((v) => [
     svg('line', { x1: left, x2: width - right, y1: y(v), y2: y(v), class: 'grid' }),
-    svg('text', { x: left - 5, y: y(v) + 4, class: 'tick' }, cm(v))]),
+    svg('text', { x: left - 5, y: y(v) + 4, class: 'tick' }, mm(v))]),
   svg('text', { x: (left + width) / 2, y: height - 3, class: 'tick middle' }, S.result.sliceWay),
   end(left, 'start', -1), end(width - right, 'end', 1),
   svg('text', {
@@ -186,7 +186,7 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
     const value = cell < 0 ? NaN : around(maps[shown.map], cell);
     const words = cell < 0 ? text.outsideMap : Number.isNaN(value)
       ? region?.values[cell] === 2 ? text.hole_ : text.unknown : text.reads(signed(1000 * value));
-    clear(reading, h('strong', {}, words), ` ${text.at(cursor.x, cursor.y)}`);
+    clear(reading, h('strong', {}, words), ` ${text.at(1000 * cursor.x, 1000 * cursor.y)}`);
     cross.style.setProperty('left', `${100 * (cursor.x - view.x_min) / view.width}%`);
     cross.style.setProperty('top', `${100 * (view.y_max - cursor.y) / view.height}%`);
     clear(slice, profile(grid, view, heights, maps[shown.map], cursor, shown.along, compass));

@@ -95,7 +95,7 @@ export function drawCropped(canvas, view, draw) {
 
 function axes(view, size) {
   const ticks = [];
-  const label = (value) => fixed(100 * value, 0);
+  const label = (value) => fixed(1000 * value, 0);
   const first = (low) => Math.ceil(low / kTick_m - 1e-6);
   for (let i = first(view.x_min); i * kTick_m <= view.x_min + view.width; ++i) {
     const x = i * kTick_m - view.x_min;
@@ -112,8 +112,8 @@ function axes(view, size) {
         && svg('text', { x: 0.7 * size, y: y + 0.35 * size }, label(i * kTick_m)));
   }
   return svg('g', { class: 'axes' }, ticks,
-    svg('text', { x: view.width - 0.3 * size, y: view.height - 0.7 * size, class: 'end' }, 'x cm'),
-    svg('text', { x: 0.7 * size, y: 1.1 * size }, 'y cm'));
+    svg('text', { x: view.width - 0.3 * size, y: view.height - 0.7 * size, class: 'end' }, 'x mm'),
+    svg('text', { x: 0.7 * size, y: 1.1 * size }, 'y mm'));
 }
 
 const sizeOf = (view) => Math.max(view.width, view.height) / 42;

@@ -75,8 +75,9 @@ export function paint(canvas, { width, height }, colour) {
 }
 
 const kUnmeasured = [46, 53, 60];
-const kHole = [176, 86, 196];
-const kHoleDark = [88, 43, 98];
+// Black and white in stripes: seen whatever colours a person tells apart, and in no scale.
+const kHole = [255, 255, 255];
+const kHoleDark = [10, 10, 12];
 
 /// Whether a cell lies where most cells of the region around it were not measured.
 function holesOf({ width, height, values }) {
@@ -106,7 +107,6 @@ export function paintErrors(canvas, map, tolerance_m, region = null) {
     const inside = region ? region.values[i] : 1;
     if (Number.isNaN(value)) {
       if (inside === 2 && !isHole(i)) return;  // a single cell: as the one beside it
-      // A hole is hatched, so that more than its colour distinguishes it from unmeasured parts.
       const hatched = inside === 2 && (i % width + Math.floor(i / width)) % 12 < 6;
       set(out, inside === 2 ? hatched ? kHole : kHoleDark : kUnmeasured);
       return;

@@ -10,7 +10,7 @@ const kHeight = 150;
 const kLeft = 36;
 const kBottom = 22;
 const kAbove_m = 0.01;   // the skin is known as well as this
-const kFar_m = 0.5;
+const kFar_m = 0.5;     // kMostIsocentreAway_m of web/model/limits.hpp
 const kDown_m = 0.4;     // where no couch is seen: no body is thicker
 
 const isBody = (body, cell) => Boolean(body) && cell >= 0 && !Number.isNaN(body.values[cell]);
@@ -45,18 +45,18 @@ function offBody({ grid, body }, [x, y]) {
 export function doubtsOf(heights, point) {
   const text = S.plan;
   const off_m = offBody(heights, point);
-  if (off_m > kFar_m) return { refused: true, words: [text.isocentreFar(Math.round(100 * off_m))] };
+  const far = (away_m) =>
+    ({ refused: true, words: [text.isocentreFar(Math.round(1000 * away_m))] });
+  if (off_m > kFar_m) return far(off_m);
   const words = [];
   if (off_m > 0) words.push(text.isocentreBeside(Math.round(1000 * off_m)));
   const skin = heightAt(heights.map, cellAt(heights.grid, point[0], point[1]));
   const couch = couchOf(heights);
   const top = point[2] - skin;
-  if (top > kFar_m) return { refused: true, words: [text.isocentreFar(Math.round(100 * top))] };
+  if (top > kFar_m) return far(top);
   if (top > kAbove_m) words.push(text.isocentreAbove(Math.round(1000 * top)));
   const floor = Number.isNaN(couch) ? skin - kDown_m : Math.min(couch, skin);
-  if (floor - point[2] > kFar_m) {
-    return { refused: true, words: [text.isocentreFar(Math.round(100 * (floor - point[2])))] };
-  }
+  if (floor - point[2] > kFar_m) return far(floor - point[2]);
   if (floor - point[2] > kAbove_m) {
     words.push(text.isocentreBelow(Math.round(1000 * (floor - point[2]))));
   }

@@ -36,6 +36,12 @@ export function markOf(tone, cx, cy, r) {
   return svg('path', { d, class: `mark ${tone}` });
 }
 
+/// The days below a chart: several points of one day have one label.
+/// @param points  In the order of time: {x, time}.
+export const dayLabels = (points, y) => points.map(({ x, time }) => ({ x, day: localDay(time) }))
+  .filter(({ day }, i, all) => day !== all[i - 1]?.day)
+  .map(({ x, day }) => svg('text', { x, y, class: 'tick middle' }, day));
+
 function chart(axis, fractions, limit, isTitled) {
   const points = fractions
     .map((fraction, i) => ({
@@ -90,12 +96,8 @@ function chart(axis, fractions, limit, isTitled) {
       }),
       fraction.first !== fraction.last && first.value !== null && mark(first, i, false),
       mark(last, i, true)]),
-    // Several fractions of one day have one label.
-    points.filter((p) => p.i % every === 0)
-      .map(({ i, fraction }) => ({ i, day: localDay(fraction.last.started_at) }))
-      .filter(({ day }, k, labels) => day !== labels[k - 1]?.day)
-      .map(({ i, day }) =>
-        svg('text', { x: x(i), y: kHeight - 6, class: 'tick middle' }, day))));
+    dayLabels(points.filter((p) => p.i % every === 0)
+      .map(({ i, fraction }) => ({ x: x(i), time: fraction.last.started_at })), kHeight - 6)));
 }
 
 /// @param scans  Newest first.

@@ -2,7 +2,7 @@
 // What a reference was made of; and how far a captured surface lies from the planning CT that it
 // was compared with when it was captured.
 import { getOrNull } from '../api.js';
-import { card, h, hint } from '../dom.js';
+import { card, h, hint, localDate } from '../dom.js';
 import { digitsOf, kAxes, mostDigits, signed, withUnit } from '../numbers.js';
 import { S, said } from '../words.js';
 import { isAdvice } from './common.js';
@@ -11,10 +11,11 @@ import { isAdvice } from './common.js';
 export const sourceVersion = ({ source, version }) =>
   S.session.sourceVersion[source === 'planning_ct' ? source : 'sweep'](version);
 
-/// The version that a session compares with, and of which source it is where that is not plain.
-export const comparesWith = ({ reference, other_reference: other }) => (
+/// The version that a session compares with and its date, and of which source it is where that is
+/// not plain.
+export const comparesWith = ({ reference, other_reference: other }) => `${
   other || reference.source === 'planning_ct' ? S.session.compares(sourceVersion(reference))
-    : S.session.referenceIs(reference.version));
+    : S.session.referenceIs(reference.version)}, ${localDate(reference.created_at)}`;
 
 /// The scan that `reference` was captured from and the planning CT that it was compared with; null
 /// where it was not made so.

@@ -3,17 +3,17 @@
 import { currentSession, get, live, may, post } from '../api.js';
 import { couchCard } from '../couch/profile.js';
 import {
-  action, card, clear, done, field, fixed, h, hint, localDay, localTime, redraw, row, rowHead,
+  action, card, clear, done, field, fixed, h, hint, localTime, redraw, row, rowHead,
   signedTime, svg, table,
 } from '../dom.js';
 import { kReason } from '../limits.js';
 import { signed } from '../numbers.js';
 import { controlLimits } from '../drawings/control_limits.js';
-import { markOf } from '../drawings/trend.js';
+import { dayLabels, markOf } from '../drawings/trend.js';
 import { markerHelp } from '../help/drawings.js';
 import { signedForm } from '../signed_form.js';
 import { S, said, saidEach } from '../words.js';
-import { sentence } from './common.js';
+import { cautionsOf, sentence } from './common.js';
 import { roomCard } from './room_calibration.js';
 
 const kIcons = { passed: '✓', failed: '▲', no_baseline: '?' };
@@ -51,7 +51,7 @@ function verdict(check, overdue) {
     h('p', { class: 'word' },
       h('span', { class: 'icon', 'aria-hidden': 'true' }, kIcons[check.status]),
       text.verdicts[check.status]),
-    h('p', { class: 'why' }, why),
+    h('p', { class: 'why' }, why), cautionsOf(check),
     h('p', { class: 'when' }, text.last(localTime(check.time), check.user)));
 }
 
@@ -121,9 +121,8 @@ function chart(name, checks) {
     svg('polyline', { points: values.map((v, i) => `${x(i)},${y(v)}`).join(' '), class: 'line' }),
     points.map(({ item }, i) =>
       markOf(item.passed ? 'within' : 'outside', x(i), y(item.value), 4)),
-    points.map(({ check }, i) => i % every === 0 && svg('text', {
-      x: x(i), y: kHeight - 6, class: 'tick middle',
-    }, localDay(check.time)))));
+    dayLabels(points.map(({ check }, i) => ({ x: x(i), time: check.time }))
+      .filter((_, i) => i % every === 0), kHeight - 6)));
 }
 
 function trends(checks) {

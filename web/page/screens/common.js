@@ -15,6 +15,10 @@ const capital = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}`;
 export const sentence = (reason = '') =>
   `${capital(reason).replaceAll('+-', '±')}${/[.!]$/.test(reason) || !reason ? '' : '.'}`;
 
+/// What a daily check did not check.
+export const cautionsOf = (check) =>
+  saidEach(check, 'cautions').map((one) => h('p', { class: 'caution' }, sentence(one)));
+
 /// Says what is wrong and what to do about it; null where nothing is.
 export function faultWords(status) {
   if (!status.fault) return null;

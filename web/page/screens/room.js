@@ -13,8 +13,8 @@ import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseTheme } from '../preferences.js';
 import { S, saidEach } from '../words.js';
 import {
-  acceptanceMark, ageText, faultWords, findings, flagList, isAdvice, isCold, lastKnownNote,
-  minutesOf, partsOf, sentence, sidesOf,
+  acceptanceMark, ageText, cautionsOf, faultWords, findings, flagList, isAdvice, isCold,
+  lastKnownNote, minutesOf, partsOf, sentence, sidesOf,
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { askMonitor, monitorView } from '../monitoring/monitor.js';
@@ -302,7 +302,7 @@ function checkResult(check) {
   const tone = { passed: 'in_tolerance', failed: 'move' }[check?.status] ?? 'no_answer';
   return h('section', { class: `verdict ${tone}` },
     h('p', { class: 'word' }, `${S.room.checkDoneTitle}: `, S.check.verdicts[check?.status] ?? ''),
-    h('p', { class: 'why' }, sentence(saidEach(check, 'reasons')[0])));
+    h('p', { class: 'why' }, sentence(saidEach(check, 'reasons')[0])), cautionsOf(check));
 }
 
 /// Draws what the appliance does now. What changes ten times a second is drawn again, the camera

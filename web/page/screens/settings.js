@@ -10,7 +10,7 @@ import { S, said, saidEach } from '../words.js';
 import { certificateCard } from './certificate.js';
 import { profileCard } from './sensor_profile.js';
 
-const kFlags = ['couch_markers', 'keep_recordings', 'scan_wristband'];
+const kFlags = ['couch_markers', 'keep_recordings', 'scan_wristband', 'code_check_character'];
 
 /// When the last backup was made and how it went, and one more now.
 function backupCard() {

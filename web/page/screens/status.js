@@ -6,8 +6,8 @@ import { lastLogin, lastLoginWords } from '../last_login.js';
 import { sessionName } from '../treatment.js';
 import { S, said, saidEach } from '../words.js';
 import {
-  faultWords, follow, isCold, lastKnownNote, minutesOf, outcomeBadge, patientCodes, stateHere,
-  stateHint,
+  cautionsOf, faultWords, follow, isCold, lastKnownNote, minutesOf, outcomeBadge, patientCodes,
+  stateHere, stateHint,
 } from './common.js';
 
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
@@ -19,7 +19,7 @@ function checkTile({ last_check: last, check_overdue: overdue, check_failed: fai
   const word = good ? text.verdicts.passed
     : last && last.status !== 'passed' ? text.verdicts[last.status] : text.overdue;
   return tile(text.tile, word.toLowerCase(), good ? 'good' : 'bad',
-    last && h('p', {}, text.last(localTime(last.time), last.user)),
+    last && h('p', {}, text.last(localTime(last.time), last.user)), cautionsOf(last),
     overdue && h('p', { class: 'caution' }, failed ? text.failedText : text.overdueText),
     h('p', {}, h('a', { href: '#/check' }, S.nav.check)));
 }

@@ -18,7 +18,7 @@ import { S, said } from '../../words.js';
 import { capturedAgainst, capturedCard } from '../captured.js';
 import { blockNote, flagList, qualityOf } from '../common.js';
 import { planningFacts } from '../planning.js';
-import { editor, measure } from './plan_editor.js';
+import { editor, inMillimetres, measure } from './plan_editor.js';
 import { templateOf } from './plan_template.js';
 
 async function loadHeights(reference) {
@@ -34,15 +34,16 @@ function markerChoice(scene, take) {
   const text = S.plan;
   const found = Object.entries(scene?.markers ?? {});
   if (!found.length) return null;
-  const names = Object.fromEntries(found.map(([id]) => [id, text.marker(id)]));
+  const middleOf = (corners) => [0, 1, 2].map((axis) =>
+    Number((corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length).toFixed(4)));
+  // With where it lies on the map: nobody knows all numbers.
+  const names = Object.fromEntries(found.map(([id, corners]) => {
+    const [x, y] = middleOf(corners).map((value) => fixed(1000 * value, 0));
+    return [id, `${text.marker(id)}: x ${x}, y ${y} mm`];
+  }));
   const marker = select(names, found[0][0]);
   return h('div', { class: 'row' }, field(text.markerAtLasers, marker),
-    action(text.takeMarker, async () => {
-      const corners = scene.markers[marker.value];
-      const mean = (axis) => corners.reduce((sum, corner) => sum + corner[axis], 0)
-        / corners.length;
-      take([0, 1, 2].map((axis) => Number(mean(axis).toFixed(4))));
-    }, {}));
+    action(text.takeMarker, async () => take(middleOf(scene.markers[marker.value])), {}));
 }
 
 function isInside(region, [x, y]) {
@@ -53,9 +54,6 @@ function isInside(region, [x, y]) {
   });
   return inside;
 }
-
-/// A point of a plan, which is in metres, as people read and type it.
-const inMillimetres = (point) => point?.map((value) => Number((1000 * value).toFixed(3)));
 
 /// @param plan  What the fields begin with: what is stored, or what was typed before.
 function controls(reference, model, plan, editable) {
@@ -145,7 +143,7 @@ function summary(reference, patient, { scan, quality, picture, heights, captured
       row(text.planned, reference.planned_by),
       row(S.patients.reasonShort, reference.reason || S.none),
       row(text.region, plan.region_m.length
-        ? `${text.corners(plan.region_m.length)}, ${text.area(size.cm2, size.cm)}`
+        ? `${text.corners(plan.region_m.length)}, ${text.area(size.cm2, size.mm)}`
         : text.wholeBody),
       row(text.isocentre, plan.isocentre_m ? `${placed(plan.isocentre_m)} mm` : text.middle),
       kAxes.map((axis) => row(text.toleranceSigned(S.result.axes[axis.name].toLowerCase()),
@@ -223,7 +221,7 @@ async function draft(place, reference, store, reload) {
     drawSide();
     const size = measure(model.region);
     corners.textContent = model.region.length > 2
-      ? `${text.corners(model.region.length)}, ${text.area(size.cm2, size.cm)}`
+      ? `${text.corners(model.region.length)}, ${text.area(size.cm2, size.mm)}`
       : text.corners(model.region.length);
     if (stored === undefined) return;
     const edited = isEdited();

@@ -12,7 +12,10 @@ const kFinger_px = 14;  // a corner is drawn smaller than a finger can aim
 const kSame_m = 0.0005;
 const distance = ([ax, ay], [bx, by]) => Math.hypot(ax - bx, ay - by);
 
-/// Area in square centimetres and length of the outline in centimetres.
+/// A point of a plan, which is in metres, as people read and type it.
+export const inMillimetres = (point) => point?.map((value) => Number((1000 * value).toFixed(3)));
+
+/// Area in square centimetres and length of the outline in millimetres.
 export function measure(region) {
   let area = 0;
   let round = 0;
@@ -21,7 +24,7 @@ export function measure(region) {
     area += (ax * by - bx * ay) / 2;
     round += Math.hypot(bx - ax, by - ay);
   });
-  return { cm2: Math.round(1e4 * Math.abs(area)), cm: Math.round(100 * round) };
+  return { cm2: Math.round(1e4 * Math.abs(area)), mm: Math.round(1000 * round) };
 }
 
 /// Height map with a polygon and a point that people draw, by pointer or keys. `model` is {region,
@@ -80,10 +83,10 @@ export function editor({ grid, map, body, compass }, model, editable, changed,
   const lengths = (points, size) => points.length > 1 && points.map(([ax, ay], i) => {
     if (i + 1 === points.length && points.length < 3) return null;
     const [bx, by] = points[(i + 1) % points.length];
-    const cm = 100 * Math.hypot(bx - ax, by - ay);
-    return cm > 4 && svg('text', {
+    const mm = 1000 * Math.hypot(bx - ax, by - ay);
+    return mm > 40 && svg('text', {
       x: (ax + bx) / 2, y: (ay + by) / 2, class: 'length', 'font-size': 1.6 * size,
-    }, `${cm.toFixed(0)} cm`);
+    }, `${mm.toFixed(0)} mm`);
   });
   const whole = body && outlineOf(body, grid);
   const draw = () => {
@@ -132,7 +135,7 @@ export function editor({ grid, map, body, compass }, model, editable, changed,
     state.crosshair = [within(x + by * dx, grid.x_min, width),
       within(y + by * dy, grid.y_min, height)];
     draw();
-    say(text.crosshairAt(...state.crosshair));
+    say(text.crosshairAt(...inMillimetres(state.crosshair)));
   };
   /// Adds a corner at the crosshair, which stays for the next one; takes the corner that is there.
   const enterCorner = () => {
@@ -143,11 +146,11 @@ export function editor({ grid, map, body, compass }, model, editable, changed,
       const i = addCorner([...state.crosshair]);
       state.chosen = -1;
       update();
-      say(text.corner(i + 1, ...state.crosshair));
+      say(text.corner(i + 1, ...inMillimetres(state.crosshair)));
     } else {
       state.chosen = there;
       update();
-      say(text.corner(there + 1, ...model.region[there]));
+      say(text.corner(there + 1, ...inMillimetres(model.region[there])));
     }
   };
   /// The isocentre by keys: put on the skin, then moved at the height that it has.
@@ -165,7 +168,7 @@ export function editor({ grid, map, body, compass }, model, editable, changed,
       state.onIsocentre = false;
     }
     update();
-    say(model.isocentre ? text.isocentreAt(...model.isocentre.map((value) => 1000 * value))
+    say(model.isocentre ? text.isocentreAt(...inMillimetres(model.isocentre))
       : text.isocentreGone);
   };
   const update = () => { draw(); changed(); };
@@ -248,7 +251,7 @@ export function editor({ grid, map, body, compass }, model, editable, changed,
       event.preventDefault();
       update();
       const now = model.region[state.chosen];
-      if (now) say(text.corner(state.chosen + 1, ...now));
+      if (now) say(text.corner(state.chosen + 1, ...inMillimetres(now)));
     });
   }
   draw();

@@ -59,7 +59,7 @@ export async function templateOf(patient, grid, model, inputs, drawing, changed)
       await post('templates/remove', { site });
       await load();
     }, {});
-    const says = found ? text.templateIs(found.width_mm / 10, found.height_mm / 10,
+    const says = found ? text.templateIs(found.width_mm, found.height_mm,
       found.tolerance.shift_mm, found.tolerance.rotation_deg) : text.templateNone;
     const more = found && (found.posture || found.hint) && hint(text.templateSays(
       text.postures[found.posture] ?? S.none, found.hint || S.none));
