@@ -21,6 +21,8 @@ namespace {
 constexpr double kAxial = 1e-3;       // of the directions' cosines: 0.5 mm over a body
 constexpr double kFarthest_mm = 1e4;  // of an image from the origin, along each axis
 constexpr double kMostPixel_mm = 5.0;
+constexpr double kPlacesPerMillimetre = 100.0;
+constexpr double kMostStep = 1.5;  // of the usual one; twice that is where an image is missing
 constexpr std::size_t kMostSkinPoints = 4'000'000;
 // Noise, not parts of a body; a wrist has twenty times as much.
 constexpr double kLeastPart_mm2 = 100.0;
@@ -218,7 +220,7 @@ void CtSkin::Add(const CtImage& image, const std::string& name) {
     throw DataError(say::planning::TooManyImages(static_cast<std::int64_t>(kMostCtImages)));
   if (!(image.origin_mm.cwiseAbs().maxCoeff() < kFarthest_mm))
     throw DataError(say::planning::ImageFarOff(name, kFarthest_mm));
-  if (!places_.insert(std::llround(100 * image.origin_mm.z())).second)
+  if (!places_.insert(std::llround(kPlacesPerMillimetre * image.origin_mm.z())).second)
     throw DataError(say::planning::ImageTwice(name, image.origin_mm.z()));
   series_uid_ = image.series_uid;
   position_ = image.position;
@@ -240,6 +242,22 @@ void CtSkin::Add(const CtImage& image, const std::string& name) {
   if (num_points_ > kMostSkinPoints)
     throw DataError(say::planning::ImagesRagged(static_cast<std::int64_t>(kMostSkinPoints)));
   if (!bordered.steps().empty()) steepness_.push_back(TakeQuantile(bordered.steps(), 0.5));
+}
+
+void CtSkin::RequireWhole() const {
+  std::vector<double> steps;
+  for (auto at = places_.begin(); at != places_.end() && std::next(at) != places_.end(); ++at)
+    steps.push_back(static_cast<double>(*std::next(at) - *at) / kPlacesPerMillimetre);
+  if (steps.empty()) return;
+  std::vector<double> sorted = steps;
+  const double usual = TakeQuantile(sorted, 0.5);
+  auto at = places_.begin();
+  for (const double step : steps) {
+    if (step > kMostStep * usual)
+      throw DataError(say::planning::ImagesMissing(static_cast<double>(*at) / kPlacesPerMillimetre,
+                                                   step, usual));
+    ++at;
+  }
 }
 
 double CtSkin::Steepness() const {

@@ -14,6 +14,8 @@ namespace plumb {
 
 /// Tissue is brighter and air darker; about the edge that planning systems draw.
 inline constexpr double kSkinThreshold_hu = -300.0;
+/// What a person may choose.
+inline constexpr double kLeastSkinThreshold_hu = -900.0, kMostSkinThreshold_hu = 0.0;
 /// More images are refused.
 inline constexpr std::size_t kMostCtImages = 2000;
 
@@ -29,6 +31,9 @@ class CtSkin {
   /// @throws DataError for an image of another series, frame or patient than those before, at the
   ///         place of one of them, or that is not axial.
   void Add(const CtImage& image, const std::string& name);
+
+  /// @throws DataError if one is missing between others: the series was not sent as a whole.
+  void RequireWhole() const;
 
   [[nodiscard]] std::size_t num_images() const { return places_.size(); }
   [[nodiscard]] double threshold_hu() const { return threshold_hu_; }

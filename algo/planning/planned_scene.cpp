@@ -229,10 +229,12 @@ Scene MakePlannedScene(const std::optional<StructureSet>& structures, const Trea
   const PlannedPlace place = ChoosePlace(plan, choice.beam, scene.warnings);
   RequireImagesOfPlan(images, plan, place.posture);
   RequireOneFrame(structures.value_or(StructureSet()), images.roi(), plan);
+  images.RequireWhole();
 
   PlanningSource& source = scene.planning.emplace();
   const ContourSurface surface = SurfaceOfImages(images, structures, place, scene);
   source.roi = images.roi().name;
+  source.skin_threshold_hu = images.threshold_hu();
   FillSource(plan, place, surface, source);
   Warn(surface, source.slices, scene.warnings);
   SetSurface(surface, scene);

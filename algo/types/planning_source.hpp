@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include <Eigen/Core>
@@ -29,6 +30,8 @@ struct PlanningSource {
   /// Half-width of the 95 % interval of the skin's place along its normal, since the threshold by
   /// which the skin was found in the CT is not stated.
   double skin_u95_m = 1 * kMillimetre;
+  /// Hounsfield units by which the skin was found in CT images; not set: a contour is the surface.
+  std::optional<double> skin_threshold_hu = {};
 };
 
 }  // namespace plumb

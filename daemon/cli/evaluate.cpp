@@ -82,7 +82,9 @@ Scene Reconstruct(const Suite& suite, const std::string& name, const Config& con
     const std::filesystem::path images = planning / "images";
     const Scene planned =
         std::filesystem::exists(images)
-            ? ReadPlanningWithImages({}, plan, {images}, kSkinThreshold_hu, {}, context.stop)
+            ? ReadPlanningWithImages({.structures = {}, .plan = plan},
+                                     ImagesIn({images}, kSkinThreshold_hu, context.stop), {})
+                  .scene
             : ReadPlanning({.structures = planning / "structures.dcm", .plan = plan}, {}).scene;
     WriteScene(planned, folder);
     return planned;

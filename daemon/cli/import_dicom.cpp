@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -68,18 +67,16 @@ std::string TextOf(const Scene& scene, const ImportDicomArguments& options,
 }
 
 Scene Read(const ImportDicomArguments& options, const std::stop_token& stop, Progress& progress) {
-  const std::vector<std::filesystem::path>& files = options.files;
-  if (options.images.empty())
-    return ReadPlanning({.structures = files.front(), .plan = files.back()}, options.choice).scene;
-  std::optional<std::filesystem::path> structures;
-  if (files.size() > 1) structures = files.front();
-  return ReadPlanningWithImages(
-      structures, files.back(), options.images, options.threshold_hu, options.choice, stop,
-      [&](std::size_t count) {
+  PlanningFiles files{.structures = {}, .plan = options.files.back()};
+  if (options.files.size() > 1) files.structures = options.files.front();
+  if (options.images.empty()) return ReadPlanning(files, options.choice).scene;
+  const PlanningImages images =
+      ImagesIn(options.images, options.threshold_hu, stop, [&](std::size_t count) {
         // How many there will be is not known.
         progress.Update(say::cli::ReadingDicom(),
                         0.8 * static_cast<double>(count) / (static_cast<double>(count) + 100.0));
       });
+  return ReadPlanningWithImages(files, images, options.choice).scene;
 }
 
 int Run(const ImportDicomArguments& options, const CommandContext& context) {
@@ -117,7 +114,7 @@ Command AddImportDicom(CLI::App& app) {
           ->type_name("CT");
   app.add_option("--threshold", options->threshold_hu, "Hounsfield units of the skin in the images")
       ->needs(images)
-      ->check(CLI::Range(-900.0, 0.0))
+      ->check(CLI::Range(kLeastSkinThreshold_hu, kMostSkinThreshold_hu))
       ->capture_default_str()
       ->type_name("HU");
   app.add_option("--out", options->out, "Scene folder to write")->required()->type_name("SCENE");

@@ -110,7 +110,7 @@ class FieldWriter {
   }
   /// Left out if it is not set.
   template <typename T>
-  void IfSet(const char* key, const std::optional<T>& value) const {
+  void IfSet(const char* key, const std::optional<T>& value, const Bounds& = {}) const {
     if (value) json_[key] = Written(*value);
   }
   /// A message that is written as an empty text if there is none.
@@ -266,8 +266,8 @@ class FieldReader {
     if (const Json* const found = Find(key)) Read(At(key, *found, bounds), value);
   }
   template <typename T>
-  void IfSet(const char* key, std::optional<T>& value) const {
-    (*this)(key, value);
+  void IfSet(const char* key, std::optional<T>& value, const Bounds& bounds = {}) const {
+    (*this)(key, value, bounds);
   }
   void Text(const char* key, Message& value) const { (*this)(key, value); }
   void Sentences(const char* key, const char* messages, std::vector<Message>& value) const {

@@ -57,6 +57,7 @@ struct StoredFields<PlanningSource> {
     visit("parts_left_out", self.parts_left_out, kCount);
     visit("support_m", self.support_m, Bounds{-10, 10});
     visit("skin_u95_m", self.skin_u95_m, Bounds{1e-6, 0.1});
+    visit.IfSet("skin_threshold_hu", self.skin_threshold_hu, Bounds{-2000, 2000});
   }
 };
 

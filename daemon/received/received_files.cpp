@@ -2,6 +2,7 @@
 #include "daemon/received/received_files.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <functional>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
 #include "algo/base/plain_text.hpp"
+#include "algo/planning/plan_choices.hpp"
 #include "daemon/planning/patient_hash.hpp"
 #include "daemon/unit/page_identity.hpp"
 #include "drivers/dicom/planning_files.hpp"
@@ -26,6 +28,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostListed = 100;
 constexpr int kMostReadAtOnce = 8;  // each may take seconds
 constexpr std::size_t kMostNoteBytes = 4096, kMostNotesBytes = std::size_t{1} << 20;
+constexpr std::chrono::seconds kReadingImages{2};  // at each call
 constexpr std::size_t kMostWord = 64;
 constexpr const char* kCtImage = "1.2.840.10008.5.1.4.1.1.2";
 
@@ -43,15 +46,20 @@ std::string WordIn(const Json& json, const char* key) {
              : std::string();
 }
 
+/// What the note says beside what a page shows.
+struct Uids {
+  std::string of_class, of_instance;
+};
+
 /// The note of plumb-dicomd; a damaged one leaves out what it does not say.
-ReceivedFile FromNote(const fs::path& note, std::string& class_uid) {
+ReceivedFile FromNote(const fs::path& note, Uids& uids) {
   ReceivedFile file{.name = note.stem().string(), .is_read = false};
   try {
     const Json json = ParseBoundedJson<Json>(ReadTextFile(note, kMostNoteBytes));
     file.received_at = WordIn(json, "received_at");
     file.sender = WordIn(json, "calling_ae_title");
     file.address = WordIn(json, "address");
-    class_uid = WordIn(json, "class_uid");
+    uids = {.of_class = WordIn(json, "class_uid"), .of_instance = WordIn(json, "instance_uid")};
     if (json.contains("bytes") && json["bytes"].is_number_unsigned())
       file.bytes = json["bytes"].get<std::uint64_t>();
   } catch (const std::exception&) {
@@ -75,7 +83,7 @@ std::vector<std::string> NamesIn(const fs::path& spool) {
 }  // namespace
 
 ReceivedFiles::ReceivedFiles(fs::path spool, fs::path notes, std::string key)
-    : spool_(std::move(spool)), notes_(std::move(notes)), key_(std::move(key)) {}
+    : spool_(std::move(spool)), notes_(std::move(notes)), key_(std::move(key)), images_(key_) {}
 
 void ReceivedFiles::Load() {
   if (std::exchange(is_loaded_, true)) return;
@@ -92,9 +100,14 @@ void ReceivedFiles::Load() {
           .label = WordIn(one, "label"),
           .patient_hash = one.at("patient_hash").get<std::string>(),
           .reference_id = WordIn(one, "reference_id"),
+          .frame_uid = WordIn(one, "frame_uid"),
+          .has_skin = one.value("has_skin", false),
+          .is_stale = !one.contains("frame_uid"),
           .fault = MessageFromJson(one.at("fault"), WordIn(one, "fault_english"))};
     }
+    if (json.contains("images")) images_.FromJson(json["images"]);
   } catch (const std::exception&) {
+    images_ = ReceivedImages(key_);
     known_.clear();  // the files are read again; only what became of them is not known any more
   }
 }
@@ -108,10 +121,12 @@ void ReceivedFiles::Store() const {
                    {"label", one.label},
                    {"patient_hash", one.patient_hash},
                    {"reference_id", one.reference_id},
+                   {"frame_uid", one.frame_uid},
+                   {"has_skin", one.has_skin},
                    {"fault", MessageJson(one.fault)},
                    {"fault_english", one.fault.English()}};
-  KeepSecret(notes_, Json{{"format", 1}, {"files", files}}.dump(-1, ' ', false,
-                                                                Json::error_handler_t::replace));
+  const Json json = {{"format", 1}, {"files", files}, {"images", images_.ToJson()}};
+  KeepSecret(notes_, json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 ReceivedFiles::Known ReceivedFiles::ReadOne(const std::string& name) const {
@@ -121,9 +136,13 @@ ReceivedFiles::Known ReceivedFiles::ReadOne(const std::string& name) const {
     known.instance_uid = content.file.instance_uid;
     known.label = AsPlainText(content.file.label.substr(0, kMostWord));
     known.patient_hash = PatientHash(key_, content.file.patient_id);
-    if (content.structures) known.kind = ReceivedKind::kStructures;
+    if (content.structures) {
+      known.kind = ReceivedKind::kStructures;
+      known.has_skin = HasExternal(*content.structures);
+    }
     if (content.plan) {
       known.kind = ReceivedKind::kPlan;
+      known.frame_uid = AsPlainText(content.file.frame_of_reference_uid.substr(0, kMostWord));
       known.structure_set_uid = content.plan->structure_set_uid;
     }
   } catch (const DataError& error) {
@@ -132,61 +151,119 @@ ReceivedFiles::Known ReceivedFiles::ReadOne(const std::string& name) const {
   return known;
 }
 
+ReceivedFiles::Found ReceivedFiles::Look() const {
+  Found found;
+  for (const std::string& name : NamesIn(spool_)) {
+    Uids uids;
+    ReceivedFile file = FromNote(spool_ / (name + ".json"), uids);
+    if (uids.of_class == kCtImage) {
+      ++found.num_images;
+      if (found.images.size() < ReceivedImages::kMost)
+        found.images.push_back({.name = name,
+                                .instance_uid = uids.of_instance,
+                                .received_at = file.received_at,
+                                .sender = file.sender,
+                                .address = file.address});
+    } else if (found.files.size() < kMostListed) {
+      found.files.push_back(std::move(file));
+    } else {
+      ++found.unlisted;
+    }
+  }
+  return found;
+}
+
+bool ReceivedFiles::IsRead(const std::string& name) const {
+  const auto known = known_.find(name);
+  return known != known_.end() && !known->second.is_stale;
+}
+
+void ReceivedFiles::ReadSome(const Found& found) {
+  using Steady = std::chrono::steady_clock;
+  const auto is_gone = [&](const auto& one) {
+    std::error_code error;
+    return !fs::exists(spool_ / (one.first + ".dcm"), error) && !error;
+  };
+  bool is_changed = std::erase_if(known_, is_gone) > 0;
+  is_changed = images_.Keep(found.images) || is_changed;
+  int num_read = 0;
+  for (const ReceivedFile& file : found.files) {
+    if (IsRead(file.name) || num_read == kMostReadAtOnce) continue;
+    ++num_read;
+    const std::string reference = known_[file.name].reference_id;
+    known_[file.name] = ReadOne(file.name);
+    known_[file.name].reference_id = reference;
+  }
+  for (const auto until = Steady::now() + kReadingImages; const auto& image : found.images) {
+    if (images_.IsKnown(image.name)) continue;
+    if (Steady::now() >= until) break;
+    images_.Read(spool_, image.name);
+    is_changed = true;
+  }
+  if (is_changed || num_read > 0) Store();
+}
+
 ReceivedFiles::Listing ReceivedFiles::List() {
   const std::lock_guard lock(mutex_);
   Load();
-  Listing listing;
-  const std::vector<std::string> names = NamesIn(spool_);
-  const auto before = known_.size();
-  std::erase_if(known_, [&](const auto& one) {
-    return !std::ranges::binary_search(names, one.first, std::greater<>());
-  });
-  bool is_changed = known_.size() != before;
-  int num_read = 0;
-  for (const std::string& name : names) {
-    std::string class_uid;
-    ReceivedFile file = FromNote(spool_ / (name + ".json"), class_uid);
-    if (class_uid == kCtImage) {
-      ++listing.images;
-      continue;
-    }
-    if (listing.entries.size() >= kMostListed) {
-      ++listing.unlisted;
-      continue;
-    }
-    auto known = known_.find(name);
-    if (known == known_.end() && num_read < kMostReadAtOnce) {
-      ++num_read;
-      is_changed = true;
-      known = known_.emplace(name, ReadOne(name)).first;
-    }
-    if (known != known_.end()) {
-      const Known& facts = known->second;
-      file.is_read = true;
-      file.kind = facts.kind;
-      file.label = facts.label;
-      file.reference_id = facts.reference_id;
-      file.fault = facts.fault;
-      listing.entries.push_back({std::move(file), facts.patient_hash});
+  Found found = Look();
+  ReadSome(found);
+  Listing listing{.entries = {},
+                  .series = images_.SeriesOf(found.images),
+                  .images = found.num_images,
+                  .unlisted = found.unlisted,
+                  .damaged_images = images_.num_damaged(),
+                  .image_fault = images_.fault()};
+  for (const auto& image : found.images) listing.unread += images_.IsKnown(image.name) ? 0 : 1;
+  for (ReceivedFile& file : found.files) {
+    Entry entry{.file = std::move(file), .patient_hash = {}};
+    if (IsRead(entry.file.name)) {
+      const Known& facts = known_.at(entry.file.name);
+      entry.file.is_read = true;
+      entry.file.kind = facts.kind;
+      entry.file.label = facts.label;
+      entry.file.reference_id = facts.reference_id;
+      entry.file.fault = facts.fault;
+      entry.file.has_skin = facts.has_skin;
+      entry.patient_hash = facts.patient_hash;
     } else {
-      listing.entries.push_back({std::move(file), {}});
+      ++listing.unread;
     }
+    listing.entries.push_back(std::move(entry));
   }
   JoinPlans(listing);
-  if (is_changed) Store();
   return listing;
 }
 
 void ReceivedFiles::JoinPlans(Listing& listing) const {
-  std::map<std::string, std::string> newest;  // structure set of each instance
+  std::map<std::string, const Entry*> newest;  // structure set of each instance
   for (const Entry& entry : listing.entries)
     if (entry.file.kind == ReceivedKind::kStructures)
-      newest.emplace(known_.at(entry.file.name).instance_uid, entry.file.name);
+      newest.emplace(known_.at(entry.file.name).instance_uid, &entry);
   for (Entry& entry : listing.entries) {
     if (entry.file.kind != ReceivedKind::kPlan) continue;
-    const auto found = newest.find(known_.at(entry.file.name).structure_set_uid);
-    if (found != newest.end()) entry.file.structures = found->second;
+    const Known& plan = known_.at(entry.file.name);
+    if (const auto found = newest.find(plan.structure_set_uid); found != newest.end()) {
+      entry.file.structures = found->second->file.name;
+      entry.file.has_skin = found->second->file.has_skin;
+    }
+    for (const ReceivedImages::Series& series : listing.series)
+      if (!plan.frame_uid.empty() && series.facts.frame_uid == plan.frame_uid)
+        entry.file.series.push_back(series.facts.uid);
   }
+}
+
+std::optional<std::vector<fs::path>> ReceivedFiles::ImagesOf(const std::string& series) {
+  const std::lock_guard lock(mutex_);
+  Load();
+  const Found found = Look();
+  ReadSome(found);
+  for (const auto& image : found.images)
+    if (!images_.IsKnown(image.name)) return std::nullopt;
+  std::vector<fs::path> files;
+  for (const std::string& name : images_.Of(series, found.images)) files.push_back(PathOf(name));
+  if (files.empty()) throw DataError(say::scan::NoReceivedFile());
+  return files;
 }
 
 fs::path ReceivedFiles::PathOf(const std::string& name) const {

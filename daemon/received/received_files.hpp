@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/received/received_images.hpp"
 #include "web/model/planning.hpp"
 
 namespace plumb {
@@ -26,15 +28,24 @@ class ReceivedFiles {
     std::string patient_hash;  ///< Empty: the file states no Patient ID.
   };
   struct Listing {
-    std::vector<Entry> entries;  ///< Newest first.
+    std::vector<Entry> entries;                  ///< Newest first.
+    std::vector<ReceivedImages::Series> series;  ///< Likewise.
     int images = 0, unlisted = 0;
+    int unread = 0;  ///< Files and images: another call reads more of them.
+    int damaged_images = 0;
+    Message image_fault;  ///< Why one of those cannot be used.
   };
-  /// Files are read by plumb-dicom-reader, a few at each call.
+  /// Files are read by plumb-dicom-reader, a few at each call, and images for two seconds.
   /// @throws IoError if the folder or the notes cannot be read or written.
   [[nodiscard]] Listing List();
 
   /// @throws DataError if there is no such file.
   [[nodiscard]] std::filesystem::path PathOf(const std::string& name) const;
+
+  /// The images of a series; nothing while not all images are read.
+  /// @throws DataError if there are none; IoError as above.
+  [[nodiscard]] std::optional<std::vector<std::filesystem::path>> ImagesOf(
+      const std::string& series);
 
   /// A draft was made of them. @throws IoError
   void NoteReference(const std::vector<std::string>& names, const std::string& reference_id);
@@ -45,12 +56,25 @@ class ReceivedFiles {
     ReceivedKind kind = ReceivedKind::kOther;
     std::string instance_uid = {}, structure_set_uid = {}, label = {}, patient_hash = {},
                 reference_id = {};
+    std::string frame_uid = {};  ///< Of a plan.
+    bool has_skin = false;       ///< Of a structure set: an external contour with points.
+    bool is_stale = false;       ///< An earlier version read it, and knew less of it.
     Message fault = {};
+  };
+  /// What is in the folder.
+  struct Found {
+    std::vector<ReceivedFile> files;
+    std::vector<ReceivedImages::Image> images;
+    int num_images = 0, unlisted = 0;
   };
 
   void Load();
   void Store() const;
-  /// Names the structure set of each plan.
+  [[nodiscard]] Found Look() const;
+  /// Reads what has not been read yet, for a while, and keeps it.
+  void ReadSome(const Found& found);
+  [[nodiscard]] bool IsRead(const std::string& name) const;
+  /// Names the structure set and the series of each plan.
   void JoinPlans(Listing& listing) const;
   [[nodiscard]] Known ReadOne(const std::string& name) const;
 
@@ -59,6 +83,7 @@ class ReceivedFiles {
   std::mutex mutex_;
   bool is_loaded_ = false;
   std::map<std::string, Known> known_;  ///< By name.
+  ReceivedImages images_;
 };
 
 }  // namespace plumb

@@ -256,7 +256,7 @@ std::string ReferenceStore::Plan(const Actor& actor, const std::string& id, int 
 
 void ReferenceStore::Approve(const Actor& actor, const std::string& id, int revision,
                              const std::string& digest, bool two_users, const std::string& reason,
-                             bool posture_confirmed) {
+                             const ConfirmedDoubts& confirmed) {
   const std::int64_t number = RequireId(id, "reference");
   if (const std::optional<Reference> reference = Find(id)) {  // before the lock is taken
     const Message fault = integrity_.Check(reference->scan_id, /*scene_only=*/true);
@@ -282,7 +282,9 @@ void ReferenceStore::Approve(const Actor& actor, const std::string& id, int revi
               actor.user, StoredNow(), reference->digest, number);
   Message approval = reason.empty() ? say::store::LogDigest(reference->digest)
                                     : say::store::LogDigestReason(reference->digest, reason);
-  if (posture_confirmed) approval = say::store::LogPostureConfirmed(std::move(approval));
+  if (confirmed.posture) approval = say::store::LogPostureConfirmed(std::move(approval));
+  if (const auto& skin_hu = confirmed.skin_threshold_hu)
+    approval = say::store::LogImagesConfirmed(std::move(approval), *skin_hu);
   change.Log(actor, "reference.approve", id, approval);
   change.Commit();
 }

@@ -21,6 +21,12 @@ struct KnownPlanning {
       other_code;  ///< Of another patient whose files have the same hash; empty if none has.
 };
 
+/// Doubts about a reference that the approver has looked at, for the log.
+struct ConfirmedDoubts {
+  bool posture = false;                          ///< The surface speaks against it.
+  std::optional<double> skin_threshold_hu = {};  ///< Its skin is that of CT images.
+};
+
 /// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds, and DataError
 /// for a plan that cannot be read, which is never replaced by a default.
 class ReferenceStore {
@@ -54,7 +60,7 @@ class ReferenceStore {
   /// @param reason  Why a scan with cautions becomes the reference, for the log; may be empty.
   void Approve(const Actor& actor, const std::string& id, int revision,
                const std::string& digest = {}, bool two_users = true,
-               const std::string& reason = {}, bool posture_confirmed = false);
+               const std::string& reason = {}, const ConfirmedDoubts& confirmed = {});
 
  private:
   StoreDatabase& database_;

@@ -77,11 +77,8 @@ ScanReport DescribeResult(const StoredResult& result, const std::string& patient
                     .pictures = std::move(pictures),
                     .footer = Text(say::result::ReportPrinted(result.version, when), language)};
   if (const auto& planned = result.compared_with)
-    report.identity.emplace_back(
-        word(say::result::kReportReference),
-        Text(say::text_report::PlanningCt(planned->roi, planned->plan_label, planned->plan_date,
-                                          planned->posture),
-             language));
+    report.identity.emplace_back(word(say::result::kReportReference),
+                                 Text(ComparedWith(*planned), language));
   for (const Message& warning : result.warnings) report.cautions.push_back(Text(warning, language));
   if (!report.numbers.empty() && result.body)
     for (const StoredBodyPart& part : result.body->parts)

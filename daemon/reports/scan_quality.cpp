@@ -8,6 +8,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/reports/text_report.hpp"
 #include "daemon/result/axis_names.hpp"
 #include "daemon/result/result_folder.hpp"
 #include "web/service/result_terms.hpp"
@@ -42,9 +43,8 @@ class Rows {
 
 void AddComparisonTo(Rows& rows, const StoredResult& result) {
   if (const auto& planned = result.compared_with)
-    rows.Add(say::text_report::Reference(),
-             say::text_report::PlanningCt(planned->roi, planned->plan_label, planned->plan_date,
-                                          planned->posture));
+    rows.Add(say::text_report::Reference(), ComparedWith(*planned),
+             planned->skin_threshold_hu.has_value());
   if (const auto& alignment = result.alignment) {
     rows.Add(say::result::QualityMarkers(),
              say::result::QualityCount(static_cast<std::int64_t>(alignment->markers_used.size())));

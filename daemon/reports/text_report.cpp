@@ -118,9 +118,7 @@ void Report::Numbers(const std::vector<ShownRow>& rows, Verdict verdict) {
 void Report::Trust(const StoredResult& result) {
   Line("\n" + Said(say::text_report::Quality()) + "\n");
   if (const auto& planned = result.compared_with)
-    Row(say::text_report::Reference(),
-        say::text_report::PlanningCt(planned->roi, planned->plan_label, planned->plan_date,
-                                     planned->posture));
+    Row(say::text_report::Reference(), ComparedWith(*planned));
   if (const auto& alignment = result.alignment) {
     Row(say::text_report::Markers(), MarkersThatPlace(*alignment));
     for (const auto& [id, residual_m] : alignment->markers_rejected)
@@ -144,6 +142,14 @@ void Report::Trust(const StoredResult& result) {
 }
 
 }  // namespace
+
+Message ComparedWith(const StoredReference& planned) {
+  if (!planned.skin_threshold_hu)
+    return say::text_report::PlanningCt(planned.roi, planned.plan_label, planned.plan_date,
+                                        planned.posture);
+  return say::text_report::PlanningCtImages(*planned.skin_threshold_hu, planned.skin_u95_mm,
+                                            planned.plan_label, planned.plan_date, planned.posture);
+}
 
 Message MarkersThatPlace(const StoredAlignment& alignment) {
   const std::vector<int>& used = alignment.markers_used;

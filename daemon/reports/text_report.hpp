@@ -17,6 +17,9 @@ namespace plumb {
 /// One line for a picture, in English: the verdict and the residual if nothing else is known.
 [[nodiscard]] std::string PictureSubtitle(const Comparison& comparison);
 
+/// What the reference was: a contour of a planning CT, or the skin of its images.
+[[nodiscard]] Message ComparedWith(const StoredReference& planned);
+
 /// Which markers place the scan, and how well they fit where they were fitted.
 [[nodiscard]] Message MarkersThatPlace(const StoredAlignment& alignment);
 

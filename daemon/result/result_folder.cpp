@@ -141,7 +141,8 @@ StoredReference Stored(const PlanningSource& planning) {
           .beam = planning.beam,
           .isocentre_lps_mm = planning.isocentre_mm,
           .skin_u95_mm = planning.skin_u95_m / kMillimetre,
-          .slice_spacing_mm = planning.slice_spacing_m / kMillimetre};
+          .slice_spacing_mm = planning.slice_spacing_m / kMillimetre,
+          .skin_threshold_hu = planning.skin_threshold_hu};
 }
 
 void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {

@@ -215,6 +215,8 @@ struct StoredReference {
   std::string source, roi, posture, plan_label, plan_date, plan_uid, structure_set_uid, beam;
   Eigen::Vector3d isocentre_lps_mm = Eigen::Vector3d::Zero();
   double skin_u95_mm = 0.0, slice_spacing_mm = 0.0;
+  /// Of CT images; not set: a contour was the surface.
+  std::optional<double> skin_threshold_hu = {};
 
   static void Fields(auto& self, const auto& visit) {
     visit("source", self.source);
@@ -228,6 +230,7 @@ struct StoredReference {
     visit("isocentre_lps_mm", self.isocentre_lps_mm);
     visit("skin_u95_mm", self.skin_u95_mm);
     visit("slice_spacing_mm", self.slice_spacing_mm);
+    visit.IfSet("skin_threshold_hu", self.skin_threshold_hu);
   }
 };
 

@@ -27,7 +27,7 @@ class BackgroundThreads : public web::BackgroundWork {
  private:
   EventLoop& loop_;
   AliveFlag alive_;
-  WorkThread reads_{64}, files_{64};
+  WorkThread reads_{64}, files_{64}, imports_{8};
 };
 
 }  // namespace plumb

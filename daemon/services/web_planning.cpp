@@ -20,6 +20,7 @@
 #include "drivers/dicom/dicom_find.hpp"
 #include "drivers/files/file_io.hpp"
 #include "web/model/limits.hpp"
+#include "words/scan.hpp"
 #include "words/upkeep.hpp"
 
 namespace plumb {
@@ -53,11 +54,15 @@ PlannedPatients PatientsByHash(Store& store) {
 }
 
 /// Copies both files, one after the other, as an upload would bring them.
+/// @param structures  Not set: there is none.
+/// @return  Size of the structure set.
 /// @throws DataError, IoError
-std::uint64_t CopyBoth(const fs::path& structures, const fs::path& plan, const fs::path& to) {
+std::uint64_t CopyBoth(const std::optional<fs::path>& structures, const fs::path& plan,
+                       const fs::path& to) {
   fs::create_directories(to.parent_path());
-  const std::vector<std::uint8_t> first = ReadWholeFile(structures, kMaxPlanningFile),
-                                  second = ReadWholeFile(plan, kMaxPlanningFile);
+  std::vector<std::uint8_t> first;
+  if (structures) first = ReadWholeFile(*structures, kMaxPlanningFile);
+  const std::vector<std::uint8_t> second = ReadWholeFile(plan, kMaxPlanningFile);
   FileWriter writer(to);
   writer.Write(first);
   writer.Write(second);
@@ -81,7 +86,7 @@ class WebPlanning final : public web::PlanningService {
 
   Received GetReceived() override {
     Renew(received_, kFilesFresh, [this](Store& store) { return ReadReceived(store); });
-    received_.value.is_settled = !received_.is_being_made;
+    received_.value.is_settled = !received_.is_being_made && received_.value.unread == 0;
     return received_.value;
   }
 
@@ -108,17 +113,8 @@ class WebPlanning final : public web::PlanningService {
       references_.AddPlanning(actor, patient_id, *sent, Imported(choice, sent, done));
     };
     InBackground(done, [=, this](Store& store) -> std::function<void()> {
-      try {
-        ReceivedFiles& files = Files(store);
-        sent->file = store.folders.Staging("received") / "both.dcm";
-        sent->structures_bytes =
-            CopyBoth(files.PathOf(choice.structures), files.PathOf(choice.plan), sent->file);
-        return [=] { import(std::nullopt); };
-      } catch (const DataError& error) {
-        return [=, why = error.message()] { import(Refused(ChangeResult::kNotFound, why)); };
-      } catch (const std::exception& error) {
-        return [=, why = MessageOf(error)] { import(Refused(ChangeResult::kFailed, why)); };
-      }
+      std::optional<Change> refusal = Gather(store, choice, *sent);
+      return [=] { import(refusal); };
     });
   }
 
@@ -158,6 +154,30 @@ class WebPlanning final : public web::PlanningService {
     if (!is_posted) done(busy);
   }
 
+  /// Puts what was chosen together, on the thread. Why it cannot be; nothing: it is in `sent`.
+  std::optional<Change> Gather(Store& store, const web::ReceivedChoice& choice,
+                               web::SentPlanning& sent) {
+    try {
+      ReceivedFiles& files = Files(store);
+      if (!choice.series.empty()) {
+        auto images = files.ImagesOf(choice.series);
+        if (!images) return Refused(ChangeResult::kConflict, say::scan::ImagesBeingRead());
+        sent.images = *std::move(images);
+        sent.threshold_hu = choice.threshold_hu;
+      }
+      std::optional<fs::path> structures;
+      if (!choice.structures.empty()) structures = files.PathOf(choice.structures);
+      const fs::path plan = files.PathOf(choice.plan);
+      sent.file = store.folders.Staging("received") / "both.dcm";
+      sent.structures_bytes = CopyBoth(structures, plan, sent.file);
+      return std::nullopt;
+    } catch (const DataError& error) {
+      return Refused(ChangeResult::kNotFound, error.message());
+    } catch (const std::exception& error) {
+      return Refused(ChangeResult::kFailed, MessageOf(error));
+    }
+  }
+
   /// What follows the import: the copy is removed, and what became of the files is kept.
   Done Imported(const web::ReceivedChoice& choice, const std::shared_ptr<web::SentPlanning>& sent,
                 const Done& done) {
@@ -166,8 +186,10 @@ class WebPlanning final : public web::PlanningService {
                    [=, this](Store& store) -> std::function<void()> {
                      std::error_code ignored;
                      fs::remove_all(sent->file.parent_path(), ignored);
+                     std::vector<std::string> names = {choice.plan};
+                     if (!choice.structures.empty()) names.push_back(choice.structures);
                      if (change.result == ChangeResult::kDone)
-                       Files(store).NoteReference({choice.structures, choice.plan}, change.id);
+                       Files(store).NoteReference(names, change.id);
                      return [] {};
                    });
       received_.made_at.reset();
@@ -192,15 +214,25 @@ class WebPlanning final : public web::PlanningService {
     if (!ReadSettings().enabled) return {};
     ReceivedFiles::Listing listing = Files(store).List();
     const PlannedPatients patients = PatientsByHash(store);
-    Received received{
-        .is_on = true, .files = {}, .images = listing.images, .unlisted = listing.unlisted};
+    Received received{.is_on = true,
+                      .images = listing.images,
+                      .unlisted = listing.unlisted,
+                      .unread = listing.unread,
+                      .damaged_images = listing.damaged_images,
+                      .image_fault = listing.image_fault};
+    const auto name = [&](const std::string& hash, auto& of) {
+      const auto found = patients.find(hash);
+      if (hash.empty() || found == patients.end()) return;
+      of.patient_id = found->second.id;
+      of.patient_code = found->second.code;
+    };
     for (ReceivedFiles::Entry& entry : listing.entries) {
-      const auto found = patients.find(entry.patient_hash);
-      if (!entry.patient_hash.empty() && found != patients.end()) {
-        entry.file.patient_id = found->second.id;
-        entry.file.patient_code = found->second.code;
-      }
+      name(entry.patient_hash, entry.file);
       received.files.push_back(std::move(entry.file));
+    }
+    for (ReceivedImages::Series& series : listing.series) {
+      name(series.patient_hash, series.facts);
+      received.series.push_back(std::move(series.facts));
     }
     return received;
   }

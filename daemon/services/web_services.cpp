@@ -42,8 +42,8 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
       button_(MakeWebAppliance(appliance, shared.sensors, shared.outline, shared.notices)),
       patients_(
           MakeWebPatients(appliance, shared.session, shared.references, shared.notices, store_)),
-      references_(
-          MakeWebReferences(shared.references, shared.session, shared.room, store_, background_)),
+      references_(MakeWebReferences(shared.references, shared.session, shared.room, store_,
+                                    background_, stop_.get_token())),
       planning_(MakeWebPlanning(shared.loop, shared.given.config_file, *references_, store_)),
       scans_(MakeWebScans(appliance, shared.references, shared.room, store_,
                           [this] { archive_.Wake(); })),

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stop_token>
 
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/shared_parts.hpp"
@@ -44,7 +45,7 @@ namespace plumb {
     web::ReferenceService& references, StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::ReferenceService> MakeWebReferences(
     const ReferenceGate& references, const CurrentSession& session, const RoomInUse& room,
-    StoreAccess& store, web::BackgroundWork& background);
+    StoreAccess& store, web::BackgroundWork& background, std::stop_token stop);
 [[nodiscard]] std::unique_ptr<web::RoomCalibrationService> MakeWebRoomCalibration(
     RoomInUse& room, StoreAccess& store);
 [[nodiscard]] std::unique_ptr<web::ScanService> MakeWebScans(Appliance& appliance,
@@ -63,6 +64,9 @@ class WebServices {
   /// Appliance and parts are borrowed and outlive this object. @param restart  Restarts the
   /// machine.
   WebServices(Appliance& appliance, SharedParts& shared, std::unique_ptr<SystemRestart> restart);
+  ~WebServices() { stop_.request_stop(); }  // or a long import would be waited for
+  WebServices(const WebServices&) = delete;
+  WebServices& operator=(const WebServices&) = delete;
 
   /// References to what this object owns.
   [[nodiscard]] web::Services services() {
@@ -86,6 +90,7 @@ class WebServices {
   [[nodiscard]] Updates& updates() { return updates_; }
 
  private:
+  std::stop_source stop_;
   StoreAccess store_;
   std::unique_ptr<web::AuditLog> audit_;
   std::unique_ptr<web::ApplianceService> button_;

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "algo/base/errors.hpp"
@@ -55,6 +56,13 @@ std::string SaidName(const fs::path& file, const fs::path& name) {
   return (name.empty() ? file : name).string();
 }
 
+CtImage ImageOf(PlanningContent content, const std::string& name) {
+  if (!content.image_fault.empty()) throw DataError(say::dicom::Damaged(name, content.image_fault));
+  if (!content.image)
+    throw DataError(say::dicom::OtherKind(name, content.modality, say::dicom::KindImage()));
+  return *std::move(content.image);
+}
+
 }  // namespace
 
 bool IsDicomFile(const fs::path& file) {
@@ -94,19 +102,17 @@ TreatmentPlan ReadTreatmentPlan(const fs::path& file, const fs::path& name) {
   return *std::move(content.plan);
 }
 
-void ForEachCtImage(const std::vector<fs::path>& paths,
-                    const std::function<void(const CtImage&, const std::string&)>& visit) {
+CtImage ReadCtImage(const fs::path& file, const fs::path& name) {
+  return ImageOf(ReadDicomFile(file, name), SaidName(file, name));
+}
+
+void ForEachCtImage(const std::vector<fs::path>& paths, const CtImageVisit& visit) {
   for (const fs::path& path : paths) {
     const bool is_folder = fs::is_directory(path);
     for (const fs::path& file : is_folder ? DicomFilesIn(path) : std::vector{path}) {
-      const PlanningContent content = ReadDicomFile(file);
+      PlanningContent content = ReadDicomFile(file);
       if (is_folder && (content.structures || content.plan)) continue;
-      if (!content.image_fault.empty())
-        throw DataError(say::dicom::Damaged(file.string(), content.image_fault));
-      if (!content.image)
-        throw DataError(
-            say::dicom::OtherKind(file.string(), content.modality, say::dicom::KindImage()));
-      visit(*content.image, file.string());
+      visit(ImageOf(std::move(content), file.string()), file.string());
     }
   }
 }

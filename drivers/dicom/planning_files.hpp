@@ -26,11 +26,17 @@ namespace plumb {
 [[nodiscard]] TreatmentPlan ReadTreatmentPlan(const std::filesystem::path& file,
                                               const std::filesystem::path& name = {});
 
+/// @throws DataError as above, also with the image's fault.
+[[nodiscard]] CtImage ReadCtImage(const std::filesystem::path& file,
+                                  const std::filesystem::path& name = {});
+
+/// Takes an image, and what messages call it.
+using CtImageVisit = std::function<void(const CtImage&, const std::string& name)>;
+
 /// Visits the CT images among files, one after the other, so that only one is in memory.
 /// @param paths  Files, and folders whose DICOM files count; structure sets and plans that lie in a
 ///               folder beside the images are left out.
 /// @throws DataError as above, for images of another kind, and for a folder without DICOM files.
-void ForEachCtImage(const std::vector<std::filesystem::path>& paths,
-                    const std::function<void(const CtImage&, const std::string& name)>& visit);
+void ForEachCtImage(const std::vector<std::filesystem::path>& paths, const CtImageVisit& visit);
 
 }  // namespace plumb

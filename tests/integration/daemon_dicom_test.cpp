@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What comes by DICOM, on the page of a real plumbd: received files, and the worklist of DCMTK's
 // own server.
+#include <algorithm>
+#include <cstdint>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <memory>
 #include <thread>
@@ -12,6 +15,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/integration/dicomd.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
@@ -40,21 +44,12 @@ std::string LocalDay(int days_from_now) {
 class DaemonDicomTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    fs::create_directory(folder_ / "spool");
     worklist_port_ = testing::FreePort();
-    std::ofstream(folder_ / "plumb.toml") << fmt::format(
-        "[dicom]\nenabled = true\nlisten = \"127.0.0.1:0\"\n"
-        "senders = [\"TPS@127.0.0.1\"]\nspool = \"{}\"\n"
-        "worklist = \"CLINIC@127.0.0.1:{}\"\n",
-        (folder_ / "spool").string(), worklist_port_);
-    dicomd_ = std::make_unique<Process>(std::vector<std::string>{
-        PLUMB_DICOMD_BINARY, "--config", (folder_ / "plumb.toml").string()});
-    ASSERT_TRUE(dicomd_->WaitForStderr(", in the clear")) << dicomd_->err();
-    const std::string& said = dicomd_->err();
-    dicomd_port_ = std::stoi(said.substr(said.find(" port ") + 6));
+    dicomd_ = std::make_unique<testing::Dicomd>(
+        folder_.path(), fmt::format("worklist = \"CLINIC@127.0.0.1:{}\"\n", worklist_port_));
     plumbd_ = std::make_unique<Plumbd>(
         folder_.path(),
-        testing::PlumbdOptions{.arguments = {"--config", (folder_ / "plumb.toml").string()}});
+        testing::PlumbdOptions{.arguments = {"--config", dicomd_->config().string()}});
     for (int i = 0; i < 10 && !plumbd_->WaitUntilUp(); ++i) {
     }
     plumbd_->WaitForState("ready");
@@ -70,14 +65,7 @@ class DaemonDicomTest : public ::testing::Test {
   void SendSmallCt() {
     auto [structures, plan] = SmallCt();
     structures.file.patient_id = plan.file.patient_id = kId;
-    const RunResult sent =
-        plumb::Run({PLUMB_BINARY, "send-dicom",
-                    Written(folder_ / "structures.dcm", DicomBytes(structures)).string(),
-                    Written(folder_ / "plan.dcm", DicomBytes(plan)).string(), "--from", "TPS",
-                    "--to", fmt::format("PLUMB@127.0.0.1:{}", dicomd_port_)});
-    ASSERT_EQ(sent.exit_code, 0) << sent.err;
-    fs::remove(folder_ / "structures.dcm");
-    fs::remove(folder_ / "plan.dcm");
+    dicomd_->Send({DicomBytes(structures), DicomBytes(plan)});
   }
 
   /// What a page shows once the appliance has looked, and `enough` holds.
@@ -104,8 +92,8 @@ class DaemonDicomTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  int worklist_port_ = 0, dicomd_port_ = 0;
-  std::unique_ptr<Process> dicomd_;
+  int worklist_port_ = 0;
+  std::unique_ptr<testing::Dicomd> dicomd_;
   std::unique_ptr<Plumbd> plumbd_;
   std::unique_ptr<HttpClient> planner_;
   std::string patient_;
@@ -162,7 +150,77 @@ TEST_F(DaemonDicomTest, WhatWasReceivedIsListedAndImportedByAPersonOnly) {
   EXPECT_EQ(plumbd_->log().find(kId), std::string::npos);
 }
 
-/// DCMTK's server of worklists, whose entries are files.
+/// Uploads of the images of the small CT, whose plan has no contour to offer.
+class DaemonImagesTest : public DaemonDicomTest {
+ protected:
+  struct Sent {
+    TreatmentPlan plan = SmallCt().second;
+    std::vector<CtImage> images = SmallImages();
+    std::string threshold = "-300";
+  };
+  /// As the page sends it: the plan, and each image behind its size.
+  test::HttpAnswer Upload(const Sent& sent, std::size_t cut_bytes = 0) {
+    const std::string plan = DicomBytes(sent.plan);
+    std::string body = plan;
+    for (const CtImage& image : sent.images) {
+      const std::string bytes = DicomBytes(image);
+      for (std::size_t i = 0; i < 8; ++i)
+        body += static_cast<char>(std::uint64_t{bytes.size()} >> (8 * i) & 0xFFU);
+      body += bytes;
+    }
+    body.resize(body.size() - cut_bytes);
+    HttpClient sender = *planner_;
+    sender.extra_headers["Content-Type"] = "application/octet-stream";
+    sender.extra_headers["X-Plumb-Planning"] = fmt::format(
+        "structures_bytes=0&plan_bytes={}&threshold_hu={}", plan.size(), sent.threshold);
+    return sender.Ask("POST", "/api/v1/patients/" + patient_ + "/planning", body);
+  }
+  /// Id of the message with which it is refused.
+  std::string Refusal(const Sent& sent) {
+    const auto answer = Upload(sent);
+    EXPECT_EQ(answer.status, 400) << answer.body;
+    EXPECT_EQ(answer.body.find(folder_.path().string()), std::string::npos) << "a path of ours";
+    return answer.json()["error_message"].value("id", "");
+  }
+  void Change(Sent& sent, const std::function<void(CtImage&)>& change) {
+    std::ranges::for_each(sent.images, change);
+  }
+};
+
+TEST_F(DaemonImagesTest, ImagesThatDoNotFitThePlanAreRefusedWithTheCause) {
+  ASSERT_EQ(Upload({}).status, 201) << Upload({}).body;
+  Sent sent;
+  Change(sent, [](CtImage& image) { image.file.patient_id = "SOMEBODY"; });
+  EXPECT_EQ(Refusal(sent), "planning.images_other_patient");
+  sent = {};
+  Change(sent, [](CtImage& image) { image.file.frame_of_reference_uid = "2.25.99"; });
+  EXPECT_EQ(Refusal(sent), "planning.other_frame");
+  sent = {};
+  Change(sent, [](CtImage& image) { image.position = "HFDR"; });
+  EXPECT_EQ(Refusal(sent), "planning.images_position");
+  sent = {.plan = SmallCt({.quirks = {simulated::CtQuirk::kDecubitus}}).second};
+  EXPECT_EQ(Refusal(sent), "planning.position_refused");
+  sent = {};
+  sent.images.erase(sent.images.begin() + 4);
+  EXPECT_EQ(Refusal(sent), "planning.images_missing");
+  sent = {};
+  sent.images.push_back(sent.images.front());
+  EXPECT_EQ(Refusal(sent), "planning.image_twice");
+  sent = {};
+  sent.images.front().series_uid = "2.25.99";
+  EXPECT_EQ(Refusal(sent), "planning.images_mixed");
+  EXPECT_EQ(Refusal({.images = {}}), "scan.planning_no_images");
+  EXPECT_EQ(Upload({}, 1).json()["error_message"]["id"], "scan.planning_images_cut");
+  // The threshold must be stated, and be one of a skin.
+  EXPECT_EQ(Upload({.threshold = "-900"}).status, 201);
+  EXPECT_EQ(Upload({.threshold = "0"}).status, 201);
+  for (const char* wrong : {"-900.1", "0.1", "nan", "soft"})
+    EXPECT_EQ(Upload({.threshold = wrong}).status, 400) << wrong;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "state"))
+    EXPECT_NE(entry.path().extension(), ".dcm") << "the files name the patient";
+}
+
+/// Servers of worklists, whose entries are files.
 class DaemonWorklistTest : public DaemonDicomTest {
  protected:
   static bool IsInstalled() {
@@ -200,34 +258,69 @@ class DaemonWorklistTest : public DaemonDicomTest {
     }
     ADD_FAILURE() << "wlmscpfs does not listen";
   }
+  /// Orthanc with its plug-in for worklists, over the same entries. False where it is missing.
+  bool StartOrthanc() {
+    const std::string program = "/usr/sbin/Orthanc",
+                      plugin = "/usr/share/orthanc/plugins/libModalityWorklists.so";
+    if (!fs::exists(program) || !fs::exists(plugin)) return false;
+    const json config = {
+        {"StorageDirectory", (folder_ / "orthanc").string()},
+        {"IndexDirectory", (folder_ / "orthanc").string()},
+        {"HttpServerEnabled", false},
+        {"DicomPort", worklist_port_},
+        {"DicomAet", "CLINIC"},
+        {"DicomCheckCalledAet", true},
+        {"DicomModalities", {{"plumb", {"PLUMB", "127.0.0.1", 11112}}}},
+        {"Plugins", json::array({plugin})},
+        {"Worklists", {{"Enable", true}, {"Database", (folder_ / "worklists/CLINIC").string()}}}};
+    std::ofstream(folder_ / "orthanc.json") << config.dump();
+    worklist_ = std::make_unique<Process>(
+        std::vector<std::string>{program, (folder_ / "orthanc.json").string()});
+    return worklist_->WaitForStderr("Orthanc has started");
+  }
+  /// One patient of today whose planning files were imported, a stranger, and one of tomorrow.
+  void MakeSteps() {
+    SendSmallCt();
+    const json plan = ReceivedOf("plan", [](const json& file) { return file["structures"] != ""; });
+    ASSERT_EQ(planner_
+                  ->Post("/api/v1/patients/" + patient_ + "/planning/received",
+                         {{"structures", plan["structures"]}, {"plan", plan["name"]}})
+                  .status,
+              201);
+    AddStep("A1", kId, LocalDay(0), "093000");
+    AddStep("A2", "SOMEBODY-ELSE", LocalDay(0), "100000");
+    AddStep("A3", kId, LocalDay(1), "093000");
+  }
+  void ExpectTheOneWhoIsKnown() {
+    const json before = planner_->Get("/api/v1/status").json()["session"];
+    const json list = Settled("/api/v1/worklist", [](const json&) { return true; });
+    EXPECT_TRUE(list["is_on"].get<bool>());
+    EXPECT_TRUE(list["fault"].is_null()) << list.dump();
+    ASSERT_EQ(list["patients"].size(), 1U) << list.dump();
+    EXPECT_EQ(list["patients"][0]["time"], "09:30");
+    EXPECT_EQ(list["patients"][0]["patient_code"], "CT-1");
+    EXPECT_EQ(list["patients"][0]["patient_id"], patient_);
+    EXPECT_EQ(list["unknown"], 1);
+    EXPECT_EQ(list.dump().find(kId), std::string::npos);
+    EXPECT_EQ(planner_->Get("/api/v1/status").json()["session"], before) << "it changes none";
+    EXPECT_EQ(plumbd_->log().find(kId), std::string::npos);
+  }
+
   std::unique_ptr<Process> worklist_;
 };
 
 TEST_F(DaemonWorklistTest, TodaysPatientsAreThoseWhoseHashIsKnown) {
   if (!IsInstalled()) PLUMB_SKIP("DCMTK's programs are not installed: apt install dcmtk");
-  SendSmallCt();
-  const json plan = ReceivedOf("plan", [](const json& file) { return file["structures"] != ""; });
-  ASSERT_EQ(planner_
-                ->Post("/api/v1/patients/" + patient_ + "/planning/received",
-                       {{"structures", plan["structures"]}, {"plan", plan["name"]}})
-                .status,
-            201);
-  AddStep("A1", kId, LocalDay(0), "093000");
-  AddStep("A2", "SOMEBODY-ELSE", LocalDay(0), "100000");
-  AddStep("A3", kId, LocalDay(1), "093000");
+  MakeSteps();
   StartWorklist();
-  const json before = planner_->Get("/api/v1/status").json()["session"];
-  const json list = Settled("/api/v1/worklist", [](const json&) { return true; });
-  EXPECT_TRUE(list["is_on"].get<bool>());
-  EXPECT_TRUE(list["fault"].is_null()) << list.dump();
-  ASSERT_EQ(list["patients"].size(), 1U) << list.dump();
-  EXPECT_EQ(list["patients"][0]["time"], "09:30");
-  EXPECT_EQ(list["patients"][0]["patient_code"], "CT-1");
-  EXPECT_EQ(list["patients"][0]["patient_id"], patient_);
-  EXPECT_EQ(list["unknown"], 1);
-  EXPECT_EQ(list.dump().find(kId), std::string::npos);
-  EXPECT_EQ(planner_->Get("/api/v1/status").json()["session"], before) << "it changes no session";
-  EXPECT_EQ(plumbd_->log().find(kId), std::string::npos);
+  ExpectTheOneWhoIsKnown();
+}
+
+TEST_F(DaemonWorklistTest, OrthancIsAskedAsWell) {
+  if (!IsInstalled()) PLUMB_SKIP("DCMTK's programs are not installed: apt install dcmtk");
+  MakeSteps();
+  if (!StartOrthanc()) PLUMB_SKIP("Orthanc is not installed: apt install orthanc");
+  ExpectTheOneWhoIsKnown();
 }
 
 TEST_F(DaemonWorklistTest, AServerThatIsNotThereIsSaidAndHoldsNothingUp) {

@@ -8,13 +8,16 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <thread>
 
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
 #include "algo/comparison/correction.hpp"
 #include "drivers/simulator/suites/board_scenes.hpp"
+#include "drivers/simulator/suites/ct_images.hpp"
 #include "drivers/simulator/suites/dicom_writer.hpp"
 #include "drivers/simulator/suites/planning_ct.hpp"
+#include "tests/integration/dicomd.hpp"
 #include "tests/support/calibrate_room.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
@@ -45,8 +48,11 @@ const Pose kIecWorld = simulated::CalibrationBoardPose().inverse();
 class DaemonPlanningTest : public ::testing::Test {
  protected:
   void SetUp() override {
+    dicomd_ = std::make_unique<testing::Dicomd>(folder_.path());
     plumbd_ = std::make_unique<Plumbd>(
-        folder_.path(), testing::PlumbdOptions{.arguments = {"--sim-board"}, .scenes = 5});
+        folder_.path(),
+        testing::PlumbdOptions{.arguments = {"--sim-board", "--config", dicomd_->config().string()},
+                               .scenes = 5});
     for (int i = 0; i < 10 && !plumbd_->WaitUntilUp(); ++i) {
     }
     plumbd_->WaitForState("ready");
@@ -92,8 +98,9 @@ class DaemonPlanningTest : public ::testing::Test {
 
   void CalibrateRoom() { testing::CalibrateRoom(*plumbd_, *engineer_, *planner_); }
 
-  /// Plans the draft as it is, has another person approve it, and opens a fraction.
-  void Approve(const std::string& reference) {
+  /// Plans the draft as it is, and has another person approve it.
+  /// @param skin_of_images  It must be confirmed that this is the body's.
+  void Approve(const std::string& reference, bool skin_of_images = false) {
     const std::string path = "/api/v1/references/" + reference;
     const json draft = planner_->Get(path).json();
     json plan = {
@@ -108,9 +115,19 @@ class DaemonPlanningTest : public ::testing::Test {
     ASSERT_EQ(planner_->Put(path + "/plan", plan).status, 200);
     const json planned = approver_->Get(path).json();
     EXPECT_EQ(planned["room"]["gantry_xy"], (json{0.0, 1.0})) << planned.dump();
-    const auto approved = approver_->Post(path + "/approve", {{"revision", planned["revision"]},
-                                                              {"digest", planned["digest"]},
-                                                              {"password", kPassword}});
+    json approval = {
+        {"revision", planned["revision"]}, {"digest", planned["digest"]}, {"password", kPassword}};
+    if (skin_of_images) {
+      for (const json& said : {json(), json(false)}) {
+        json without = approval;
+        if (!said.is_null()) without["images_confirmed"] = said;
+        const auto refused = approver_->Post(path + "/approve", without);
+        EXPECT_EQ(refused.status, 409) << refused.body;
+        EXPECT_EQ(refused.json()["error_message"]["id"], "store.reference_images");
+      }
+      approval["images_confirmed"] = true;
+    }
+    const auto approved = approver_->Post(path + "/approve", approval);
     ASSERT_EQ(approved.status, 200) << approved.body;
   }
 
@@ -164,18 +181,34 @@ class DaemonPlanningTest : public ::testing::Test {
     return planner_->Get("/api/v1/results/" + scan).json();
   }
 
-  json ScanFraction() {
+  /// @param said_of_it  What the scan's quality must say of the reference.
+  json ScanFraction(const std::string& said_of_it = "BODY") {
     const json opened = OpenSession();
     EXPECT_EQ(opened["reference"]["source"], "planning_ct");
     const std::string scan = plumbd_->ScanOnce()["last_result"]["scan"];
     const json session = planner_->Get("/api/v1/status").json()["session"];
     EXPECT_EQ(planner_->Post("/api/v1/treatment/close", {{"session_id", session["id"]}}).status,
               200);
-    EXPECT_THAT(planner_->Get("/api/v1/scans/" + scan + "/quality").body, HasSubstr("BODY"));
+    EXPECT_THAT(planner_->Get("/api/v1/scans/" + scan + "/quality").body, HasSubstr(said_of_it));
     return planner_->Get("/api/v1/results/" + scan).json();
   }
 
+  /// What the couch has to do after PlannedBody().
+  [[nodiscard]] static Vector6d TrueCouch() {
+    const simulated::SuitePlan demo = DemoPlan();
+    const Pose T_motion =
+        kIecWorld * demo.scenes.front().T_world_body * PlannedBody(demo.scenes.front()).inverse();
+    return CouchVector(T_motion, Eigen::Vector3d::Zero(), Pose::Identity());
+  }
+  static void ExpectShifts(const json& numbers, const Vector6d& couch) {
+    // Measured: 0.84, 0.45 and 0.48 mm off, at intervals of 2.1, 3.0 and 1.7 mm.
+    EXPECT_NEAR(numbers["lateral_mm"].get<double>(), couch(0) / kMillimetre, 1.8);
+    EXPECT_NEAR(numbers["longitudinal_mm"].get<double>(), couch(1) / kMillimetre, 1.8);
+    EXPECT_NEAR(numbers["vertical_mm"].get<double>(), couch(2) / kMillimetre, 1.8);
+  }
+
   testing::TempFolder folder_;
+  std::unique_ptr<testing::Dicomd> dicomd_;
   std::unique_ptr<Plumbd> plumbd_;
   std::unique_ptr<HttpClient> engineer_, planner_, approver_;
   std::string patient_;
@@ -198,6 +231,7 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   EXPECT_EQ(scene["source"], "dicom");
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path()))
     EXPECT_NE(entry.path().extension(), ".dcm") << "the files name the patient";
+  EXPECT_FALSE(scene["planning"].contains("skin_threshold_hu")) << "a contour has none";
   Approve(reference);
 
   // The board lies there and no body: whatever is seen, the room is not calibrated.
@@ -210,15 +244,8 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   EXPECT_EQ(result["compared_with"]["source"], "dicom");
   EXPECT_TRUE(result["room_calibration"]["used"].get<bool>());
   ASSERT_TRUE(result["correction"].is_object()) << result["reasons"].dump();
-  const simulated::SuitePlan demo = DemoPlan();
-  const Pose T_motion =
-      kIecWorld * demo.scenes.front().T_world_body * PlannedBody(demo.scenes.front()).inverse();
-  const Vector6d couch = CouchVector(T_motion, Eigen::Vector3d::Zero(), Pose::Identity());
-  const json& numbers = result["correction"];
-  // Measured: 0.84, 0.45 and 0.48 mm off, at intervals of 2.1, 3.0 and 1.7 mm.
-  EXPECT_NEAR(numbers["lateral_mm"].get<double>(), couch(0) / kMillimetre, 1.8);
-  EXPECT_NEAR(numbers["longitudinal_mm"].get<double>(), couch(1) / kMillimetre, 1.8);
-  EXPECT_NEAR(numbers["vertical_mm"].get<double>(), couch(2) / kMillimetre, 1.8);
+  const Vector6d couch = TrueCouch();
+  ExpectShifts(result["correction"], couch);
 
   // That position is captured. Each session compares with what was chosen for it.
   const std::string captured = Capture(planner_->Get("/api/v1/status").json()["last_result"]["id"]);
@@ -239,6 +266,68 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   EXPECT_FALSE(against_surface["compared_with"].is_object()) << against_surface.dump();
   EXPECT_NEAR(against_surface["correction"]["lateral_mm"].get<double>(), 0, 1.5);
   EXPECT_NEAR(against_surface["correction"]["vertical_mm"].get<double>(), 0, 1.5);
+}
+
+TEST_F(DaemonPlanningTest, FromReceivedImagesToSixNumbersInACalibratedRoom) {
+  // The planning system sends a plan, a structure set without an external contour, and the images.
+  const simulated::PlanningCtOptions options{.spacing_m = 5 * kMillimetre,
+                                             .quirks = {CtQuirk::kShort, CtQuirk::kNoExternal}};
+  const simulated::SuitePlan demo = DemoPlan();
+  const auto [structures, plan] = simulated::MakePlanningCt(
+      demo.scenes.front().body->surface, PlannedBody(demo.scenes.front()), options);
+  std::vector<std::string> files = {DicomBytes(structures), DicomBytes(plan)};
+  simulated::MakeCtImages(structures, options, {.pixel_mm = 2.4},
+                          [&](const CtImage& image) { files.push_back(DicomBytes(image)); });
+  dicomd_->Send(files);
+  json received;
+  const auto is_complete = [&] {
+    received = planner_->Get("/api/v1/planning/received").json();
+    return received.value("is_settled", false) && received["files"].size() == 2 &&
+           received["unread"] == 0;
+  };
+  for (int i = 0; i < 600 && !is_complete(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  ASSERT_TRUE(is_complete()) << received.dump();
+  ASSERT_EQ(received["series"].size(), 1U) << received.dump();
+  const json& series = received["series"][0];
+  EXPECT_EQ(series["images"], files.size() - 2);
+  const json& file = received["files"][received["files"][0]["kind"] == "plan" ? 0 : 1];
+  EXPECT_EQ(file["has_skin"], false);
+  EXPECT_EQ(file["series"], json({series["uid"]}));
+
+  const auto import = [&](json body) {
+    body["plan"] = file["name"];
+    body["structures"] = file["structures"];
+    return planner_->Post("/api/v1/patients/" + patient_ + "/planning/received", body);
+  };
+  EXPECT_THAT(import({}).json()["error_message"]["id"].get<std::string>(),
+              HasSubstr("planning.no_external"))
+      << "images are never taken by themselves";
+  EXPECT_EQ(import({{"series", series["uid"]}}).status, 400) << "at which threshold?";
+  EXPECT_EQ(import({{"series", series["uid"]}, {"threshold_hu", 1}}).status, 400);
+  EXPECT_EQ(import({{"series", "2.25.404"}, {"threshold_hu", -300}}).status, 404);
+  const auto imported = import({{"series", series["uid"]}, {"threshold_hu", -350}});
+  ASSERT_EQ(imported.status, 201) << imported.body;
+  const std::string reference = imported.json()["id"];
+  const json draft = planner_->Get("/api/v1/references/" + reference).json();
+  const json scene =
+      planner_->Get("/api/v1/scans/" + draft["scan_id"].get<std::string>() + "/files/scene.json")
+          .json();
+  EXPECT_EQ(scene["planning"]["skin_threshold_hu"], -350);
+  EXPECT_THAT(scene["warnings"].dump(),
+              AllOf(HasSubstr("CT images at -350 HU"), HasSubstr("the couch, whose top")));
+  Approve(reference, /*skin_of_images=*/true);
+  EXPECT_THAT(engineer_->Get("/api/v1/audit").body, HasSubstr("CT images at -350 HU confirmed"));
+
+  CalibrateRoom();
+  const json result = ScanFraction("skin of the CT images at -350 HU");
+  EXPECT_EQ(result["compared_with"]["skin_threshold_hu"], -350);
+  EXPECT_DOUBLE_EQ(result["compared_with"]["skin_u95_mm"].get<double>(),
+                   1e3 * scene["planning"]["skin_u95_m"].get<double>());
+  ASSERT_TRUE(result["correction"].is_object()) << result["reasons"].dump();
+  ExpectShifts(result["correction"], TrueCouch());
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ / "state"))
+    EXPECT_NE(entry.path().extension(), ".dcm") << "the files name the patient";
 }
 
 TEST_F(DaemonPlanningTest, FilesOfAnotherPatientAreRefusedUntilAPersonHasLooked) {

@@ -195,6 +195,8 @@ class FakeAppliance : public web::BackgroundWork,
                    Done done) override;
   std::function<std::filesystem::path(const web::SentPlanning&)> import_planning;
   web::SentPlanning sent_planning;  ///< The last one.
+  /// Threshold of the CT images that a scan's scene was made of; nothing: it was not.
+  std::function<std::optional<double>(const Scan&)> skin_of_images;
   Received received;
   TodaysWorklist worklist;
   Received GetReceived() override { return received; }

@@ -425,9 +425,15 @@ void FakeAppliance::ImportReceived(const Actor& actor, const std::string& patien
     return std::ranges::any_of(received.files,
                                [&](const ReceivedFile& file) { return file.name == name; });
   };
-  if (!is_there(choice.structures) || !is_there(choice.plan))
+  const bool has_series =
+      choice.series.empty() || std::ranges::any_of(received.series, [&](const auto& one) {
+        return one.uid == choice.series;
+      });
+  const bool has_structures = choice.structures.empty() || is_there(choice.structures);
+  if (!has_structures || !has_series || !is_there(choice.plan))
     return Finish(done, Refused(ChangeResult::kNotFound, say::scan::NoReceivedFile()));
   web::SentPlanning sent;
+  if (!choice.series.empty()) sent.threshold_hu = choice.threshold_hu;
   sent.roi = choice.roi;
   sent.beam = choice.beam;
   sent.reason = choice.reason;
@@ -502,6 +508,9 @@ void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, 
     return Finish(done, Refused(ChangeResult::kConflict, say::store::ReferenceNeedsReason()));
   if (RoomOfReference(*found).contradicts_posture && !considered.posture)
     return Finish(done, Refused(ChangeResult::kConflict, say::store::ReferencePosture()));
+  if (const auto scan = FindScan(found->scan_id); scan && skin_of_images && !considered.images)
+    if (const std::optional<double> hu = skin_of_images(*scan))
+      return Finish(done, Refused(ChangeResult::kConflict, say::store::ReferenceImages(*hu)));
   found->approved_by = actor.user;
   found->approved_at = WallClock::now();
   if (Patient* patient = PatientOf(found->patient_id)) patient->approved_reference_id = id;

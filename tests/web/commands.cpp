@@ -66,8 +66,16 @@ Received SomeReceived(const FakeAppliance& service) {
                 file("d", ReceivedKind::kPlan, "PELVIS"), file("c", ReceivedKind::kOther, ""),
                 file("b", ReceivedKind::kPlan, "THORAX"),
                 file("a", ReceivedKind::kStructures, "THORAX CT")},
+      .series = {{.uid = "2.25.7",
+                  .frame_uid = "2.25.8",
+                  .received_at = "2026-03-01T09:31:00Z",
+                  .sender = "PLANNING",
+                  .address = "192.168.1.20",
+                  .images = 61}},
       .images = 98};
   received.files[1].structures = received.files[3].structures = "a";
+  received.files[3].has_skin = true;
+  received.files[0].series = {"2.25.7"};
   received.files[1].patient_id = "other";
   received.files[1].patient_code = "CT-2";
   received.files[2].fault = say::dicom::CannotRead();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The planning CT as reference on the page: planning_test.mjs NODE_MODULES SERVER OUT_FOLDER
 // CHROMIUM
+import { readdirSync } from 'node:fs';
+
 import { Harness } from './harness.mjs';
 
 const [modules, server, folder, chromium] = process.argv.slice(2);
@@ -134,6 +136,48 @@ await h.step('a session compares with what was chosen for it', async () => {
   await h.look(planner, 'captured-result');
 });
 
+await h.step('without a contour the skin of CT images counts, at a stated threshold', async () => {
+  const other = (await h.api(planner, 'patients', 'POST', { code: 'CT-IMAGES', site: '' })).body.id;
+  await planner.goto(`${h.url}#/patient/${other}`);
+  await planner.getByText('Reference from the planning CT').click();
+  const threshold = planner.getByLabel('Threshold of the skin (HU)');
+  equal(await threshold.isVisible(), false, 'nobody has asked for images');
+  await planner.getByLabel('Take the skin from the CT images').check();
+  equal(await threshold.inputValue(), '-300', 'where planning systems draw it');
+  await planner.getByLabel('Plan', { exact: true }).setInputFiles(h.file('data/plan.dcm'));
+  const images = readdirSync(h.file('data/images')).map((name) => h.file(`data/images/${name}`));
+  const files = planner.getByLabel('CT images', { exact: true });
+  const importAll = planner.getByRole('button', { name: 'Import', exact: true });
+  await files.setInputFiles([...images.slice(0, 30), ...images.slice(31)]);
+  await threshold.fill('1');
+  await importAll.click();
+  check(await threshold.evaluate((input) => !input.validity.valid), 'brighter than any skin');
+  await threshold.fill('-350');
+  await importAll.click();
+  await planner.getByText('at least one is missing').first().waitFor();
+  await files.setInputFiles(images);
+  await h.look(planner, 'planning-images-upload');
+  await importAll.click();
+  await planner.waitForURL(/#\/plan\//);
+  const facts = planner.locator('.planning-facts');
+  await facts.getByText('CT images at −350 HU').waitFor();
+  await facts.getByText('only the frame of reference shows').waitFor();
+  await facts.getByText('are added to the uncertainty along its normal').waitFor();
+  await h.look(planner, 'planning-images-plan');
+  await planner.getByRole('button', { name: 'Save plan' }).click();
+  await second.goto(planner.url());
+  await second.locator('.planning-facts').waitFor();
+  await second.getByRole('button', { name: 'Review and approve' }).click();
+  const summary = second.locator('.summary');
+  await summary.getByText('the surface is the skin of the CT images at −350 HU').waitFor();
+  const looked = summary.getByLabel('I have looked at the surface');
+  check(await looked.evaluate((box) => box.required && !box.checked), 'a person has to say it');
+  await looked.check();
+  await h.look(second, 'planning-images-summary-phone');
+  await h.sign(second);
+  await second.getByText('approved by second').first().waitFor();
+});
+
 await h.step('another patient’s files are refused until a person has looked', async () => {
   h.tell('foreignfiles');
   await planner.goto(`${h.url}#/patient/${patient}`);
@@ -165,7 +209,7 @@ await h.step('what the planning system sent is listed and imported from there', 
   equal(await rowOf('PELVIS').getByRole('button').count(), 0, 'another patient’s');
   equal(await rowOf('BREAST').getByText('its structure set was not received').count(), 1, 'alone');
   equal(await received.getByText('It cannot be read.').count(), 1, 'damaged');
-  await planner.getByText('98 CT images are not used.').waitFor();
+  await planner.getByText('98 CT images were received.').waitFor();
   await h.look(planner, 'planning-received');
   await second.goto(`${h.url}#/patient/${patient}`);
   await second.getByText('Reference from the planning CT').click();
@@ -181,6 +225,29 @@ await h.step('what the planning system sent is listed and imported from there', 
   await planner.goto(`${h.url}#/patient/${patient}`);
   await planner.getByText('Reference from the planning CT').click();
   await rowOf('Plan THORAX').getByRole('link', { name: 'a reference' }).waitFor();
+});
+
+await h.step('received images are offered where a plan has no contour', async () => {
+  await planner.goto(`${h.url}#/patients`);
+  await planner.goto(`${h.url}#/patient/${patient}`);
+  await planner.getByText('Reference from the planning CT').click();
+  const received = planner.getByRole('table', { name: 'From the planning system' });
+  const breast = received.locator('tbody tr', { hasText: 'BREAST' });
+  await breast.getByText('its CT images are here').waitFor();
+  equal(await breast.getByRole('button').count(), 0, 'not without asking for them');
+  await planner.getByLabel('Take the skin from the CT images').check();
+  const take = breast.getByRole('button', { name: 'Import with 61 CT images' });
+  await take.waitFor();
+  equal(await received.getByRole('button', { name: 'with 61 CT images' }).count(), 1,
+    'not for the plan that has a contour');
+  await h.look(planner, 'planning-received-images');
+  await planner.locator('.planning-upload').getByLabel('Reason for the new reference')
+    .fill('no contour');
+  await take.click();
+  await planner.getByLabel('The files are of this patient').check();
+  await take.click();
+  await planner.waitForURL(/#\/plan\//);
+  await planner.locator('.planning-facts').getByText('CT images at −300 HU').waitFor();
 });
 
 await h.step('the worklist of today opens a session by a tap, and never changes one', async () => {

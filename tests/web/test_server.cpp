@@ -29,6 +29,7 @@
 #include "daemon/planning/planning_import.hpp"
 #include "daemon/reports/scan_quality.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/simulator/suites/ct_images.hpp"
 #include "drivers/simulator/suites/dicom_writer.hpp"
 #include "drivers/simulator/suites/planning_ct.hpp"
 #include "drivers/simulator/suites/suite_plan.hpp"
@@ -73,8 +74,8 @@ SensorProfiles KnownSensor() {
           .versions = {learned(4, 0.981), learned(3, 1.0046), learned(2, 1.0045)}};
 }
 
-/// The files of a small planning CT for the browser to send, and the import of what it sends.
-void ServePlanning(FakeAppliance& service, const fs::path& root) {
+/// The files of a small planning CT for the browser to send.
+void WritePlanning(const fs::path& root) {
   const simulated::SuitePlan demo = simulated::PlanSuite({});
   const simulated::ScenePlan& scene = demo.scenes.front();
   Pose T_iec_body = scene.T_world_body;
@@ -88,26 +89,51 @@ void ServePlanning(FakeAppliance& service, const fs::path& root) {
                    std::string_view(DicomBytes(structures)));
     WriteWholeFile(root / (std::string(name) + "plan.dcm"), std::string_view(DicomBytes(plan)));
   }
+  fs::create_directory(root / "images");
+  const simulated::PlanningCtOptions options{.spacing_m = 0.005,
+                                             .quirks = {simulated::CtQuirk::kShort}};
+  const auto planned = simulated::MakePlanningCt(scene.body->surface, T_iec_body, options);
+  simulated::MakeCtImages(planned.first, options, {.pixel_mm = 2.4},
+                          [&, number = 100](const CtImage& image) mutable {
+                            WriteWholeFile(root / "images" / fmt::format("{}.dcm", number++),
+                                           std::string_view(DicomBytes(image)));
+                          });
+}
+
+/// The import of what the browser sends; in the place of received files are those of above.
+void ServePlanning(FakeAppliance& service, const fs::path& root) {
+  WritePlanning(root);
   service.import_planning = [root, number = 0](const web::SentPlanning& sent) mutable {
     const fs::path folder = root / fmt::format("planned-{}", ++number);
     fs::create_directories(folder);
-    fs::path structures = sent.file;
+    PlanningFiles files{.structures = folder / "structures.dcm",
+                        .plan = folder / "plan.dcm",
+                        .structures_name = "STRUCTURES",
+                        .plan_name = "PLAN"};
+    const SentParts parts{.structures_bytes = sent.structures_bytes, .plan_bytes = sent.plan_bytes};
+    PlanningImages images = ImagesIn({root / "images"}, sent.threshold_hu.value_or(0), {});
     if (sent.file.empty()) {  // received, not sent
-      structures = folder / "structures.dcm";
-      fs::copy_file(root / "structures.dcm", structures);
-      fs::copy_file(root / "plan.dcm", folder / "plan.dcm");
+      fs::copy_file(root / "structures.dcm", files.structures);
+      fs::copy_file(root / "plan.dcm", files.plan);
     } else {
-      SplitPlanning(sent.file, sent.structures_bytes, folder / "plan.dcm");
+      SplitPlanning(sent.file, parts, files);
+      images.for_each = [&](const CtImageVisit& visit) {
+        ForEachSentImage(sent.file, parts, folder / "image.dcm", visit);
+      };
     }
+    if (sent.threshold_hu && (sent.file.empty() || parts.structures_bytes == 0))
+      files.structures.clear();
     PlanningChoice choice;
     if (!sent.roi.empty()) choice.roi = sent.roi;
-    const ReadPlan read = ReadPlanning({.structures = structures,
-                                        .plan = folder / "plan.dcm",
-                                        .structures_name = "STRUCTURES",
-                                        .plan_name = "PLAN"},
-                                       choice);
+    const ReadPlan read = sent.threshold_hu ? ReadPlanningWithImages(files, images, choice)
+                                            : ReadPlanning(files, choice);
     WriteScene(read.scene, folder / "scene");
     return folder;
+  };
+  service.skin_of_images = [](const Scan& scan) -> std::optional<double> {
+    if (!IsSceneFolder(scan.folder / "scene")) return std::nullopt;
+    const auto planning = ReadStoredScene(scan.folder / "scene").scene.planning;
+    return planning ? planning->skin_threshold_hu : std::nullopt;
   };
 }
 

@@ -66,6 +66,8 @@ void Accounts::AddSignedActs(Routes& routes) {
                 considered.reason = fields.Text("reason", kMinReason, kMaxReason);
               if (fields.Has("posture_confirmed"))
                 considered.posture = fields.Flag("posture_confirmed");
+              if (fields.Has("images_confirmed"))
+                considered.images = fields.Flag("images_confirmed");
               return [this, id = request.arguments.at(0), revision, considered,
                       digest = fields.Text("digest", 1, 64)](const Actor& actor, Done done) {
                 references_.ApproveReference(actor, id, revision, digest, considered,

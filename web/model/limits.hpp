@@ -43,6 +43,10 @@ inline constexpr std::size_t kMaxDrawnPoints = 3000;
 inline constexpr std::size_t kMinReason = 3, kMaxReason = 200;
 /// Of a structure set and of a plan, each; a file of a planning CT is smaller.
 inline constexpr std::uint64_t kMaxPlanningFile = std::uint64_t{64} << 20;
+/// Of the images of a CT together, as they are sent.
+inline constexpr std::uint64_t kMaxPlanningImages = std::uint64_t{1} << 30;
+/// Hounsfield units of the skin in CT images.
+inline constexpr double kMinSkinThreshold_hu = -900.0, kMaxSkinThreshold_hu = 0.0;
 /// Name of a contour or a beam: the longest that DICOM permits, in bytes of UTF-8.
 inline constexpr std::size_t kMaxPlanningName = 4 * 64;
 inline constexpr int kMaxFraction = 999;

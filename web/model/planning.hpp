@@ -16,6 +16,17 @@ template <>
 inline constexpr auto kNamesOf<ReceivedKind> = NamesUpTo<ReceivedKind::kOther>({"structures",
                                                                                 "plan", "other"});
 
+/// CT images of one series that plumb-dicomd received.
+struct ReceivedSeries {
+  std::string uid = {};                   ///< As the images state it.
+  std::string frame_uid = {};             ///< Of their frame of reference.
+  std::string received_at = {};           ///< When the newest of them came.
+  std::string sender = {}, address = {};  ///< Who sent the newest of them.
+  int images = 0;                         ///< Different ones.
+  /// As of ReceivedFile.
+  std::string patient_id = {}, patient_code = {};
+};
+
 /// A file that plumb-dicomd received. It waits until a physicist imports it, or it is too old.
 struct ReceivedFile {
   std::string name = {};  ///< Our own.
@@ -26,6 +37,11 @@ struct ReceivedFile {
   std::string label = {};  ///< As the planning system calls it.
   std::string structures =
       {};  ///< Of a plan: the received file that it was made on; empty: not here.
+  /// Of a plan: series of images in its frame of reference, newest first.
+  std::vector<std::string> series = {};
+  /// Of a plan: its structure set is here, and has an external contour with points. Of a structure
+  /// set: it has one.
+  bool has_skin = false;
   /// The patient whose earlier planning files state the same Patient ID; empty: nobody's do.
   std::string patient_id = {}, patient_code = {};
   std::string reference_id = {};  ///< The draft that was made of it; empty: none.
@@ -34,12 +50,16 @@ struct ReceivedFile {
 };
 
 struct Received {
-  bool is_on = false;                    ///< Something is to be received.
-  std::vector<ReceivedFile> files = {};  ///< Newest first, no images.
-  int images = 0;                        ///< CT images, which are not used.
-  int unlisted = 0;                      ///< Older files than those of the list.
-  bool is_settled = true;                ///< False: this is being read anew; ask again.
-  Message fault = {};                    ///< Why nothing could be read; empty: it could.
+  bool is_on = false;                       ///< Something is to be received.
+  std::vector<ReceivedFile> files = {};     ///< Newest first, no images.
+  std::vector<ReceivedSeries> series = {};  ///< Newest first.
+  int images = 0;                           ///< CT images, read or not.
+  int unlisted = 0;                         ///< Older files than those of the list.
+  int unread = 0;                           ///< Files and images whose turn has not come yet.
+  int damaged_images = 0;                   ///< They cannot be used.
+  Message image_fault = {};                 ///< Why one of these cannot.
+  bool is_settled = true;                   ///< False: this is being read anew; ask again.
+  Message fault = {};                       ///< Why nothing could be read; empty: it could.
 };
 
 /// Somebody whom the worklist expects today.

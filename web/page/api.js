@@ -146,7 +146,7 @@ export const put = (path, body) => ask('PUT', api(path), body);
 export const removeFor = (path, body) => ask('DELETE', api(path), body,
   { timeout_ms: kLongAnswer_ms, read: orNothing });
 /// For requests that copy much: the answer comes when they are done.
-export const postLong = (path) => ask('POST', api(path), undefined,
+export const postLong = (path, body) => ask('POST', api(path), body,
   { timeout_ms: kVeryLongAnswer_ms, read: orNothing });
 export const remove = (path) => ask('DELETE', api(path), undefined, { timeout_ms: kLongAnswer_ms });
 /// A file of a scan; the texts of a picture are in the language of the page.

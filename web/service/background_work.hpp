@@ -8,8 +8,9 @@ namespace plumb::web {
 
 /// Threads beside the loop, for work that may take long.
 enum class BackgroundPool {
-  kReads,  ///< Lists, and files that are opened.
-  kFiles,  ///< Writing and removing large files.
+  kReads,    ///< Lists, and files that are opened.
+  kFiles,    ///< Writing and removing large files.
+  kImports,  ///< Planning CTs, of which one may take minutes.
 };
 
 /// Called on the loop thread.

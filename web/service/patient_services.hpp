@@ -80,8 +80,14 @@ class PatientService {
 
 /// The files of a planning CT as they were sent.
 struct SentPlanning {
-  std::filesystem::path file;  ///< The structure set, followed by the plan; it may be changed.
-  std::uint64_t structures_bytes = 0;
+  /// The structure set, followed by the plan, and by images, each behind its size in 8 bytes.
+  std::filesystem::path file;
+  std::uint64_t structures_bytes = 0;  ///< 0: no structure set, only with images.
+  std::uint64_t plan_bytes = 0;        ///< 0: up to the end of the file.
+  /// A person wants the skin of CT images at so many Hounsfield units, where there is no external
+  /// contour. Not set: there are no images.
+  std::optional<double> threshold_hu;
+  std::vector<std::filesystem::path> images;  ///< Those that were received; empty: as sent.
   std::string roi;     ///< The contour that is the skin; empty: as the file states it.
   std::string beam;    ///< Whose isocentre counts; empty: all have the same.
   std::string reason;  ///< Reason for a new reference; may be empty.
@@ -93,6 +99,9 @@ struct SentPlanning {
 struct Considered {
   std::string reason;    ///< Why the scan's cautions (ScanQuality) do not matter.
   bool posture = false;  ///< The posture is right although RoomOnMap::contradicts_posture is set.
+  /// The surface is that of the body although it is the skin of CT images, not a contour that a
+  /// person has drawn.
+  bool images = false;
 };
 
 /// The rules of services.hpp hold.

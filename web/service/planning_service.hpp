@@ -12,7 +12,9 @@ namespace plumb::web {
 
 /// Received files to import for a patient.
 struct ReceivedChoice {
-  std::string structures, plan;  ///< Their names.
+  std::string structures, plan;  ///< Their names; no structure set only with images.
+  std::string series;            ///< UID of the images' series; empty: none are wanted.
+  double threshold_hu = 0.0;     ///< Of their skin, as SentPlanning states it.
   std::string roi, beam, reason;
   bool is_same_patient = false;  ///< As in SentPlanning.
 };
@@ -25,7 +27,7 @@ class PlanningService {
   /// As it is known now; files that came since are read beside it (Received::is_settled).
   [[nodiscard]] virtual Received GetReceived() = 0;
   /// As ReferenceService::AddPlanning(): a draft, with every check and question of an upload.
-  /// kNotFound for files that are not there any more.
+  /// kNotFound for files that are not there any more, kConflict while images are still read.
   virtual void ImportReceived(const Actor& actor, const std::string& patient_id,
                               const ReceivedChoice& choice, Done done) = 0;
   /// As it is known now; the clinic's worklist is asked at most once a minute. Changes nothing.

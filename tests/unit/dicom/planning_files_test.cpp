@@ -10,6 +10,8 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
+#include <cstdint>
 #include <stop_token>
 
 #include "algo/base/errors.hpp"
@@ -18,6 +20,7 @@
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/dicom/small_files.hpp"
 #include "words/dicom.hpp"
+#include "words/scan.hpp"
 
 namespace plumb {
 namespace {
@@ -264,14 +267,95 @@ TEST_F(PlanningFilesTest, AStopRequestEndsTheReadingOfImages) {
   std::stop_source stop;
   std::size_t num_read = 0;
   const auto read = [&] {
-    return ReadPlanningWithImages({}, plan, files, -300, {}, stop.get_token(),
-                                  [&](std::size_t count) {
-                                    num_read = count;
-                                    stop.request_stop();
-                                  });
+    const auto after_one = [&](std::size_t count) {
+      num_read = count;
+      stop.request_stop();
+    };
+    return ReadPlanningWithImages({.structures = {}, .plan = plan},
+                                  ImagesIn(files, -300, stop.get_token(), after_one), {});
   };
   EXPECT_THROW((void)read(), Interrupted);
   EXPECT_EQ(num_read, 1U);
+}
+
+TEST_F(PlanningFilesTest, WithinTimeEndsAtItsLimitAndOnAStopRequest) {
+  int visits = 0;
+  const auto count = [&](const CtImage&, const std::string&) { ++visits; };
+  std::stop_source stop;
+  const CtImageVisit in_time = WithinTime(std::chrono::hours(1), stop.get_token(), count);
+  in_time({}, "");
+  EXPECT_THROW(WithinTime(std::chrono::seconds(0), stop.get_token(), count)({}, ""), DataError);
+  stop.request_stop();
+  EXPECT_THROW(in_time({}, ""), Interrupted);
+  EXPECT_EQ(visits, 1);
+}
+
+/// An upload of plan and images, as a browser puts it together.
+class SentImagesTest : public PlanningFilesTest {
+ protected:
+  static std::string Size(std::uint64_t bytes) {
+    std::string text;
+    for (int i = 0; i < 8; ++i) text += static_cast<char>(bytes >> (8 * i) & 0xFFU);
+    return text;
+  }
+  [[nodiscard]] std::filesystem::path Upload(const std::string& images) const {
+    return Write("sent", "structures" + plan_ + images);
+  }
+  /// Numbers in the names of the images.
+  [[nodiscard]] std::vector<std::string> Visit(const std::filesystem::path& sent) const {
+    std::vector<std::string> names;
+    ForEachSentImage(sent, parts_, folder_.path() / "scratch",
+                     [&](const CtImage& image, const std::string& name) {
+                       EXPECT_FALSE(image.hu.empty());
+                       names.push_back(name);
+                     });
+    return names;
+  }
+  [[nodiscard]] Message RefusalOf(const std::string& images) const {
+    try {
+      (void)Visit(Upload(images));
+    } catch (const DataError& error) {
+      return error.message();
+    }
+    return {};
+  }
+
+  const std::string plan_ = DicomBytes(SmallCt().second);
+  const std::string image_ = DicomBytes(SmallImages().front());
+  const SentParts parts_{.structures_bytes = 10, .plan_bytes = plan_.size()};
+};
+
+TEST_F(SentImagesTest, EachPartOfAnUploadBecomesWhatItWas) {
+  const auto sent = Upload(Size(image_.size()) + image_ + Size(image_.size()) + image_);
+  const PlanningFiles to{.structures = folder_.path() / "s", .plan = folder_.path() / "p"};
+  SplitPlanning(sent, parts_, to);
+  EXPECT_EQ(ReadTextFile(to.structures, 100), "structures");
+  EXPECT_EQ(ReadTextFile(to.plan, 1 << 20), plan_);
+  EXPECT_THAT(Visit(sent), ::testing::ElementsAre("CT 1", "CT 2"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "scratch")) << "it names the patient";
+  // Without images the plan ends with the upload; without a structure set it begins it.
+  SplitPlanning(Write("sent", plan_), {}, {.structures = {}, .plan = to.plan});
+  EXPECT_EQ(ReadTextFile(to.plan, 1 << 20), plan_);
+}
+
+TEST_F(SentImagesTest, WhatIsCutOrNotThereIsRefused) {
+  EXPECT_TRUE(RefusalOf(Size(image_.size()) + image_).empty());
+  EXPECT_TRUE(RefusalOf("").Is(say::scan::kPlanningNoImages));
+  for (const std::string& cut :
+       {std::string("1234567"), Size(0), Size(image_.size() + 1) + image_,
+        Size(image_.size()) + image_ + Size(1), Size(~std::uint64_t{0}) + image_})
+    EXPECT_TRUE(RefusalOf(cut).Is(say::scan::kPlanningImagesCut)) << cut.size();
+  EXPECT_TRUE(RefusalOf(Size(plan_.size()) + plan_).Is(say::dicom::kOtherKind));
+  const auto refused = [&](const SentParts& parts) {
+    EXPECT_THROW(SplitPlanning(Upload(""), parts,
+                               {.structures = folder_.path() / "s", .plan = folder_.path() / "p"}),
+                 DataError)
+        << parts.structures_bytes << ", " << parts.plan_bytes;
+  };
+  const std::uint64_t all = 10 + plan_.size();
+  refused({.structures_bytes = all});
+  refused({.structures_bytes = 10, .plan_bytes = plan_.size() + 1});
+  refused({.structures_bytes = 10, .plan_bytes = ~std::uint64_t{0}});
 }
 
 TEST_F(PlanningFilesTest, ATruncatedFileIsNeverHalfOfOne) {

@@ -3,6 +3,7 @@
 #include "daemon/received/received_files.hpp"
 
 #include <fstream>
+#include <functional>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -88,6 +89,128 @@ TEST_F(ReceivedFilesTest, DamagedFilesNotesAndMemoryHideNothingElse) {
     EXPECT_EQ(entries[1].file.kind, ReceivedKind::kPlan) << wrong;
     EXPECT_EQ(entries[1].file.sender, "") << wrong;
   }
+}
+
+/// Images of the small CT, as plumb-dicomd keeps them.
+class ReceivedImagesTest : public ReceivedFilesTest {
+ protected:
+  static constexpr const char* kCt = "1.2.840.10008.5.1.4.1.1.2";
+  static std::string NameOf(int number) {
+    return fmt::format("20260301-0940{:02}-{:016x}", number, number);
+  }
+  /// The first is the oldest, and its instance has that number.
+  void KeepImages(int from, const std::function<void(CtImage&)>& change = {}) const {
+    std::vector<CtImage> images = SmallImages();
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      if (change) change(images[i]);
+      const std::string name = NameOf(from + static_cast<int>(i));
+      Keep(name, DicomBytes(images[i]), kCt);
+      std::ofstream(spool() / (name + ".json")) << fmt::format(
+          R"({{"format":1,"received_at":"2026-03-01T09:40:{:02}Z","calling_ae_title":"TPS",)"
+          R"("address":"10.1.2.3","class_uid":"{}","instance_uid":"1.2.{}"}})",
+          i, kCt, images[i].series_uid + std::to_string(i));
+    }
+  }
+  /// Once everything is read.
+  static ReceivedFiles::Listing Settled(ReceivedFiles& files) {
+    ReceivedFiles::Listing listing = files.List();
+    for (int i = 0; i < 100 && listing.unread > 0; ++i) listing = files.List();
+    EXPECT_EQ(listing.unread, 0);
+    return listing;
+  }
+};
+
+TEST_F(ReceivedImagesTest, ImagesAreSortedIntoSeriesOfThePlansFrame) {
+  KeepSmallCt();
+  KeepImages(0);
+  KeepImages(10, [](CtImage& image) {
+    image.series_uid = "2.25.777";
+    image.file.frame_of_reference_uid = "2.25.99";
+    image.file.patient_id = "OTHER-1";
+  });
+  ReceivedFiles files = Files();
+  const auto listing = Settled(files);
+  const std::string series = SmallImages().front().series_uid;
+  const int count = static_cast<int>(SmallImages().size());
+  EXPECT_EQ(listing.images, 2 * count);
+  ASSERT_EQ(listing.series.size(), 2U);
+  EXPECT_EQ(listing.series[0].facts.uid, "2.25.777") << "the newest first";
+  EXPECT_EQ(listing.series[0].patient_hash, PatientHash(key_, "OTHER-1"));
+  EXPECT_EQ(listing.series[1].facts.uid, series);
+  EXPECT_EQ(listing.series[1].facts.images, count);
+  EXPECT_EQ(listing.series[1].facts.sender, "TPS");
+  EXPECT_EQ(listing.series[1].facts.received_at, fmt::format("2026-03-01T09:40:{:02}Z", count - 1));
+  EXPECT_EQ(listing.series[1].patient_hash, PatientHash(key_, "SIM-1"));
+  ASSERT_EQ(listing.entries.size(), 2U);
+  EXPECT_THAT(listing.entries[0].file.series, ::testing::ElementsAre(series));
+  EXPECT_TRUE(listing.entries[0].file.has_skin);
+  EXPECT_EQ(files.ImagesOf(series)->size(), static_cast<std::size_t>(count));
+  EXPECT_THROW((void)files.ImagesOf("2.25.404"), DataError);
+  EXPECT_THROW((void)files.ImagesOf(""), DataError);
+  EXPECT_EQ(ReadTextFile(folder_ / "received.json", 1 << 20).find("OTHER-1"), std::string::npos);
+}
+
+TEST_F(ReceivedImagesTest, OfAnInstanceThatWasSentTwiceTheNewestCounts) {
+  KeepImages(0);
+  KeepImages(20);
+  ReceivedFiles files = Files();
+  const auto listing = Settled(files);
+  ASSERT_EQ(listing.series.size(), 1U);
+  const auto images = *files.ImagesOf(listing.series[0].facts.uid);
+  EXPECT_EQ(static_cast<int>(images.size()), listing.series[0].facts.images);
+  EXPECT_EQ(images.size(), SmallImages().size());
+  for (const fs::path& image : images) EXPECT_GE(image.stem().string(), NameOf(20));
+}
+
+TEST_F(ReceivedImagesTest, EachIsReadOnceAndDamagedOnesAreCountedWithTheirFault) {
+  KeepImages(0);
+  Keep(NameOf(50), "an image", kCt);
+  {
+    ReceivedFiles files = Files();
+    const auto listing = Settled(files);
+    EXPECT_EQ(listing.damaged_images, 1);
+    EXPECT_FALSE(listing.image_fault.empty());
+    EXPECT_EQ(listing.series.at(0).facts.images, static_cast<int>(SmallImages().size()));
+  }
+  // What was read is known without reading: the files may say anything now.
+  for (std::size_t i = 0; i < SmallImages().size(); ++i)
+    Written(spool() / (NameOf(static_cast<int>(i)) + ".dcm"), "x");
+  ReceivedFiles again = Files();
+  const auto kept = again.List();
+  EXPECT_EQ(kept.unread, 0);
+  EXPECT_EQ(kept.damaged_images, 1);
+  EXPECT_EQ(kept.series.at(0).facts.images, static_cast<int>(SmallImages().size()));
+  fs::remove(spool() / (NameOf(50) + ".dcm"));
+  EXPECT_EQ(again.List().damaged_images, 0);
+  EXPECT_TRUE(again.List().image_fault.empty());
+  // What cannot be understood of the notes is begun anew.
+  for (const char* wrong : {R"({"files":{},"images":7})", R"({"files":{},"images":{"series":{}}})",
+                            R"({"files":{},"images":{"series":{},"names":{"a":3}}})"}) {
+    std::ofstream(folder_ / "received.json") << wrong;
+    ReceivedFiles files = Files();
+    EXPECT_EQ(Settled(files).damaged_images, static_cast<int>(SmallImages().size())) << wrong;
+  }
+}
+
+TEST_F(ReceivedFilesTest, WithoutAnExternalContourThatIsSaidOfThePlan) {
+  const auto [structures, plan] = SmallCt({.quirks = {simulated::CtQuirk::kNoExternal}});
+  Keep("20260301-093000-0000000000000001", DicomBytes(structures));
+  Keep("20260301-093001-0000000000000002", DicomBytes(plan));
+  const auto entries = Files().List().entries;
+  EXPECT_FALSE(entries.at(0).file.has_skin);
+  EXPECT_FALSE(entries.at(1).file.has_skin);
+}
+
+TEST_F(ReceivedFilesTest, WhatAnEarlierVersionReadIsReadAgainAndWhatBecameOfItStays) {
+  KeepSmallCt();
+  const std::string plan = "20260301-093001-0000000000000002";
+  std::ofstream(folder_ / "received.json") << fmt::format(
+      R"({{"format":1,"files":{{"{}":{{"kind":"plan","instance_uid":"","structure_set_uid":"",)"
+      R"("label":"","patient_hash":"","reference_id":"7","fault":null,"fault_english":""}}}}}})",
+      plan);
+  const auto entries = Files().List().entries;
+  EXPECT_EQ(entries.at(0).file.reference_id, "7");
+  EXPECT_TRUE(entries.at(0).file.has_skin);
 }
 
 TEST_F(ReceivedFilesTest, ImagesAreCountedAndOnlyNamesOfOursAreOpened) {

@@ -125,6 +125,13 @@ TEST_F(SceneFolderTest, GivesBackAPlanningCt) {
   EXPECT_EQ(read.planning->plan_uid, "1.2.3");
   EXPECT_EQ(read.planning->slices, 98);
   EXPECT_EQ(read.planning->support_m, -0.17);
+  EXPECT_FALSE(read.planning->skin_threshold_hu) << "a contour";
+  scene.planning->skin_threshold_hu = -350;
+  WriteScene(scene, scene_);
+  EXPECT_EQ(ReadScene(scene_).planning->skin_threshold_hu, -350);
+  scene.planning->skin_threshold_hu = -2001;
+  WriteScene(scene, scene_);
+  EXPECT_THAT(Refusal(), HasSubstr("skin_threshold_hu"));
   EXPECT_EQ(nlohmann::json::parse(SceneJson(SmallScene())).count("source"), 0U);
 }
 

@@ -106,6 +106,7 @@ TEST(CtSkinTest, InEveryPositionTheSkinLiesWhereTheBodyDoesAndTheCouchIsGone) {
     EXPECT_THAT(scene.warnings, Warns(say::planning::kImagesByFrame));
     EXPECT_THAT(scene.warnings, Not(Warns(say::planning::kImagesCut)));
     EXPECT_EQ(scene.planning->roi, "CT -300 HU");
+    EXPECT_EQ(scene.planning->skin_threshold_hu, -300);
     EXPECT_EQ(Name(scene.planning->posture), position);
     // The interval of the skin covers that, and is not much wider.
     EXPECT_GT(scene.planning->skin_u95_m, 0.0003);
@@ -265,6 +266,7 @@ TEST(CtSkinTest, WithAnExternalContourImagesAreCheckedAndSaidToBeUnused) {
   files.structures = simulated::MakePlanningCt(Torso().surface, PlaceOfTorso(), Region()).first;
   const Scene scene = SceneOf(files);
   EXPECT_EQ(scene.planning->roi, "BODY");
+  EXPECT_FALSE(scene.planning->skin_threshold_hu);
   EXPECT_THAT(scene.warnings, Warns(say::planning::kImagesNotUsed));
   for (CtImage& image : files.images) image.position = "HFP";
   EXPECT_TRUE(RefusalOf(files).Is(say::planning::kImagesPosition));
@@ -288,10 +290,25 @@ TEST(CtSkinTest, AChosenContourNeedsAStructureSet) {
   }
 }
 
-TEST(CtSkinTest, AMissingImageIsAGap) {
+TEST(CtSkinTest, AMissingImageIsRefusedWithItsPlace) {
   CtFiles files = FilesOf(Region());
+  CtFiles ends = files;  // of a series nothing shows how long it was
+  ends.images.erase(ends.images.begin());
+  ends.images.pop_back();
+  EXPECT_TRUE(RefusalOf(ends).empty());
+  const double before_mm = files.images[19].origin_mm.z();
   files.images.erase(files.images.begin() + 20);
-  EXPECT_THAT(SceneOf(files).warnings, Warns(say::planning::kSliceGaps));
+  EXPECT_EQ(RefusalOf(files), say::planning::ImagesMissing(before_mm, 10, 5));
+  // Without the image in between two steps of unequal lengths are no gap: 5 and 7.4 mm.
+  CtFiles moved = FilesOf(Region());
+  moved.images[20].origin_mm.z() += 2.4;
+  EXPECT_TRUE(RefusalOf(moved).empty());
+  moved.images[20].origin_mm.z() += 0.2;
+  EXPECT_TRUE(RefusalOf(moved).Is(say::planning::kImagesMissing));
+}
+
+TEST(CtSkinTest, TooFewOrTooThinlySpreadImagesAreRefused) {
+  CtFiles files = FilesOf(Region());
   for (std::size_t i = files.images.size() - 1; i > 0; --i)
     if (i % 2 == 0) files.images.erase(files.images.begin() + static_cast<std::ptrdiff_t>(i));
   EXPECT_TRUE(RefusalOf(files).Is(say::planning::kSpacingTooWide));

@@ -445,9 +445,15 @@ TEST_F(StoreSessionsTest, WhatIsSignedIsWhatIsStored) {
   const std::string next = store.references.Plan(kAnna, reference, 2, {});
   const Reference draft = *store.references.Find(next);
   store.references.Approve(kBert, next, draft.revision, draft.digest, /*two_users=*/true, "",
-                           /*posture_confirmed=*/true);
+                           {.posture = true});
   EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(),
             "sha256 " + draft.digest + "; posture confirmed against the surface");
+  const std::string skin = store.references.Plan(kAnna, next, draft.revision, {});
+  const Reference third = *store.references.Find(skin);
+  store.references.Approve(kBert, skin, third.revision, third.digest, /*two_users=*/true, "",
+                           {.skin_threshold_hu = -300});
+  EXPECT_EQ(store.audit.Find({0, 1}).at(0).detail.English(),
+            "sha256 " + third.digest + "; the skin of CT images at -300 HU confirmed");
 }
 
 TEST_F(StoreSessionsTest, PairedScreensStayOverARestart) {

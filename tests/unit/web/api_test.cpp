@@ -504,8 +504,21 @@ TEST_F(UploadTest, APlanningCtReachesTheServiceWithItsChoicesAndNothingIsLeftOfI
     EXPECT_EQ(service_.references.back().id, answer.json()["id"]);
   });
   EXPECT_TRUE(BecomesEmpty()) << "it names the patient";
-  for (const std::string& bad : {std::string("structures_bytes=-1"), std::string("%GG"),
-                                 "structures_bytes=1&roi=" + std::string(257, 'x')}) {
+  physicist.extra_headers["X-Plumb-Planning"] =
+      "structures_bytes=0&plan_bytes=4&threshold_hu=-300.5";
+  EXPECT_EQ(physicist.Ask("POST", path, "planimages").status, 201);
+  loop_->Do([&] {
+    EXPECT_EQ(service_.sent_planning.plan_bytes, 4U);
+    EXPECT_EQ(service_.sent_planning.threshold_hu, -300.5);
+  });
+  for (const std::string& bad :
+       {std::string("structures_bytes=-1"), std::string("%GG"), std::string("structures_bytes=0"),
+        "structures_bytes=1&roi=" + std::string(257, 'x'),
+        std::string("structures_bytes=1&threshold_hu=-300"),
+        std::string("structures_bytes=1&threshold_hu=-300&plan_bytes=0"),
+        std::string("structures_bytes=1&threshold_hu=0.1&plan_bytes=1"),
+        std::string("structures_bytes=1&threshold_hu=-900.1&plan_bytes=1"),
+        std::string("structures_bytes=1&threshold_hu=nan&plan_bytes=1")}) {
     physicist.extra_headers["X-Plumb-Planning"] = bad;
     EXPECT_EQ(physicist.Ask("POST", path, "x").status, 400) << bad;
   }

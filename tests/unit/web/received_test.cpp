@@ -27,11 +27,16 @@ class ReceivedTest : public WebTest {
                                     .address = "10.1.2.3",
                                     .bytes = 5000,
                                     .label = "breast",
-                                    .structures = "s"},
+                                    .structures = "s",
+                                    .series = {"2.25.7"}},
                                    {.name = "s",
                                     .kind = ReceivedKind::kStructures,
                                     .fault = say::dicom::CannotRead()}},
-                         .images = 98};
+                         .series = {{.uid = "2.25.7", .sender = "TPS", .images = 90}},
+                         .images = 98,
+                         .unread = 3,
+                         .damaged_images = 5,
+                         .image_fault = say::dicom::CannotRead()};
   }
   int Import(const nlohmann::json& body) {
     return physicist_.Post("/api/v1/patients/" + patient_ + "/planning/received", body).status;
@@ -47,6 +52,13 @@ TEST_F(ReceivedTest, TheListSaysFromWhomWhenAndWhatBecameOfIt) {
   EXPECT_EQ(found["files"][0]["sender"], "TPS");
   EXPECT_EQ(found["files"][0]["received_at"], "2026-03-01T09:30:00Z");
   EXPECT_EQ(found["files"][0]["structures"], "s");
+  EXPECT_EQ(found["files"][0]["series"], nlohmann::json::array({"2.25.7"}));
+  EXPECT_EQ(found["files"][0]["has_skin"], false);
+  EXPECT_EQ(found["series"][0]["uid"], "2.25.7");
+  EXPECT_EQ(found["series"][0]["images"], 90);
+  EXPECT_EQ(found["unread"], 3);
+  EXPECT_EQ(found["damaged_images"], 5);
+  EXPECT_EQ(found["image_fault_message"]["id"], "dicom.cannot_read");
   EXPECT_EQ(found["files"][1]["fault_message"]["id"], "dicom.cannot_read");
   EXPECT_EQ(Import({{"structures", "s"}, {"plan", "p"}, {"roi", "BODY"}, {"reason", "new plan"}}),
             201);
@@ -54,6 +66,27 @@ TEST_F(ReceivedTest, TheListSaysFromWhomWhenAndWhatBecameOfIt) {
   EXPECT_EQ(service_.sent_planning.reason, "new plan");
   found = physicist_.Get("/api/v1/planning/received").json();
   EXPECT_EQ(found["files"][0]["reference_id"], service_.references.back().id);
+}
+
+TEST_F(ReceivedTest, ImagesNeedTheThresholdOfTheirSkin) {
+  const nlohmann::json images = {{"plan", "p"}, {"series", "2.25.7"}};
+  const auto at = [&](const nlohmann::json& threshold) {
+    nlohmann::json body = images;
+    body["threshold_hu"] = threshold;
+    return Import(body);
+  };
+  EXPECT_EQ(Import(images), 400);
+  for (const double wrong : {-900.5, 0.5}) EXPECT_EQ(at(wrong), 400) << wrong;
+  EXPECT_EQ(at("soft"), 400);
+  EXPECT_TRUE(service_.references.empty());
+  for (const double right : {-900.0, 0.0}) {
+    EXPECT_EQ(at(right), 201) << right;
+    EXPECT_EQ(service_.sent_planning.threshold_hu, right);
+  }
+  EXPECT_EQ(Import({{"structures", "s"}, {"plan", "p"}, {"threshold_hu", -300}}), 400)
+      << "of which images?";
+  EXPECT_EQ(Import({{"plan", "p"}}), 400) << "neither a contour nor images";
+  EXPECT_EQ(Import({{"plan", "p"}, {"series", "2.25.8"}, {"threshold_hu", -300}}), 404);
 }
 
 TEST_F(ReceivedTest, WhatIsNotThereAndOtherFieldsAreRefused) {

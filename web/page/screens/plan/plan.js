@@ -17,7 +17,7 @@ import { signedForm } from '../../signed_form.js';
 import { S, said } from '../../words.js';
 import { capturedAgainst, capturedCard } from '../captured.js';
 import { blockNote, flagList, qualityOf } from '../common.js';
-import { planningFacts } from '../planning.js';
+import { planningFacts, skinThreshold } from '../planning.js';
 import { editor, inMillimetres, measure } from './plan_editor.js';
 import { templateOf } from './plan_template.js';
 
@@ -128,13 +128,17 @@ function summary(reference, patient, { scan, quality, picture, heights, captured
   const reason = flags && h('input', { required: true, autocomplete: 'off', ...kReason });
   const posture = reference.room?.contradicts_posture
     && checkbox(text.postureConfirm, false, { required: true });
+  const hu = skinThreshold(heights?.scene);
+  const skin = hu !== null && checkbox(text.imagesConfirm, false, { required: true });
   const signature = signedForm({ class: 'form inline below' },
     (sign) => approve({ ...sign(), ...(reason && { reason: reason.value.trim() }),
-      ...(posture && { posture_confirmed: posture.box.checked }) }),
+      ...(posture && { posture_confirmed: posture.box.checked }),
+      ...(skin && { images_confirmed: skin.box.checked }) }),
     h('button', { class: 'primary' }, text.summarySubmit),
     reason ? field(text.flagsReason, reason) : [],
     posture ? h('div', {}, h('p', { class: 'caution' }, text.postureContradicted),
-      posture.element) : []);
+      posture.element) : [],
+    skin ? h('div', {}, h('p', { class: 'caution' }, text.imagesUsed(hu)), skin.element) : []);
   return h('section', { class: 'card summary', 'aria-label': text.summary },
     h('h2', {}, text.summary), h('div', { class: 'summary-grid' },
       picture, h('dl', { class: 'facts' },

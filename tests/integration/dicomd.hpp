@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// A running plumb-dicomd, and a planning system that sends to it.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/process.hpp"
+#include "tests/unit/dicom/small_files.hpp"
+
+namespace plumb::testing {
+
+class Dicomd {
+ public:
+  /// @param folder  Of the test. Gets plumb.toml, with which plumbd is started, too, and spool/.
+  /// @param more  Further lines of [dicom].
+  explicit Dicomd(std::filesystem::path folder, const std::string& more = {})
+      : folder_(std::move(folder)) {
+    std::filesystem::create_directory(folder_ / "spool");
+    std::ofstream(config()) << fmt::format(
+        "[dicom]\nenabled = true\nlisten = \"127.0.0.1:0\"\n"
+        "senders = [\"TPS@127.0.0.1\"]\nspool = \"{}\"\n{}",
+        (folder_ / "spool").string(), more);
+    process_ = std::make_unique<Process>(
+        std::vector<std::string>{PLUMB_DICOMD_BINARY, "--config", config().string()});
+    EXPECT_TRUE(process_->WaitForStderr(", in the clear")) << process_->err();
+    const std::string& said = process_->err();
+    port_ = std::stoi(said.substr(said.find(" port ") + 6));
+  }
+
+  [[nodiscard]] std::filesystem::path config() const { return folder_ / "plumb.toml"; }
+
+  /// Sends files of these bytes, which must be taken.
+  void Send(const std::vector<std::string>& files) {
+    const std::filesystem::path sent = folder_ / "sent";
+    std::filesystem::create_directory(sent);
+    std::vector<std::string> line = {PLUMB_BINARY, "send-dicom"};
+    for (const std::string& bytes : files)
+      line.push_back(Written(sent / fmt::format("{}.dcm", line.size()), bytes).string());
+    for (const std::string& more : {std::string("--from"), std::string("TPS"), std::string("--to"),
+                                    fmt::format("PLUMB@127.0.0.1:{}", port_)})
+      line.push_back(more);
+    const RunResult result = plumb::Run(line);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::filesystem::remove_all(sent);
+  }
+
+ private:
+  std::filesystem::path folder_;
+  std::unique_ptr<Process> process_;
+  int port_ = 0;
+};
+
+}  // namespace plumb::testing
