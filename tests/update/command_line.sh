@@ -82,7 +82,7 @@ seen() { echo "$code $(tr '\n' ' ' <out)"; }
 run machine/good.raucb
 check "no plumbd" '^5 .*cannot reach plumbd' "$(seen)"
 start one
-for _ in $(seq 50); do run machine/other.raucb; grep -q 'no installer' out || break; sleep 0.1; done
+for _ in $(seq 50); do run machine/other.raucb; grep -q 'no program that installs' out || break; sleep 0.1; done
 check "another machine" "^5 .*for another machine: it is for 'plumb-other-machine'" "$(seen)"
 run machine/older.raucb
 check "an older version" '^5 .*older than 0\.' "$(seen)"

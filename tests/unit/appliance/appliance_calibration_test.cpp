@@ -165,7 +165,8 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
     EXPECT_EQ(Sign(), ChangeResult::kDone);
     ASSERT_TRUE(Gantry());
     EXPECT_LT((*Gantry() - calibrated).norm(), 1e-6);
-    EXPECT_THAT(warnings_, ::testing::HasSubstr("T_iec_reference of the configuration is ignored"));
+    EXPECT_THAT(warnings_,
+                ::testing::HasSubstr("the axes of the room in the configuration are not used"));
 
     MarkerMap moved = testing::MarkersOfRoom();
     for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;

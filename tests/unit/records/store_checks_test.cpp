@@ -229,8 +229,8 @@ TEST_F(StoreTest, WhatAnotherBaselineChangesIsNamed) {
   TakenCheck other = CheckWith(6, MarkerCheckStatus::kFailed);
   other.seen.markers.erase(5);
   for (Eigen::Vector3d& corner : other.seen.markers.at(2).corners) corner.y() += 0.03;
-  EXPECT_THAT(changes(other), ::testing::ElementsAre("no longer part of the baseline: markers 5",
-                                                     "new in the baseline: markers 6",
+  EXPECT_THAT(changes(other), ::testing::ElementsAre("no longer part of the baseline: marker 5",
+                                                     "new in the baseline: marker 6",
                                                      "marker 2 lies 30.0 mm from where it was"));
 }
 

@@ -291,7 +291,7 @@ TEST_F(ReportsTest, ARowThatIsWorseThanItShouldBeIsACaution) {
   EXPECT_EQ(good["Largest hole"], Row("50 mm", false));
   EXPECT_EQ(good["Frames tracked"], Row("270 of 300", false));
   EXPECT_EQ(good["Frames lost"], Row("30 (10 %)", true));
-  EXPECT_EQ(good["Keyframes"], Row("40", false));
+  EXPECT_EQ(good["Images used"], Row("40", false));
   auto bad = rows(region(0.899, 0.051));
   EXPECT_EQ(bad["Region covered"], Row("89.9 %", true));
   EXPECT_EQ(bad["Largest hole"], Row("51 mm", true));

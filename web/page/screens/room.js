@@ -102,7 +102,7 @@ function top(status, said, isSwapped, isChecked) {
     !isCheck && session && h('p', { class: 'room-fraction' }, session.purpose === 'reference'
       ? S.purposes.reference : S.session.fraction(session.fraction),
     h('span', {}, ` · ${S.session.scans(session.num_scans)}`),
-    session.reference && h('span', {}, ` · ${comparesWith(session)}`)),
+    session.reference && h('span', { class: 'room-reference' }, ` · ${comparesWith(session)}`)),
     !isCheck && session?.newer_reference && h('p', { class: 'room-newer caution', role: 'alert' },
       S.session.referenceNewer(session.newer_reference.version)),
     !isCheck && session && saidEach(status, 'peer_notes').map(
