@@ -51,7 +51,10 @@ convert() {
   rm -rf state/*
   mkdir state/before-checksums
   echo old >state/before-checksums/plumb.db
-  for file in plumb.db plumb.db-wal plumb.db-mark plumb.db-seals; do echo new >"state/$file"; done
+  for file in plumb.db plumb.db-wal plumb.db-mark plumb.db-seals rows.key; do
+    echo new >"state/$file"
+  done
+  mkdir -p state/scans/000001 state/scans/000002
 }
 convert
 : >calls
@@ -60,10 +63,14 @@ run roll-back
 check "the system before gets its own database, and nothing starts this one again" \
   '^old old=new systemctl stop plumbd.socket plumbd.service$' \
   "$(cat state/plumb.db) old=$(cat state/before-restore-1/plumb.db) $(head -1 calls)"
-check "and nothing that goes with the other" '^before-restore-1 plumb.db $' \
+check "and nothing that goes with the other" '^before-restore-1 plumb.db restored.json scans $' \
   "$(cd state && echo * | tr '\n' ' ')"
-check "what was stored since stays" '^plumb.db plumb.db-mark plumb.db-seals plumb.db-wal $' \
+check "what was stored since stays" '^plumb.db plumb.db-mark plumb.db-seals plumb.db-wal rows.key $' \
   "$(cd state/before-restore-1 && echo * | tr '\n' ' ')"
+check "it is noted as restored, for the log of the database that is back" \
+  "^\\{\"backup\": \"$work/state/before-checksums/plumb.db\", \"sha256\": \"$(
+    echo old | sha256sum | cut -d' ' -f1)\", \"scans\": 2, \"time\": [0-9]{16}\\}$" \
+  "$(cat state/restored.json)"
 run roll-back
 check "once" '^old$' "$(cat state/plumb.db)"
 convert

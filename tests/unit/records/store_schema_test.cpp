@@ -85,53 +85,6 @@ TEST_F(StoreTest, AfterARollBackTheOldVersionWorksWithTheNewerDatabase) {
             kSchemaVersion + 1);  // the newer version finds it migrated
 }
 
-/// A database as 0.2.0 has it, without checksums.
-void MakeOldDatabase(const fs::path& file) {
-  fs::create_directories(file.parent_path());
-  Database old(file, Database::Access::kUnsealed);
-  Migrate(old);
-  old.Execute(testing::kToSchema9);
-  old.Run(
-      "INSERT INTO users (name, role, password_hash, created_at) VALUES ('eva', 'engineer', 'x', "
-      "1)");
-  old.Run("INSERT INTO patients (code, site, created_at) VALUES ('A', 'thorax', 1)");
-}
-
-/// As `health-gate roll-back` does.
-void PutBack(const fs::path& state) {
-  const fs::path aside = state / "before-restore-1";
-  fs::create_directory(aside);
-  for (const char* name : {"plumb.db", "plumb.db-mark", "plumb.db-seals"})
-    fs::rename(state / name, aside / name);
-  fs::rename(state / "before-checksums" / "plumb.db", state / "plumb.db");
-}
-
-TEST_F(StoreTest, FromTheVersionBeforeToThisAndBackAndToThisAgain) {
-  MakeOldDatabase(database());
-  {
-    const auto store = Open();
-    EXPECT_EQ(store->users.Find("eva")->role, Role::kEngineer);
-    EXPECT_TRUE(store->patients.FindByCode("A"));
-    (void)store->patients.Add(kAnna, "of this version", "");
-  }
-  PutBack(folder_ / "state");
-  {
-    Database old(database(), Database::Access::kUnsealed);
-    EXPECT_EQ(old.FirstInteger("PRAGMA user_version"), 9);
-    EXPECT_FALSE(old.Has("SELECT 1 FROM patients WHERE code = 'of this version'"));
-    old.Run("INSERT INTO patients (code, site, created_at) VALUES ('B', 'thorax', 2)");
-    old.Run("UPDATE users SET password_hash = 'changed meanwhile'");
-  }
-  const auto store = Open();
-  EXPECT_EQ(store->users.Find("eva")->password_hash, "changed meanwhile");
-  for (const char* code : {"A", "B"}) EXPECT_TRUE(store->patients.FindByCode(code)) << code;
-  EXPECT_FALSE(store->audit.FirstBroken());
-  Database copy(folder_ / "state" / "before-checksums" / "plumb.db", Database::Access::kFrozen);
-  EXPECT_TRUE(copy.Has("SELECT 1 FROM patients WHERE code = 'B'"));
-  Database aside(folder_ / "state" / "before-restore-1" / "plumb.db", Database::Access::kFrozen);
-  EXPECT_TRUE(aside.Has("SELECT 1 FROM patients WHERE code = 'of this version'"));
-}
-
 TEST_F(StoreTest, ANewerDatabaseThatThisVersionCannotUseIsRefused) {
   (void)Open();
   for (const std::string& usable_from :
