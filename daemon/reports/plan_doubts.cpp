@@ -15,13 +15,14 @@ namespace plumb {
 bool ContradictsPosture(const Scene& scene, const Pose& T_iec_scene, PatientPosture posture) {
   if (!scene.height_map) return false;
   const std::vector<std::uint8_t> body = ReferenceRegion(scene, {});
-  return !DescribeBody({.reference = *scene.height_map,
-                        .deviation_after = *scene.height_map,
-                        .region_mask = body,
-                        .body_mask = body,
-                        .T_iec_reference = T_iec_scene,
-                        .posture = posture})
-              .by_posture;
+  const BodyParts parts = DescribeBody({.reference = *scene.height_map,
+                                        .deviation_after = *scene.height_map,
+                                        .region_mask = body,
+                                        .body_mask = body,
+                                        .T_iec_reference = T_iec_scene,
+                                        .posture = posture});
+  // Nobody lies across in a CT, but one of a region is often wider than it is long.
+  return scene.planning ? parts.head_at_other_end : !parts.by_posture;
 }
 
 double IsocentreAway_m(const Scene& scene, const std::array<double, 3>& isocentre_m) {

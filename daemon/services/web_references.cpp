@@ -53,8 +53,12 @@ class WebReferences final : public web::ReferenceService {
     if (!scan || scan->folder.empty()) return {};
     try {
       const Scene scene = ReadStoredScene(scan->folder / "scene").scene;
+      const bool is_to_approve = reference.approved_by.empty() && !reference.planned_by.empty();
       if (scene.planning)  // its map lies in IEC axes
-        return {.gantry_xy = {0, 1}, .right_xy = {1, 0}, .is_known = true};
+        return {.gantry_xy = {0, 1},
+                .right_xy = {1, 0},
+                .is_known = true,
+                .contradicts_posture = is_to_approve && DoubtsOf(reference).posture};
       const MarkerMap& markers = scene.markers;
       const auto ways = room_.In(markers);
       if (!ways) return {};
@@ -63,8 +67,7 @@ class WebReferences final : public web::ReferenceService {
                      .is_known = true};
       if (const auto lasers = room_.LasersIn(markers))
         room.lasers_m = {lasers->x(), lasers->y(), lasers->z()};
-      if (reference.approved_by.empty() && !reference.planned_by.empty())
-        room.contradicts_posture = DoubtsOf(reference).posture;
+      room.contradicts_posture = is_to_approve && DoubtsOf(reference).posture;
       return room;
     } catch (const std::exception& error) {
       Log(LogLevel::kNotice,

@@ -153,9 +153,16 @@ TEST_F(DaemonDicomTest, WhatWasReceivedIsListedAndImportedByAPersonOnly) {
 /// Uploads of the images of the small CT, whose plan has no contour to offer.
 class DaemonImagesTest : public DaemonDicomTest {
  protected:
+  /// Of pixels of 1 mm: a surface is left beside the straight sides of the box.
+  static std::vector<CtImage> FineImages() {
+    std::vector<CtImage> images;
+    simulated::MakeCtImages(SmallCt().first, {}, {.pixel_mm = 1.0},
+                            [&](const CtImage& image) { images.push_back(image); });
+    return images;
+  }
   struct Sent {
     TreatmentPlan plan = SmallCt().second;
-    std::vector<CtImage> images = SmallImages();
+    std::vector<CtImage> images = FineImages();
     std::string threshold = "-300";
   };
   /// As the page sends it: the plan, and each image behind its size.

@@ -79,9 +79,10 @@ Received SomeReceived(const FakeAppliance& service) {
   received.files[1].patient_id = "other";
   received.files[1].patient_code = "CT-2";
   received.files[2].fault = say::dicom::CannotRead();
-  if (!service.patients.empty()) {
-    received.files[3].patient_id = service.patients.back().id;
-    received.files[3].patient_code = service.patients.back().code;
+  const auto owner = std::ranges::find(service.patients, "CT-1", &Patient::code);
+  if (owner != service.patients.end()) {
+    received.files[3].patient_id = owner->id;
+    received.files[3].patient_code = owner->code;
   }
   return received;
 }

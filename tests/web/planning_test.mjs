@@ -148,7 +148,7 @@ await h.step('without a contour the skin of CT images counts, at a stated thresh
   const images = readdirSync(h.file('data/images')).map((name) => h.file(`data/images/${name}`));
   const files = planner.getByLabel('CT images', { exact: true });
   const importAll = planner.getByRole('button', { name: 'Import', exact: true });
-  await files.setInputFiles([...images.slice(0, 30), ...images.slice(31)]);
+  await files.setInputFiles(images.toSpliced(images.length / 2, 1));
   await threshold.fill('1');
   await importAll.click();
   check(await threshold.evaluate((input) => !input.validity.valid), 'brighter than any skin');
@@ -160,7 +160,7 @@ await h.step('without a contour the skin of CT images counts, at a stated thresh
   await importAll.click();
   await planner.waitForURL(/#\/plan\//);
   const facts = planner.locator('.planning-facts');
-  await facts.getByText('CT images at −350 HU').waitFor();
+  await facts.getByText('CT images at -350 HU, ±').waitFor();
   await facts.getByText('only the frame of reference shows').waitFor();
   await facts.getByText('are added to the uncertainty along its normal').waitFor();
   await h.look(planner, 'planning-images-plan');
@@ -169,7 +169,7 @@ await h.step('without a contour the skin of CT images counts, at a stated thresh
   await second.locator('.planning-facts').waitFor();
   await second.getByRole('button', { name: 'Review and approve' }).click();
   const summary = second.locator('.summary');
-  await summary.getByText('the surface is the skin of the CT images at −350 HU').waitFor();
+  await summary.getByText('the surface is the skin of the CT images at -350 HU').waitFor();
   const looked = summary.getByLabel('I have looked at the surface');
   check(await looked.evaluate((box) => box.required && !box.checked), 'a person has to say it');
   await looked.check();
@@ -247,7 +247,7 @@ await h.step('received images are offered where a plan has no contour', async ()
   await planner.getByLabel('The files are of this patient').check();
   await take.click();
   await planner.waitForURL(/#\/plan\//);
-  await planner.locator('.planning-facts').getByText('CT images at −300 HU').waitFor();
+  await planner.locator('.planning-facts').getByText('CT images at -300 HU, ±').waitFor();
 });
 
 await h.step('the worklist of today opens a session by a tap, and never changes one', async () => {

@@ -19,6 +19,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -93,8 +94,11 @@ void WritePlanning(const fs::path& root) {
   const simulated::PlanningCtOptions options{.spacing_m = 0.005,
                                              .quirks = {simulated::CtQuirk::kShort}};
   const auto planned = simulated::MakePlanningCt(scene.body->surface, T_iec_body, options);
+  // A few about the isocentre: they are read on the loop of this server.
   simulated::MakeCtImages(planned.first, options, {.pixel_mm = 2.4},
                           [&, number = 100](const CtImage& image) mutable {
+                            if (std::abs(image.origin_mm.z() - options.isocentre_mm.z()) > 30)
+                              return;
                             WriteWholeFile(root / "images" / fmt::format("{}.dcm", number++),
                                            std::string_view(DicomBytes(image)));
                           });
