@@ -26,6 +26,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/plain_text.hpp"
 #include "daemon/loop/end_guard.hpp"
 #include "drivers/files/descriptor.hpp"
@@ -220,10 +221,7 @@ std::string Normalised(const std::string& name) {
       given == nullptr)
     return name;
   const std::unique_ptr<char, decltype(&ldap_memfree)> held(given, ldap_memfree);
-  std::string normalised = given;
-  std::ranges::transform(normalised, normalised.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return normalised;
+  return AsciiLower(given);
 }
 
 // With a certificate that is checked: nothing is said without.

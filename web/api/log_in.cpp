@@ -4,6 +4,7 @@
 #include <cctype>
 #include <utility>
 
+#include "algo/base/ascii_lower.hpp"
 #include "web/api/accounts.hpp"
 #include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"
@@ -159,9 +160,7 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
   // Whoever checks it wipes it; what waits here for the answer has no copy.
   std::string password = std::exchange(form.password, {});
   // A directory knows no difference between capital and small letters; accounts have small ones.
-  if (options_.ask_directory)
-    std::ranges::transform(form.name, form.name.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (options_.ask_directory) form.name = AsciiLower(form.name);
   const auto user = users_.FindUser(form.name);
   const std::string stored = user && !user->disabled ? user->password_hash : std::string();
   const auto [counters, is_known] = CountersOf(request, form, stored);

@@ -14,6 +14,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/plain_text.hpp"
 #include "web/http/checks.hpp"
@@ -131,9 +132,7 @@ struct Transport::Callbacks {
   static MHD_Result OnHeader(void* cls, MHD_ValueKind, const char* key, const char* value) {
     auto* exchange = static_cast<Exchange*>(cls);
     if (!IsToken(key) || !exchange->head.TakeHeader(key, value)) exchange->malformed = true;
-    std::string name(key);
-    std::transform(name.begin(), name.end(), name.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::string name = AsciiLower(key);
     const std::string_view text = value != nullptr ? value : "";
     exchange->num_hosts += name == "host" ? 1 : 0;
     auto& headers = exchange->request.headers;

@@ -99,7 +99,7 @@ const Arrows kAllowed = {
     {"web/api",
      {"algo/base", "web/model", "web/service", "web/security", "web/http", "web/exchange",
       "web/page"}},
-    {"web/api/exports", {"web/model", "web/exchange", "web/api"}},
+    {"web/api/exports", {"algo/base", "web/model", "web/exchange", "web/api"}},
     {"web/api/planning", {"algo/base", "web/model", "web/http", "web/exchange", "web/api"}},
     {"web/api/watching",
      {"algo/base", "web/http", "web/model", "web/security", "web/exchange", "web/api"}},
