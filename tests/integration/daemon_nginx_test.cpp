@@ -14,6 +14,7 @@
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/self_signed.hpp"
 #include "tests/support/skip.hpp"
 
 namespace plumb {
@@ -100,11 +101,7 @@ class DaemonNginxTest : public ::testing::Test {
   [[nodiscard]] std::string Site(const Plumbd& plumbd) const {
     std::string site = Read(fs::path(PLUMB_SOURCE_DIR) / "toolchain" / "nginx.conf");
     const auto in_folder = [&](const char* name) { return (folder_ / name).string(); };
-    const std::string made = fmt::format(
-        "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN={} -keyout '{}' -out '{}' "
-        "2>/dev/null",
-        kSite, in_folder("site.key"), in_folder("site.pem"));
-    EXPECT_EQ(std::system(made.c_str()), 0);
+    testing::MakeSelfSigned(in_folder("site.pem"), in_folder("site.key"), kSite);
     Replace(site, "/etc/ssl/certs/plumb.clinic.example.pem", in_folder("site.pem"));
     Replace(site, "/etc/ssl/private/plumb.clinic.example.key", in_folder("site.key"));
     const RunResult authority =

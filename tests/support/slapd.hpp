@@ -17,6 +17,7 @@
 
 #include "tests/support/free_port.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/self_signed.hpp"
 
 namespace plumb::testing {
 
@@ -41,9 +42,8 @@ class Slapd {
   /// @param folder  Of its own; outlives it.
   explicit Slapd(const std::filesystem::path& folder) : folder_(folder) {
     std::filesystem::create_directories(folder_ / "data");
-    Shell(
-        "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=directory "
-        "-addext subjectAltName=IP:127.0.0.1 -keyout key.pem -out cert.pem");
+    MakeSelfSigned(certificate(), folder_ / "key.pem", "directory",
+                   {.options = "-addext subjectAltName=IP:127.0.0.1"});
     std::ofstream(folder_ / "slapd.conf") << fmt::format(
         "include /etc/ldap/schema/core.schema\ninclude /etc/ldap/schema/cosine.schema\n"
         "include /etc/ldap/schema/inetorgperson.schema\n"
