@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/base64.hpp"
 #include "algo/base/message_json.hpp"
-#include "web/security/base64.hpp"
 #include "words/messages.hpp"
 
 namespace plumb {
@@ -35,7 +35,7 @@ std::string EncodedWords(std::string_view text) {
            (static_cast<unsigned char>(text[count]) & 0xC0U) == 0x80U)
       --count;
     if (!words.empty()) words += "\r\n ";
-    words += fmt::format("=?UTF-8?B?{}?=", web::ToBase64(text.substr(0, count)));
+    words += fmt::format("=?UTF-8?B?{}?=", ToBase64(text.substr(0, count)));
     text.remove_prefix(count);
   }
   return words;
@@ -57,7 +57,7 @@ int PriorityOf(const OutMessage& message) {
 std::string MailText(const OutMessage& message, const Catalogue& language, const std::string& from,
                      const std::string& to) {
   const std::string said = SaidTo(message, language);
-  const std::string body = web::ToBase64(fmt::format(
+  const std::string body = ToBase64(fmt::format(
       "{}\r\n\r\n{}\r\n", said, Text(say::messages::WhereToLook(message.unit), language)));
   // Names of days and months are those of the protocol, whatever the locale.
   constexpr std::array kDays = {"Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"};

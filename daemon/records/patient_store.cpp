@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/base64.hpp"
 #include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/database/stored_values.hpp"
 #include "web/model/limits.hpp"
-#include "web/security/base64.hpp"
 #include "words/store.hpp"
 
 namespace plumb {
@@ -171,7 +171,7 @@ std::optional<std::string> PatientStore::Photo(const std::string& id) {
       database_.ForRows()
           ->FirstText("SELECT photo FROM patients WHERE id = ? AND id > 0", ParseId(id))
           .value_or("");
-  std::optional<std::string> jpeg = web::FromBase64(stored);
+  std::optional<std::string> jpeg = FromBase64(stored);
   // An imported record may hold anything.
   if (!jpeg || !jpeg->starts_with("\xFF\xD8")) return std::nullopt;
   return jpeg;
@@ -185,7 +185,7 @@ void PatientStore::SetPhoto(const Actor& actor, const std::string& id, const std
   change->Run(
       "UPDATE patients SET photo = ?, has_photo = ?, drawing = '', sheet_revision = sheet_revision "
       "+ 1 WHERE id = ? AND id > 0",
-      web::ToBase64(jpeg), std::int64_t{jpeg.empty() ? 0 : 1}, number);
+      ToBase64(jpeg), std::int64_t{jpeg.empty() ? 0 : 1}, number);
   if (change->num_changed() == 0)
     throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
   change.Log(actor, jpeg.empty() ? "patient.photo_remove" : "patient.photo", id, {});

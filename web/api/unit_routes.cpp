@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "algo/base/base64.hpp"
 #include "algo/base/errors.hpp"
 #include "web/api/look_back.hpp"
 #include "web/exchange/json.hpp"
@@ -17,7 +18,6 @@
 #include "web/model/settings.hpp"
 #include "web/model/status.hpp"
 #include "web/model/wall_clock.hpp"
-#include "web/security/base64.hpp"
 #include "words/web.hpp"
 
 namespace plumb::web {

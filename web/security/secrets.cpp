@@ -5,8 +5,8 @@
 
 #include <cstdint>
 
+#include "algo/base/base64.hpp"
 #include "algo/base/errors.hpp"
-#include "web/security/base64.hpp"
 #include "words/web.hpp"
 
 namespace plumb::web {
@@ -37,9 +37,7 @@ std::string PlainCode(std::string_view typed) {
   return code;
 }
 
-std::string RandomToken(std::size_t bytes) {
-  return ToBase64Url(RandomBytes(bytes));
-}
+std::string RandomToken(std::size_t bytes) { return ToBase64Url(RandomBytes(bytes)); }
 
 std::string StoredHashOf(const std::string& token) {
   const std::string hash = HashOf(token);

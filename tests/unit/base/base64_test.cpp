@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "web/security/base64.hpp"
+#include "algo/base/base64.hpp"
 
 #include <gtest/gtest.h>
 
 #include <optional>
 #include <string>
+#include <utility>
 
-namespace plumb::web {
+namespace plumb {
 namespace {
 
 // RFC 4648, section 10.
@@ -21,9 +22,9 @@ TEST(Base64Test, IsThatOfTheStandard) {
 }
 
 TEST(Base64Test, WhatIsNotWhollyBase64IsNothing) {
-  for (const char* wrong : {"Zg", "Zg=", "Zg==x", "Z g==", "-_8="})
+  for (const char* wrong : {"Zg", "Zg=", "Zg==x", "Z g==", "-_8=", "Z===", "=", "Zh=="})
     EXPECT_EQ(FromBase64(wrong), std::nullopt) << wrong;
 }
 
 }  // namespace
-}  // namespace plumb::web
+}  // namespace plumb
