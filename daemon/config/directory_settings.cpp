@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <utility>
 
 namespace plumb {
 namespace {
 
 constexpr std::size_t kMostGroups = 32;  // Of each role.
-constexpr std::string_view kPlaceOfName = "{name}";
-constexpr std::string_view kPlaceOfPerson = "{person}";
 
 // Scheme and host only: a path, a filter or a name of a user has no place there.
 bool IsDirectoryUrl(const std::string& text) {
@@ -28,6 +27,14 @@ bool IsShortText(const std::string& text) { return !text.empty() && text.size() 
 
 bool HasName(const std::string& text) {
   return IsShortText(text) && text.find(kPlaceOfName) != std::string::npos;
+}
+
+bool HasPerson(const std::string& text) { return text.find(kPlaceOfPerson) != std::string::npos; }
+
+// Begins with an attribute and its value, at least.
+bool IsDistinguishedName(const std::string& text) {
+  const std::size_t at = text.find('=');
+  return at != std::string::npos && at > 0;
 }
 
 bool IsFilter(const std::string& text) {
@@ -50,13 +57,13 @@ DirectorySettings ReadDirectorySettings(Section section) {
   // Without the person in it all groups would be everybody's.
   section.Take(
       "groups_filter", settings.groups_filter,
-      say::config::ExpectedFilter(std::string(kPlaceOfPerson)), [](const std::string& text) {
-        return IsFilter(text) && (HasName(text) || text.find(kPlaceOfPerson) != std::string::npos);
-      });
-  section.TakeNames("engineers", settings.engineers, say::config::ExpectedGroups(), kMostGroups);
-  section.TakeNames("physicists", settings.physicists, say::config::ExpectedGroups(), kMostGroups);
-  section.TakeNames("technicians", settings.technicians, say::config::ExpectedGroups(),
-                    kMostGroups);
+      say::config::ExpectedFilter(std::string(kPlaceOfPerson)),
+      [](const std::string& text) { return IsFilter(text) && (HasName(text) || HasPerson(text)); });
+  // A short name would be no group of anybody's.
+  for (const auto& [key, names] :
+       {std::pair("engineers", &settings.engineers), std::pair("physicists", &settings.physicists),
+        std::pair("technicians", &settings.technicians)})
+    section.TakeNames(key, *names, say::config::ExpectedGroups(), kMostGroups, IsDistinguishedName);
   section.RejectUnknownKeys();
   if (settings.url.empty()) return settings;
   const bool has_groups =
@@ -65,6 +72,10 @@ DirectorySettings ReadDirectorySettings(Section section) {
     throw DataError(say::config::DirectoryIncomplete());
   if (settings.people_base.empty() != settings.people_filter.empty())
     throw DataError(say::config::DirectoryPeopleIncomplete());
+  // The name by which a person logs in is no member of a group, unless it is that of an entry.
+  if (settings.people_filter.empty() && HasPerson(settings.groups_filter) &&
+      !IsDistinguishedName(settings.person))
+    throw DataError(say::config::DirectoryPersonIsNoEntry(std::string(kPlaceOfPerson)));
   return settings;
 }
 

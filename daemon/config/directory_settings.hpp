@@ -5,11 +5,15 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/config/config_section.hpp"
 
 namespace plumb {
+
+/// Stand in the settings for the name that was typed and for the person's entry.
+inline constexpr std::string_view kPlaceOfName = "{name}", kPlaceOfPerson = "{person}";
 
 /// Without a url there is no directory.
 struct DirectorySettings {

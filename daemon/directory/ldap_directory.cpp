@@ -13,8 +13,10 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <stop_token>
@@ -24,7 +26,7 @@
 
 #include <fmt/format.h>
 
-#include "algo/base/errors.hpp"
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/plain_text.hpp"
 #include "daemon/loop/end_guard.hpp"
 #include "drivers/files/descriptor.hpp"
@@ -48,13 +50,23 @@ class Interrupt {
  public:
   // The descriptor stays open until this object is gone.
   Interrupt(int fd, std::chrono::steady_clock::time_point end, const std::stop_token& stop)
-      : too_long_(std::chrono::duration_cast<std::chrono::milliseconds>(
+      : fd_(fd),
+        too_long_(std::chrono::duration_cast<std::chrono::milliseconds>(
                       end - std::chrono::steady_clock::now()),
-                  [fd] { ::shutdown(fd, SHUT_RDWR); }),
-        stopped_(stop, [fd] { ::shutdown(fd, SHUT_RDWR); }) {}
+                  [this] { Act(); }),
+        stopped_(stop, [this] { Act(); }) {}
+
+  [[nodiscard]] bool has_acted() const { return has_acted_; }
 
  private:
-  EndGuard too_long_;
+  void Act() {
+    has_acted_ = true;
+    ::shutdown(fd_, SHUT_RDWR);
+  }
+
+  const int fd_;
+  std::atomic<bool> has_acted_ = false;
+  EndGuard too_long_;  // this and the next one last: they use the others
   std::stop_callback<std::function<void()>> stopped_;
 };
 
@@ -63,49 +75,70 @@ struct Unbind {
 };
 using Connection = std::unique_ptr<LDAP, Unbind>;
 
-// Why there is no answer.
-struct Unanswered {
+// Why the question has no answer.
+struct Failure {
   Message why;
 };
 
 bool IsAway(int code) {
   return code == LDAP_SERVER_DOWN || code == LDAP_TIMEOUT || code == LDAP_CONNECT_ERROR ||
-         code == LDAP_BUSY || code == LDAP_UNAVAILABLE;
+         code == LDAP_BUSY || code == LDAP_UNAVAILABLE || code == LDAP_USER_CANCELLED;
 }
 
-// @param connection  Knows more about a certificate that is refused; may be null.
-// @throws Unanswered  That the server is away, or what is wrong with the question: then the
-//                     configuration is.
-void Check(LDAP* connection, int code) {
-  if (code == LDAP_SUCCESS) return;
+// Neither the server's absence nor a wrong configuration.
+bool IsTrouble(int code) {
+  return code == LDAP_TIMELIMIT_EXCEEDED || code == LDAP_ADMINLIMIT_EXCEEDED ||
+         code == LDAP_OTHER || code == LDAP_NO_MEMORY || code == LDAP_LOCAL_ERROR;
+}
+
+// @param connection  Has what the server said beside the code; may be null.
+std::string WhyOf(LDAP* connection, int code) {
   std::string why = ldap_err2string(code);
   char* given = nullptr;
   if (connection != nullptr &&
       ldap_get_option(connection, LDAP_OPT_DIAGNOSTIC_MESSAGE, &given) == LDAP_OPT_SUCCESS &&
       given != nullptr) {
     const std::unique_ptr<char, decltype(&ldap_memfree)> held(given, ldap_memfree);
-    if (*given != '\0') why += fmt::format(" ({})", AsPlainText(given));
+    // Of a certificate that it refuses the library says "(unknown error code)".
+    if (*given != '\0' && *given != '(') why += fmt::format(" ({})", AsPlainText(given));
   }
-  throw Unanswered{IsAway(code) ? say::directory::NoAnswer(why)
-                                : say::directory::CannotBeAsked(why)};
+  return why;
 }
 
-// Waits kLongest for an address to answer. @return no descriptor if it does not.
-Descriptor Dialled(const addrinfo& address, std::chrono::steady_clock::time_point end,
-                   const std::stop_token& stop) {
-  Descriptor socket(::socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  const int fd = socket.get();
-  const Interrupt interrupt(fd, end, stop);
-  if (::connect(fd, address.ai_addr, address.ai_addrlen) != 0) {
-    pollfd waiting{.fd = fd, .events = POLLOUT, .revents = 0};
-    int error = 0;
+// @param connection  As above.
+// @throws Failure  That the server is away, or what is wrong with the question: then the
+//                  configuration is.
+void Check(LDAP* connection, int code) {
+  if (code == LDAP_SUCCESS) return;
+  const std::string why = WhyOf(connection, code);
+  if (IsAway(code)) throw Failure{say::directory::NoAnswer(why)};
+  if (IsTrouble(code)) throw Failure{say::directory::QuestionFailed(why)};
+  throw Failure{say::directory::CannotBeAsked(why)};
+}
+
+// Waits kLongest for an address to answer. A full queue of a Unix socket is not waited for.
+// @return 0 with `socket` connected, or why it is not, as errno.
+int Connect(int socket, const sockaddr* address, socklen_t size,
+            std::chrono::steady_clock::time_point end, const std::stop_token& stop) {
+  const Interrupt interrupt(socket, end, stop);
+  int error = ::connect(socket, address, size) == 0 ? 0 : errno;
+  if (error == EINPROGRESS) {
+    pollfd waiting{.fd = socket, .events = POLLOUT, .revents = 0};
     socklen_t length = sizeof error;
-    if (errno != EINPROGRESS || ::poll(&waiting, 1, kLongest.tv_sec * 1000) != 1 ||
-        ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &length) != 0 || error != 0)
-      return Descriptor(-1);
+    const int ready = ::poll(&waiting, 1, kLongest.tv_sec * 1000);
+    if (ready == 0) return ETIMEDOUT;
+    if (ready < 0 || ::getsockopt(socket, SOL_SOCKET, SO_ERROR, &error, &length) != 0) return errno;
   }
-  if (::fcntl(fd, F_SETFL, 0) != 0) return Descriptor(-1);
-  return socket;
+  if (error != 0) return error;
+  return ::fcntl(socket, F_SETFL, 0) == 0 ? 0 : errno;
+}
+
+Descriptor NewSocket(int family) {
+  return Descriptor(::socket(family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+}
+
+Failure NotReached(const std::string& where, int error) {
+  return {say::directory::NoAnswer(fmt::format("{}: {}", where, std::strerror(error)))};
 }
 
 // A connection to the server, before anything is said. The library's own would wait for minutes
@@ -117,11 +150,15 @@ Descriptor Dial(const std::string& url, std::chrono::steady_clock::time_point en
   const std::unique_ptr<LDAPURLDesc, decltype(&ldap_free_urldesc)> parts(given, ldap_free_urldesc);
   const std::string host = parts->lud_host == nullptr ? "" : parts->lud_host;
   if (url.starts_with("ldapi://")) {
-    try {
-      return Descriptor(ConnectUnix(host));
-    } catch (const DeviceError& error) {
-      throw Unanswered{say::directory::NoAnswer(error.what())};
-    }
+    Descriptor socket = NewSocket(AF_UNIX);
+    int error = socket.get() < 0 ? errno : 0;
+    const auto connect = [&](const sockaddr* address, socklen_t size) {
+      errno = Connect(socket.get(), address, size, end, stop);
+      return errno == 0 ? 0 : -1;
+    };
+    if (error == 0 && WithUnixAddress(host, connect) != 0) error = errno;
+    if (error != 0) throw NotReached(host, error);
+    return socket;
   }
   // Of this thread only: the usual ones are 5 s, tried twice.
   if (::res_init() == 0) {
@@ -133,20 +170,31 @@ Descriptor Dial(const std::string& url, std::chrono::steady_clock::time_point en
   const int code =
       ::getaddrinfo(host.c_str(), fmt::format("{}", parts->lud_port).c_str(), &wanted, &found);
   if (code != 0)
-    throw Unanswered{say::directory::NoAnswer(fmt::format("{}: {}", host, ::gai_strerror(code)))};
+    throw Failure{say::directory::NoAnswer(fmt::format("{}: {}", host, ::gai_strerror(code)))};
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> held(found, ::freeaddrinfo);
-  int tried = 0;
+  int tried = 0, error = 0;
   for (const addrinfo* one = found; one != nullptr && tried < kMostAddresses;
-       one = one->ai_next, ++tried)
-    if (Descriptor socket = Dialled(*one, end, stop); socket.get() >= 0) return socket;
-  throw Unanswered{say::directory::NoAnswer(ldap_err2string(LDAP_SERVER_DOWN))};
+       one = one->ai_next, ++tried) {
+    Descriptor socket = NewSocket(one->ai_family);
+    error =
+        socket.get() < 0 ? errno : Connect(socket.get(), one->ai_addr, one->ai_addrlen, end, stop);
+    if (error == 0) return socket;
+  }
+  throw NotReached(host, error);
 }
 
-std::string Replaced(std::string text, std::string_view place, const std::string& by) {
-  for (std::size_t at = text.find(place); at != std::string::npos;
-       at = text.find(place, at + by.size()))
-    text.replace(at, place.size(), by);
-  return text;
+// What stands in the text for others; what is put in their places is looked through for none.
+using Places = std::vector<std::pair<std::string_view, std::string>>;
+
+std::string Filled(std::string_view text, const Places& places) {
+  std::string filled;
+  while (!text.empty()) {
+    const auto place = std::ranges::find_if(
+        places, [&](const auto& known) { return text.starts_with(known.first); });
+    filled += place == places.end() ? std::string(1, text.front()) : place->second;
+    text.remove_prefix(place == places.end() ? 1 : place->first.size());
+  }
+  return filled;
 }
 
 std::string Escaped(std::string_view text, std::string_view special, const char* format) {
@@ -173,14 +221,34 @@ std::string Normalised(const std::string& name) {
       given == nullptr)
     return name;
   const std::unique_ptr<char, decltype(&ldap_memfree)> held(given, ldap_memfree);
-  std::string normalised = given;
-  std::ranges::transform(normalised, normalised.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return normalised;
+  return AsciiLower(given);
+}
+
+// With a certificate that is checked: nothing is said without.
+void BeginTls(LDAP* connection, const DirectorySettings& settings, const Interrupt& interrupt) {
+  const auto set = [&](int option, const void* value) {
+    if (ldap_set_option(connection, option, value) != LDAP_OPT_SUCCESS)
+      Check(nullptr, LDAP_PARAM_ERROR);
+  };
+  const int demand = LDAP_OPT_X_TLS_DEMAND, client = 0, least = LDAP_OPT_X_TLS_PROTOCOL_TLS1_2;
+  set(LDAP_OPT_X_TLS_REQUIRE_CERT, &demand);
+  set(LDAP_OPT_X_TLS_PROTOCOL_MIN, &least);
+  const std::string trusted =
+      settings.trusted.empty() ? "/etc/ssl/certs/ca-certificates.crt" : settings.trusted.string();
+  if (::access(trusted.c_str(), R_OK) != 0) throw Failure{say::directory::NoAuthority(trusted)};
+  set(LDAP_OPT_X_TLS_CACERTFILE, trusted.c_str());
+  set(LDAP_OPT_X_TLS_NEWCTX, &client);
+  const int code = settings.url.starts_with("ldap://")
+                       ? ldap_start_tls_s(connection, nullptr, nullptr)
+                       : ldap_install_tls(connection);
+  // The library's code for each handshake that fails, also for one that was cut short.
+  if (code == LDAP_CONNECT_ERROR && !interrupt.has_acted())
+    throw Failure{say::directory::NotTrusted(WhyOf(connection, code), trusted)};
+  Check(connection, code);
 }
 
 // @param fd  Connected; it belongs to this connection from now on.
-Connection Connect(const DirectorySettings& settings, int fd) {
+Connection Open(const DirectorySettings& settings, int fd, const Interrupt& interrupt) {
   LDAP* made = nullptr;
   const bool is_local = settings.url.starts_with("ldapi://");
   const int code =
@@ -191,8 +259,7 @@ Connection Connect(const DirectorySettings& settings, int fd) {
   const auto set = [&](int option, const void* value) {
     if (ldap_set_option(made, option, value) != LDAP_OPT_SUCCESS) Check(nullptr, LDAP_PARAM_ERROR);
   };
-  const int version = LDAP_VERSION3, demand = LDAP_OPT_X_TLS_DEMAND, client = 0,
-            least = LDAP_OPT_X_TLS_PROTOCOL_TLS1_2;
+  const int version = LDAP_VERSION3;
   set(LDAP_OPT_PROTOCOL_VERSION, &version);
   set(LDAP_OPT_REFERRALS, LDAP_OPT_OFF);  // The password goes to this server only.
   set(LDAP_OPT_TIMEOUT, &kLongest);
@@ -202,21 +269,19 @@ Connection Connect(const DirectorySettings& settings, int fd) {
   if (ldap_get_option(made, LDAP_OPT_SOCKBUF, &buffer) != LDAP_OPT_SUCCESS ||
       ber_sockbuf_ctrl(buffer, LBER_SB_OPT_SET_MAX_INCOMING, &most) < 0)
     Check(nullptr, LDAP_LOCAL_ERROR);
-  if (is_local) return connection;
-  set(LDAP_OPT_X_TLS_REQUIRE_CERT, &demand);
-  set(LDAP_OPT_X_TLS_PROTOCOL_MIN, &least);
-  const std::string trusted =
-      settings.trusted.empty() ? "/etc/ssl/certs/ca-certificates.crt" : settings.trusted.string();
-  if (::access(trusted.c_str(), R_OK) != 0) throw Unanswered{say::directory::NoAuthority(trusted)};
-  set(LDAP_OPT_X_TLS_CACERTFILE, trusted.c_str());
-  set(LDAP_OPT_X_TLS_NEWCTX, &client);
-  Check(made, settings.url.starts_with("ldap://") ? ldap_start_tls_s(made, nullptr, nullptr)
-                                                  : ldap_install_tls(made));
+  if (!is_local) BeginTls(made, settings, interrupt);
   return connection;
 }
 
-// False: name and password do not belong together.
-bool LogsIn(LDAP* connection, const std::string& person, const std::string& password) {
+// Such as a locked account or a password that has run out; some servers say so whatever the
+// password is.
+bool IsRefusal(int code) {
+  return code == LDAP_CONSTRAINT_VIOLATION || code == LDAP_UNWILLING_TO_PERFORM;
+}
+
+// False: name and password do not belong together, or `refusal` says why the person may not log in.
+bool LogsIn(LDAP* connection, const std::string& person, const std::string& password,
+            Message& refusal) {
   berval secret{};
   secret.bv_len = password.size();
   secret.bv_val = const_cast<char*>(password.data());  // NOLINT: the library only reads it
@@ -225,6 +290,10 @@ bool LogsIn(LDAP* connection, const std::string& person, const std::string& pass
   if (code == LDAP_INVALID_CREDENTIALS || code == LDAP_NO_SUCH_OBJECT ||
       code == LDAP_INAPPROPRIATE_AUTH)
     return false;
+  if (IsRefusal(code)) {
+    refusal = say::directory::RefusesPerson(WhyOf(connection, code));
+    return false;
+  }
   Check(connection, code);
   return true;
 }
@@ -286,29 +355,29 @@ web::DirectoryAnswer AskLdap(const DirectorySettings& settings, const std::strin
   if (name.empty() || password.empty()) return answer;
   const auto end = std::chrono::steady_clock::now() + kLongestInAll;
   try {
-    if (stop.stop_requested()) throw Unanswered{say::directory::NoAnswer("stop")};
+    if (stop.stop_requested()) Check(nullptr, LDAP_USER_CANCELLED);
     // It stays open until the end, so that no other one is ever shut down in its place.
     const Descriptor socket = Dial(settings.url, end, stop);
     const Interrupt interrupt(socket.get(), end, stop);
-    const Connection connection = Connect(settings, ::dup(socket.get()));
-    std::string person = Replaced(settings.person, "{name}", InName(name));
-    if (!LogsIn(connection.get(), person, password)) return answer;
+    const Connection connection = Open(settings, ::dup(socket.get()), interrupt);
+    std::string person = Filled(settings.person, {{kPlaceOfName, InName(name)}});
+    if (!LogsIn(connection.get(), person, password, answer.refusal)) return answer;
     if (!settings.people_filter.empty()) {
       const std::vector<std::string> found =
           Find(connection.get(), settings.people_base,
-               Replaced(settings.people_filter, "{name}", InFilter(name)));
+               Filled(settings.people_filter, {{kPlaceOfName, InFilter(name)}}));
       // Two entries of that name: whose groups count is not known.
-      if (found.size() != 1) throw Unanswered{say::directory::PersonNotFound(found.size())};
+      if (found.size() != 1) throw Failure{say::directory::PersonNotFound(found.size())};
       person = found.front();
     }
-    const std::string groups = Replaced(
-        Replaced(settings.groups_filter, "{person}", InFilter(person)), "{name}", InFilter(name));
+    const std::string groups = Filled(settings.groups_filter, {{kPlaceOfPerson, InFilter(person)},
+                                                               {kPlaceOfName, InFilter(name)}});
     answer.role = RoleOf(settings, Find(connection.get(), settings.groups_base, groups));
     answer.matches = true;  // last: a failure is no answer
-  } catch (const Unanswered& unanswered) {
-    answer.failure = unanswered.why;
+  } catch (const Failure& failure) {
+    answer.failure = failure.why;
   } catch (const std::exception& error) {  // no memory, or no thread
-    answer.failure = say::directory::NoAnswer(error.what());
+    answer.failure = say::directory::QuestionFailed(error.what());
   }
   return answer;
 }

@@ -14,7 +14,7 @@ namespace plumb {
 /// Waits for the network: at most ten seconds once the server's name is known, some seconds for the
 /// name. An empty password never matches: a server would take it for a visitor who gives no name.
 /// SIGPIPE must be ignored, as the loop does. Thread-safe; does not throw.
-/// @param stop  Ends the question; the answer is then a failure.
+/// @param stop  Ends the question once the server's name is known; the answer is then a failure.
 [[nodiscard]] web::DirectoryAnswer AskLdap(const DirectorySettings& settings,
                                            const std::string& name, const std::string& password,
                                            const std::stop_token& stop);

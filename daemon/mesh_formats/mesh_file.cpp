@@ -5,13 +5,13 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cctype>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/ply_file.hpp"
@@ -33,10 +33,7 @@ void CheckTriangles(const TriangleMesh& mesh) {
 }
 
 std::string EndingOf(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
+  return AsciiLower(path.extension().string());
 }
 
 TriangleMesh InUnit(TriangleMesh mesh, MeshUnit unit) {

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/base64.hpp"
 #include "algo/base/message_json.hpp"
 #include "words/messages.hpp"
 
@@ -24,14 +25,6 @@ std::string SaidTo(const OutMessage& message, const Catalogue& language) {
   return Text(message.is_repeated ? say::messages::StillSo(message.text) : message.text, language);
 }
 
-std::string Base64Of(std::string_view bytes) {
-  std::string text(sodium_base64_ENCODED_LEN(bytes.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
-  sodium_bin2base64(text.data(), text.size(), reinterpret_cast<const unsigned char*>(bytes.data()),
-                    bytes.size(), sodium_base64_VARIANT_ORIGINAL);
-  text.pop_back();  // the zero byte
-  return text;
-}
-
 /// A header's text as encoded words (RFC 2047), each of whole characters and of at most 75 bytes.
 std::string EncodedWords(std::string_view text) {
   constexpr std::size_t kMostBytes = 42;
@@ -42,7 +35,7 @@ std::string EncodedWords(std::string_view text) {
            (static_cast<unsigned char>(text[count]) & 0xC0U) == 0x80U)
       --count;
     if (!words.empty()) words += "\r\n ";
-    words += fmt::format("=?UTF-8?B?{}?=", Base64Of(text.substr(0, count)));
+    words += fmt::format("=?UTF-8?B?{}?=", ToBase64(text.substr(0, count)));
     text.remove_prefix(count);
   }
   return words;
@@ -64,7 +57,7 @@ int PriorityOf(const OutMessage& message) {
 std::string MailText(const OutMessage& message, const Catalogue& language, const std::string& from,
                      const std::string& to) {
   const std::string said = SaidTo(message, language);
-  const std::string body = Base64Of(fmt::format(
+  const std::string body = ToBase64(fmt::format(
       "{}\r\n\r\n{}\r\n", said, Text(say::messages::WhereToLook(message.unit), language)));
   // Names of days and months are those of the protocol, whatever the locale.
   constexpr std::array kDays = {"Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"};

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/patient_store.hpp"
 
-#include <sodium.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include <fmt/format.h>
 
+#include "algo/base/base64.hpp"
 #include "daemon/database/row_digests.hpp"
 #include "daemon/database/store_refusal.hpp"
 #include "daemon/database/stored_values.hpp"
@@ -172,14 +171,9 @@ std::optional<std::string> PatientStore::Photo(const std::string& id) {
       database_.ForRows()
           ->FirstText("SELECT photo FROM patients WHERE id = ? AND id > 0", ParseId(id))
           .value_or("");
-  std::string jpeg(stored.size(), '\0');
-  std::size_t bytes = 0;
-  const bool is_read = sodium_base642bin(reinterpret_cast<unsigned char*>(jpeg.data()), jpeg.size(),
-                                         stored.data(), stored.size(), nullptr, &bytes, nullptr,
-                                         sodium_base64_VARIANT_ORIGINAL) == 0;
-  jpeg.resize(bytes);
+  std::optional<std::string> jpeg = FromBase64(stored);
   // An imported record may hold anything.
-  if (!is_read || !jpeg.starts_with("\xFF\xD8")) return std::nullopt;
+  if (!jpeg || !jpeg->starts_with("\xFF\xD8")) return std::nullopt;
   return jpeg;
 }
 
@@ -187,16 +181,11 @@ void PatientStore::SetPhoto(const Actor& actor, const std::string& id, const std
   const std::int64_t number = RequireId(id, "patient");
   if (jpeg.size() > kMaxPhoto)
     throw StoreRefusal(ChangeResult::kInvalid, say::store::PhotoTooLarge());
-  std::string stored(sodium_base64_encoded_len(jpeg.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
-  sodium_bin2base64(stored.data(), stored.size(),
-                    reinterpret_cast<const unsigned char*>(jpeg.data()), jpeg.size(),
-                    sodium_base64_VARIANT_ORIGINAL);
-  stored.pop_back();  // the zero at its end
   StoreChange change(database_);
   change->Run(
       "UPDATE patients SET photo = ?, has_photo = ?, drawing = '', sheet_revision = sheet_revision "
       "+ 1 WHERE id = ? AND id > 0",
-      stored, std::int64_t{jpeg.empty() ? 0 : 1}, number);
+      ToBase64(jpeg), std::int64_t{jpeg.empty() ? 0 : 1}, number);
   if (change->num_changed() == 0)
     throw StoreRefusal(ChangeResult::kNotFound, say::store::NoPatient());
   change.Log(actor, jpeg.empty() ? "patient.photo_remove" : "patient.photo", id, {});

@@ -235,7 +235,7 @@ TEST_F(DaemonDamageTest, NoDamageToTheLogOfWritesTakesARowSilently) {
         EXPECT_THAT(codes, ::testing::HasSubstr(fmt::format("\"K{}\"", i)));
     } else {
       ++refused;
-      EXPECT_NE(plumbd.Status()["reason"], "");
+      EXPECT_NE(plumbd.Status().value("reason", ""), "");
       EXPECT_EQ(bytes(), damaged) << "it is evidence, and may be repaired";
     }
     EXPECT_EQ(plumbd.Stop(), 0) << plumbd.log();

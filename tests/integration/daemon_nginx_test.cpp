@@ -9,10 +9,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/fake_peer.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/self_signed.hpp"
 #include "tests/support/skip.hpp"
 
 namespace plumb {
@@ -99,11 +101,7 @@ class DaemonNginxTest : public ::testing::Test {
   [[nodiscard]] std::string Site(const Plumbd& plumbd) const {
     std::string site = Read(fs::path(PLUMB_SOURCE_DIR) / "toolchain" / "nginx.conf");
     const auto in_folder = [&](const char* name) { return (folder_ / name).string(); };
-    const std::string made = fmt::format(
-        "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN={} -keyout '{}' -out '{}' "
-        "2>/dev/null",
-        kSite, in_folder("site.key"), in_folder("site.pem"));
-    EXPECT_EQ(std::system(made.c_str()), 0);
+    testing::MakeSelfSigned(in_folder("site.pem"), in_folder("site.key"), kSite);
     Replace(site, "/etc/ssl/certs/plumb.clinic.example.pem", in_folder("site.pem"));
     Replace(site, "/etc/ssl/private/plumb.clinic.example.key", in_folder("site.key"));
     const RunResult authority =
@@ -118,7 +116,8 @@ class DaemonNginxTest : public ::testing::Test {
   /// As a browser asks that has opened the page by TLS; test clients speak without.
   static HttpClient Browser(const Nginx& nginx) {
     HttpClient browser(nginx.plain_port());
-    browser.extra_headers = {{"Origin", "https://127.0.0.1"}, {"Sec-Fetch-Site", "same-origin"}};
+    browser.extra_headers = {{"Origin", fmt::format("https://127.0.0.1:{}", nginx.plain_port())},
+                             {"Sec-Fetch-Site", "same-origin"}};
     return browser;
   }
   static HttpAnswer SetUpBy(HttpClient& browser, const Plumbd& plumbd) {
@@ -168,11 +167,11 @@ TEST_F(DaemonNginxTest, ARefusalNamesTheProxyThatIsSetUpOtherwise) {
   {
     const auto plumbd = Start("0.0.0.0:0");
     std::string site = Site(*plumbd);
-    Replace(site, "proxy_set_header Host $host;", "");
+    Replace(site, "proxy_set_header Host $http_host;", "");
     ExpectRefusedBy(Nginx(folder_ / "without-host", site), *plumbd,
                     "behind a proxy, have it pass on the browser's Host");
     site = Site(*plumbd);
-    Replace(site, "Host $host;", "Host another.clinic.example;");
+    Replace(site, "Host $http_host;", "Host another.clinic.example;");
     const Nginx elsewhere(folder_ / "other-name", site);
     const HttpAnswer unknown = HttpClient(elsewhere.plain_port()).Get("/health");
     EXPECT_EQ(unknown.status, 421);
@@ -184,6 +183,23 @@ TEST_F(DaemonNginxTest, ARefusalNamesTheProxyThatIsSetUpOtherwise) {
   Replace(site, "proxy_pass https:", "proxy_pass http:");
   ExpectRefusedBy(Nginx(folder_ / "without-tls", site), *plumbd,
                   "have the proxy use https to the unit");
+  EXPECT_EQ(plumbd->Stop(), 0);
+}
+
+// The product's site says an hour. A second in its place shows that this is the time that counts:
+// nginx by itself would wait for 60, and the unit of this test hangs up before.
+TEST_F(DaemonNginxTest, AnAnswerThatTakesLongIsWaitedForAsLongAsTheSiteSays) {
+  const auto plumbd = Start("127.0.0.1:0");
+  std::string site = Site(*plumbd);
+  testing::FakePeer busy([](testing::PeerConnection& unit) {
+    unit.ReadTo("\r\n\r\n");
+    unit.ReadTo("until the proxy gives up");
+  });
+  Replace(site, fmt::format("proxy_pass https://127.0.0.1:{}", plumbd->port()),
+          fmt::format("proxy_pass http://127.0.0.1:{}", busy.port()));
+  Replace(site, "proxy_read_timeout 1h;", "proxy_read_timeout 1s;");
+  const Nginx nginx(folder_ / "nginx", site);
+  EXPECT_EQ(Browser(nginx).Post("/api/v1/backup").status, 504) << "before the unit hangs up";
   EXPECT_EQ(plumbd->Stop(), 0);
 }
 

@@ -12,6 +12,7 @@
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/self_signed.hpp"
 
 namespace plumb {
 namespace {
@@ -327,11 +328,8 @@ TEST_F(DaemonWebTest, TheEndOfItsCertificateIsToldFromThirtyDaysBefore) {
       << fmt::format("[web]\ntls_certificate = '{}'\ntls_key = '{}'\n",
                      (folder_ / "certificate.pem").string(), (folder_ / "key.pem").string());
   for (const int days : {29, 31}) {
-    const std::string make = fmt::format(
-        "cd {} && openssl req -x509 -newkey rsa:2048 -nodes -days {} -subj '/CN=room 1' -keyout "
-        "key.pem -out certificate.pem 2> /dev/null",
-        folder_.path().string(), days);
-    ASSERT_EQ(std::system(make.c_str()), 0);
+    testing::MakeSelfSigned(folder_ / "certificate.pem", folder_ / "key.pem", "room 1",
+                            {.days = days});
     Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
     ASSERT_TRUE(plumbd.WaitUntilUp());
     const json page = plumbd.WaitFor(

@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
+#include <semaphore>
 #include <string>
 #include <vector>
 
@@ -93,7 +95,12 @@ class FakeAppliance : public web::BackgroundWork,
   /// on the loop.
   bool hold_background_work = false;
   std::vector<std::function<void()>> held_background_work;
+  /// Of this kind only; the other kind is done at once.
+  std::optional<web::BackgroundPool> hold_only;
   bool refuse_background_work = false;  ///< Too much waits already.
+  int num_refused_background_work = 0;
+  /// Released for each work that waits here or is refused.
+  std::counting_semaphore<> asked_for_background_work{0};
 
   /// Moves a running scan on. @param now  Any clock that grows.
   void Tick(std::chrono::steady_clock::time_point now);

@@ -126,15 +126,20 @@ void FakeAppliance::ChangeSettings(const Actor& actor, const SettingsChange& cha
   Did(actor, "settings.change", "", done);
 }
 
-bool FakeAppliance::RunInBackground(web::BackgroundPool, std::function<void()> job,
+bool FakeAppliance::RunInBackground(web::BackgroundPool where, std::function<void()> job,
                                     std::function<void()> done) {
-  if (refuse_background_work) return false;
+  if (refuse_background_work) {
+    ++num_refused_background_work;
+    asked_for_background_work.release();
+    return false;
+  }
   const auto both = [job = std::move(job), done = std::move(done)] {
     job();
     done();
   };
-  if (hold_background_work) {
+  if (hold_background_work && hold_only.value_or(where) == where) {
     held_background_work.push_back(both);
+    asked_for_background_work.release();
   } else {
     both();
   }

@@ -17,6 +17,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "algo/base/ascii_lower.hpp"
 #include "tests/support/sanitized.hpp"
 
 namespace plumb::test {
@@ -32,12 +33,6 @@ sockaddr_in Address(const std::string& text, std::uint16_t port) {
   return address;
 }
 
-std::string Lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 HttpAnswer ParseHead(const std::string& head) {
   HttpAnswer answer;
   answer.status = std::stoi(head.substr(9, 3));
@@ -46,7 +41,7 @@ HttpAnswer ParseHead(const std::string& head) {
     const std::size_t end = head.find("\r\n", at), colon = head.find(": ", at);
     if (end == std::string::npos || end == at) break;
     if (colon < end)
-      answer.headers.emplace(Lower(head.substr(at, colon - at)),
+      answer.headers.emplace(AsciiLower(head.substr(at, colon - at)),
                              head.substr(colon + 2, end - colon - 2));
     at = end + 2;
   }

@@ -17,6 +17,7 @@
 
 #include "tests/support/free_port.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/self_signed.hpp"
 
 namespace plumb::testing {
 
@@ -31,12 +32,18 @@ class Slapd {
 
   [[nodiscard]] static bool IsInstalled() { return std::filesystem::exists(kProgram); }
 
+  /// Of a server's socket on this machine.
+  [[nodiscard]] static std::string UrlOf(const std::filesystem::path& socket) {
+    std::string url = "ldapi://";
+    for (const char c : socket.string()) url += c == '/' ? "%2F" : std::string(1, c);
+    return url;
+  }
+
   /// @param folder  Of its own; outlives it.
   explicit Slapd(const std::filesystem::path& folder) : folder_(folder) {
     std::filesystem::create_directories(folder_ / "data");
-    Shell(
-        "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=directory "
-        "-addext subjectAltName=IP:127.0.0.1 -keyout key.pem -out cert.pem");
+    MakeSelfSigned(certificate(), folder_ / "key.pem", "directory",
+                   {.options = "-addext subjectAltName=IP:127.0.0.1"});
     std::ofstream(folder_ / "slapd.conf") << fmt::format(
         "include /etc/ldap/schema/core.schema\ninclude /etc/ldap/schema/cosine.schema\n"
         "include /etc/ldap/schema/inetorgperson.schema\n"
@@ -55,7 +62,7 @@ class Slapd {
     process_ = std::make_unique<Process>(std::vector<std::string>{
         "/bin/bash", "-c", "exec \"$@\" 2> >(sed -u '/epoll: listen=/q' >&2; exec cat >/dev/null)",
         "slapd", kProgram, "-d", "conns", "-f", (folder_ / "slapd.conf").string(), "-h",
-        tls_url() + " " + plain_url()});
+        tls_url() + " " + plain_url() + " " + local_url()});
     if (!process_->WaitForStderr("epoll: listen="))
       throw std::runtime_error("slapd: " + process_->err());
   }
@@ -72,6 +79,8 @@ class Slapd {
   [[nodiscard]] std::string plain_url() const {
     return fmt::format("ldap://127.0.0.1:{}", plain_port_);
   }
+  /// Its socket in the folder, without TLS.
+  [[nodiscard]] std::string local_url() const { return UrlOf(folder_ / "socket"); }
   [[nodiscard]] std::filesystem::path certificate() const { return folder_ / "cert.pem"; }
 
  private:

@@ -582,7 +582,7 @@ await h.step('the daily check and the room’s calibration, passed and failed; u
   const why = 'what is stored cannot be read: the stored settings cannot be read: expected a JSON '
     + 'object, found none; it was changed from outside, or its disk failed. Put a backup of the '
     + 'database in its place, or save it again';
-  const settings = '**/api/v1/settings';
+  const settings = '**/api/v1/settings', users = '**/api/v1/users';
   await lookAll(
     atCheck('passed', '.verdict.in_tolerance'),
     { name: 'update-restart', state: true, route: 'update', who: 'engineer', hash: 'update',
@@ -594,6 +594,18 @@ await h.step('the daily check and the room’s calibration, passed and failed; u
       before: (page) => page.route(settings, (route) => (route.request().method() === 'GET'
         ? route.fulfill({ status: 500, json: { error: why } }) : route.continue())),
       leave: (page) => page.unroute(settings),
+    },
+    {
+      name: 'users-without-directory', state: true, route: 'users', who: 'engineer',
+      hash: 'users', ready: 'tbody tr',
+      before: (page) => page.route(users, (route) => route.fulfill({ json: { directory: false,
+        users: [{ name: 'anna', role: 'technician', disabled: false, second_factor: false,
+          in_directory: true, created_at: '2026-01-05T08:00:00Z' }] } })),
+      prepare: async (page, text) => {
+        await page.locator('tbody summary').click();
+        await page.locator('tbody').getByLabel(text.users.newPassword).waitFor();
+      },
+      leave: (page) => page.unroute(users),
     },
   );
   h.tell('rolledback');

@@ -183,7 +183,7 @@ void Accounts::AddRoutes(Routes& routes) {
   add("PUT", "/api/v1/session/preferences", Permission::kLogin, BodyKind::kJson,
       &Accounts::SetPreferences);
   routes.Read("/api/v1/users", Permission::kUsers, [this](const Request&) {
-    return JsonResponse({{"users", users_.Users()}});
+    return JsonResponse({{"users", users_.Users()}, {"directory", bool{options_.ask_directory}}});
   });
   add("POST", "/api/v1/users", Permission::kUsers, BodyKind::kJson, &Accounts::AddUser);
   add("PUT", "/api/v1/users/{name}", Permission::kUsers, BodyKind::kJson, &Accounts::ChangeUser);
@@ -328,6 +328,7 @@ void Accounts::VerifyPassword(const User& user, std::string password,
     return respond(ErrorResponse(503, say::web::DirectoryNotConfigured()));
   AskDirectoryOf(user.name, std::move(password), counters, respond,
                  [this, user, done, respond](const DirectoryAnswer& answer) {
+                   if (!answer.refusal.empty()) return respond(ErrorResponse(403, answer.refusal));
                    if (answer.matches && answer.role != user.role) {
                      EndAllOf(user.name);
                      return respond(ErrorResponse(403, say::web::RoleChangedInDirectory()));
@@ -435,7 +436,9 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
                                                 : std::string();  // empty: unchanged
   if (const Message why = WhyNotPassword(password, change.name); !password.empty() && !why.empty())
     throw DataError(why);
-  if (IsInDirectory(user->password_hash) && (change.role || !password.empty()))
+  // Without the directory such an account is of use again with a password of this unit's own.
+  if (options_.ask_directory && IsInDirectory(user->password_hash) &&
+      (change.role || !password.empty()))
     throw DataError(say::web::AccountOfDirectory());
   // An authenticator that was lost, with its recovery codes, is removed by an engineer.
   const bool removes_second_factor =

@@ -89,6 +89,8 @@ class Accounts : public SessionLookup {
                             const Respond& respond);
   void FinishLogIn(const Actor& actor, const std::string& stored, const LogInForm& form,
                    const std::vector<std::string>& counters, const Respond& respond);
+  /// With the name only if there is such an account.
+  void LogFailedLogIn(const Actor& actor, const Message& why);
   struct Counters {
     std::vector<std::string> names;
     bool is_known = false;  ///< Guesses of strangers neither count for it nor delay it.
@@ -131,8 +133,8 @@ class Accounts : public SessionLookup {
   [[nodiscard]] Response ListSessions(const Request& request);
   void EndSession(const Request& request, const Respond& respond);
   void EndOtherSessions(const Request& request, const Respond& respond);
-  /// Calls `done` unless this object is destroyed, and answers if that throws or the queue is full.
-  /// The same where the directory gave no answer; what `counters` counted was no guess then.
+  /// Calls `done` unless this object is destroyed, and answers if that throws. Answers, too, if the
+  /// queue is full or the question failed: the attempt is then not counted.
   void AskDirectoryOf(const std::string& name, std::string password,
                       const std::vector<std::string>& counters, const Respond& respond,
                       std::function<void(const DirectoryAnswer&)> done);

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <utility>
 
+#include "algo/base/ascii_lower.hpp"
 #include "web/api/accounts.hpp"
 #include "web/exchange/json.hpp"
 #include "web/http/checks.hpp"
@@ -156,12 +157,10 @@ void Accounts::AskDirectoryOf(const std::string& name, std::string password,
 }
 
 void Accounts::LogIn(const Request& request, LogInForm form, const Respond& respond) {
-  // It is wiped by the worker, and no other copy is kept.
+  // Whoever checks it wipes it; what waits here for the answer has no copy.
   std::string password = std::exchange(form.password, {});
   // A directory knows no difference between capital and small letters; accounts have small ones.
-  if (options_.ask_directory)
-    std::ranges::transform(form.name, form.name.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (options_.ask_directory) form.name = AsciiLower(form.name);
   const auto user = users_.FindUser(form.name);
   const std::string stored = user && !user->disabled ? user->password_hash : std::string();
   const auto [counters, is_known] = CountersOf(request, form, stored);
@@ -174,7 +173,10 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
       return respond(ErrorResponse(503, say::web::NobodyCanLogIn(why)));
   }
   const Actor actor{form.name, request.address};
-  if (options_.ask_directory && IsName(form.name) && (!user || IsInDirectory(stored)))
+  // Not before the set-up: with an account of the directory there would be no code for it any more,
+  // and nobody could become an engineer.
+  if (options_.ask_directory && !needs_setup() && IsName(form.name) &&
+      (!user || IsInDirectory(stored)))
     return AskDirectoryOf(form.name, std::move(password), counters, respond,
                           [=, this, counters = counters](const DirectoryAnswer& answer) {
                             FinishDirectoryLogIn(actor, answer, form, counters, respond);
@@ -193,6 +195,10 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
 void Accounts::FinishDirectoryLogIn(const Actor& actor, const DirectoryAnswer& answer,
                                     const LogInForm& form, const std::vector<std::string>& counters,
                                     const Respond& respond) {
+  if (!answer.refusal.empty()) {
+    LogFailedLogIn(actor, answer.refusal);
+    return respond(ErrorResponse(403, answer.refusal));
+  }
   if (!answer.matches) return FinishLogIn(actor, {}, form, counters, respond);
   if (!answer.role) {
     TakeGuessBack(counters);
@@ -224,6 +230,12 @@ void Accounts::FinishDirectoryLogIn(const Actor& actor, const DirectoryAnswer& a
   users_.AddUser(actor, user, done);
 }
 
+void Accounts::LogFailedLogIn(const Actor& actor, const Message& why) {
+  // The name as typed is not logged, because people type passwords there.
+  const bool is_known = users_.FindUser(actor.user).has_value();
+  audit_.Log({is_known ? actor.user : std::string(), actor.address}, "login.failed", "", why);
+}
+
 void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, const LogInForm& form,
                            const std::vector<std::string>& counters, const Respond& respond) {
   const auto still = users_.FindUser(actor.user);
@@ -231,8 +243,7 @@ void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, const 
     respond(is_form && response.status == 403 ? Redirect("/result?failed=1") : std::move(response));
   };
   if (stored.empty() || !still || still->disabled || still->password_hash != stored) {
-    // The name as typed is not logged, because people type passwords there.
-    audit_.Log({still ? actor.user : std::string(), actor.address}, "login.failed", "", {});
+    LogFailedLogIn(actor, {});
     return fail(ErrorResponse(403, say::web::WrongLogIn()));
   }
   PassSecondFactor(actor, *still, form.second_factor, fail,

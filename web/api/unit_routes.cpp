@@ -2,13 +2,12 @@
 // The unit: status and button, settings, audit log, updates, maintenance.
 #include "web/api/all_routes.hpp"
 
-#include <sodium.h>
-
 #include <cmath>
 #include <filesystem>
 #include <string>
 #include <utility>
 
+#include "algo/base/base64.hpp"
 #include "algo/base/errors.hpp"
 #include "web/api/look_back.hpp"
 #include "web/exchange/json.hpp"
@@ -31,13 +30,7 @@ Json OutlineJson(const CameraOutline& outline) {
     Json& points = lines.emplace_back(Json::array());
     for (const auto& [x, y] : line) points.push_back({rounded(x), rounded(y)});
   }
-  std::string picture(
-      sodium_base64_ENCODED_LEN(outline.jpeg.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
-  sodium_bin2base64(picture.data(), picture.size(),
-                    reinterpret_cast<const unsigned char*>(outline.jpeg.data()),
-                    outline.jpeg.size(), sodium_base64_VARIANT_ORIGINAL);
-  picture.pop_back();  // its zero byte
-  return {{"picture", picture},
+  return {{"picture", ToBase64(outline.jpeg)},
           {"reference", outline.reference},
           {"lines", lines},
           {"is_placed", outline.is_placed}};

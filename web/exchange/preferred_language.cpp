@@ -2,8 +2,9 @@
 #include "web/exchange/preferred_language.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
+
+#include "algo/base/ascii_lower.hpp"
 
 namespace plumb::web {
 namespace {
@@ -28,10 +29,8 @@ double WeightOf(std::string_view entry) {
 /// True for "es", "es-MX" and "ES;q=0.3".
 bool Names(std::string_view entry, std::string_view language) {
   if (entry.size() < language.size()) return false;
-  const bool begins =
-      std::equal(language.begin(), language.end(), entry.begin(), [](char a, char b) {
-        return a == static_cast<char>(std::tolower(static_cast<unsigned char>(b)));
-      });
+  const bool begins = std::equal(language.begin(), language.end(), entry.begin(),
+                                 [](char a, char b) { return a == AsciiLower(b); });
   const char next = entry.size() == language.size() ? ';' : entry[language.size()];
   return begins && (next == '-' || next == ';' || next == ' ');
 }

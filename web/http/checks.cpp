@@ -8,6 +8,7 @@
 #include <cctype>
 #include <cstdint>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/utf8.hpp"
 
 namespace plumb::web {
@@ -20,13 +21,6 @@ std::string_view Trim(std::string_view text) {
   const auto first = text.find_first_not_of(" \t");
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
-
-std::string Lower(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower;
 }
 
 bool IsNumericAddress(const std::string& host) {
@@ -68,7 +62,7 @@ bool IsKnownHost(std::string_view host, std::span<const std::string> names) {
   if (host.empty() || host.size() > kMaxHost) return false;
   const auto bracket = host.rfind(']');
   const auto colon = host.find(':', bracket == std::string_view::npos ? 0 : bracket);
-  std::string name = Lower(host.substr(0, colon));
+  std::string name = AsciiLower(host.substr(0, colon));
   if (colon != std::string_view::npos) {
     const std::string_view port = host.substr(colon + 1);
     const bool digits =
@@ -77,13 +71,13 @@ bool IsKnownHost(std::string_view host, std::span<const std::string> names) {
   }
   if (name == "localhost" || IsNumericAddress(name)) return true;
   return std::any_of(names.begin(), names.end(),
-                     [&](const std::string& known) { return Lower(known) == name; });
+                     [&](const std::string& known) { return AsciiLower(known) == name; });
 }
 
 bool IsSameOrigin(std::string_view origin, std::string_view host, bool tls) {
   const std::string_view scheme = tls ? "https://" : "http://";
   if (!origin.starts_with(scheme)) return false;
-  return Lower(origin.substr(scheme.size())) == Lower(host);
+  return AsciiLower(origin.substr(scheme.size())) == AsciiLower(host);
 }
 
 std::optional<std::string> CookieValue(std::string_view header, std::string_view name) {
@@ -122,7 +116,7 @@ bool AcceptsGzip(std::optional<std::string_view> accept_encoding) {
   bool any = false;
   while (!rest.empty()) {
     const auto end = rest.find(',');
-    const std::string item = Lower(Trim(rest.substr(0, end)));
+    const std::string item = AsciiLower(Trim(rest.substr(0, end)));
     rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
     const auto semicolon = item.find(';');
     const std::string coding(Trim(std::string_view(item).substr(0, semicolon)));
@@ -164,7 +158,7 @@ bool IsToken(std::string_view text) {
 }
 
 bool IsChunked(std::string_view transfer_encoding) {
-  return Lower(Trim(transfer_encoding)) == "chunked";
+  return AsciiLower(Trim(transfer_encoding)) == "chunked";
 }
 
 std::string EscapeHtml(std::string_view text) {

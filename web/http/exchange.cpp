@@ -3,6 +3,7 @@
 
 #include <microhttpd.h>
 
+#include <chrono>
 #include <memory>
 #include <utility>
 
@@ -14,6 +15,8 @@ namespace {
 
 /// Size of the pieces in which an uploaded file is written; one is written while the next arrives.
 constexpr std::size_t kUploadBlock = 1 << 20;
+/// Until a download asks again for a place in a full queue.
+constexpr std::chrono::milliseconds kTryAgain{100};
 
 }  // namespace
 
@@ -25,6 +28,7 @@ void Exchange::Suspend() {
 void Exchange::Resume() {
   if (!suspended) return;
   suspended = false;
+  try_again_at.reset();
   MHD_resume_connection(connection);
   wake();
 }
@@ -120,7 +124,8 @@ void Exchange::Fetch(std::uint64_t at, std::size_t most) {
     alive->fetch_failed = alive->fetched.empty();
     alive->Resume();
   };
-  if (!background.RunInBackground(BackgroundPool::kFiles, work, done)) done();
+  if (background.RunInBackground(BackgroundPool::kReads, work, done)) return;
+  try_again_at = std::chrono::steady_clock::now() + kTryAgain;
 }
 
 }  // namespace plumb::web

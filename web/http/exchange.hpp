@@ -2,6 +2,7 @@
 // One request with its answer.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -49,6 +50,8 @@ struct Exchange : std::enable_shared_from_this<Exchange> {
   bool writing = false;        ///< A piece is being written.
   std::string fetched;         ///< The next piece of a file that the disk has been waited for.
   bool fetch_failed = false;
+  /// Resume() is due then: there was no place for the question for that piece.
+  std::optional<std::chrono::steady_clock::time_point> try_again_at;
 
   void Suspend();
   void Resume();

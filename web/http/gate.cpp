@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/message_json.hpp"
 #include "web/http/checks.hpp"
@@ -21,7 +22,7 @@ namespace {
 bool IsType(std::string_view header, std::string_view type) {
   const std::string_view value = header.substr(0, header.find(';'));
   return std::equal(value.begin(), value.end(), type.begin(), type.end(),
-                    [](char a, char b) { return std::tolower(a) == b; });
+                    [](char a, char b) { return AsciiLower(a) == b; });
 }
 
 Response InternalError(std::string_view name, const std::exception& error) {

@@ -79,8 +79,9 @@ std::size_t OpenFile::Checked(std::ptrdiff_t count) const {
 std::optional<std::size_t> OpenFile::ReadAtOnce(std::uint64_t at, std::span<char> into) const {
   const iovec part{into.data(), into.size()};
   const ssize_t count = preadv2(fd_, &part, 1, static_cast<off_t>(at), RWF_NOWAIT);
-  // Some file systems cannot tell whether data is already in memory.
-  if (count < 0 && (errno == EAGAIN || errno == EOPNOTSUPP)) return std::nullopt;
+  // Some file systems cannot tell whether data is already in memory, and some kernels say 0 before
+  // the end of a file.
+  if (count == 0 || (count < 0 && (errno == EAGAIN || errno == EOPNOTSUPP))) return std::nullopt;
   return Checked(count);
 }
 

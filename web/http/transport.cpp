@@ -14,6 +14,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/plain_text.hpp"
 #include "web/http/checks.hpp"
@@ -131,9 +132,7 @@ struct Transport::Callbacks {
   static MHD_Result OnHeader(void* cls, MHD_ValueKind, const char* key, const char* value) {
     auto* exchange = static_cast<Exchange*>(cls);
     if (!IsToken(key) || !exchange->head.TakeHeader(key, value)) exchange->malformed = true;
-    std::string name(key);
-    std::transform(name.begin(), name.end(), name.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::string name = AsciiLower(key);
     const std::string_view text = value != nullptr ? value : "";
     exchange->num_hosts += name == "host" ? 1 : 0;
     auto& headers = exchange->request.headers;
@@ -461,6 +460,9 @@ Transport::~Transport() {
 void Transport::Run() {
   std::uint64_t count = 0;
   [[maybe_unused]] const auto drained = read(wake_fd_, &count, sizeof count);
+  const auto now = std::chrono::steady_clock::now();
+  for (Exchange* exchange : exchanges_)
+    if (exchange->try_again_at && *exchange->try_again_at <= now) exchange->Resume();
   RunLibrary();
 }
 
@@ -469,7 +471,8 @@ void Transport::RunLibrary() {
   const auto until = std::chrono::steady_clock::now() + kRunsATurn;
   do {
     MHD_run(daemon_);
-  } while (timeout() == std::chrono::milliseconds(0) && std::chrono::steady_clock::now() < until);
+  } while (LibraryTimeout() == std::chrono::milliseconds(0) &&
+           std::chrono::steady_clock::now() < until);
   serving = nullptr;
 }
 
@@ -484,6 +487,19 @@ void Transport::Wake() const {
 }
 
 std::optional<std::chrono::milliseconds> Transport::timeout() const {
+  auto wait = LibraryTimeout();
+  const auto now = std::chrono::steady_clock::now();
+  for (const Exchange* exchange : exchanges_) {
+    if (!exchange->try_again_at) continue;
+    const auto left =
+        std::max(std::chrono::milliseconds(0),
+                 std::chrono::ceil<std::chrono::milliseconds>(*exchange->try_again_at - now));
+    wait = std::min(wait.value_or(left), left);
+  }
+  return wait;
+}
+
+std::optional<std::chrono::milliseconds> Transport::LibraryTimeout() const {
   MHD_UNSIGNED_LONG_LONG wait_ms = 0;
   if (MHD_get_timeout(daemon_, &wait_ms) != MHD_YES) return std::nullopt;
   return std::chrono::milliseconds(wait_ms);

@@ -73,6 +73,7 @@ class Transport {
  private:
   void Start(int listen_fd);
   void RunLibrary();
+  [[nodiscard]] std::optional<std::chrono::milliseconds> LibraryTimeout() const;
 
   HttpServerOptions options_;
   BackgroundWork& background_;

@@ -14,7 +14,11 @@ namespace plumb::web {
 struct DirectoryAnswer {
   bool matches = false;      ///< Name and password belong together.
   std::optional<Role> role;  ///< By the person's groups; nothing: none of them may use this unit.
-  Message failure;           ///< Why the directory did not answer; empty: it did.
+  /// Why it lets this person in with no password at all, such as for a locked account. Empty: it
+  /// does not say so.
+  Message refusal;
+  Message
+      failure;  ///< Why the question failed: none of the above is known then. Empty: it did not.
 };
 
 /// Asks without waiting; `done` is called on the loop's thread. False, without calling it, while

@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 
+#include "algo/base/ascii_lower.hpp"
 #include "words/web.hpp"
 
 namespace plumb::web {
@@ -67,13 +68,6 @@ bool IsCommon(std::string_view text) {
 
 bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 
-std::string InSmallLetters(std::string_view text) {
-  std::string small(text);
-  std::transform(small.begin(), small.end(), small.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return small;
-}
-
 /// Without trailing digits and signs, which people append when they are required. Bytes above 127
 /// belong to letters.
 std::string_view WithoutTail(std::string_view text) {
@@ -98,7 +92,7 @@ bool IsRepetition(std::string_view text) {
 Message WhyNotPassword(std::string_view password, std::string_view user) {
   if (password.size() < kMinPassword || password.size() > kMaxPassword)
     return say::web::PasswordLength(kMinPassword, kMaxPassword);
-  const std::string small = InSmallLetters(password), name = InSmallLetters(user);
+  const std::string small = AsciiLower(password), name = AsciiLower(user);
   const std::string_view core = WithoutTail(small);
   if (IsCommon(small) || IsCommon(core)) return say::web::PasswordCommon();
   if (!name.empty() && (small == name || core == WithoutTail(name) || small == name + name))

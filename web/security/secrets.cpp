@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "algo/base/base64.hpp"
 #include "algo/base/errors.hpp"
 #include "words/web.hpp"
 
@@ -36,15 +37,7 @@ std::string PlainCode(std::string_view typed) {
   return code;
 }
 
-std::string RandomToken(std::size_t bytes) {
-  const std::string random = RandomBytes(bytes);
-  std::string text(sodium_base64_ENCODED_LEN(bytes, sodium_base64_VARIANT_URLSAFE_NO_PADDING),
-                   '\0');
-  sodium_bin2base64(text.data(), text.size(), reinterpret_cast<const unsigned char*>(random.data()),
-                    random.size(), sodium_base64_VARIANT_URLSAFE_NO_PADDING);
-  text.pop_back();  // its terminating zero
-  return text;
-}
+std::string RandomToken(std::size_t bytes) { return ToBase64Url(RandomBytes(bytes)); }
 
 std::string StoredHashOf(const std::string& token) {
   const std::string hash = HashOf(token);

@@ -123,6 +123,26 @@ TEST(ConfigTest, ADirectoryNeedsWhoAsksWhereAndWhichGroups) {
               HasSubstr("belong together"));
 }
 
+TEST(ConfigTest, GroupsAndPeopleOfTheDirectoryAreNamesThatItKnows) {
+  const std::string url = "[directory]\nurl = \"ldaps://directory.example\"\n";
+  for (const char* role : {"engineers", "physicists", "technicians"})
+    for (const char* wrong : {"therapists", "=therapists"})
+      EXPECT_THAT(ErrorOf(fmt::format("[directory]\n{} = [\"{}\"]\n", role, wrong)),
+                  HasSubstr("names of groups such as"))
+          << role;
+  // As Active Directory takes it: no entry, and so no member of any group.
+  const std::string login = "person = \"{name}@clinic.example\"\n";
+  const std::string rest =
+      "groups_base = \"ou=groups,dc=example\"\nphysicists = [\"cn=p,ou=groups,dc=example\"]\n";
+  EXPECT_THAT(ErrorOf(url + login + rest), HasSubstr("no group has it as a member"));
+  EXPECT_THAT(ErrorOf(url + login + rest + "groups_filter = \"(member={person})\"\n"),
+              HasSubstr("{person}"));
+  EXPECT_EQ(ErrorOf(url + login + rest + "groups_filter = \"(memberUid={name})\"\n"), "no error");
+  EXPECT_EQ(ErrorOf(url + login + rest +
+                    "people_base = \"dc=example\"\npeople_filter = \"(sAMAccountName={name})\"\n"),
+            "no error");
+}
+
 TEST(ConfigTest, AChannelOfUpdatesNeedsItsKeyAndTls) {
   const std::string key = "channel_key = \"2RxgFSNjDpGISHQmSN0earBA6NTyA+BYzefuXmYB5ew=\"\n";
   EXPECT_EQ(ErrorOf("[update]\nchannel = \"https://u.example/plumb\"\n" + key), "no error");

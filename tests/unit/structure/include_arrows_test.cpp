@@ -99,7 +99,7 @@ const Arrows kAllowed = {
     {"web/api",
      {"algo/base", "web/model", "web/service", "web/security", "web/http", "web/exchange",
       "web/page"}},
-    {"web/api/exports", {"web/model", "web/exchange", "web/api"}},
+    {"web/api/exports", {"algo/base", "web/model", "web/exchange", "web/api"}},
     {"web/api/planning", {"algo/base", "web/model", "web/http", "web/exchange", "web/api"}},
     {"web/api/watching",
      {"algo/base", "web/http", "web/model", "web/security", "web/exchange", "web/api"}},
@@ -412,6 +412,22 @@ TEST(IncludeArrowsTest, TheMethodKnowsNoProgramAndTheWebOnlyValues) {
         EXPECT_TRUE(!to.starts_with("web/") || to == "web/model") << folder << " -> " << to;
       }
     }
+  }
+}
+
+TEST(IncludeArrowsTest, TheTableForPeopleHasEachFolder) {
+  std::ifstream file(fs::path(PLUMB_SOURCE_DIR) / "CONTRIBUTING.md");
+  std::map<std::string, std::string> rows;  // of each top folder
+  for (std::string line; std::getline(file, line);)
+    for (const char* top : {"algo", "drivers", "web", "daemon"})
+      if (line.starts_with("| `" + std::string(top) + "` | ")) rows[top] = line;
+  for (const auto& [folder, included] : kAllowed) {
+    const std::size_t slash = folder.find('/');
+    // A folder that only one other has is found from there.
+    if (slash == std::string::npos || folder.find('/', slash + 1) != std::string::npos) continue;
+    EXPECT_THAT(rows[folder.substr(0, slash)],
+                ::testing::HasSubstr("`" + folder.substr(slash + 1) + "`"))
+        << folder;
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers that have one owner in the product's sources.
+// Numbers and small tasks that have one owner in the product's sources.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,6 +53,10 @@ std::vector<std::string> LinesThat(const std::function<bool(const std::string&)>
   return found;
 }
 
+std::function<bool(const std::string&)> Has(const char* text) {
+  return [text](const std::string& line) { return line.find(text) != std::string::npos; };
+}
+
 TEST(SingleOwnerTest, TheDefaultLengthOfMarkersIsWrittenOnce) {
   // A body's coordinates have nothing to do with it.
   EXPECT_THAT(LinesThat([](const std::string& line) { return Spells(line, kMarkerLength_m); },
@@ -63,13 +67,21 @@ TEST(SingleOwnerTest, TheDefaultLengthOfMarkersIsWrittenOnce) {
 
 TEST(SingleOwnerTest, TheDefaultDictionaryOfMarkersIsWrittenOnce) {
   // The table of all dictionaries, and the markers that the simulator prints.
-  EXPECT_THAT(LinesThat(
-                  [](const std::string& line) {
-                    return line.find("\"DICT_6X6_250\"") != std::string::npos;
-                  },
-                  {"algo/types/marker_dictionary.cpp", "drivers/simulator/world/world.hpp"}),
+  EXPECT_THAT(LinesThat(Has("\"DICT_6X6_250\""),
+                        {"algo/types/marker_dictionary.cpp", "drivers/simulator/world/world.hpp"}),
               ::testing::ElementsAre(::testing::StartsWith("algo/types/marker.hpp:")))
       << "use kDefaultMarkerDictionary";
+}
+
+TEST(SingleOwnerTest, BytesBecomeTextInOnePlace) {
+  EXPECT_THAT(LinesThat(Has("bin2base64("), {}), ::testing::IsEmpty()) << "use ToBase64()";
+}
+
+TEST(SingleOwnerTest, SmallLettersAreMadeInOnePlace) {
+  // Compares letters without making any.
+  EXPECT_THAT(LinesThat(Has("tolower("), {"algo/types/marker_dictionary.cpp"}),
+              ::testing::IsEmpty())
+      << "use AsciiLower()";
 }
 
 TEST(SingleOwnerTest, ANumberIsFoundHoweverItIsWritten) {

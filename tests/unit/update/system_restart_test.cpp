@@ -6,11 +6,11 @@
 
 #include <atomic>
 #include <optional>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/bus_service.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -25,25 +25,12 @@ class FakeLogind {
   std::atomic<int> num_reboots{0};
   std::atomic<bool> asks_for_a_password{false};
 
-  explicit FakeLogind(const std::string& address) {
-    sd_bus_new(&bus_);
-    sd_bus_set_address(bus_, address.c_str());
-    sd_bus_set_bus_client(bus_, 1);
-    sd_bus_start(bus_);
-    sd_bus_add_object_vtable(bus_, nullptr, "/org/freedesktop/login1",
-                             "org.freedesktop.login1.Manager", kTable, this);
-    sd_bus_request_name(bus_, "org.freedesktop.login1", 0);
-    thread_ = std::jthread([this](const std::stop_token& stop) {
-      while (!stop.stop_requested()) {
-        if (sd_bus_process(bus_, nullptr) == 0) sd_bus_wait(bus_, 20000);
-      }
-    });
-  }
-  ~FakeLogind() {
-    thread_.request_stop();
-    thread_.join();
-    sd_bus_flush_close_unref(bus_);
-  }
+  explicit FakeLogind(const std::string& address)
+      : service_(address, {.name = "org.freedesktop.login1",
+                           .path = "/org/freedesktop/login1",
+                           .interface = "org.freedesktop.login1.Manager",
+                           .table = kTable,
+                           .self = this}) {}
 
  private:
   static int Reboot(sd_bus_message* message, void* self, sd_bus_error* error) {
@@ -61,8 +48,7 @@ class FakeLogind {
       SD_BUS_METHOD("Reboot", "b", "", &FakeLogind::Reboot, SD_BUS_VTABLE_UNPRIVILEGED),
       SD_BUS_VTABLE_END};
 
-  sd_bus* bus_ = nullptr;
-  std::jthread thread_;
+  testing::BusService service_;
 };
 
 class SystemRestartTest : public ::testing::Test {

@@ -4,8 +4,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include <cctype>
-
+#include "algo/base/ascii_lower.hpp"
 #include "tests/unit/web/web_fixture.hpp"
 
 namespace plumb::test {
@@ -29,7 +28,7 @@ TEST_F(AccountsTest, FirstStartGivesASetupCodeThatMakesOneEngineer) {
   EXPECT_TRUE(service_.users.empty());
   std::string typed = setup_code_;  // by somebody who leaves out the hyphen and the capitals
   std::erase(typed, '-');
-  for (char& c : typed) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  typed = AsciiLower(typed);
   EXPECT_EQ(
       client.Post("/api/v1/setup", {{"code", typed}, {"name", "eve"}, {"password", kPassword}})
           .status,

@@ -7,7 +7,9 @@
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <fstream>
+#include <stdexcept>
 #include <thread>
 
 #include "tests/support/temp_folder.hpp"
@@ -15,14 +17,18 @@
 
 namespace {
 
-std::atomic<bool> is_nothing_in_memory = false;
+/// What the kernel says of the part of a file that is in memory.
+enum class InMemory { kAsItIs, kNothing, kEndOfFile };
+std::atomic<InMemory> in_memory = InMemory::kAsItIs;
 
 }  // namespace
 
-/// In place of the C library's: on some disks nothing is in memory.
+/// In place of the C library's: on some disks nothing is in memory, and some kernels then say that
+/// the file ends.
 extern "C" ssize_t preadv2(int fd, const iovec* parts, int count, off_t at, int flags) {
   static auto* const kNext = reinterpret_cast<decltype(&preadv2)>(dlsym(RTLD_NEXT, "preadv2"));
-  if (!is_nothing_in_memory) return kNext(fd, parts, count, at, flags);
+  if (in_memory == InMemory::kAsItIs) return kNext(fd, parts, count, at, flags);
+  if (in_memory == InMemory::kEndOfFile) return 0;
   errno = EAGAIN;
   return -1;
 }
@@ -55,8 +61,23 @@ class AsideTest : public WebTest {
     loop_->Do([&] { count = service_.held_background_work.size(); });
     return count;
   }
-  void WaitUntilHeld() {
-    while (NumHeld() == 0) std::this_thread::yield();
+  /// @return False once `is_over`, after which somebody has released the semaphore.
+  bool WaitUntilHeld(const std::atomic<bool>& is_over = false) {
+    while (NumHeld() == 0) {
+      if (is_over) return false;
+      AwaitAsked();
+    }
+    return true;
+  }
+  void WaitUntilRefused(int times) {
+    for (int refused = 0; refused < times;) {
+      AwaitAsked();
+      loop_->Do([&] { refused = service_.num_refused_background_work; });
+    }
+  }
+  void AwaitAsked() {
+    if (!service_.asked_for_background_work.try_acquire_for(std::chrono::seconds(60)))
+      throw std::runtime_error("nobody asks for background work");
   }
 
   /// A file of this size for the page, on a disk that is waited for. @return Its path there.
@@ -70,11 +91,11 @@ class AsideTest : public WebTest {
       scan.folder = folder_ / "scan";
       service_.scans.push_back(scan);
     });
-    is_nothing_in_memory = true;
+    in_memory = InMemory::kNothing;
     return "/api/v1/scans/s1/files/mesh.ply";
   }
   void TearDown() override {
-    is_nothing_in_memory = false;
+    in_memory = InMemory::kAsItIs;
     WebTest::TearDown();
   }
 
@@ -133,10 +154,10 @@ TEST_F(AsideTest, AFileThatTheDiskHasToGiveKeepsNobodyWaiting) {
     other.cookie = cookie;
     file = other.Get(path);
     has_arrived = true;
+    service_.asked_for_background_work.release();
   });
   std::size_t pieces = 0;
-  while (!has_arrived && pieces < 1000) {
-    if (NumHeld() == 0) continue;
+  while (pieces < 1000 && WaitUntilHeld(has_arrived)) {
     ASSERT_EQ(engineer_->Get("/health").status, 200) << "the disk stands still";
     const std::size_t done = DoHeld();
     EXPECT_LE(done, 1U) << "one piece at a time";
@@ -146,6 +167,38 @@ TEST_F(AsideTest, AFileThatTheDiskHasToGiveKeepsNobodyWaiting) {
   EXPECT_EQ(file.status, 200);
   EXPECT_EQ(file.body, std::string(kBytes, 'm'));
   EXPECT_GE(pieces, 8U);
+}
+
+TEST_F(AsideTest, AFileWaitsForItsTurnWhereTooMuchWaitsAlready) {
+  const std::string path = MakeFile(300'000);
+  const std::string cookie = engineer_->cookie;
+  HttpAnswer file;
+  std::jthread asking([&] {
+    HttpClient other(port_);
+    other.cookie = cookie;
+    file = other.Get(path);
+  });
+  WaitUntilHeld();
+  loop_->Do([&] { service_.refuse_background_work = true; });
+  DoHeld();  // it is opened, and its first piece finds no place
+  WaitUntilRefused(3);
+  EXPECT_EQ(engineer_->Get("/health").status, 200);
+  loop_->Do([&] { service_.refuse_background_work = service_.hold_background_work = false; });
+  asking.join();
+  EXPECT_EQ(file.body, std::string(300'000, 'm'));
+}
+
+TEST_F(AsideTest, AFileIsReadWhileAnUpdateTakesItsMinutes) {
+  loop_->Do([&] { service_.hold_only = web::BackgroundPool::kFiles; });
+  EXPECT_EQ(engineer_->Get(MakeFile(300'000)).body, std::string(300'000, 'm'));
+  EXPECT_EQ(NumHeld(), 0U);
+}
+
+TEST_F(AsideTest, AFileEndsWhereTheDiskSaysSo) {
+  loop_->Do([&] { service_.hold_background_work = false; });
+  const std::string path = MakeFile(300'000);
+  in_memory = InMemory::kEndOfFile;
+  EXPECT_EQ(engineer_->Get(path).body, std::string(300'000, 'm'));
 }
 
 TEST_F(AsideTest, AFileThatEndsTooSoonEndsItsConnectionOnly) {
@@ -176,6 +229,7 @@ TEST_F(AsideTest, AnUploadGoesNoFasterThanTheDiskAndKeepsNobodyWaiting) {
     sent = true;
     answer = connection.Read();
     answered = true;
+    service_.asked_for_background_work.release();
   });
   WaitUntilHeld();
   for (int i = 0; i < 200; ++i)
@@ -183,11 +237,10 @@ TEST_F(AsideTest, AnUploadGoesNoFasterThanTheDiskAndKeepsNobodyWaiting) {
   EXPECT_EQ(NumHeld(), 1U) << "one piece at a time";
   EXPECT_FALSE(sent) << "the rest waits with who sends it";
   std::size_t pieces = 0;
-  while (!answered && pieces < 1000) {
+  while (pieces < 1000 && WaitUntilHeld(answered)) {
     const std::size_t done = DoHeld();
     EXPECT_LE(done, 1U);
     pieces += done;
-    if (sent && done == 0) std::this_thread::yield();
   }
   sending.join();
   EXPECT_EQ(answer.status, 200);

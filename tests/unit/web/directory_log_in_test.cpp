@@ -3,10 +3,16 @@
 // accounts do without it.
 #include <gmock/gmock.h>
 
+#include <functional>
 #include <map>
 #include <mutex>
+#include <semaphore>
+#include <thread>
+
+#include <fmt/format.h>
 
 #include "tests/unit/web/web_fixture.hpp"
+#include "words/directory.hpp"
 #include "words/web.hpp"
 
 namespace plumb::test {
@@ -16,27 +22,36 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class DirectoryLogInTest : public WebTest {
+class DirectoryTest : public WebTest {
  protected:
-  void SetUp() override {
+  void StartWithDirectory() {
     Start([this](web::HttpServerOptions& options) {
-      options.ask_directory = [this](const std::string& name, const std::string& password,
-                                     const auto& done) {
-        const std::scoped_lock lock(mutex_);
-        ++asked_[name];
-        if (is_full_) return false;
-        web::DirectoryAnswer answer;
-        answer.failure = failure_;
-        answer.matches = failure_.empty() && roles_.contains(name) && password == kPassword;
-        if (answer.matches) answer.role = roles_[name];
-        done(answer);
-        return true;
-      };
+      options.ask_directory = std::bind_front(&DirectoryTest::Ask, this);
     });
-    SetUpAccounts();
-    SetRole("anna", Role::kTechnician);
-    SetRole("marie", Role::kPhysicist);
-    SetRole("visitor", std::nullopt);
+  }
+  bool Ask(const std::string& name, const std::string& password,
+           std::function<void(const web::DirectoryAnswer&)> done) {
+    const std::scoped_lock lock(mutex_);
+    ++asked_[name];
+    if (is_full_) return false;
+    web::DirectoryAnswer answer;
+    answer.failure = failure_;
+    answer.refusal = refusal_;
+    answer.matches =
+        failure_.empty() && refusal_.empty() && roles_.contains(name) && password == kPassword;
+    if (answer.matches) answer.role = roles_[name];
+    if (is_slow_) {
+      late_ = [answer, done = std::move(done)] { done(answer); };
+      is_asked_.release();
+    } else {
+      done(answer);
+    }
+    return true;
+  }
+  /// From now on the directory answers when late_ is called; is_asked_ says that it is asked.
+  void SetSlow() {
+    const std::scoped_lock lock(mutex_);
+    is_slow_ = true;
   }
   void SetRole(const std::string& name, std::optional<Role> role) {
     const std::scoped_lock lock(mutex_);
@@ -45,6 +60,10 @@ class DirectoryLogInTest : public WebTest {
   void SetFailure(const Message& failure) {
     const std::scoped_lock lock(mutex_);
     failure_ = failure;
+  }
+  void SetRefusal(const Message& refusal) {
+    const std::scoped_lock lock(mutex_);
+    refusal_ = refusal;
   }
   void SetFull() {
     const std::scoped_lock lock(mutex_);
@@ -80,9 +99,36 @@ class DirectoryLogInTest : public WebTest {
   std::mutex mutex_;
   std::map<std::string, std::optional<Role>> roles_;
   std::map<std::string, int> asked_;
-  Message failure_;
-  bool is_full_ = false;
+  Message failure_, refusal_;
+  bool is_full_ = false, is_slow_ = false;
+  std::function<void()> late_;
+  std::binary_semaphore is_asked_{0};
 };
+
+class DirectoryLogInTest : public DirectoryTest {
+ protected:
+  void SetUp() override {
+    StartWithDirectory();
+    SetUpAccounts();
+    SetRole("anna", Role::kTechnician);
+    SetRole("marie", Role::kPhysicist);
+    SetRole("visitor", std::nullopt);
+  }
+};
+
+TEST_F(DirectoryTest, NobodyOfTheDirectoryComesInBeforeTheFirstEngineer) {
+  StartWithDirectory();
+  SetRole("anna", Role::kTechnician);
+  HttpClient anna(port_);
+  EXPECT_EQ(LogIn(anna, "anna").status, 403);
+  EXPECT_EQ(Asked("anna"), 0);
+  WebTest::TearDown();
+  StartWithDirectory();
+  EXPECT_NE(setup_code_, "") << "an account would have ended the set-up for good";
+  SetUpAccounts();
+  HttpClient again(port_);
+  EXPECT_EQ(LogIn(again, "anna").status, 200);
+}
 
 TEST_F(DirectoryLogInTest, TheFirstLogInMakesTheAccountWithTheRoleOfTheGroups) {
   EXPECT_EQ(Account("anna"), nullptr);
@@ -128,7 +174,7 @@ TEST_F(DirectoryLogInTest, WhileTheDirectoryIsAwayTheUnitsOwnAccountsGoOn) {
   HttpClient anna(port_);
   const HttpAnswer answer = LogIn(anna, "anna");
   EXPECT_EQ(answer.status, 503);
-  EXPECT_THAT(answer.body, HasSubstr("only accounts of this unit"));
+  EXPECT_THAT(answer.body, HasSubstr("only people with an account of this unit"));
   HttpClient technician(port_);
   EXPECT_EQ(LogIn(technician, "technician").status, 200);
   EXPECT_EQ(Asked("technician"), 0) << "a password of this unit leaves it for no directory";
@@ -150,6 +196,50 @@ TEST_F(DirectoryLogInTest, AQuestionWithoutAnAnswerIsNoGuess) {
   SetFailure({});
   SetFull();
   for (int i = 0; i < 7; ++i) EXPECT_EQ(LogIn(anna, "anna").status, 503);
+}
+
+TEST_F(DirectoryLogInTest, AnAccountThatTheDirectoryLocksIsNamedAndEachAttemptCounts) {
+  HttpClient marie(port_);
+  ASSERT_EQ(marie.LogIn("marie", kPassword), 200);
+  SetRefusal(say::directory::RefusesPerson("locked"));
+  HttpClient anna(port_);
+  const HttpAnswer answer = LogIn(anna, "anna");
+  EXPECT_EQ(answer.status, 403);
+  EXPECT_THAT(answer.body, HasSubstr("refuses this log-in: locked"));
+  std::string words;
+  EXPECT_EQ(Sign(marie, kPassword, &words), 403);
+  EXPECT_THAT(words, HasSubstr("refuses this log-in: locked"));
+  int status = 403;
+  for (int i = 0; i < 20 && status == 403; ++i) status = LogIn(anna, "anna").status;
+  EXPECT_EQ(status, 429) << "or guesses here would keep the account locked";
+}
+
+TEST_F(DirectoryLogInTest, WhileTheDirectoryThinksOthersGoOn) {
+  SetSlow();
+  HttpAnswer answer;
+  std::jthread asking([&] {
+    HttpClient anna(port_);
+    answer = LogIn(anna, "anna");
+  });
+  is_asked_.acquire();
+  EXPECT_EQ(LoggedIn("engineer").Get("/api/v1/users").status, 200);
+  loop_->Do([&] { late_(); });
+  asking.join();
+  EXPECT_EQ(answer.json()["role"], "technician");
+}
+
+TEST_F(DirectoryLogInTest, AnAnswerAfterTheEndOfTheServerIsForNobody) {
+  SetSlow();
+  const std::string body = json{{"name", "anna"}, {"password", kPassword}}.dump();
+  HttpConnection anna(port_);
+  anna.Send(
+      fmt::format("POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+                  "application/json\r\nContent-Length: {}\r\n\r\n{}",
+                  body.size(), body));
+  is_asked_.acquire();
+  WebTest::TearDown();
+  late_();
+  EXPECT_FALSE(service_.FindUser("anna"));
 }
 
 TEST_F(DirectoryLogInTest, AnotherGroupIsAnotherRoleAndEndsWhatWasOpen) {
@@ -196,6 +286,23 @@ TEST_F(DirectoryLogInTest, PasswordAndRoleAreChangedThereAndTheAccountCanBeDisab
   HttpClient again(port_);
   EXPECT_EQ(LogIn(again, "anna").status, 403);
   EXPECT_EQ(Asked("anna"), asked);
+}
+
+TEST_F(DirectoryLogInTest, WithoutTheDirectoryItsAccountsGetAPasswordOfThisUnit) {
+  {
+    HttpClient anna(port_);
+    ASSERT_EQ(LogIn(anna, "anna").status, 200);
+    EXPECT_EQ(LoggedIn("engineer").Get("/api/v1/users").json()["directory"], true);
+  }
+  WebTest::TearDown();
+  Start();  // [directory] was taken out
+  HttpClient engineer = LoggedIn("engineer");
+  EXPECT_EQ(engineer.Get("/api/v1/users").json()["directory"], false);
+  EXPECT_EQ(ChangeAnna(engineer, {{"role", "physicist"}}), 200);
+  EXPECT_EQ(ChangeAnna(engineer, {{"password", kFirstPassword}}), 200);
+  EXPECT_EQ(Account("anna")["in_directory"], false);
+  HttpClient anna(port_);
+  EXPECT_EQ(LogIn(anna, "anna", kFirstPassword).json()["role"], "physicist");
 }
 
 }  // namespace

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Recognising paired displays by their cookies.
 #include "web/api/displays.hpp"
-#include "web/security/secrets.hpp"
 
-#include <cctype>
 #include <string>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+
+#include "algo/base/ascii_lower.hpp"
+#include "web/security/secrets.hpp"
 
 namespace plumb::web {
 namespace {
@@ -111,7 +112,7 @@ TEST_F(PairingTest, AnAddressHasTwoScreensWaitingAndTheNewestStay) {
 TEST_F(PairingTest, ACodeIsTypedWithOrWithoutItsHyphen) {
   std::string code = Asked("10.0.0.1");
   std::erase(code, '-');
-  for (char& c : code) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  code = AsciiLower(code);
   EXPECT_FALSE(IsPairedBy(code.substr(1)));
   EXPECT_TRUE(IsPairedBy(code.insert(2, " ")));
 }

@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
-#include <cctype>
 #include <numeric>
 
+#include "algo/base/ascii_lower.hpp"
 #include "tests/unit/web/web_fixture.hpp"
 
 namespace plumb::test {
@@ -68,7 +68,7 @@ class LockoutTest : public WebTest {
   }
   static std::string Typed(std::string code) {
     std::erase(code, '-');
-    for (char& c : code) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    code = AsciiLower(code);
     return code;
   }
   /// Enough addresses to slow a name down for those that are not known.

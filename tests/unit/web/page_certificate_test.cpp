@@ -16,6 +16,7 @@
 
 #include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/self_signed.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/security/certificate_care.hpp"
@@ -64,7 +65,10 @@ class PageCertificateTest : public WebTest {
             fmt::format("cd {} && ({}) 2> /dev/null", folder_.path().string(), command).c_str()),
         0)
         << command;
-    std::ifstream in(folder_ / written);
+    return Read(written);
+  }
+  [[nodiscard]] std::string Read(const char* name) const {
+    std::ifstream in(folder_ / name);
     return {std::istreambuf_iterator<char>(in), {}};
   }
   /// The answer's text; each request on a separate connection.
@@ -101,12 +105,10 @@ class PageCertificateTest : public WebTest {
   }
   Certificate Made(const std::string& key, const std::string& options = "") {
     Certificate made;
-    made.chain = Run(fmt::format("openssl req -x509 -newkey {} -nodes -days 20 -subj '/CN=room 1' "
-                                 "-keyout key.pem -out certificate.pem {}",
-                                 key, options),
-                     "certificate.pem");
-    std::ifstream in(folder_ / "key.pem");
-    made.key.assign(std::istreambuf_iterator<char>(in), {});
+    plumb::testing::MakeSelfSigned(folder_ / "certificate.pem", folder_ / "key.pem", "room 1",
+                                   {.days = 20, .key_options = key, .options = options});
+    made.chain = Read("certificate.pem");
+    made.key = Read("key.pem");
     made.fingerprint = FingerprintIn(
         Run("openssl x509 -noout -sha256 -fingerprint -in certificate.pem > print", "print"));
     return made;

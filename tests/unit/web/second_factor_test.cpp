@@ -7,6 +7,7 @@
 
 #include <set>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/errors.hpp"
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/security/sessions.hpp"
@@ -64,8 +65,7 @@ TEST(SecondFactorTest, ARecoveryCodeCountsOnceHoweverItIsTyped) {
   EXPECT_EQ(std::set(codes.begin(), codes.end()).size(), 10U);
   const SecondFactor factor{
       .secret = kSecret, .last_step = 0, .recovery_hashes = web::HashesOf(codes)};
-  std::string typed = codes[3];
-  for (char& c : typed) c = static_cast<char>(std::tolower(c));
+  const std::string typed = AsciiLower(codes[3]);
   const auto left = web::UsedSecondFactor(factor, " " + typed, At(0));
   ASSERT_TRUE(left);
   EXPECT_EQ(left->recovery_hashes.size(), 9U);

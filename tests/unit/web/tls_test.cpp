@@ -7,6 +7,7 @@
 
 #include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/self_signed.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/web/server_fixture.hpp"
 #include "words/web.hpp"
@@ -42,11 +43,11 @@ class TlsTest : public ServerTest {
 
   /// True if this openssl as a server and as a client speak a version with each other.
   [[nodiscard]] bool CanSpeak(const std::string& version, const std::string& ciphers) const {
+    plumb::testing::MakeSelfSigned(folder_ / "cert", folder_ / "key", "x");
     const std::string script =
         "cd " + folder_.path().string() +
-        " && rm -f server && openssl req -x509 -newkey rsa:2048 -nodes -keyout key -out cert -subj "
-        "/CN=x"
-        " && { timeout 60 openssl s_server -accept 127.0.0.1:0 -cert cert -key key -www " +
+        " && rm -f server && { timeout 60 openssl s_server -accept 127.0.0.1:0 -cert cert -key key "
+        "-www " +
         version + ciphers +
         " > server & } && for i in $(seq 300); do grep -q ^ACCEPT server && break; sleep 0.1; done"
         " ; echo | timeout 60 openssl s_client " +

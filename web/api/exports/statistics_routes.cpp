@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Set-up statistics over the fractions of a patient and over the patients of a site.
 #include <algorithm>
-#include <cctype>
 #include <chrono>
 #include <iterator>
 #include <map>
@@ -9,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/ascii_lower.hpp"
 #include "web/api/all_routes.hpp"
 #include "web/exchange/csv.hpp"
 #include "web/exchange/json.hpp"
@@ -68,9 +68,7 @@ std::map<std::string, std::pair<std::string, std::vector<CourseStatistics>>> ByS
     const std::vector<Course>& courses) {
   std::map<std::string, std::pair<std::string, std::vector<CourseStatistics>>> sites;
   for (const Course& course : courses) {
-    std::string key = course.patient.site;
-    std::ranges::transform(key, key.begin(), [](unsigned char c) { return std::tolower(c); });
-    auto& [name, of_site] = sites[key];
+    auto& [name, of_site] = sites[AsciiLower(course.patient.site)];
     if (name.empty()) name = course.patient.site;
     of_site.push_back(course.statistics);
   }

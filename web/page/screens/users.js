@@ -64,8 +64,10 @@ function ownPassword() {
       field(text.password, fresh, S.login.passwordHint), h('button', {}, text.changeOwn)));
 }
 
-function userRow(user, reload) {
+/// @param {boolean} hasDirectory  The unit asks the clinic's directory.
+function userRow(user, hasDirectory, reload) {
   const text = S.users;
+  const isKnownThere = user.in_directory && hasDirectory;
   const role = select(accountRoles(), user.role, { 'aria-label': `${text.role}, ${user.name}` });
   const disabled = checkbox(text.disable, user.disabled, {});
   const fresh = passwordInput('new-password', kNewPassword);
@@ -85,11 +87,12 @@ function userRow(user, reload) {
   };
   const editor = h('details', {},
     h('summary', { 'aria-label': `${text.change} ${user.name}` }, text.change),
-    form({ class: 'form' }, change, !user.in_directory && field(text.role, role), disabled.element,
-      !user.in_directory && user.name !== currentSession()?.user && field(text.newPassword, fresh),
+    form({ class: 'form' }, change, !isKnownThere && field(text.role, role), disabled.element,
+      !isKnownThere && user.name !== currentSession()?.user && field(text.newPassword, fresh),
       user.second_factor && withoutFactor.element, proof.fields,
       h('button', { class: 'primary' }, S.save)));
-  const roleWords = [S.roles[user.role], user.in_directory && text.inDirectory,
+  const roleWords = [S.roles[user.role],
+    user.in_directory && (hasDirectory ? text.inDirectory : text.withoutDirectory),
     user.second_factor && text.hasSecondFactor].filter(Boolean);
   return row(user.name, roleWords.join(', '), user.disabled ? text.disabled : `✓ ${text.active}`,
     localTime(user.created_at), editor);
@@ -106,9 +109,9 @@ export async function showUsers(place) {
   const fresh = passwordInput('new-password', { required: true, ...kNewPassword });
   const proof = ownProof('own_password');
   const load = async () => {
-    const { users } = await get('users');
+    const { users, directory } = await get('users');
     const heads = [text.name, text.role, text.state, S.patients.added, S.action];
-    clear(list, table(heads, users.map((user) => userRow(user, () => load())), text.title));
+    clear(list, table(heads, users.map((user) => userRow(user, directory, load)), text.title));
   };
   const add = async () => {
     await post('users', { name: name.value.trim(), role: role.value, password: fresh.value,
