@@ -225,7 +225,8 @@ TEST(MarkerCheckTest, RefusesASweepThatDidNotMeasureTheDepth) {
   const MarkerCheck check = Against(scene);
   EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
   EXPECT_FALSE(Item(check, "depth_scale").passed);
-  EXPECT_THAT(EnglishTexts(check.reasons), Contains(HasSubstr("does not tell whether the sensor's depth is right")));
+  EXPECT_THAT(EnglishTexts(check.reasons),
+              Contains(HasSubstr("does not tell whether the sensor's depth is right")));
 }
 
 TEST(MarkerCheckTest, WithoutABaselineItSaysSoAndDoesNotPass) {

@@ -28,7 +28,8 @@ TEST_F(UpdaterTest, WithoutABusItSaysThatThereIsNoInstaller) {
     bus_.Stop();
     Start();
     EXPECT_FALSE(StatusNow().supported);
-    EXPECT_THAT(StatusNow().message.English(), HasSubstr("this machine has no program that installs updates"));
+    EXPECT_THAT(StatusNow().message.English(),
+                HasSubstr("this machine has no program that installs updates"));
     EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kConflict);
   });
 }
