@@ -25,6 +25,11 @@ health() {
 }
 apt() { apt-get -q -y --no-install-recommends "$@" >>/checks/apt 2>&1; echo $?; }
 version() { plumbd --version | head -1; }
+data=/var/lib/plumb
+keep_stage() { # NAME: of a state folder that an older release has left
+  [ -d /debs/state ] || return 0
+  mkdir -p /checks/stages && cp -a "$data" "/checks/stages/$1"
+}
 
 begin=$(date +%s)
 check "apt install ./plumbd.deb" 0 "$(apt install /debs/old/plumbd_*.deb)"
@@ -41,8 +46,18 @@ check "plumb can be added" 0 "$(apt install /debs/old/plumb_*.deb)"
 check "plumb speaks to the service" "no_sensor" "$(plumb status --get state 2>&1)"
 check "files are as delivered" "" "$(dpkg -V plumb plumbd 2>&1 | grep -v /usr/share/)"
 
+if [ -d /debs/state ]; then
+  systemctl stop plumbd.socket plumbd.service
+  rm -rf "$data"
+  cp -r /debs/state "$data"
+  chown -R plumb:plumb "$data"
+  chmod 750 "$data"
+  systemctl start plumbd.socket plumbd.service
+  await "page of the older package over its own data" '*"status":"ok"*' 20 health
+fi
 echo '# changed by the operator' >>/etc/plumb/plumb.toml
-echo data >/var/lib/plumb/scans-of-the-operator
+echo data >"$data/scans-of-the-operator"
+keep_stage 1-older
 before=$(systemctl show plumbd -p MainPID --value)
 check "upgrade" 0 \
   "$(apt -o Dpkg::Options::=--force-confold install /debs/new/plumbd_*.deb /debs/new/plumb_*.deb)"
@@ -54,22 +69,26 @@ await "page after the upgrade" '*"status":"ok"*' 20 health
 check "the service was started again" "yes" \
   "$([ "$(systemctl show plumbd -p MainPID --value)" != "$before" ] && echo yes)"
 
-# The older packages get the database from before a conversion back, which lies where one of 0.2.0
-# was converted.
-data=/var/lib/plumb
+# The older packages get the database from before a conversion back. Where the older packages are not
+# of a real release, nothing was converted.
+keep_stage 2-newer
 systemctl stop plumbd.socket plumbd.service
-install -d -o plumb -g plumb "$data/before-checksums"
-cp -p "$data/plumb.db" "$data/before-checksums/plumb.db"
+if [ ! -d /debs/state ]; then
+  install -d -o plumb -g plumb "$data/before-checksums"
+  cp -p "$data/plumb.db" "$data/before-checksums/plumb.db"
+fi
 systemctl start plumbd.socket plumbd.service
 await "page before going back" '*"status":"ok"*' 20 health
 check "the older packages" 0 "$(apt --allow-downgrades -o Dpkg::Options::=--force-confold install \
   /debs/old/plumbd_*.deb /debs/old/plumb_*.deb)"
 await "page of the older package" '*"status":"ok"*' 20 health
+keep_stage 3-older
 check "the newer database is kept beside the one that is back" "yes" \
   "$([ -s "$data/before-restore-1/plumb.db" ] && echo yes)"
 check "upgrade again" 0 \
   "$(apt -o Dpkg::Options::=--force-confold install /debs/new/plumbd_*.deb /debs/new/plumb_*.deb)"
 await "page after the second upgrade" '*"status":"ok"*' 20 health
+keep_stage 4-newer
 
 check "remove" 0 "$(apt remove plumbd)"
 check "the service is gone" "inactive" "$(systemctl is-active plumbd.service)"

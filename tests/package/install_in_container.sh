@@ -3,6 +3,9 @@
 # Installs the packages with apt into a clean Debian that runs in systemd-nspawn, changes the
 # configuration, upgrades, removes and purges them.
 #   install_in_container.sh MADE WORK_FOLDER      MADE: by make_packages.sh
+# The older packages are the same under a lower number, or those in $PLUMB_OLD_PACKAGES: of a real
+# release, whose programs have left the state folder $PLUMB_OLD_STATE, if that is given. Then
+# WORK_FOLDER/out/stages has the state folder before and after each change of packages.
 # WORK_FOLDER keeps the Debian and what apt fetched for the next time. Exit code 77: it cannot run
 # here, and the last line says why.
 set -euo pipefail
@@ -29,8 +32,12 @@ rm -rf "$work/out" "$work/debs"
 mkdir -p "$work/out" "$work/debs" "$work/cache/archives/partial"
 mkdir "$work/debs/old" "$work/debs/new"
 cp "$made"/*.deb "$work/debs/new/"
-# The same under a lower number, for the upgrade.
 for package in plumb plumbd; do
+  if [ -n "${PLUMB_OLD_PACKAGES:-}" ]; then
+    cp "$PLUMB_OLD_PACKAGES/${package}"_*.deb "$work/debs/old/"
+    continue
+  fi
+  # The same under a lower number, for the upgrade.
   dpkg-deb -R "$work/debs/new/${package}"_*.deb "$work/debs/unpacked"
   sed -Ei 's/^Version: .*/Version: 0.0.1-1/; s/\bplumb \(= [^)]*\)/plumb (= 0.0.1-1)/' \
     "$work/debs/unpacked/DEBIAN/control"
@@ -40,13 +47,17 @@ for package in plumb plumbd; do
   dpkg-deb -Zgzip -z1 -b "$work/debs/unpacked" "$work/debs/old/" >/dev/null
   rm -r "$work/debs/unpacked"
 done
+if [ -n "${PLUMB_OLD_STATE:-}" ]; then cp -a "$PLUMB_OLD_STATE" "$work/debs/state"; fi
 # The container has no network: what the packages depend on is fetched here.
-apt-get -q -y -o Dir::State="$root/var/lib/apt" -o Dir::State::status="$root/var/lib/dpkg/status" \
-  -o Dir::Etc::sourcelist="$root/etc/apt/sources.list" \
-  -o Dir::Etc::sourceparts="$root/etc/apt/sources.list.d" \
-  -o Dir::Cache="$work/cache" -o APT::Sandbox::User=root --no-install-recommends \
-  --download-only install "$work"/debs/new/plumb{,d}_*.deb >"$work/out/fetch" 2>&1 ||
-  { tail -5 "$work/out/fetch"; exit 1; }
+for packages in old new; do
+  apt-get -q -y -o Dir::State="$root/var/lib/apt" \
+    -o Dir::State::status="$root/var/lib/dpkg/status" \
+    -o Dir::Etc::sourcelist="$root/etc/apt/sources.list" \
+    -o Dir::Etc::sourceparts="$root/etc/apt/sources.list.d" \
+    -o Dir::Cache="$work/cache" -o APT::Sandbox::User=root --no-install-recommends \
+    --download-only install "$work"/debs/$packages/plumb{,d}_*.deb >"$work/out/fetch" 2>&1 ||
+    { tail -5 "$work/out/fetch"; exit 1; }
+done
 
 install -m 755 "$here/in_container.sh" "$work/debs/checks"
 cat >"$root/etc/systemd/system/plumb-checks.service" <<'UNIT'
