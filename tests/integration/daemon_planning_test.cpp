@@ -331,32 +331,6 @@ TEST_F(DaemonPlanningTest, FromReceivedImagesToSixNumbersInACalibratedRoom) {
     EXPECT_NE(entry.path().extension(), ".dcm") << "the files name the patient";
 }
 
-TEST_F(DaemonPlanningTest, APositionThatTheSurfaceContradictsHasToBeConfirmed) {
-  const auto imported = Upload({.quirks = {CtQuirk::kWrongPosition}});
-  ASSERT_EQ(imported.status, 201) << imported.body;
-  const std::string path = "/api/v1/references/" + imported.json().value("id", "");
-  const json draft = planner_->Get(path).json();
-  ASSERT_EQ(draft["plan"]["posture"], "FFS");
-  ASSERT_EQ(planner_
-                ->Put(path + "/plan", {{"region_m", json::array()},
-                                       {"isocentre_m", {0, 0, 0}},
-                                       {"shift_tolerance_mm", 3},
-                                       {"rotation_tolerance_deg", 1},
-                                       {"posture", "FFS"},
-                                       {"couch_markers", false},
-                                       {"revision", draft["revision"]}})
-                .status,
-            200);
-  const json planned = approver_->Get(path).json();
-  EXPECT_EQ(planned["room"]["contradicts_posture"], true) << "or the page offers no way";
-  json approval = {
-      {"revision", planned["revision"]}, {"digest", planned["digest"]}, {"password", kPassword}};
-  EXPECT_EQ(approver_->Post(path + "/approve", approval).json()["error_message"]["id"],
-            "store.reference_posture");
-  approval["posture_confirmed"] = true;
-  EXPECT_EQ(approver_->Post(path + "/approve", approval).status, 200);
-}
-
 TEST_F(DaemonPlanningTest, FilesOfAnotherPatientAreRefusedUntilAPersonHasLooked) {
   const std::string id = "KH-4711-SECRET";
   ASSERT_EQ(Upload({}, id).status, 201) << "the first ones are nobody else's";
