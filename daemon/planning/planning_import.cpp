@@ -17,7 +17,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "drivers/files/file_io.hpp"
-#include "words/cli.hpp"
+#include "words/planning.hpp"
 #include "words/scan.hpp"
 
 namespace plumb {
@@ -119,7 +119,7 @@ void CompareWithEarlierPlan(const fs::path& folder, Scene& scene) {
     const StoredScene before = ReadStoredScene(folder);
     if (before.scene.planning && before.scene.planning->plan_date > scene.planning->plan_date)
       scene.warnings.push_back(
-          say::cli::OlderPlan(before.scene.planning->plan_date, scene.planning->plan_date));
+          say::planning::OlderPlan(before.scene.planning->plan_date, scene.planning->plan_date));
   } catch (const DataError&) {
     // What cannot be read cannot be compared; it is replaced.
   }

@@ -22,11 +22,15 @@ function keep(name, end, data) {
   return `/assets/${name}.${digest}${end}`;
 }
 
-// A language's words are a file of their own, which the page loads when the language is chosen.
+// A language's words are a file of their own, which the page loads when the language is chosen. What
+// only commands print is left out.
+const kPrinted = ['cli', 'doctor', 'evaluation'];
 const languages = {};
 const texts = {};
 for (const code of readFileSync(join(words, 'stamp'), 'utf8').trim().split('\n')) {
   const catalogue = JSON.parse(readFileSync(join(words, 'page', `${code}.json`), 'utf8'));
+  catalogue.texts = Object.fromEntries(Object.entries(catalogue.texts)
+    .filter(([id]) => !kPrinted.includes(id.split('.')[0])));
   texts[code] = catalogue.texts;
   languages[code] = { name: catalogue.language.name,
     words: keep(`words-${code}`, '.json', JSON.stringify(catalogue)) };
