@@ -28,8 +28,8 @@ inline std::string ResultWith(std::string_view values) {
   whole.region.emplace();
   whole.body.emplace().parts.emplace_back();
   whole.body->room_known = true;
-  Json json = Json::parse(ResultText(whole));
-  json["correction"].erase("judgements");
+  Json result = Json::parse(ResultText(whole));
+  result["correction"].erase("judgements");
   const std::string verdict =
       patch.contains("verdict") && patch["verdict"].is_string() ? patch["verdict"] : Json("");
   if (!patch.contains("correction") && verdict != "no_answer" && !verdict.empty())
@@ -44,8 +44,8 @@ inline std::string ResultWith(std::string_view values) {
                              {"yaw_deg", 0.1}}}};
   // Lists are replaced as a whole, so that their elements are completed here.
   const auto complete = [&](const char* part, const char* list) {
-    const Json element = json[part][list][0];
-    json[part][list] = Json::array();
+    const Json element = result[part][list][0];
+    result[part][list] = Json::array();
     if (!patch.contains(part) || !patch[part].contains(list)) return;
     for (Json& one : patch[part][list]) {
       Json merged = element;
@@ -56,9 +56,9 @@ inline std::string ResultWith(std::string_view values) {
   complete("body", "parts");
   complete("motion", "weak_directions");
   for (const char* part : {"alignment", "motion", "correction", "region", "body"})
-    if (!patch.contains(part)) json[part] = nullptr;
-  json.merge_patch(patch);
-  return json.dump();
+    if (!patch.contains(part)) result[part] = nullptr;
+  result.merge_patch(patch);
+  return result.dump();
 }
 
 /// What the method decides about these numbers.
