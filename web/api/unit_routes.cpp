@@ -136,9 +136,8 @@ void AddUpdateRoutes(Routes& routes, UpdateService& updates) {
                [&updates](const Request& request, const Done& done) {
                  const std::string& name = request.arguments[0];
                  if (!name.ends_with(".raucb")) throw DataError(say::web::BundleName());
-                 updates.AddBundle(
-                     request.actor(), request.upload->path(), name,
-                     [done, kept = request.upload](const Change& change) { done(change); });
+                 updates.AddBundle(request.actor(), request.upload->path(), name,
+                                   KeepingUpload(request, done));
                });
   routes.Write("POST", "/api/v1/update/seen", Permission::kUpdate, BodyKind::kNone,
                [&updates](const Request& request, const Done& done) {

@@ -2,6 +2,7 @@
 #include "web/exchange/routes.hpp"
 
 #include <charconv>
+#include <memory>
 #include <utility>
 
 #include "algo/base/errors.hpp"
@@ -99,6 +100,14 @@ std::vector<std::string> LanguageCodes() {
   std::vector<std::string> codes;
   for (const Catalogue* one : Catalogues()) codes.emplace_back(one->code);
   return codes;
+}
+
+Done KeepingUpload(const Request& request, Done done) {
+  auto upload = std::make_shared<std::shared_ptr<UploadFile>>(request.upload);
+  return [done = std::move(done), upload = std::move(upload)](const Change& change) {
+    upload->reset();
+    done(change);
+  };
 }
 
 }  // namespace plumb::web

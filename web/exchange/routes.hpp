@@ -59,6 +59,10 @@ inline constexpr int kMaxListed = 200;
 [[nodiscard]] std::int64_t QueryNumber(const Request& request, const std::string& name,
                                        std::int64_t otherwise, std::int64_t max);
 
+/// Keeps the file that was sent until the answer, and not longer: who has the answer may send the
+/// next one, although copies of this may be left on other threads.
+[[nodiscard]] Done KeepingUpload(const Request& request, Done done);
+
 /// Language named by "?language=es"; English if none is named.
 /// @throws DataError for an unknown language
 [[nodiscard]] const Catalogue& LanguageIn(const Request& request);

@@ -22,8 +22,8 @@ function keep(name, end, data) {
   return `/assets/${name}.${digest}${end}`;
 }
 
-// A language's words are a file of their own, which the page loads when the language is chosen. What
-// only commands print is left out.
+// A language's words are a file of their own, which the page loads when the language is chosen.
+// What only commands print is left out.
 const kPrinted = ['cli', 'doctor', 'evaluation'];
 const languages = {};
 const texts = {};

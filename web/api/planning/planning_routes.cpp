@@ -66,9 +66,8 @@ void AddUploadRoute(Routes& routes, ReferenceService& references) {
   Route& route =
       routes.Write("POST", "/api/v1/patients/{id}/planning", Permission::kPlan, BodyKind::kFile,
                    [&references](const Request& request, const Done& done) {
-                     references.AddPlanning(
-                         request.actor(), request.arguments[0], ParsePlanning(request),
-                         [done, kept = request.upload](const Change& change) { done(change); });
+                     references.AddPlanning(request.actor(), request.arguments[0],
+                                            ParsePlanning(request), KeepingUpload(request, done));
                    });
   route.most_bytes = 2 * kMaxPlanningFile + kMaxPlanningImages;
 }
