@@ -120,6 +120,12 @@ void AddOther(LiveScript& script, SensorAtPlace& place, std::size_t other) {
   place.T_before_after.translation() = (other == 4 ? 2.0 : 5.0) * kMillimetre * direction;
 }
 
+// By the place among all names.
+void DisturbImages(std::size_t i, SimulatedSweep& sweep) {
+  if (i == kFirstOfOthers + 1) sweep.lost_frames = sweep.late_frames = 0.1;
+  sweep.other_projector = i == kProjector;
+}
+
 std::shared_ptr<const SensorUnit> AnotherUnit(const SimulateOptions& options) {
   return std::make_shared<const SensorUnit>(
       MakeSensorUnit(options.noise, Hash(options.unit.value_or(options.seed), 133), options.width,
@@ -186,9 +192,7 @@ void AddLiveScenes(SuitePlan& plan, const SimulateOptions& options) {
     if (i >= kFirstOfOthers) AddOther(script, place, i - kFirstOfOthers);
     const auto shared = std::make_shared<const LiveScript>(std::move(script));
     ScenePlan* const scene = add(i, shared, place);
-    if (scene != nullptr && i == kFirstOfOthers + 1)
-      scene->sweep.lost_frames = scene->sweep.late_frames = 0.1;
-    if (scene != nullptr && i == kProjector) scene->sweep.other_projector = true;
+    if (scene != nullptr) DisturbImages(i, scene->sweep);
     if (i != kFirstOfTwo) continue;
     ScenePlan* right =
         add(i + 1, shared, {.T_world_camera = PlaceOfSensor(shared->centre, -side, random)});

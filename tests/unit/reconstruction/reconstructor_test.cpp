@@ -355,7 +355,7 @@ TEST_F(ReconstructorTest, TimesEveryStage) {
 TEST_F(ReconstructorTest, DepthOutOfRangeIsRefusedWithItsDistance) {
   const std::string message = Refusal(Scaled(sweep().frames, 8.0));
   fmt::print("{}\n", message);
-  EXPECT_THAT(message, HasSubstr("expected from 0.3 to 4.0 m; check depth_scale"));
+  EXPECT_THAT(message, HasSubstr("expected from 0.3 to 4.0 m; check the distance"));
 }
 
 TEST_F(ReconstructorTest, ImagesThatNeverCameAreTold) {
