@@ -18,6 +18,21 @@ constexpr Color kRegionHoleLight = {255, 255, 255};
 /// Weak shading keeps the legend readable: at most 14 % darker.
 constexpr double kErrorReliefStrength = 0.30;
 
+cv::Vec3b PixelOf(const Color& color) { return {color[0], color[1], color[2]}; }
+
+/// Stripes of a hole, which any eyes tell from the scale.
+cv::Vec3b HatchAt(int row, int column) {
+  return PixelOf((row + column) % 12 < 6 ? kRegionHoleColor : kRegionHoleLight);
+}
+
+cv::Mat HatchedSwatch() {
+  cv::Mat swatch(kSwatch_px, kSwatch_px, CV_8UC3);
+  for (int row = 0; row < kSwatch_px; ++row)
+    for (int column = 0; column < kSwatch_px; ++column)
+      swatch.at<cv::Vec3b>(row, column) = HatchAt(kSwatch_px - 1 - row, column);  // y up
+  return swatch;
+}
+
 /// True for an unmeasured cell of the region that has an unmeasured neighbour there: single cells
 /// are sampling noise of the grid.
 bool IsHole(const HeightMap& difference, std::span<const std::uint8_t> region, int row,
@@ -58,10 +73,7 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
         const bool is_hole =
             !options.region_mask.empty() &&
             IsHole(difference, options.region_mask, cells.y + row, cells.x + column);
-        const Color& color = !is_hole                  ? kHoleColor
-                             : (row + column) % 12 < 6 ? kRegionHoleColor
-                                                       : kRegionHoleLight;
-        out[column] = cv::Vec3b(color[0], color[1], color[2]);
+        out[column] = is_hole ? HatchAt(row, column) : PixelOf(kHoleColor);
         continue;
       }
       const Color& color =
@@ -111,8 +123,8 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
   y += height;
   if (scale.is_signed()) figure.Text(x, y + 22, words.lower, small), y += 24;
   y = DrawSwatch(figure, x, y + 18, area.width, kHoleColor, words.not_in_both);
-  if (has_hole) y = DrawSwatch(figure, x, y, area.width, kRegionHoleColor, words.hole);
-  if (has_region) DrawSwatch(figure, x, y, area.width, {255, 255, 255}, words.outlined);
+  if (has_hole) y = DrawSwatch(figure, x, y, area.width, HatchedSwatch(), words.hole);
+  if (has_region) DrawSwatch(figure, x, y, area.width, Color{255, 255, 255}, words.outlined);
 }
 
 }  // namespace

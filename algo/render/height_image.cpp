@@ -76,7 +76,7 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const Range& range,
   }
   double y = DrawSwatch(figure, x, top + height + 18, area.width, kHoleColor, words.not_measured);
   if (!options.region_mask.empty())
-    DrawSwatch(figure, x, y, area.width, {255, 255, 255}, words.outlined);
+    DrawSwatch(figure, x, y, area.width, Color{255, 255, 255}, words.outlined);
 }
 
 }  // namespace

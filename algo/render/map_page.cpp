@@ -283,18 +283,23 @@ void DrawTick(Figure& figure, double x, double y, std::string_view label, bool i
   figure.Text(right + 14, y + 6, label, {.size_px = 17, .bold = is_bold});
 }
 
-double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,
+double DrawSwatch(Figure& figure, double x, double y, double width, const cv::Mat& picture_rgb,
                   std::string_view meaning) {
-  constexpr double kSize = 24;
   const TextStyle style{.size_px = 16, .color = kInk};
-  figure.FillRectangle(x, y, kSize, kSize, color);
-  figure.FrameRectangle(x, y, kSize, kSize, kFaint);
+  figure.Picture(static_cast<int>(std::lround(x)), static_cast<int>(std::lround(y)), picture_rgb);
+  figure.FrameRectangle(x, y, kSwatch_px, kSwatch_px, kFaint);
   double baseline = y + 18;
-  for (const std::string& line : figure.Wrap(meaning, style, width - kSize - 10)) {
-    figure.Text(x + kSize + 10, baseline, line, style);
+  for (const std::string& line : figure.Wrap(meaning, style, width - kSwatch_px - 10)) {
+    figure.Text(x + kSwatch_px + 10, baseline, line, style);
     baseline += 20;
   }
-  return std::max(y + kSize, baseline - 14) + 12;
+  return std::max(y + kSwatch_px, baseline - 14) + 12;
+}
+
+double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,
+                  std::string_view meaning) {
+  const cv::Mat plain(kSwatch_px, kSwatch_px, CV_8UC3, cv::Scalar(color[0], color[1], color[2]));
+  return DrawSwatch(figure, x, y, width, plain, meaning);
 }
 
 cv::Mat DrawPage(const MapPage& page) {

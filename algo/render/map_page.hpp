@@ -67,6 +67,10 @@ void DrawColorBar(Figure& figure, double x, double y, double height,
 void DrawTick(Figure& figure, double x, double y, std::string_view label, bool is_bold = false);
 
 /// Draws a legend line: a swatch and its meaning (wrapped). Returns the y below it.
+/// @param picture_rgb  kSwatch_px wide and high.
+inline constexpr int kSwatch_px = 24;
+double DrawSwatch(Figure& figure, double x, double y, double width, const cv::Mat& picture_rgb,
+                  std::string_view meaning);
 double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,
                   std::string_view meaning);
 

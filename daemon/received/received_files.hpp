@@ -19,7 +19,7 @@ namespace plumb {
 class ReceivedFiles {
  public:
   /// @param spool  Of plumb-dicomd.
-  /// @param notes  Our own file; what cannot be read is begun anew.
+  /// @param notes  Our own file. Damaged notes are discarded, and every file is read again.
   /// @param key  For PatientHash(); of the Patient ID only that is kept.
   ReceivedFiles(std::filesystem::path spool, std::filesystem::path notes, std::string key);
 

@@ -21,7 +21,7 @@ bool ContradictsPosture(const Scene& scene, const Pose& T_iec_scene, PatientPost
                                         .body_mask = body,
                                         .T_iec_reference = T_iec_scene,
                                         .posture = posture});
-  // Nobody lies across in a CT, but one of a region is often wider than it is long.
+  // No patient lies across a CT, but a CT of one region is often wider than it is long.
   return scene.planning ? parts.head_at_other_end : !parts.by_posture;
 }
 

@@ -70,16 +70,7 @@ class DaemonDicomTest : public ::testing::Test {
 
   /// What a page shows once the appliance has looked, and `enough` holds.
   json Settled(const char* path, const std::function<bool(const json&)>& enough) {
-    json found;
-    for (int i = 0; i < 600; ++i) {
-      const auto answer = planner_->Get(path);
-      EXPECT_EQ(answer.status, 200) << answer.body;
-      found = answer.json();
-      if (found.value("is_settled", false) && enough(found)) return found;
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-    ADD_FAILURE() << path << ": " << found.dump();
-    return found;
+    return testing::Settled(*planner_, path, enough);
   }
   json ReceivedOf(const std::string& kind, const std::function<bool(const json&)>& enough) {
     json one;

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <thread>
 
 #include "algo/base/pose.hpp"
 #include "algo/base/units.hpp"
@@ -98,6 +97,12 @@ class DaemonPlanningTest : public ::testing::Test {
 
   void CalibrateRoom() { testing::CalibrateRoom(*plumbd_, *engineer_, *planner_); }
 
+  json SceneOf(const std::string& reference) {
+    const json draft = planner_->Get("/api/v1/references/" + reference).json();
+    return planner_
+        ->Get("/api/v1/scans/" + draft["scan_id"].get<std::string>() + "/files/scene.json")
+        .json();
+  }
   /// Plans the draft as it is, and has another person approve it.
   /// @param skin_of_images  It must be confirmed that this is the body's.
   void Approve(const std::string& reference, bool skin_of_images = false) {
@@ -224,10 +229,7 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   const auto imported = Upload({});
   ASSERT_EQ(imported.status, 201) << imported.body;
   const std::string reference = imported.json()["id"];
-  const json draft = planner_->Get("/api/v1/references/" + reference).json();
-  const json scene =
-      planner_->Get("/api/v1/scans/" + draft["scan_id"].get<std::string>() + "/files/scene.json")
-          .json();
+  const json scene = SceneOf(reference);
   EXPECT_EQ(scene["planning"]["roi"], "BODY");
   EXPECT_EQ(scene["source"], "dicom");
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path()))
@@ -280,15 +282,9 @@ TEST_F(DaemonPlanningTest, FromReceivedImagesToSixNumbersInACalibratedRoom) {
   simulated::MakeCtImages(structures, options, {.pixel_mm = 2.4},
                           [&](const CtImage& image) { files.push_back(DicomBytes(image)); });
   dicomd_->Send(files);
-  json received;
-  const auto is_complete = [&] {
-    received = planner_->Get("/api/v1/planning/received").json();
-    return received.value("is_settled", false) && received["files"].size() == 2 &&
-           received["unread"] == 0;
-  };
-  for (int i = 0; i < 600 && !is_complete(); ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  ASSERT_TRUE(is_complete()) << received.dump();
+  const json received = testing::Settled(
+      *planner_, "/api/v1/planning/received",
+      [](const json& found) { return found["files"].size() == 2 && found["unread"] == 0; });
   ASSERT_EQ(received["series"].size(), 1U) << received.dump();
   const json& series = received["series"][0];
   EXPECT_EQ(series["images"], files.size() - 2);
@@ -310,10 +306,7 @@ TEST_F(DaemonPlanningTest, FromReceivedImagesToSixNumbersInACalibratedRoom) {
   const auto imported = import({{"series", series["uid"]}, {"threshold_hu", -350}});
   ASSERT_EQ(imported.status, 201) << imported.body;
   const std::string reference = imported.json()["id"];
-  const json draft = planner_->Get("/api/v1/references/" + reference).json();
-  const json scene =
-      planner_->Get("/api/v1/scans/" + draft["scan_id"].get<std::string>() + "/files/scene.json")
-          .json();
+  const json scene = SceneOf(reference);
   EXPECT_EQ(scene["planning"]["skin_threshold_hu"], -350);
   EXPECT_THAT(scene["warnings"].dump(),
               AllOf(HasSubstr("CT images at -350 HU"), HasSubstr("the couch, whose top")));

@@ -2,15 +2,20 @@
 // A running plumb-dicomd, and a planning system that sends to it.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include "tests/support/http_client.hpp"
 #include "tests/support/process.hpp"
 #include "tests/unit/dicom/small_files.hpp"
 
@@ -56,5 +61,21 @@ class Dicomd {
   std::unique_ptr<Process> process_;
   int port_ = 0;
 };
+
+/// What a page shows once the appliance has looked, and `enough` holds. It asks again as the page
+/// does, because the folder is another account's, and no event tells of it.
+inline nlohmann::json Settled(HttpClient& client, const std::string& path,
+                              const std::function<bool(const nlohmann::json&)>& enough) {
+  nlohmann::json found;
+  for (int i = 0; i < 1200; ++i) {
+    const auto answer = client.Get(path);
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    found = answer.json();
+    if (found.value("is_settled", false) && enough(found)) return found;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  ADD_FAILURE() << path << ": " << found.dump();
+  return found;
+}
 
 }  // namespace plumb::testing

@@ -344,7 +344,7 @@ TEST_F(ApiRules, ACodeWithAWrongCheckCharacterIsRefusedWhereTheSettingAsksForOne
   const auto ask = [&](bool asks) {
     EXPECT_EQ(engineer.Put("/api/v1/settings", {{"code_check_character", asks}}).status, 200);
   };
-  EXPECT_EQ(add("PX-0042").status, 201) << "nobody asks for it";
+  EXPECT_EQ(add("PX-0042").status, 201) << "the setting is off";
   ask(true);
   for (const char* wrong : {"PX-0043", "PX-0061U", "P0061X", "7"}) {
     const HttpAnswer refused = add(wrong);

@@ -268,6 +268,32 @@ export class Harness {
     }, [path, method, body]);
   }
 
+  /// The body of an answer that is no refusal.
+  async ok(page, path, method, body) {
+    const answer = await this.api(page, path, method, body);
+    this.check(answer.status < 300,
+      `${method} ${path}: ${answer.status} ${JSON.stringify(answer.body)}`);
+    return answer.body;
+  }
+  /// Waits for a status of the appliance.
+  async until(page, what, holds) {
+    for (const begun = Date.now(); ;) {
+      const { body } = await this.api(page, 'status');
+      if (holds(body)) return body;
+      this.check(Date.now() - begun < 60000, what);
+      await new Promise((ready) => { setTimeout(ready, 50); });
+    }
+  }
+  /// A sweep to its result: the number of the scan.
+  async sweepByApi(page, ...commands) {
+    const before = (await this.api(page, 'status')).body.last_result?.id;
+    for (const command of commands) this.tell(command);
+    this.tell('press');
+    const { last_result: last } = await this.until(page, 'a result',
+      (status) => status.state === 'result' && status.last_result?.id !== before);
+    return last.id;
+  }
+
   /// On these pages the people have seen that the session was changed from elsewhere.
   async acknowledge(...pages) {
     await Promise.all(pages.map((page) => page.evaluate(async () => {

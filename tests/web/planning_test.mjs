@@ -141,7 +141,7 @@ await h.step('without a contour the skin of CT images counts, at a stated thresh
   await planner.goto(`${h.url}#/patient/${other}`);
   await planner.getByText('Reference from the planning CT').click();
   const threshold = planner.getByLabel('Threshold of the skin (HU)');
-  equal(await threshold.isVisible(), false, 'nobody has asked for images');
+  equal(await threshold.isVisible(), false, 'shown only once images are chosen');
   await planner.getByLabel('Take the skin from the CT images').check();
   equal(await threshold.inputValue(), '-300', 'where planning systems draw it');
   await planner.getByLabel('Plan', { exact: true }).setInputFiles(h.file('data/plan.dcm'));

@@ -236,28 +236,10 @@ const room = await watch(await h.person('room', kSizes[2]));
 const reader = await watch(await h.person('reader', kSizes[2]));
 who = { engineer, anna, bob, clara, visitor, room, reader };
 
-const ok = async (page, path, method, body) => {
-  const answer = await h.api(page, path, method, body);
-  check(answer.status < 300, `${method} ${path}: ${answer.status} ${JSON.stringify(answer.body)}`);
-  return answer.body;
-};
+const ok = (...asked) => h.ok(...asked);
 const state = async () => (await h.api(bob, 'status')).body;
-async function until(what, holds) {
-  for (const begun = Date.now(); !holds(await state());) {
-    check(Date.now() - begun < 60000, what);
-    await new Promise((ready) => { setTimeout(ready, 50); });
-  }
-}
-const inState = (name) => until(`state ${name}`, (status) => status.state === name);
-/// A sweep to its result: the number of the scan.
-async function sweep(...commands) {
-  const before = (await state()).last_result?.id;
-  for (const command of commands) h.tell(command);
-  h.tell('press');
-  await until('a result',
-    (status) => status.state === 'result' && status.last_result?.id !== before);
-  return (await state()).last_result.id;
-}
+const inState = (name) => h.until(bob, `state ${name}`, (status) => status.state === name);
+const sweep = (...commands) => h.sweepByApi(bob, ...commands);
 async function sweepOfCheck(...commands) {
   const { checks } = await ok(bob, 'checks', 'GET');
   await ok(anna, 'checks/open', 'POST');
@@ -602,8 +584,9 @@ await h.step('the daily check and the room’s calibration, passed and failed; u
         users: [{ name: 'anna', role: 'technician', disabled: false, second_factor: false,
           in_directory: true, created_at: '2026-01-05T08:00:00Z' }] } })),
       prepare: async (page, text) => {
-        await page.locator('tbody summary').click();
-        await page.locator('tbody').getByLabel(text.users.newPassword).waitFor();
+        const user = page.getByRole('row', { name: 'anna' });  // the displays have rows, too
+        await user.locator('summary').click();
+        await user.getByLabel(text.users.newPassword).waitFor();
       },
       leave: (page) => page.unroute(users),
     },

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The result for people who see less: the page at 200 %, and eyes that tell fewer colours apart.
+// Low vision and colour blindness: the page at 200 % zoom, and the maps under deuteranopia.
 // sight_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
 import { Harness } from './harness.mjs';
 
@@ -15,24 +15,8 @@ const clara = await h.person('clara');
 const near = await h.person('near', { width: 640, height: 400 }, { deviceScaleFactor: 2 });
 const eye = await h.person('eye');  // an empty page, in which screenshots are unpacked
 
-const ok = async (page, path, method, body) => {
-  const answer = await h.api(page, path, method, body);
-  check(answer.status < 300, `${method} ${path}: ${answer.status} ${JSON.stringify(answer.body)}`);
-  return answer.body;
-};
-const state = async () => (await h.api(bob, 'status')).body;
-/// A sweep to its result.
-async function sweep(...commands) {
-  const before = (await state()).last_result?.id;
-  for (const command of commands) h.tell(command);
-  h.tell('press');
-  for (const begun = Date.now();;) {
-    const { state: now, last_result: last } = await state();
-    if (now === 'result' && last?.id !== before) return last.id;
-    check(Date.now() - begun < 60000, 'a result');
-    await new Promise((ready) => { setTimeout(ready, 50); });
-  }
-}
+const ok = (...asked) => h.ok(...asked);
+const sweep = (...commands) => h.sweepByApi(bob, ...commands);
 
 await h.step('a patient with an approved reference and an open fraction', async () => {
   await h.firstStart(engineer);
@@ -58,7 +42,7 @@ await h.step('a patient with an approved reference and an open fraction', async 
   await ok(clara, `references/${draft}/approve`, 'POST',
     { revision: planned, digest, password: h.password });
   await ok(anna, `patients/${id}/open`, 'POST',
-    { purpose: 'fraction', reason: '', replaces: (await state()).session.id });
+    { purpose: 'fraction', reason: '', replaces: (await ok(bob, 'status')).session.id });
   await h.acknowledge(anna, bob, clara, near);
 });
 

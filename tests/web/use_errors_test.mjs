@@ -971,7 +971,7 @@ await h.step('what a form does not accept is said at its field, in the language 
     equal(await code.getAttribute('aria-invalid'), null, 'no longer');
   }
   equal((await h.api(anna, 'patients')).body.patients.some(({ code }) => code === 'José'), false,
-    'nobody was added');
+    'no patient was added');
   await engineer.goto(`${h.url}#/settings`);
   const limit = engineer.getByLabel('Longest sweep (s)');
   await limit.fill('601');

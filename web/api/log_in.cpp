@@ -174,7 +174,7 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
   }
   const Actor actor{form.name, request.address};
   // Not before the set-up: with an account of the directory there would be no code for it any more,
-  // and nobody could become an engineer.
+  // and the unit could never get an engineer.
   if (options_.ask_directory && !needs_setup() && IsName(form.name) &&
       (!user || IsInDirectory(stored)))
     return AskDirectoryOf(form.name, std::move(password), counters, respond,

@@ -386,7 +386,7 @@ TEST_F(ApplianceTest, WhereTheSettingsAskForItNoSweepBeginsBeforeTheWristbandWas
       (void)appliance_->Press(ButtonPress::kShort, kTester);  // acknowledges what became of it
       EXPECT_EQ(appliance_->StartSweep(tess).English(), say::scan::WristbandFirst().English());
       shared_->store->settings.Change(tess, Settings{});
-      EXPECT_FALSE(appliance_->WebStatus().wants_wristband) << "nobody asks for it any more";
+      EXPECT_FALSE(appliance_->WebStatus().wants_wristband) << "the setting is off again";
       EXPECT_EQ(appliance_->StartSweep(tess).English(), "");
     });
   });

@@ -226,7 +226,7 @@ TEST(MarkerCheckTest, RefusesASweepThatDidNotMeasureTheDepth) {
   EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
   EXPECT_FALSE(Item(check, "depth_scale").passed);
   EXPECT_THAT(EnglishTexts(check.reasons),
-              Contains(HasSubstr("does not tell whether the sensor's depth is right")));
+              Contains(HasSubstr("cannot confirm the sensor's depth")));
 }
 
 TEST(MarkerCheckTest, WithoutABaselineItSaysSoAndDoesNotPass) {

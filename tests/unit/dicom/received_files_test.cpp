@@ -183,7 +183,7 @@ TEST_F(ReceivedImagesTest, EachIsReadOnceAndDamagedOnesAreCountedWithTheirFault)
   fs::remove(spool() / (NameOf(50) + ".dcm"));
   EXPECT_EQ(again.List().damaged_images, 0);
   EXPECT_TRUE(again.List().image_fault.empty());
-  // What cannot be understood of the notes is begun anew.
+  // Damaged notes are discarded, and every file is read again.
   for (const char* wrong : {R"({"files":{},"images":7})", R"({"files":{},"images":{"series":{}}})",
                             R"({"files":{},"images":{"series":{},"names":{"a":3}}})"}) {
     std::ofstream(folder_ / "received.json") << wrong;

@@ -91,6 +91,11 @@ TEST(ErrorImageTest, AHoleInTheRegionIsToldFromWhatWasNotMeasuredElsewhere) {
   std::vector<std::uint8_t> region(difference.grid.num_cells(), 1);
   const cv::Mat inside = DrawErrorImage(difference, {.region_mask = region});
   EXPECT_GT(Share(inside, kRegionHoleColor), 0.04) << "every second stripe";
+  constexpr int kLegendFrom = 240;  // pixels from the right
+  const cv::Mat legend = inside.colRange(inside.cols - kLegendFrom, inside.cols);
+  const double swatch = Share(legend, kRegionHoleColor) * static_cast<double>(legend.total());
+  EXPECT_GT(swatch, 100) << "hatched in the legend, too";
+  EXPECT_LT(swatch, 350) << "a plain one has 484 within its frame";
   std::fill(region.begin(), region.begin() + std::ptrdiff_t{70} * difference.grid.width,
             std::uint8_t{0});
   const cv::Mat outside = DrawErrorImage(difference, {.region_mask = region});

@@ -10,7 +10,7 @@ namespace {
 
 TEST(PlanDoubtsTest, AnIsocentreIsAsFarAwayAsTheNearestOfTheSurface) {
   Scene scene;
-  EXPECT_EQ(IsocentreAway_m(scene, {7, 8, 9}), 0.0) << "without a surface nobody knows";
+  EXPECT_EQ(IsocentreAway_m(scene, {7, 8, 9}), 0.0) << "no surface to measure from";
   HeightMap& map = scene.height_map.emplace(
       GridShape{.x_min = 0, .y_min = 0, .step = 0.1, .width = 4, .height = 3});
   EXPECT_TRUE(std::isinf(IsocentreAway_m(scene, {0, 0, 0})));

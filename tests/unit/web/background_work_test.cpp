@@ -77,7 +77,7 @@ class AsideTest : public WebTest {
   }
   void AwaitAsked() {
     if (!service_.asked_for_background_work.try_acquire_for(std::chrono::seconds(60)))
-      throw std::runtime_error("nobody asks for background work");
+      throw std::runtime_error("no background work was requested within 60 s");
   }
 
   /// A file of this size for the page, on a disk that is waited for. @return Its path there.

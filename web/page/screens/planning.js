@@ -54,7 +54,7 @@ function receivedList(patient, skin, take) {
   const text = S.planning;
   const list = h('div', {});
   let found = null;
-  /// What may be done with a plan of this patient, or of nobody yet.
+  /// What may be done with a plan of this patient, or of no known patient yet.
   const choices = (file) => {
     const withContour = action(text.take, () => take(file), {});
     if (file.structures && file.has_skin) return withContour;

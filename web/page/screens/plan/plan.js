@@ -36,7 +36,7 @@ function markerChoice(scene, take) {
   if (!found.length) return null;
   const middleOf = (corners) => [0, 1, 2].map((axis) =>
     Number((corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length).toFixed(4)));
-  // With where it lies on the map: nobody knows all numbers.
+  // With where it lies on the map: markers are rarely known by their numbers.
   const names = Object.fromEntries(found.map(([id, corners]) => {
     const [x, y] = middleOf(corners).map((value) => fixed(1000 * value, 0));
     return [id, `${text.marker(id)}: x ${x}, y ${y} mm`];
