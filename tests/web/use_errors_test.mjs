@@ -150,6 +150,24 @@ for (const [axis, amount, posture, name, value, words, toward, why] of kSigns) {
   });
 }
 
+await h.step('the result opens by itself even if the message of it was lost on the way',
+  async () => {
+  await anna.addInitScript(() => {
+    const listen = EventSource.prototype.addEventListener;
+    EventSource.prototype.addEventListener = function hear(kind, take) {
+      listen.call(this, kind, (event) => {
+        if (kind !== 'result' || !window.losesResults) take(event);
+      });
+    };
+  });
+  await anna.goto(`${h.url}#/scan`);
+  await anna.reload();
+  await anna.evaluate(() => { window.losesResults = true; });
+  await scan();
+  check(await anna.evaluate(() => window.losesResults), 'in the same page');
+  await anna.reload();
+});
+
 await h.step('couch readings: the sum is done, only for a move, only where the room is known',
   async () => {
   h.tell('moved y -8 HFS');  // put right by +8 mm toward the gantry, which counts up

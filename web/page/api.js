@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requests to the appliance, the session, and the stream of its state.
-import { S, said } from './words.js';
+import { S, haveWords, said } from './words.js';
 
 export class ApiError extends Error {
   constructor(status, body) {
@@ -64,8 +64,10 @@ async function ask(method, path, body,
       return await read(response);
     }
   } catch {
+    await haveWords;
     throw new ApiError(0, { error: S.noAnswer });
   }
+  await haveWords;
   const problem = await errorOf(response);
   if (response.status === 401) endSession();
   throw problem;

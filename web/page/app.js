@@ -167,7 +167,7 @@ function showFocused() {
 
 /// The answer to `question`. Until the appliance answers, the page shows only that it does not, and
 /// asks again.
-async function ask(question, text = S.offline) {
+async function ask(question, text = () => S.offline) {
   const mine = ++turn;
   waiting = true;
   cleanUp?.();
@@ -180,7 +180,7 @@ async function ask(question, text = S.offline) {
         if (error.status > 0 && error.status < 500) throw error;
         top.hidden = true;
         clear(main, h('h1', { class: 'visually-hidden' }, S.product),
-          h('p', { class: 'card' }, error.status ? error.message : text));
+          h('p', { class: 'card' }, error.status ? error.message : text()));
         await new Promise((ready) => { setTimeout(ready, kAskAgain_ms); });
       }
     }
@@ -195,21 +195,22 @@ async function leave() {
   drafts.removeAll();
   live.close();
   forgetSession();
-  await ask(logOut, S.leavingOffline).catch(() => {});
+  await ask(logOut, () => S.leavingOffline).catch(() => {});
   await begin();
 }
 
 async function speak(who, language = languageOf(who)) {
-  await useLanguage(language);
+  if (!await useLanguage(language)) return;
   document.querySelector('.skip').textContent = S.skip;
   const notice = document.querySelector('.notice');
   notice.setAttribute('aria-label', S.notice.label);
   clear(notice.firstElementChild, h('strong', {}, S.notice.strong), ` ${S.notice.text}`);
 }
 
+const asked = [];  // the session at the start, beside the words
 /// @param message  Gives the text to show above the log-in, in its language.
 async function begin(message) {
-  const found = await ask(loadSession);
+  const found = await ask(() => asked.pop() ?? loadSession());
   if (!found) return;
   const { session, setupRequired, fault, certificate } = found;
   if (session) adoptPreferences(session);
@@ -249,9 +250,10 @@ async function begin(message) {
 }
 
 /// A result that arrives while the sweep is shown is opened at once. A failed scan is announced,
-/// and no older result is shown in its place.
+/// and no older result is shown in its place. The state says that a sweep has ended, not a message
+/// of its own: that can be lost with the connection, and the state then comes with the next one.
 async function followScan() {
-  const { state, sensor } = await get('status', true);
+  const { state, sensor } = live.status;
   if (state === 'result') {
     location.hash = lastPurpose === 'daily_check' ? '#/check' : '#/result';
     return;
@@ -283,7 +285,9 @@ let seenState = null;
 function noteSweep() {
   const { state } = live.status ?? {};
   const isUse = seenState !== null && state !== seenState && kSweep.includes(state);
+  const hasEnded = kMakesResult.includes(seenState) && !kMakesResult.includes(state);
   seenState = state ?? null;
+  if (hasEnded && route().name === 'scan') followScan().catch(() => {});
   if (isUse && kActOnSession.includes(route().name) && !document.hidden) {
     used = now();
     get('session').catch(() => {});
@@ -325,7 +329,8 @@ let lastPurpose = null;
 /// Screens on which users act on the open session: they scan, or use a result. Opening another
 /// patient there asks whether to close this session.
 const kActOnSession = ['scan', 'result'];
-const kSweep = ['scanning', 'working', 'result'];
+const kMakesResult = ['scanning', 'working'];
+const kSweep = [...kMakesResult, 'result'];
 const watchSession = () => {
   const { name, argument } = route();
   // A result that was opened from the history is read, not acted on.
@@ -346,7 +351,6 @@ function listen() {
       watchSession();
       noteSweep();
     }
-    if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
   });
   setLoggedOffHandler(() => {
     live.close();
@@ -386,5 +390,7 @@ if (location.pathname === '/room') {
   listen();
   // Until the user is known, the page is in the language of the login screen.
   applyTheme(kNobody);
-  speak(kNobody).then(begin).catch(report);
+  asked.push(loadSession());
+  speak(kNobody).catch(report);
+  begin().catch(report);
 }

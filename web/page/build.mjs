@@ -4,7 +4,7 @@
 import { createHash } from 'node:crypto';
 import { mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
-import { dirname, extname, join } from 'node:path';
+import { basename, dirname, extname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 
@@ -36,7 +36,7 @@ for (const code of readFileSync(join(words, 'stamp'), 'utf8').trim().split('\n')
     words: keep(`words-${code}`, '.json', JSON.stringify(catalogue)) };
 }
 
-await esbuild.build({
+const { metafile } = await esbuild.build({
   entryPoints: [join(here, 'app.js'), join(here, 'style.css')],
   bundle: true,
   minify: true,
@@ -50,6 +50,7 @@ await esbuild.build({
   assetNames: '[name].[hash]',
   legalComments: 'inline',
   define: { PLUMB_LANGUAGES: JSON.stringify(languages) },
+  metafile: true,
 });
 
 const kTypes = { '.js': 'text/javascript; charset=utf-8', '.css': 'text/css; charset=utf-8',
@@ -61,7 +62,12 @@ const find = (start, end) =>
 const withoutScript = Object.entries(texts).map(([code, of]) =>
   `<p class="card" lang="${code}">${of['page.noscript.text']} <a href="/result?language=${code}"\n`
     + `hreflang="${code}">${of['page.noscript.link']}</a>.</p>`).join('\n');
-const parts = { app: find('app.', '.js'), style: find('style.', '.css'), icon,
+const app = find('app.', '.js');
+// Fetched together with the script that needs them, not after it.
+const [, bundle] = Object.entries(metafile.outputs).find(([name]) => name.endsWith(basename(app)));
+const chunks = bundle.imports.filter(({ kind }) => kind === 'import-statement')
+  .map(({ path }) => `<link rel="modulepreload" href="/assets/${basename(path)}">`).join('\n');
+const parts = { app, chunks, style: find('style.', '.css'), icon,
   without_script: withoutScript };
 const html = readFileSync(join(here, 'index.html'), 'utf8')
   .replace(/\{([\w.]+)\}/g, (_, name) => parts[name] ?? texts.en[`page.${name}`]);

@@ -32,21 +32,33 @@ export function keepLanguage(who, name) {
   try { localStorage.setItem(key(who), name); } catch { /* private window: for this page only */ }
 }
 
-const loaded = new Map();
+const asked = new Map();  // each language's words are asked for once; null: not had
 let wanted = null;
+let used = null;
 
-/// Done when the texts are in that language, or in one that was asked for later. Without a
+async function wordsOf(name) {
+  try {
+    const answer = await fetch(kLanguages[name].words);
+    if (answer.ok) return await answer.json();
+  } catch { /* no connection */ }
+  asked.delete(name);
+  return null;
+}
+
+/// True when the texts are in that language, false when one was asked for later. Without a
 /// connection the words of before stay until these have come.
 export async function useLanguage(name) {
   wanted = name;
-  while (!loaded.has(name)) {
-    try {
-      const answer = await fetch(kLanguages[name].words);
-      if (answer.ok) loaded.set(name, await answer.json());
-    } catch { /* no connection */ }
-    if (wanted !== name) return;
-    if (!loaded.has(name)) await new Promise((ready) => { setTimeout(ready, kAgain_ms); });
+  for (;;) {
+    if (!asked.has(name)) asked.set(name, wordsOf(name));
+    const words = await asked.get(name);
+    if (wanted !== name) return false;
+    if (words) {
+      if (used !== words) useCatalogue(words);
+      used = words;
+      document.documentElement.lang = name;
+      return true;
+    }
+    await new Promise((ready) => { setTimeout(ready, kAgain_ms); });
   }
-  useCatalogue(loaded.get(name));
-  document.documentElement.lang = name;
 }

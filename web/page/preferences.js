@@ -6,6 +6,7 @@ import { clear, field, h, select } from './dom.js';
 import { kLanguages, kNobody, keepLanguage, languageOf } from './language.js';
 import { S } from './words.js';
 
+const kThemes = ['auto', 'dark', 'light'];
 const key = (who) => `plumb-theme-${who}`;
 const themeOf = (who) => {
   try {
@@ -21,7 +22,7 @@ const keepTheme = (who, theme) => {
 
 /// For a screen that nobody logs in at.
 export function chooseTheme(who, theme) {
-  if (Object.hasOwn(S.themes, theme)) keepTheme(who, theme);
+  if (kThemes.includes(theme)) keepTheme(who, theme);
 }
 
 /// At a login: what the account chose, perhaps in another browser.
@@ -48,7 +49,8 @@ export function preferences(who, changed) {
   const names = Object.fromEntries(Object.entries(kLanguages)
     .map(([code, { name }]) => [code, name]));
   const language = select(names, languageOf(who));
-  const themes = select(S.themes, themeOf(who));
+  const themes = select(
+    Object.fromEntries(kThemes.map((one) => [one, S.themes[one]])), themeOf(who));
   // Without a connection the choice holds until the account is asked again.
   const save = () => currentSession()
     && put('session/preferences', { language: language.value, theme: themes.value })

@@ -134,12 +134,15 @@ export function wordOf(words, stored) {
 /// A text of the page, or the function that fills it in.
 function pageText(text, types) {
   if (!types) return text;
-  const names = Object.keys(types);
-  const units = Object.values(types).map((type) => type.split(/[+.!]/)[0]);
-  return (...given) => filled(text, Object.fromEntries(names.map((name, i) =>
-    [name, kPlain.has(units[i]) ? given[i] ?? S.none
-      : { value: given[i], unit: units[i] === 'number' ? '' : units[i] }])));
+  const value = (given, unit) => (kPlain.has(unit) ? given ?? S.none
+    : { value: given, unit: unit === 'number' ? '' : unit });
+  return (...given) => filled(text, Object.fromEntries(Object.entries(types).map(
+    ([name, type], i) => [name, value(given[i], type.split(/[+.!]/)[0])])));
 }
+
+let tellWords;
+/// Done once there are words. What is asked of the appliance before then waits with its error.
+export const haveWords = new Promise((done) => { tellWords = done; });
 
 /// @param chosen  What web/words/generate.py made of the language's file for the page.
 export function useCatalogue(chosen) {
@@ -154,4 +157,5 @@ export function useCatalogue(chosen) {
     for (const part of path) node = node[part] ??= {};
     node[last] = pageText(text, chosen.arguments[id]);
   }
+  tellWords();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One result, from its verdict down to the pictures.
-import { fileUrl, get, getOrNull, live, now } from '../api.js';
+import { fileUrl, get, getOrNull, live, now, since_s } from '../api.js';
 import { couchVersion } from '../couch/axes.js';
 import { couchReadings } from '../couch/readings.js';
 import { card, clear, h, hint, keepFocus, warn } from '../dom.js';
@@ -16,6 +16,8 @@ import { findings, follow, isAdvice, partsOf, sentence } from './common.js';
 import { meshView } from './mesh_view.js';
 import { recordsOf } from '../monitoring/monitoring_record.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
+
+const kNew_s = 1;  // what the page has just been told is not asked for again
 
 /// The newest finished scan: of this run of the appliance, else the newest that is stored.
 const newest = async (last) => last
@@ -181,10 +183,11 @@ export async function showResult(place, id) {
     const received = now();
     let last = null;
     if (!id) {
-      const status = await get('status', true);
+      const isNew = latest === undefined && live.status && since_s(live.received) < kNew_s;
+      const status = isNew ? live.status : await get('status', true);
       last = status.last_result;
       latest = last?.id ?? null;
-      live.take(status);  // its event may come later, and the result is judged by it
+      if (!isNew) live.take(status);  // its event may come later, and the result is judged by it
     }
     const found = id ? await find(id) : await newest(last);
     const data = found && await collect(found, received);
