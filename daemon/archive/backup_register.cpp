@@ -76,10 +76,11 @@ std::optional<CheckedBackup> CheckNextBackup(StoreDatabase& database, std::chron
 }
 
 bool IsVerificationDue(Database& database, WallClock::time_point now) {
+  // An entry is its sentence in English, behind which its message stands: see DetailIn().
   const std::optional<std::int64_t> since = database.FirstInteger(
       "SELECT since FROM (SELECT ifnull((SELECT max(time) FROM audit WHERE action = "
-      "'backup.verify'), (SELECT min(time) FROM audit WHERE action = 'backup.make')) AS since) "
-      "WHERE since IS NOT NULL");
+      "'backup.verify'), (SELECT min(time) FROM audit WHERE action = 'backup.make' AND "
+      "instr(detail || char(31), ', encrypted' || char(31)))) AS since) WHERE since IS NOT NULL");
   return since && now - FromStored(*since) > kVerifiedEvery;
 }
 

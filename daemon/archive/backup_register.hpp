@@ -38,7 +38,7 @@ std::optional<CheckedBackup> CheckNextBackup(StoreDatabase& database, std::chron
 /// does not have.
 inline constexpr std::chrono::hours kVerifiedEvery{24 * 183};
 /// Whether a person has noted no such verification for as long, as the log says. Before the first
-/// one the time runs from the first backup. @throws IoError and its kinds
+/// one the time runs from the first encrypted backup. @throws IoError and its kinds
 [[nodiscard]] bool IsVerificationDue(Database& database, WallClock::time_point now);
 
 }  // namespace plumb

@@ -81,6 +81,7 @@ class FakeAppliance : public web::BackgroundWork,
     std::optional<ResultSummary> result;
   };
   std::vector<std::function<Recorded()>> recorded;
+  bool encrypts_backups = false;
   std::string backup_fault;               ///< Why no backup can be made; empty: one can.
   std::optional<Recorded> next_recorded;  ///< Set: what the next finished scan shows, out of turn.
   std::chrono::milliseconds sweep{3000};

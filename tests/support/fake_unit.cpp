@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <fstream>
 
+#include "words/backup.hpp"
+
 namespace plumb::test {
 
 using namespace web;  // NOLINT: a test's own names are none of these
@@ -29,7 +31,10 @@ void FakeAppliance::RemoveDisplay(const Actor& actor, const std::string& id, Don
 
 void FakeAppliance::MakeBackup(const Actor& actor, Done done) {
   if (!backup_fault.empty()) return Finish(done, Refused(ChangeResult::kInvalid, backup_fault));
-  Did(actor, "backup.make", "", done);
+  const Message made = say::backup::LogMade("/backups/one", 3, 20, 1000, 0);
+  Log(actor, "backup.make", "", encrypts_backups ? say::backup::LogEncrypted(made) : made);
+  Notify(web::EventKind::kData);
+  Finish(done, DoneWith(""));
 }
 
 std::optional<User> FakeAppliance::FindUser(const std::string& name) {

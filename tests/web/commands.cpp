@@ -142,6 +142,7 @@ void ObeySensor(FakeAppliance& service, const std::string& name, std::istream& w
 
 /// Of the unit, its updates and its disk.
 void ObeyUnit(FakeAppliance& service, const std::string& name) {
+  if (name == "encrypts") service.encrypts_backups = true;
   if (name == "nobackup") {
     service.backup_fault = "no folder for backups is configured";
     service.status.storage.warnings = {say::upkeep::BackupFailed(say::upkeep::NoBackupFolder())};

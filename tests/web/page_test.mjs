@@ -784,8 +784,12 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByText('No backup has been made yet.').waitFor();
   await engineer.getByRole('button', { name: 'Back up now' }).click();
   await engineer.getByText(/Last backup: .*, by engineer\./).waitFor();
+  const verify = engineer.getByRole('button', { name: 'Note: verified now' });
+  equal(await verify.isVisible(), false, 'a plain backup is opened by the unit itself');
+  h.tell('encrypts');
+  await engineer.getByRole('button', { name: 'Back up now' }).click();
   await engineer.getByText('No verification of a backup has been noted yet.').waitFor();
-  await engineer.getByRole('button', { name: 'Note: verified now' }).click();
+  await verify.click();
   await engineer.getByText(/A backup was last verified: .*, by engineer\./).waitFor();
   h.tell('nobackup');
   await engineer.getByRole('button', { name: 'Back up now' }).click();

@@ -143,6 +143,12 @@ await h.step('by finger, on a phone; what somebody else has drawn meanwhile is n
   await touch.getByRole('alert').getByText('changed by somebody else meanwhile').waitFor();
   equal(await seen(drawing(touch)), 3, 'what was drawn is still there');
   equal((await drawn(anna)).length, 0, 'and nothing was overwritten');
+  check(await onSheet(touch).getByRole('button', { name: 'Remove the photo' }).isDisabled(),
+    'the photo stays while somebody draws on it');
+  await onSheet(touch).getByRole('button', { name: 'Give up this drawing' }).tap();
+  await onSheet(touch).locator('[data-edited]').waitFor({ state: 'detached' });
+  check(await onSheet(touch).getByRole('button', { name: 'Remove the photo' }).isEnabled(),
+    'the sheet as it is now');
   await touch.context().close();
 });
 

@@ -2,17 +2,17 @@
 // The real HTTP server over a fake appliance whose scans show real results: for tests of the page
 // in a browser. plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its
 // address and "setup code: XXXX-XXXX", obeys lines on stdin: unplug, plug, fail (of the running
-// scan), nobackup (backups fail), overdue (no check has passed, references are blocked), checked,
-// slow (long sweeps), fast, toil (long computing), swift (half a second from the start to the
-// result), old (the last result becomes 10 minutes old), restarted (the status names no last
-// result), plugged (another bundle is on the stick), quit; of what the next scan shows:
-// markermoved and markerunseen (a check), stranger (another body), shoulder (lifted), across (the
-// body lies across the room's axes), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by
-// mm or turned by pitch, roll, yaw by degrees); hole (in the region), shifted (one marker, by 12
-// mm), weak (roll is not well seen), hurried (a third of the frames lost); "room known", "room
-// unknown", "room lasers": what the status says; "moved z 8 HFS bare": as compared where the room
-// is not known; cold, warm (the sensor); full, emptied (the disk); "peers open", "peers silent",
-// "peers nothing".
+// scan), nobackup (backups fail), encrypts (backups are for a key), overdue (no check has passed,
+// references are blocked), checked, slow (long sweeps), fast, toil (long computing), swift (half a
+// second from the start to the result), old (the last result becomes 10 minutes old), restarted
+// (the status names no last result), plugged (another bundle is on the stick), quit; of what the
+// next scan shows: markermoved and markerunseen (a check), stranger (another body), shoulder
+// (lifted), across (the body lies across the room's axes), "moved AXIS AMOUNT POSTURE" (the body
+// moved along x, y, z by mm or turned by pitch, roll, yaw by degrees); hole (in the region),
+// shifted (one marker, by 12 mm), weak (roll is not well seen), hurried (a third of the frames
+// lost); "room known", "room unknown", "room lasers": what the status says; "moved z 8 HFS bare":
+// as compared where the room is not known; cold, warm (the sensor); full, emptied (the disk);
+// "peers open", "peers silent", "peers nothing".
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>

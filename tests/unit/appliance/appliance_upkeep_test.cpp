@@ -15,6 +15,7 @@
 #include "drivers/files/file_io.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
 #include "tests/unit/records/scan_folder.hpp"
+#include "words/backup.hpp"
 
 namespace plumb {
 namespace {
@@ -82,11 +83,17 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
   static constexpr const char* kVerificationDue =
       "No verification of an encrypted backup has been noted for half a year";
   /// The first one was made 184 days ago.
-  void LetABackupBeOld() const {
+  void LetABackupBeOld(bool is_encrypted) const {
     constexpr std::int64_t kDays_us = 184LL * 24 * 3600 * 1'000'000;
-    Store(state()).audit.Log(kTester, "backup.make", "", Message());
+    const Message made = say::backup::LogMade("/backups/one", 3, 20, 1000, 0);
+    Store(state()).audit.Log(kTester, "backup.make", "",
+                             is_encrypted ? say::backup::LogEncrypted(made) : made);
     ChangeDatabase("DROP TRIGGER audit_no_update; UPDATE audit SET time = time - " +
                    std::to_string(kDays_us));
+  }
+  void EncryptBackups() {
+    parts_.config.appliance.backup_recipients =
+        AgeRecipients({"age1z8q8p3f3getd6h87azd0zc2vzskwttwywjqumzv8yqddd73pwg3svc56n6"});
   }
   void ChangeDatabase(const std::string& sql) const {
     Database(state() / "plumb.db", Database::Access::kReadWrite).Execute(sql);
@@ -165,7 +172,18 @@ TEST_F(ApplianceUpkeepTest, ABackupFromThePageEndsTheWarningOfAFailedOne) {
 
 TEST_F(ApplianceUpkeepTest, APlainBackupIsOpenedByPlumbdItselfAndAsksNobody) {
   parts_.config.appliance.backup_folder = folder_ / "backups";
-  LetABackupBeOld();
+  LetABackupBeOld(true);
+  Play([&] {
+    ASSERT_TRUE(Comes([&] { return Backups().size() == 2; }));
+    WaitForTicks(400);
+    On([&] { EXPECT_FALSE(Warns(kVerificationDue)); });
+  });
+}
+
+TEST_F(ApplianceUpkeepTest, TheDayOnWhichBackupsAreFirstEncryptedIsNotHalfAYearTooLate) {
+  parts_.config.appliance.backup_folder = folder_ / "backups";
+  EncryptBackups();
+  LetABackupBeOld(false);
   Play([&] {
     ASSERT_TRUE(Comes([&] { return Backups().size() == 2; }));
     WaitForTicks(400);
@@ -175,9 +193,8 @@ TEST_F(ApplianceUpkeepTest, APlainBackupIsOpenedByPlumbdItselfAndAsksNobody) {
 
 TEST_F(ApplianceUpkeepTest, ThatAnEncryptedBackupIsToBeVerifiedIsAWarningUntilItIsNoted) {
   parts_.config.appliance.backup_folder = folder_ / "backups";
-  parts_.config.appliance.backup_recipients =
-      AgeRecipients({"age1z8q8p3f3getd6h87azd0zc2vzskwttwywjqumzv8yqddd73pwg3svc56n6"});
-  LetABackupBeOld();
+  EncryptBackups();
+  LetABackupBeOld(true);
   Play([&] {
     EXPECT_TRUE(Comes([&] { return Warns(kVerificationDue); }));
     const auto noted = std::make_shared<std::promise<Change>>();

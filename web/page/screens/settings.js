@@ -22,6 +22,8 @@ function backupCard() {
     const { last: entry, verified } = await get('backup', true);
     lastVerified.textContent = verified
       ? text.backupVerified(localTime(verified.time), verified.user) : text.backupNotVerified;
+    // A plain one is opened by the unit itself.
+    forKey.hidden = entry?.detail_message?.id !== 'backup.log_encrypted';
     const warnings = saidEach(live.status?.storage, 'warnings');
     clear(last, entry ? text.backupLast(localTime(entry.time), entry.user || S.product)
       : text.backupNone, entry && [' ', h('code', {}, said(entry, 'detail'))],
@@ -42,9 +44,9 @@ function backupCard() {
     done(S.saved);
     await draw();
   }, {});
+  const forKey = h('div', { hidden: true }, hint(text.backupVerifyHint), lastVerified, verified);
   draw().catch((error) => clear(last, error.message));
-  return card(text.backup,
-    hint(text.backupHint), last, now, running, hint(text.backupVerifyHint), lastVerified, verified);
+  return card(text.backup, hint(text.backupHint), last, now, running, forKey);
 }
 
 /// Who outside is told of what needs a person, and whether that works.

@@ -70,7 +70,7 @@ function drawingBoard(lines, changed) {
     const within = (value) => Math.max(0, Math.min(1, value));
     return [within((event.clientX - left) / width), within((event.clientY - top) / height)];
   };
-  const undo = () => { lines.pop(); edited(); };
+  const undo = () => { if (lines.pop()) edited(); };
   overlay.addEventListener('pointerdown', (event) => {
     overlay.focus();
     if (!event.isPrimary || isFull()) return;
@@ -120,33 +120,42 @@ function drawingBoard(lines, changed) {
 
 /// For who may change the sheet: opens the board over what is there. While it is drawn on, the
 /// element has data-edited.
-export function drawingForm(patient, reload) {
+/// @param changed  Called when this begins.
+export function drawingForm(patient, reload, changed) {
   const text = S.setUp;
   const place = h('div', {});
   const element = h('details', { class: 'below' }, h('summary', {}, text.draw), place);
   const open = async () => {
     const { points } = await get(`patients/${patient.id}/drawing`);
     const lines = linesOf(points);
-    const changed = () => {
+    const edited = () => {
       element.dataset.edited = '';
+      changed();
       for (const button of [undo, wipe]) enable(button, lines.length > 0);
     };
-    const { element: overlay, ...acts } = drawingBoard(lines, changed);
+    const { element: overlay, ...acts } = drawingBoard(lines, edited);
+    const asItIs = h('div', {});
     const undo = action(text.drawUndo, async () => acts.undo(), {});
     const wipe = action(text.drawClear, async () => acts.wipe(), {});
+    const leave = async () => {
+      delete element.dataset.edited;
+      await reload();
+    };
     const save = action(text.drawSave, async () => {
       await put(`patients/${patient.id}/drawing`,
-        { points: pointsOf(lines), sheet_revision: patient.sheet_revision });
-      delete element.dataset.edited;
+        { points: pointsOf(lines), sheet_revision: patient.sheet_revision }).catch((error) => {
+        if (error.status === 409) clear(asItIs, action(text.drawLeave, leave, {}));
+        throw error;
+      });
       done(text.drawSaved);
-      await reload();
+      await leave();
     }, { class: 'primary' });
     for (const button of [undo, wipe]) enable(button, lines.length > 0);
     const words = hint(text.drawHint);
     words.id = 'drawing-hint';
     overlay.setAttribute('aria-describedby', words.id);
     clear(place, words, h('div', { class: 'set-up-picture drawable' }, groundOf(patient), overlay),
-      h('div', { class: 'row' }, save, undo, wipe));
+      h('div', { class: 'row' }, save, undo, wipe, asItIs));
   };
   element.addEventListener('toggle', () => {
     if (element.open && !place.firstChild) open().catch((error) => warn(error.message));

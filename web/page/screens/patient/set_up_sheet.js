@@ -45,10 +45,14 @@ export function setUpCard(patient, reload) {
     await reload();
   }, field(text.alert, alert, text.alertHint), field(text.devices, devices, text.devicesHint),
   h('button', {}, S.save));
+  const remove = action(text.photoRemove, async () => {
+    await removeFor(`patients/${patient.id}/photo`);
+    await reload();
+  }, {});
+  // What is being drawn belongs to this photo.
+  const drawing = drawingForm(patient, reload,
+    () => { for (const button of [take, remove]) enable(button, false); });
   const ofPhoto = may('patients') && h('div', { class: 'below' }, hint(text.photoHint),
-    h('div', { class: 'row' }, take, patient.has_photo && action(text.photoRemove, async () => {
-      await removeFor(`patients/${patient.id}/photo`);
-      await reload();
-    }, {})), drawingForm(patient, reload));
+    h('div', { class: 'row' }, take, patient.has_photo && remove), drawing);
   return card(text.title, setUpNote(patient), write, ofPhoto);
 }
