@@ -6,6 +6,9 @@
 #include <cmath>
 #include <set>
 
+#include <fmt/format.h>
+
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/planning/contour_surface.hpp"
 #include "algo/planning/iec_axes.hpp"
@@ -44,9 +47,7 @@ const PlannedRoi& Largest(const std::vector<const PlannedRoi*>& rois) {
 }
 
 bool SoundsLikeABody(const std::string& name) {
-  std::string lower = name;
-  for (char& c : lower)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  const std::string lower = AsciiLower(name);
   constexpr std::array<const char*, 5> kUsual = {"body", "external", "skin", "patient", "outer"};
   return std::any_of(kUsual.begin(), kUsual.end(),
                      [&](const char* usual) { return lower.find(usual) != std::string::npos; });
@@ -82,22 +83,49 @@ std::vector<std::string> NamesOf(const std::vector<PlannedBeam>& beams) {
   return names;
 }
 
-/// The beam whose isocentre counts; nothing chosen: one for all if they agree.
-const PlannedBeam& BeamOf(const TreatmentPlan& plan, const std::optional<std::string>& name) {
-  std::vector<const PlannedBeam*> with_isocentre;
+bool ShareIsocentre(const std::vector<const PlannedBeam*>& beams) {
+  return std::all_of(beams.begin(), beams.end(), [&](const PlannedBeam* beam) {
+    return (*beam->isocentre_mm - *beams.front()->isocentre_mm).norm() <= kSame_mm;
+  });
+}
+
+bool HasItsNameAlone(const TreatmentPlan& plan, const PlannedBeam& beam) {
+  return std::count_if(plan.beams.begin(), plan.beams.end(),
+                       [&](const PlannedBeam& other) { return other.name == beam.name; }) == 1;
+}
+
+/// Those that a choice may mean. A beam's name may be the number of another: names count first, and
+/// a number beside them only if its beam shares its own name and so can be called in no other way.
+std::vector<const PlannedBeam*> BeamsCalled(const TreatmentPlan& plan, const std::string& choice) {
+  std::vector<const PlannedBeam*> called;
+  for (const PlannedBeam& beam : plan.beams)
+    if (beam.name == choice) called.push_back(&beam);
+  const bool is_name = !called.empty();
   for (const PlannedBeam& beam : plan.beams) {
-    const bool named = name && (beam.name == *name || std::to_string(beam.number) == *name);
-    if (named && !beam.isocentre_mm) throw DataError(say::planning::BeamWithoutIsocentre(*name));
-    if (named) return beam;
-    if (beam.isocentre_mm) with_isocentre.push_back(&beam);
+    if (std::to_string(beam.number) != choice || beam.name == choice) continue;
+    if (!is_name || !HasItsNameAlone(plan, beam)) called.push_back(&beam);
   }
-  if (name) throw DataError(say::planning::NoSuchBeam(*name, NamesOf(plan.beams)));
-  if (with_isocentre.empty()) throw DataError(say::planning::NoIsocentre());
-  for (const PlannedBeam* beam : with_isocentre) {
-    if (!((*beam->isocentre_mm - *with_isocentre.front()->isocentre_mm).norm() <= kSame_mm))
-      throw DataError(say::planning::SeveralIsocentres(NamesOf(plan.beams)));
+  return called;
+}
+
+/// The beam whose isocentre counts; nothing chosen: one for all if they agree.
+const PlannedBeam& BeamOf(const TreatmentPlan& plan, const std::optional<std::string>& choice) {
+  std::vector<const PlannedBeam*> beams;
+  if (choice) {
+    beams = BeamsCalled(plan, *choice);
+    if (beams.empty()) throw DataError(say::planning::NoSuchBeam(*choice, NamesOf(plan.beams)));
+  } else {
+    for (const PlannedBeam& beam : plan.beams) beams.push_back(&beam);
   }
-  return *with_isocentre.front();
+  std::erase_if(beams, [](const PlannedBeam* beam) { return !beam->isocentre_mm; });
+  if (beams.empty())
+    throw DataError(choice ? say::planning::BeamWithoutIsocentre(*choice)
+                           : say::planning::NoIsocentre());
+  if (ShareIsocentre(beams)) return *beams.front();
+  if (!choice) throw DataError(say::planning::SeveralIsocentres(NamesOf(plan.beams)));
+  std::vector<std::string> numbers;
+  for (const PlannedBeam* beam : beams) numbers.push_back(std::to_string(beam->number));
+  throw DataError(say::planning::BeamTwice(*choice, numbers));
 }
 
 void CheckCouch(const TreatmentPlan& plan, std::vector<Message>& warnings) {
@@ -174,6 +202,7 @@ PlannedPlace ChoosePlace(const TreatmentPlan& plan, const std::optional<std::str
   const PlannedBeam& chosen = BeamOf(plan, beam);
   place.isocentre_mm = *chosen.isocentre_mm;
   if (beam) place.beam = chosen.name;
+  if (beam && !HasItsNameAlone(plan, chosen)) place.beam += fmt::format(" ({})", chosen.number);
   CheckCouch(plan, warnings);
   return place;
 }

@@ -14,7 +14,7 @@ namespace plumb {
 /// What a person chose where the files leave it open.
 struct PlanningChoice {
   std::optional<std::string> roi = {};   ///< Name of the contour that is the surface.
-  std::optional<std::string> beam = {};  ///< Name or number of the beam whose isocentre counts.
+  std::optional<std::string> beam = {};  ///< Name (or number) of the beam whose isocentre counts.
 };
 
 /// The surface of the external contour as a camera above sees it: in IEC axes, the isocentre at the

@@ -154,6 +154,52 @@ TEST(PlannedSceneTest, TwoIsocentresAreAskedFor) {
   EXPECT_TRUE(Refusal(two, {.beam = "3"}).Is(say::planning::kNoSuchBeam));
 }
 
+// The beams of a plan, by name and by how far their isocentres lie from the first one's, mm. They
+// have the numbers from 1 on.
+TreatmentPlan PlanWith(TreatmentPlan plan, const std::vector<std::pair<std::string, int>>& beams) {
+  const PlannedBeam first = plan.beams.front();
+  plan.beams.clear();
+  for (const auto& [name, off_mm] : beams) {
+    PlannedBeam& beam = plan.beams.emplace_back(first);
+    beam.name = name;
+    beam.number = static_cast<std::int64_t>(plan.beams.size());
+    beam.isocentre_mm->x() += off_mm;
+  }
+  return plan;
+}
+
+TEST(PlannedSceneTest, ABeamIsChosenByItsNameBeforeAnyNumber) {
+  const auto [structures, plan] = Files({});
+  const TreatmentPlan renumbered = PlanWith(plan, {{"3", 0}, {"2", 10}, {"1", 20}});
+  for (const auto& [choice, off_mm] : {std::pair{"3", 0}, {"2", 10}, {"1", 20}}) {
+    const Scene scene = MakePlannedScene(structures, renumbered, {.beam = choice});
+    EXPECT_EQ(scene.planning->beam, choice);
+    EXPECT_DOUBLE_EQ(scene.planning->isocentre_mm.x(), plan.beams[0].isocentre_mm->x() + off_mm);
+  }
+}
+
+TEST(PlannedSceneTest, ANameOfSeveralBeamsIsTakenOnlyWhereTheirIsocentreIsOne) {
+  const auto [structures, plan] = Files({});
+  const auto refusal = [&](const TreatmentPlan& changed, const std::string& choice) {
+    try {
+      (void)MakePlannedScene(structures, changed, {.beam = choice});
+    } catch (const DataError& error) {
+      return error.message();
+    }
+    return Message();
+  };
+  const TreatmentPlan twice = PlanWith(plan, {{"AP", 0}, {"AP", 10}, {"LAT", 20}});
+  EXPECT_EQ(refusal(twice, "AP"), say::planning::BeamTwice("AP", {"1", "2"}));
+  const Scene second = MakePlannedScene(structures, twice, {.beam = "2"});
+  EXPECT_EQ(second.planning->beam, "AP (2)");
+  EXPECT_DOUBLE_EQ(second.planning->isocentre_mm.x(), plan.beams[0].isocentre_mm->x() + 10);
+  EXPECT_TRUE(refusal(PlanWith(plan, {{"AP", 0}, {"AP", 0}, {"LAT", 20}}), "AP").empty());
+  // The number that the refusal asks for is the name of another beam.
+  const TreatmentPlan entangled = PlanWith(plan, {{"AP", 0}, {"AP", 10}, {"1", 20}});
+  EXPECT_EQ(refusal(entangled, "1"), say::planning::BeamTwice("1", {"3", "1"}));
+  EXPECT_TRUE(refusal(entangled, "3").empty());
+}
+
 TEST(PlannedSceneTest, FilesThatDoNotBelongTogetherAreRefused) {
   const auto refused = [](CtQuirk quirk) { return Refusal({.quirks = {quirk}}); };
   EXPECT_TRUE(refused(CtQuirk::kOtherFrame).Is(say::planning::kOtherFrame));
