@@ -16,6 +16,8 @@ namespace {
 constexpr double kSamePlace_m = 0.01 * kMillimetre;
 constexpr double kSameHeight_m = 1e-6;
 constexpr double kBesideCut_m = 15 * kMillimetre;
+// Far more than the outlines of a body and its arms have, and few enough for seconds and megabytes.
+constexpr std::size_t kMostSlices = 10'000, kMostParts = 500, kMostCrossings = 50;
 constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
 double Lowest(const FlatContour& contour) {
@@ -30,39 +32,26 @@ double Highest(const FlatContour& contour) {
   return high;
 }
 
-// Whether two contours enclose the same, wherever they begin and whichever way they run.
+// Whether two contours enclose the same, wherever they begin and whichever way they run. A contour
+// passes its first point once, at a keyhole twice: one that stays there is not compared for ever.
 bool IsSame(const FlatContour& a, const FlatContour& b) {
   if (a.size() != b.size() || a.empty()) return false;
   const auto near = [](const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
     return (p - q).cwiseAbs().maxCoeff() < kSamePlace_m;
   };
   const std::size_t n = a.size();
+  std::size_t left = 4 * n;
   for (std::size_t start = 0; start < n; ++start) {
     if (!near(a[0], b[start])) continue;
     bool forwards = true, backwards = true;
     for (std::size_t i = 1; i < n && (forwards || backwards); ++i) {
+      if (left-- == 0) return false;
       forwards = forwards && near(a[i], b[(start + i) % n]);
       backwards = backwards && near(a[i], b[(start + n - i) % n]);
     }
     if (forwards || backwards) return true;
   }
   return false;
-}
-
-std::vector<ContourSlice> Joined(std::vector<ContourSlice> slices) {
-  std::stable_sort(slices.begin(), slices.end(),
-                   [](const auto& a, const auto& b) { return a.y_m < b.y_m; });
-  std::vector<ContourSlice> joined;
-  for (ContourSlice& slice : slices) {
-    if (joined.empty() || slice.y_m - joined.back().y_m > kSamePlace_m) {
-      joined.push_back(std::move(slice));
-      continue;
-    }
-    ContourSlice& into = joined.back();
-    std::ranges::move(slice.contours, std::back_inserter(into.contours));
-    std::ranges::copy(slice.cuts, std::back_inserter(into.cuts));
-  }
-  return joined;
 }
 
 // Without crumbs; the largest contour first.
@@ -72,6 +61,7 @@ void DropCrumbs(std::vector<ContourSlice>& slices, const ContourSurfaceOptions& 
     result.crumbs += std::erase_if(slice.contours, [&](const FlatContour& contour) {
       return contour.size() < 3 || AreaOf(contour) < options.min_area_m2;
     });
+    if (slice.contours.size() > kMostParts) throw RaggedContours("too many parts in a slice");
     std::stable_sort(slice.contours.begin(), slice.contours.end(),
                      [](const auto& a, const auto& b) { return AreaOf(a) > AreaOf(b); });
     // The same contour twice would be a hole in itself.
@@ -125,10 +115,11 @@ void SortParts(std::vector<ContourSlice>& slices, const ContourSurfaceOptions& o
   }
 }
 
-double UsualSpacing(const std::vector<ContourSlice>& slices) {
-  std::vector<double> gaps;
-  for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].y_m - slices[i - 1].y_m);
-  return TakeQuantile(gaps, 0.5);
+std::vector<double> StepsOf(const std::vector<ContourSlice>& slices) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < slices.size(); ++i)
+    steps.push_back(slices[i].y_m - slices[i - 1].y_m);
+  return steps;
 }
 
 GridShape GridOver(const std::vector<ContourSlice>& slices, double step) {
@@ -153,6 +144,7 @@ GridShape GridOver(const std::vector<ContourSlice>& slices, double step) {
 // Heights of the crossings of every column's centre with the contours of a slice.
 std::vector<std::vector<double>> Crossings(const ContourSlice& slice, const GridShape& grid) {
   std::vector<std::vector<double>> crossings(static_cast<std::size_t>(grid.width));
+  std::size_t left = kMostCrossings * crossings.size();
   for (const FlatContour& contour : slice.contours) {
     for (std::size_t i = 0, j = contour.size() - 1; i < contour.size(); j = i++) {
       const Eigen::Vector2d &a = contour[i], &b = contour[j];
@@ -161,6 +153,7 @@ std::vector<std::vector<double>> Crossings(const ContourSlice& slice, const Grid
       for (; column < grid.width && grid.x_centre(column) <= high; ++column) {
         const double x = grid.x_centre(column);
         if ((a.x() > x) == (b.x() > x)) continue;
+        if (left-- == 0) throw RaggedContours("too many crossings with the columns of a slice");
         crossings[static_cast<std::size_t>(column)].push_back(
             a.y() + (b.y() - a.y()) * (x - a.x()) / (b.x() - a.x()));
       }
@@ -202,17 +195,16 @@ std::vector<double> UncutTops(const ContourSlice& slice, const ContourSurfaceOpt
   return tops;
 }
 
-void FillRows(const std::vector<ContourSlice>& slices, const ContourSurfaceOptions& options,
-              ContourSurface& result) {
+void FillRows(const std::vector<ContourSlice>& slices, const std::vector<bool>& is_gap,
+              const ContourSurfaceOptions& options, ContourSurface& result) {
   HeightMap& map = result.heights;
-  const double widest = std::min(options.max_spacing_m, 1.5 * result.spacing_m);
   std::vector<double> before, after = UncutTops(slices[1], options, result);
   // The first and the last slice take no part.
   for (std::size_t i = 1; i + 2 < slices.size(); ++i) {
     before = std::move(after);
     after = UncutTops(slices[i + 1], options, result);
     const double y = slices[i].y_m, gap = slices[i + 1].y_m - y;
-    if (gap > widest) continue;
+    if (is_gap[i]) continue;
     for (int row = 0; row < map.grid.height; ++row) {
       const double share = (map.grid.y_centre(row) - y) / gap;
       if (!(share >= 0 && share < 1)) continue;
@@ -253,16 +245,21 @@ double StraightSide(const ContourSlice& slice, double side, double height_m) {
   const FlatContour& contour = slice.contours.front();
   double farthest = std::numeric_limits<double>::lowest();
   for (const Eigen::Vector2d& p : contour) farthest = std::max(farthest, side * p.x());
-  for (std::size_t i = 0; i < contour.size(); ++i) {
-    // The run of neighbours of an extreme point that are as far out.
-    if (side * contour[i].x() < farthest - kStraight_m) continue;
-    double low = contour[i].y(), high = low;
-    for (std::size_t k = 1; k < contour.size(); ++k) {
-      const Eigen::Vector2d& p = contour[(i + k) % contour.size()];
-      if (side * p.x() < farthest - kStraight_m) break;
-      low = std::min(low, p.y());
-      high = std::max(high, p.y());
+  // Runs of neighbours that are as far out, from the end of one on.
+  const auto is_out = [&](const Eigen::Vector2d& p) {
+    return side * p.x() >= farthest - kStraight_m;
+  };
+  const auto begin = std::find_if_not(contour.begin(), contour.end(), is_out) - contour.begin();
+  double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
+  for (std::size_t k = 0; k < contour.size(); ++k) {
+    const Eigen::Vector2d& p = contour[(static_cast<std::size_t>(begin) + k) % contour.size()];
+    if (!is_out(p)) {
+      low = std::numeric_limits<double>::max();
+      high = std::numeric_limits<double>::lowest();
+      continue;
     }
+    low = std::min(low, p.y());
+    high = std::max(high, p.y());
     if (high - low >= height_m) return side * farthest;
   }
   return kNowhere;
@@ -310,18 +307,59 @@ double AreaOf(const FlatContour& contour) {
   return std::abs(0.5 * twice);
 }
 
+std::vector<ContourSlice> Joined(std::vector<ContourSlice> slices) {
+  std::stable_sort(slices.begin(), slices.end(),
+                   [](const auto& a, const auto& b) { return a.y_m < b.y_m; });
+  std::vector<ContourSlice> joined;
+  for (ContourSlice& slice : slices) {
+    if (joined.empty() || slice.y_m - joined.back().y_m > kSamePlace_m) {
+      joined.push_back(std::move(slice));
+      continue;
+    }
+    ContourSlice& into = joined.back();
+    std::ranges::move(slice.contours, std::back_inserter(into.contours));
+    std::ranges::copy(slice.cuts, std::back_inserter(into.cuts));
+  }
+  return joined;
+}
+
+std::vector<bool> MissingWithin(const std::vector<double>& steps) {
+  constexpr double kMost = 1.5;
+  constexpr std::size_t kLongestRun = 3;
+  std::vector<bool> missing(steps.size(), false);
+  for (std::size_t from = 0; from < steps.size(); ++from) {
+    double shortest = steps[from];
+    for (std::size_t end = from + 1; end <= std::min(from + kLongestRun, steps.size()); ++end) {
+      shortest = std::min(shortest, steps[end - 1]);
+      const bool is_at_end = from == 0 || end == steps.size();
+      // Several steps at the end of a scan are its other spacing.
+      if (is_at_end && (end - from > 1 || steps.size() == 1)) continue;
+      const double beside =
+          std::max(from > 0 ? steps[from - 1] : 0.0, end < steps.size() ? steps[end] : 0.0);
+      if (shortest > kMost * beside)
+        std::fill(missing.begin() + static_cast<std::ptrdiff_t>(from),
+                  missing.begin() + static_cast<std::ptrdiff_t>(end), true);
+    }
+  }
+  return missing;
+}
+
 ContourSurface SurfaceFromAbove(std::vector<ContourSlice> slices,
                                 const ContourSurfaceOptions& options) {
   ContourSurface result;
   slices = Joined(std::move(slices));
   DropCrumbs(slices, options, result);
-  result.spacing_m = UsualSpacing(slices);
+  if (slices.size() > kMostSlices) throw RaggedContours("too many slices");
+  std::vector<double> steps = StepsOf(slices);
+  std::vector<bool> is_gap = MissingWithin(steps);
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    if (steps[i] > options.max_spacing_m) is_gap[i] = true;
+  result.gaps = static_cast<std::size_t>(std::ranges::count(is_gap, true));
+  result.spacing_m = TakeQuantile(steps, 0.5);
   result.support_m = SupportUnder(slices);
   SortParts(slices, options, result);
-  for (std::size_t i = 1; i < slices.size(); ++i)
-    result.gaps += slices[i].y_m - slices[i - 1].y_m > 1.5 * result.spacing_m ? 1 : 0;
   result.heights = HeightMap(GridOver(slices, options.step_m));
-  FillRows(slices, options, result);
+  FillRows(slices, is_gap, options, result);
   MaskUnsure(options, result);
   MaskCutSides(slices, options, result);
   return result;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <stdexcept>
 #include <vector>
 
 #include <Eigen/Core>
@@ -43,10 +44,24 @@ struct ContourSurface {
   std::size_t repeated = 0;     ///< Contours that the same slice has once more.
   std::size_t couch_parts = 0;  ///< Parts apart that do not rise above the height of the couch.
   std::size_t holes = 0;        ///< Contours inside another one.
-  std::size_t gaps = 0;         ///< Places where slices are missing; nothing is interpolated there.
-  bool cut_at_side = false;     ///< Arms or shoulders end at the edge of the field of view.
-  std::size_t cut_slices = 0;   ///< Slices whose cuts took a part of the surface.
+  std::size_t gaps = 0;        ///< Steps that are left empty: slices are missing, or too far apart.
+  bool cut_at_side = false;    ///< Arms or shoulders end at the edge of the field of view.
+  std::size_t cut_slices = 0;  ///< Slices whose cuts took a part of the surface.
 };
+
+/// Contours with more parts in a slice, more slices or more to and fro than outlines of a body
+/// have: they would take all memory, or minutes.
+struct RaggedContours : std::invalid_argument {
+  using std::invalid_argument::invalid_argument;
+};
+
+/// One slice for each place (to 0.01 mm), in their order.
+[[nodiscard]] std::vector<ContourSlice> Joined(std::vector<ContourSlice> slices);
+
+/// For each step from a place to the next whether slices are missing within it: where one to three
+/// in a row are more than 1.5 times as long as those on both sides; at an end of the scan one. More
+/// of them are another spacing, which a scan may have beyond what is treated.
+[[nodiscard]] std::vector<bool> MissingWithin(const std::vector<double>& steps);
 
 /// Each column of each slice takes its topmost crossing by the even-odd rule, so that holes and
 /// keyholes need no care (a contour that a slice has twice counts once), and rows between
@@ -54,7 +69,9 @@ struct ContourSurface {
 /// ends of the scan; rows in a gap; steps; what is not higher than the couch; the field of view's
 /// edges; and what lies beside a cut.
 /// @param slices  In any order. Those at one place (to 0.01 mm) are joined.
-/// @throws std::invalid_argument with fewer than three places, or none with an area.
+/// @throws RaggedContours with more than 10,000 places, 500 parts in a slice, or 50 crossings of a
+///         slice's columns in the mean; std::invalid_argument with fewer than three places, or none
+///         with an area.
 [[nodiscard]] ContourSurface SurfaceFromAbove(std::vector<ContourSlice> slices,
                                               const ContourSurfaceOptions& options = {});
 

@@ -22,7 +22,6 @@ constexpr double kAxial = 1e-3;       // of the directions' cosines: 0.5 mm over
 constexpr double kFarthest_mm = 1e4;  // of an image from the origin, along each axis
 constexpr double kMostPixel_mm = 5.0;
 constexpr double kPlacesPerMillimetre = 100.0;
-constexpr double kMostStep = 1.5;  // of the usual one; twice that is where an image is missing
 constexpr std::size_t kMostSkinPoints = 4'000'000;
 // Noise, not parts of a body; a wrist has twenty times as much.
 constexpr double kLeastPart_mm2 = 100.0;
@@ -251,13 +250,12 @@ void CtSkin::RequireWhole() const {
   if (steps.empty()) return;
   std::vector<double> sorted = steps;
   const double usual = TakeQuantile(sorted, 0.5);
-  auto at = places_.begin();
-  for (const double step : steps) {
-    if (step > kMostStep * usual)
-      throw DataError(say::planning::ImagesMissing(static_cast<double>(*at) / kPlacesPerMillimetre,
-                                                   step, usual));
-    ++at;
-  }
+  const std::vector<bool> missing = MissingWithin(steps);
+  const auto found = std::ranges::find(missing, true) - missing.begin();
+  if (found == std::ssize(missing)) return;
+  throw DataError(say::planning::ImagesMissing(
+      static_cast<double>(*std::next(places_.begin(), found)) / kPlacesPerMillimetre,
+      steps[static_cast<std::size_t>(found)], usual));
 }
 
 double CtSkin::Steepness() const {

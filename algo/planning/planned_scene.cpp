@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <vector>
 
 #include "algo/base/errors.hpp"
@@ -52,12 +51,6 @@ void AddSlice(const PlannedRoi& roi, const PlannedContour& contour, const Eigen:
   if (flat.front() == flat.back()) flat.pop_back();
 }
 
-std::int64_t CountPlaces(const std::vector<ContourSlice>& slices) {
-  std::set<std::int64_t> places;
-  for (const ContourSlice& slice : slices) places.insert(std::llround(slice.y_m * 1e5));
-  return static_cast<std::int64_t>(places.size());
-}
-
 void Warn(const ContourSurface& surface, std::int64_t num_slices, std::vector<Message>& warnings) {
   const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
   if (surface.spacing_m > kWideSpacing_m + kFlat_mm * kMillimetre)
@@ -80,17 +73,20 @@ std::vector<ContourSlice> SlicesOf(const PlannedRoi& roi, const PlannedPlace& pl
   std::vector<ContourSlice> slices;
   for (const PlannedContour& contour : roi.contours)
     AddSlice(roi, contour, R, place.isocentre_mm, slices);
-  return slices;
+  return Joined(std::move(slices));
 }
 
 ContourSurface SurfaceOf(const std::string& name, std::vector<ContourSlice> slices,
                          const ContourSurfaceOptions& options, PlanningSource& source) {
-  source.slices = CountPlaces(slices);
+  slices = Joined(std::move(slices));
+  source.slices = std::ssize(slices);
   if (source.slices < kFewestSlices)
     throw DataError(say::planning::FewSlices(name, source.slices, kFewestSlices));
   ContourSurface surface;
   try {
     surface = SurfaceFromAbove(std::move(slices), options);
+  } catch (const RaggedContours&) {
+    throw DataError(say::planning::ContoursRagged(name));
   } catch (const std::invalid_argument&) {
     throw DataError(say::planning::NoSurface(name));
   }
@@ -103,20 +99,35 @@ ContourSurface SurfaceOf(const std::string& name, std::vector<ContourSlice> slic
   return surface;
 }
 
-// Top of the couch as a planning system has drawn it, in the frame of the images. It may be drawn
-// as several structures, such as the surface and the inside of a shell, beside cushions and head
-// rests: the highest of those that are flat along the scan counts.
-std::optional<double> DrawnCouch(const StructureSet& structures, const CtSkin& images,
-                                 const PlannedPlace& place) {
-  std::optional<double> highest;
+// What a planning system has drawn beneath the body, in the frame of the images: the surface and
+// the inside of the couch's shell as structures of their own, cushions, boards and head rests.
+std::vector<DrawnSupport> DrawnSupports(const StructureSet& structures, const CtSkin& images,
+                                        const PlannedPlace& place) {
+  std::vector<DrawnSupport> supports;
   for (const PlannedRoi& roi : structures.rois) {
     const std::string& frame = roi.frame_of_reference_uid;
     if (roi.type != "SUPPORT" || (!frame.empty() && frame != images.roi().frame_of_reference_uid))
       continue;
-    if (const std::optional<double> top = FlatTop(SlicesOf(roi, place)))
-      highest = std::max(highest.value_or(*top), *top);
+    DrawnSupport support{.name = roi.name, .slices = SlicesOf(roi, place)};
+    if (!support.slices.empty()) supports.push_back(std::move(support));
   }
-  return highest;
+  return supports;
+}
+
+void RemoveCouch(const std::vector<DrawnSupport>& supports, std::vector<ContourSlice>& slices,
+                 std::vector<Message>& warnings) {
+  const DrawnCouch drawn = CouchAsDrawn(slices, supports);
+  for (const DrawnCouch::Part& part : drawn.parts)
+    warnings.push_back(say::planning::CouchDrawn(part.name, part.top_m / kMillimetre));
+  if (!drawn.not_used.empty()) warnings.push_back(say::planning::SupportsNotUsed(drawn.not_used));
+  for (std::size_t i = 0; i < drawn.top_m.size(); ++i)
+    RemoveBelow(drawn.top_m[i] + kAboveCouch_m, slices[i]);
+  if (!drawn.top_m.empty()) return;
+  const std::optional<double> top_m = CouchTop(slices);
+  warnings.push_back(top_m ? say::planning::CouchRemoved(*top_m / kMillimetre)
+                           : say::planning::CouchNotFound());
+  for (ContourSlice& slice : slices)
+    if (top_m) RemoveBelow(*top_m + kAboveCouch_m, slice);
 }
 
 // Along its normal, 95 %, for the threshold.
@@ -145,11 +156,8 @@ void AddCuts(const CtSkin& images, const PlannedPlace& place, std::vector<Contou
 ContourSurface SurfaceOfImages(const CtSkin& images, const std::optional<StructureSet>& structures,
                                const PlannedPlace& place, Scene& scene) {
   std::vector<ContourSlice> slices = SlicesOf(images.roi(), place);
-  std::optional<double> couch = structures ? DrawnCouch(*structures, images, place) : std::nullopt;
-  if (!couch) couch = CouchTop(slices);
-  if (couch) RemoveBelow(*couch + kAboveCouch_m, slices);
-  scene.warnings.push_back(couch ? say::planning::CouchRemoved(*couch / kMillimetre)
-                                 : say::planning::CouchNotFound());
+  RemoveCouch(structures ? DrawnSupports(*structures, images, place) : std::vector<DrawnSupport>(),
+              slices, scene.warnings);
   AddCuts(images, place, slices);
   ContourSurface surface = SurfaceOf(images.roi().name, std::move(slices),
                                      {.min_area_m2 = kLeastImagePart_m2}, *scene.planning);

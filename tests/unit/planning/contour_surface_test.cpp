@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algo/planning/contour_surface.hpp"
 
+#include <time.h>
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -172,6 +174,82 @@ TEST(ContourSurfaceTest, AMissingSliceIsNotBridged) {
   EXPECT_TRUE(std::isnan(HeightAt(surface, 0, 0.150)));
   EXPECT_FALSE(std::isnan(HeightAt(surface, 0, 0.145)));
   EXPECT_FALSE(std::isnan(HeightAt(surface, 0, 0.155)));
+}
+
+TEST(ContourSurfaceTest, SlicesAreMissingWhereAFewStepsAreLongerThanThoseBesideThem) {
+  const auto found = [](const std::vector<double>& steps) {
+    std::vector<std::size_t> at;
+    const std::vector<bool> missing = MissingWithin(steps);
+    for (std::size_t i = 0; i < missing.size(); ++i)
+      if (missing[i]) at.push_back(i);
+    return at;
+  };
+  using At = std::vector<std::size_t>;
+  EXPECT_EQ(found({5, 5, 7.4, 5, 5}), At());
+  EXPECT_EQ(found({5, 5, 7.6, 5, 5}), At({2}));
+  EXPECT_EQ(found({5, 10, 10, 5, 5}), At({1, 2})) << "two, each alone";
+  EXPECT_EQ(found({5, 10, 5, 15, 5}), At({1, 3}));
+  EXPECT_EQ(found({3, 3, 3, 5, 5, 5}), At()) << "two spacings";
+  EXPECT_EQ(found({5, 5, 3, 3, 3, 5, 5, 5}), At());
+  EXPECT_EQ(found({3, 3, 5, 5, 5, 5, 3, 3}), At());
+  EXPECT_EQ(found({3, 3, 5, 5, 10, 5, 5}), At({4})) << "missing in the wider part";
+  EXPECT_EQ(found({3, 3, 8, 5, 5}), At({2})) << "missing where they meet";
+  EXPECT_EQ(found({10, 5, 5, 5}), At({0}));
+  EXPECT_EQ(found({5, 5, 5, 10}), At({3}));
+  EXPECT_EQ(found({5}), At());
+  EXPECT_EQ(found({}), At());
+}
+
+// A contour that runs to and fro, each time across all columns.
+std::vector<ContourSlice> ToAndFro(int times) {
+  FlatContour contour = {{-0.2, -0.1}, {0.2, -0.1}, {0.2, 0.0}};
+  for (int i = 2; i < times; ++i) contour.emplace_back(i % 2 == 0 ? -0.2 : 0.2, 0.002 * i);
+  return {{0.0, {contour}}, {0.003, {contour}}, {0.006, {contour}}, {0.009, {contour}}};
+}
+
+TEST(ContourSurfaceTest, ContoursThatWouldTakeAllMemoryOrMinutesAreRefused) {
+  EXPECT_NO_THROW((void)SurfaceFromAbove(ToAndFro(48)));
+  EXPECT_THROW((void)SurfaceFromAbove(ToAndFro(54)), RaggedContours);
+  for (const int parts : {499, 500}) {
+    std::vector<ContourSlice> slices = Cylinder();
+    for (int i = 0; i < parts; ++i)
+      slices[20].contours.push_back(Box(0.4 + 0.03 * i, 0.42 + 0.03 * i, 0.1, 0.12));
+    if (parts == 499)
+      EXPECT_EQ(SurfaceFromAbove(std::move(slices)).parts_apart, 499U);
+    else
+      EXPECT_THROW((void)SurfaceFromAbove(std::move(slices)), RaggedContours);
+  }
+  for (const int places : {10'000, 10'001}) {
+    std::vector<ContourSlice> slices;
+    for (int i = 0; i < places; ++i) slices.push_back({1e-4 * i, {Box(0, 0.02, 0, 0.02)}});
+    if (places == 10'000)
+      EXPECT_NO_THROW((void)SurfaceFromAbove(std::move(slices)));
+    else
+      EXPECT_THROW((void)SurfaceFromAbove(std::move(slices)), RaggedContours);
+  }
+}
+
+TEST(ContourSurfaceTest, ContoursThatStayAtOnePlaceTakeNoLonger) {
+  constexpr std::size_t kPoints = 100'000;
+  std::vector<ContourSlice> slices = Cylinder();
+  for (ContourSlice& slice : slices) slice.contours.front() = Box(-0.15, 0.15, 0, 0.3);
+  for (const double end : {0.31, 0.32}) {
+    FlatContour still(kPoints, Eigen::Vector2d(0.25, 0.3));
+    still.emplace_back(0.2, end);
+    still.emplace_back(0.2, 0.3);
+    slices[20].contours.push_back(std::move(still));
+  }
+  timespec begun{}, ended{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &begun);
+  const ContourSurface surface = SurfaceFromAbove(std::move(slices));
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &ended);
+  EXPECT_EQ(surface.repeated, 0U);
+#ifdef NDEBUG
+  // Measured: 0.05 s; each with each point takes 5 s and more.
+  EXPECT_LT(static_cast<double>(ended.tv_sec - begun.tv_sec) +
+                1e-9 * static_cast<double>(ended.tv_nsec - begun.tv_nsec),
+            2.0);
+#endif
 }
 
 TEST(ContourSurfaceTest, SlicesMayComeInAnyOrderAndContourByContour) {

@@ -234,28 +234,35 @@ TEST(CtSkinTest, AContourOfTheCouchCountsMoreThanItsShape) {
   PlannedRoi& couch = structures.rois.emplace_back();
   couch = {.number = 9, .name = "Couch", .type = "SUPPORT", .frame_of_reference_uid = "2.25.52"};
   const double y_mm = -304.3 - 1e3 * (by_shape.planning->support_m + 0.02);  // HFS
-  for (const double z_mm : {-50.0, 0.0, 50.0})
+  for (const CtImage& image : files.images) {
+    const double z_mm = image.origin_mm.z();
     couch.contours.push_back({.kind = "CLOSED_PLANAR",
                               .points_mm = {{-200, y_mm, z_mm},
                                             {200, y_mm, z_mm},
                                             {200, y_mm + 30, z_mm},
                                             {-200, y_mm + 30, z_mm}}});
+  }
   const Scene drawn = SceneOf(files);
+  EXPECT_THAT(drawn.warnings, Warns(say::planning::kCouchDrawn));
+  EXPECT_THAT(drawn.warnings, Not(Warns(say::planning::kCouchRemoved)));
+  EXPECT_THAT(drawn.warnings, Not(Warns(say::planning::kSupportsNotUsed)));
   EXPECT_NEAR(drawn.planning->support_m, by_shape.planning->support_m + 0.023, 0.001);
   EXPECT_THAT(drawn.warnings, Not(Warns(say::planning::kImagesByFrame)));
   // Planning systems draw the inside of its shell, rails and cushions as structures of their own.
+  const double middle_mm = files.images[files.images.size() / 2].origin_mm.z();
   const auto add_support = [&](const std::string& name, double lower_mm, double rise_mm) {
     PlannedRoi part = structures.rois.back();
     part.name = name;
     for (PlannedContour& contour : part.contours)
       for (Eigen::Vector3d& p : contour.points_mm)
-        p.y() += lower_mm - (p.z() > -25 ? rise_mm : 0.0);  // HFS: y points down
+        p.y() += lower_mm - (p.z() > middle_mm ? rise_mm : 0.0);  // HFS: y points down
     structures.rois.insert(structures.rois.begin(), part);
     return SceneOf(files).planning->support_m;
   };
   for (const auto& [name, lower_mm, rise_mm] :
        {std::tuple{"inside", 8.0, 0.0}, {"rails", 60.0, 0.0}, {"cushion", -40.0, 30.0}})
     EXPECT_NEAR(add_support(name, lower_mm, rise_mm), drawn.planning->support_m, 1e-9) << name;
+  EXPECT_THAT(SceneOf(files).warnings, Contains(say::planning::SupportsNotUsed({"cushion"})));
   // In another frame of reference its height says nothing.
   for (PlannedRoi& roi : structures.rois) roi.frame_of_reference_uid = "2.25.53";
   EXPECT_NEAR(SceneOf(files).planning->support_m, by_shape.planning->support_m, 1e-9);
@@ -305,6 +312,25 @@ TEST(CtSkinTest, AMissingImageIsRefusedWithItsPlace) {
   EXPECT_TRUE(RefusalOf(moved).empty());
   moved.images[20].origin_mm.z() += 0.2;
   EXPECT_TRUE(RefusalOf(moved).Is(say::planning::kImagesMissing));
+}
+
+TEST(CtSkinTest, ASeriesOfTwoSpacingsIsWhole) {
+  PlanningCtOptions options = Region();
+  options.spacing_m = 0.0025;
+  CtFiles files = FilesOf(options);
+  const std::size_t half = files.images.size() / 2;
+  for (std::size_t i = files.images.size() - 1; i > half; --i)
+    if ((i - half) % 2 == 1) files.images.erase(files.images.begin() + static_cast<long>(i));
+  const Scene scene = SceneOf(files);
+  EXPECT_THAT(scene.warnings, Not(Warns(say::planning::kSliceGaps)));
+  const double off = OffBody(scene).front();
+  EXPECT_GT(off, -0.005);
+  // Both parts are there: as many points as of the one spacing.
+  EXPECT_NEAR(static_cast<double>(scene.cloud.size()),
+              static_cast<double>(SceneOf(FilesOf(options)).cloud.size()),
+              0.03 * static_cast<double>(scene.cloud.size()));
+  files.images.erase(files.images.begin() + static_cast<long>(half) + 5);
+  EXPECT_TRUE(RefusalOf(files).Is(say::planning::kImagesMissing));
 }
 
 TEST(CtSkinTest, TooFewOrTooThinlySpreadImagesAreRefused) {
@@ -485,6 +511,90 @@ TEST(CouchTopTest, OnlyALevelSideAlongTheScanIsACouch) {
   EXPECT_NEAR(*CouchTop(with_narrow), 0.05, 1e-6);
   EXPECT_FALSE(CouchTop(slices([&](double x, int i) { return on_couch(x, i) + 0.01 * i; })));
   EXPECT_FALSE(CouchTop({}));
+}
+
+FlatContour BoxUpTo(double top, double half_width = 0.25, double height = 0.05) {
+  return {{-half_width, top - height},
+          {half_width, top - height},
+          {half_width, top},
+          {-half_width, top}};
+}
+
+/// Twenty slices of a body that reaches up to 0.2 m.
+std::vector<ContourSlice> ScannedSlices() {
+  std::vector<ContourSlice> scan;
+  for (int i = 0; i < 20; ++i) scan.push_back({0.003 * i, {BoxUpTo(0.2, 0.15, 0.25)}});
+  return scan;
+}
+
+/// A structure in some of the slices; its contours at each place.
+DrawnSupport SupportOf(const std::string& name, int from, int to,
+                       const std::function<std::vector<FlatContour>(int)>& contours) {
+  std::vector<ContourSlice> slices;
+  for (int i = from; i < to; ++i)  // one slice for each contour, as structure sets have them
+    for (const FlatContour& contour : contours(i)) slices.push_back({0.003 * i, {contour}});
+  return {.name = name, .slices = Joined(std::move(slices))};
+}
+
+DrawnSupport BoxSupport(const std::string& name, int from, int to, double top) {
+  return SupportOf(name, from, to, [top](int) { return std::vector<FlatContour>{BoxUpTo(top)}; });
+}
+
+TEST(CouchTopTest, TheHighestOfAllContoursOfAPlaceIsTheTop) {
+  const DrawnSupport shell = SupportOf("shell", 0, 20, [](int) {
+    return std::vector<FlatContour>{BoxUpTo(-0.05), BoxUpTo(-0.058, 0.24), BoxUpTo(-0.08, 0.02)};
+  });
+  const DrawnCouch couch = CouchAsDrawn(ScannedSlices(), {shell});
+  ASSERT_EQ(couch.parts.size(), 1U);
+  EXPECT_EQ(couch.parts[0].name, "shell");
+  EXPECT_EQ(couch.top_m, std::vector<double>(20, -0.05));
+}
+
+TEST(CouchTopTest, ADrawnTopMayRiseByFiveMillimetres) {
+  for (const double rise_m : {0.004, 0.006}) {
+    const DrawnSupport rising = SupportOf("rising", 0, 20, [rise_m](int i) {
+      return std::vector<FlatContour>{BoxUpTo(-0.05 + (i < 10 ? 0.0 : rise_m))};
+    });
+    const DrawnCouch couch = CouchAsDrawn(ScannedSlices(), {rising});
+    EXPECT_EQ(couch.top_m.empty(), rise_m > 0.005);
+    EXPECT_EQ(couch.not_used.size(), rise_m > 0.005 ? 1U : 0U);
+  }
+}
+
+TEST(CouchTopTest, AShortStructureIsNoCouchAndALongOneCountsWhereItIs) {
+  const DrawnSupport couch = BoxSupport("couch", 0, 20, -0.05);
+  // What is drawn at a place is there up to its neighbours: 5 slices are 6 of 20 places, 6 are 7.
+  const DrawnCouch with_block =
+      CouchAsDrawn(ScannedSlices(), {BoxSupport("block", 0, 5, 0.03), couch});
+  EXPECT_THAT(with_block.not_used, ::testing::ElementsAre("block"));
+  EXPECT_EQ(with_block.top_m, std::vector<double>(20, -0.05));
+  const DrawnCouch with_board =
+      CouchAsDrawn(ScannedSlices(), {BoxSupport("board", 0, 6, 0.03), couch});
+  EXPECT_TRUE(with_board.not_used.empty());
+  EXPECT_EQ(with_board.parts.size(), 2U);
+  EXPECT_EQ(with_board.top_m[6], 0.03);
+  EXPECT_EQ(with_board.top_m[7], -0.05);
+  // Drawn in every second slice, and not to the ends.
+  DrawnSupport thin = BoxSupport("thin", 4, 15, -0.05);
+  for (const std::ptrdiff_t i : {9, 7, 5, 3, 1}) thin.slices.erase(thin.slices.begin() + i);
+  EXPECT_EQ(CouchAsDrawn(ScannedSlices(), {thin}).top_m, std::vector<double>(20, -0.05));
+}
+
+TEST(CouchTopTest, WhatNothingRisesAboveIsNoCouch) {
+  for (const double below_m : {0.019, 0.021}) {
+    const DrawnCouch couch =
+        CouchAsDrawn(ScannedSlices(), {BoxSupport("plate", 0, 20, 0.2 - below_m)});
+    EXPECT_EQ(couch.top_m.empty(), below_m < 0.02);
+    EXPECT_EQ(couch.not_used.size(), below_m < 0.02 ? 1U : 0U);
+  }
+}
+
+TEST(CouchTopTest, WhatLiesBelowLeavesNoContour) {
+  ContourSlice slice{0.0, {BoxUpTo(0.2, 0.15, 0.25), BoxUpTo(-0.05), BoxUpTo(-0.03)}};
+  RemoveBelow(-0.045, slice);
+  ASSERT_EQ(slice.contours.size(), 2U);
+  EXPECT_NEAR(AreaOf(slice.contours[0]), 0.3 * 0.245, 1e-9);
+  EXPECT_NEAR(AreaOf(slice.contours[1]), 0.5 * 0.015, 1e-9);
 }
 
 }  // namespace

@@ -240,6 +240,15 @@ TEST(PlannedSceneTest, PlansThatCannotPlaceThePatientAreRefused) {
   EXPECT_TRUE(RefusalAfter([](S structures, P) {
                 structures.rois[0].contours.resize(3);
               }).Is(p::kFewSlices));
+  EXPECT_TRUE(RefusalAfter([](S structures, P) {
+                // To and fro, as no outline runs.
+                PlannedContour& contour = structures.rois[0].contours[20];
+                const double z_mm = contour.points_mm.front().z();
+                contour.points_mm = {{-200, -500, z_mm}, {200, -500, z_mm}, {200, -450, z_mm}};
+                for (int i = 2; i < 200; ++i)
+                  contour.points_mm.emplace_back(i % 2 == 0 ? -200 : 200, i - 450, z_mm);
+                contour.stated_points = -1;
+              }).Is(p::kContoursRagged));
   EXPECT_TRUE(RefusalAfter([](S, P plan) {
                 for (PlannedBeam& beam : plan.beams) beam.isocentre_mm->y() += 5000;
               }).Is(p::kFarAway));
