@@ -135,7 +135,7 @@ std::optional<MonitorLine> Monitor::Add(const Frame& frame, std::size_t index) {
         FitSome();
         break;
       case Stage::kFollowing:
-        Follow(sensor, frame, line);
+        if (!Follow(sensor, frame, line)) return std::nullopt;
         break;
     }
   }
@@ -151,6 +151,8 @@ MonitorLine Monitor::LineAside(const Frame& frame, std::size_t index) const {
   MonitorLine line{.time_s = frame.depth_time_s, .sensor = index, .takes_part = false};
   if (sensor.moved) {
     line.state = MonitorState::kMovedSensor;
+  } else if (sensor.takes_part) {  // a repeated image
+    line.state = MonitorState::kBlind;
   } else if (sensor.at_rest.stage() != RestStage::kMounting) {
     line.state = MonitorState::kBlind;
     line.reason = BlindReason::kNoZero;
@@ -315,22 +317,23 @@ std::optional<MotionFit> Monitor::FitAll(SensorSet& set, MonitorLine& line) {
   return std::nullopt;
 }
 
-void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
+bool Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
   if (!zero_time_s_) {
     zero_time_s_ = frame.depth_time_s;
     for (Sensor& one : sensors_) one.markers_s = frame.depth_time_s;
   }
-  if (sensor.image_s && frame.depth_time_s - *sensor.image_s > kAway_s) {
+  if (frame.depth_time_s - sensor.image_s.value_or(*zero_time_s_) > kAway_s) {
     sensor.at_rest.ForgetPlace();
     sensor.checks_due = kChecksOnReturn;
   }
-  const bool was_checked = sensor.at_rest.See(frame);
+  const SeenImage seen = sensor.at_rest.See(frame);
+  if (seen == SeenImage::kRepeated) return false;
   sensor.image_s = frame.depth_time_s;
   const PlaceCheck& check = sensor.at_rest.check();
   constexpr int kLeastMarkers = 3;
   if (check.num_seen >= kLeastMarkers) {
     sensor.markers_s = frame.depth_time_s;
-    if (was_checked && sensor.checks_due > 0) --sensor.checks_due;
+    if (seen == SeenImage::kChecked && sensor.checks_due > 0) --sensor.checks_due;
   }
   line.markers_seen = check.num_seen;
   line.couch_moved = check.couch_moved;
@@ -340,7 +343,7 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
   if (std::ranges::none_of(sensors_,
                            [](const Sensor& one) { return one.takes_part && !one.moved; })) {
     line.state = MonitorState::kMovedSensor;
-    return;
+    return true;
   }
   SensorSet set = SensorsThatMaySee(line.time_s);
   // Only one that was just pushed, or whose place is not known again.
@@ -351,7 +354,7 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
   if (!fit) {
     line.state = MonitorState::kBlind;
     recent_.clear();
-    return;
+    return true;
   }
   line.state = MonitorState::kMonitoring;
   line.sensors_used = static_cast<int>(set.size());
@@ -370,6 +373,7 @@ void Monitor::Follow(Sensor& sensor, const Frame& frame, MonitorLine& line) {
   }
   for (std::size_t i = 0; i < set.size(); ++i) sensors_[set[i]].modes_m = fit->views[i].modes_m;
   line.breathing_m = Breathing_m(set);
+  return true;
 }
 
 std::optional<double> Monitor::Breathing_m(const SensorSet& set) const {

@@ -120,7 +120,8 @@ class Monitor {
   Monitor(const Monitor&) = delete;
   Monitor& operator=(const Monitor&) = delete;
 
-  /// @return Nothing for a frame of a sensor that takes no part while another one does.
+  /// @return Nothing for a frame of a sensor that takes no part while another one does, and for one
+  ///         that repeats the image before, which is none (see SensorAtRest::See()).
   [[nodiscard]] std::optional<MonitorLine> Add(const Frame& frame, std::size_t sensor = 0);
   /// The line of such a frame: unknown, and why that sensor takes no part. It is no advice: the
   /// others go on.
@@ -158,7 +159,8 @@ class Monitor {
   /// @param last  There will be no other: also without a breath.
   void TakeZeros(bool last);
   void FitSome();
-  void Follow(Sensor& sensor, const Frame& frame, MonitorLine& line);
+  /// @return False for a repeated image.
+  [[nodiscard]] bool Follow(Sensor& sensor, const Frame& frame, MonitorLine& line);
   [[nodiscard]] SensorSet SensorsThatMaySee(double time_s) const;
   /// Fits all that see enough; those that do not leave the set.
   [[nodiscard]] std::optional<MotionFit> FitAll(SensorSet& set, MonitorLine& line);

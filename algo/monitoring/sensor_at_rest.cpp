@@ -10,6 +10,7 @@
 #include "algo/base/polygon.hpp"
 #include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
+#include "algo/monitoring/advice.hpp"
 #include "algo/surface/surface_mesh.hpp"
 #include "words/monitoring.hpp"
 
@@ -29,6 +30,11 @@ constexpr double kCheckInterval_s = 0.19;           // five times a second
 constexpr double kDriftTime_s = 10.0;
 constexpr float kRecent = 0.2F;
 constexpr std::size_t kLeastRegionBlocks = 300;
+
+// Where nothing is measured, as of a covered sensor, nothing is repeated.
+bool IsSameImage(const std::vector<float>& one, const std::vector<float>& other) {
+  return one == other && std::ranges::any_of(one, [](float inverse) { return inverse > 0; });
+}
 
 }  // namespace
 
@@ -127,6 +133,16 @@ FitView SensorAtRest::ViewOf(const BlockImage& image, const Eigen::Vector2d& mod
   return view;
 }
 
+bool SensorAtRest::RepeatedAtZero() const {
+  std::size_t first = 0;  // of those that are the same
+  for (std::size_t i = 1; i < still_.size(); ++i) {
+    if (IsSameImage(still_.inverse_depth[i], still_.inverse_depth[i - 1])) continue;
+    if (still_.time_s[i - 1] - still_.time_s[first] > kLongestGap_s) return true;
+    first = i;
+  }
+  return false;
+}
+
 BlockImage SensorAtRest::StillImage(std::size_t frame) const {
   return {.inverse_depth = still_.inverse_depth[frame], .ray = grid_.centre_ray};
 }
@@ -179,6 +195,7 @@ bool SensorAtRest::Zero(ZeroKind kind) {
   breathing_ = std::move(mode);
   SetCorrection(zero);
   FindFaces();
+  is_without_noise_ = RepeatedAtZero();
   stage_ = RestStage::kReady;
   return model_.CountOf(SurfacePart::kRegion) >= kLeastRegionBlocks;
 }
@@ -271,8 +288,11 @@ void SensorAtRest::FindFaces() {
   }
 }
 
-bool SensorAtRest::See(const Frame& frame) {
-  image_ = AverageBlocks(frame.depth_m, grid_, info_.usable_depth);
+SeenImage SensorAtRest::See(const Frame& frame) {
+  BlockImage image = AverageBlocks(frame.depth_m, grid_, info_.usable_depth);
+  if (!is_without_noise_ && IsSameImage(image.inverse_depth, image_.inverse_depth))
+    return SeenImage::kRepeated;
+  image_ = std::move(image);
   for (std::size_t b = 0; b < recent_.size(); ++b) {
     const float now = image_.inverse_depth[b];
     if (now <= 0) continue;
@@ -285,7 +305,7 @@ bool SensorAtRest::See(const Frame& frame) {
   }
   FollowDrift(frame.depth_time_s);
   MeasureSupport();
-  return is_due;
+  return is_due ? SeenImage::kChecked : SeenImage::kTaken;
 }
 
 void SensorAtRest::ForgetPlace() {

@@ -41,6 +41,10 @@ struct MonitoredScene {
 /// Where the sensor is in its work.
 enum class RestStage : std::uint8_t { kMounting, kZeroing, kReady };
 
+/// What See() made of a frame: a repetition of the one before, an image, or one by which the
+/// sensor's place was checked, too.
+enum class SeenImage : std::uint8_t { kRepeated, kTaken, kChecked };
+
 /// What a zero must rest on.
 enum class ZeroKind : std::uint8_t { kAny, kOfWholeBreath };
 
@@ -62,8 +66,10 @@ class SensorAtRest {
   [[nodiscard]] bool Zero(ZeroKind kind = ZeroKind::kAny);
 
   /// Of a frame after the zero: averages it, follows the drift, checks the place some times a
-  /// second. @return Whether this frame's place was checked.
-  bool See(const Frame& frame);
+  /// second. Nothing is done with one that repeats the depth of the one before to the last bit: it
+  /// was measured once. No sensor does so by chance; one without noise, which stood still at the
+  /// zero for longer than kLongestGap_s, is believed.
+  [[nodiscard]] SeenImage See(const Frame& frame);
   /// Call after the sensor was away: what it saw of its place before no longer counts.
   void ForgetPlace();
   /// What See() saw, for a fit that starts at these sizes of the breathing's patterns.
@@ -89,7 +95,7 @@ class SensorAtRest {
   [[nodiscard]] std::size_t frames_in_zero() const { return frames_in_zero_; }
   [[nodiscard]] const PlaceCheck& check() const { return check_; }
   /// Depth now over depth at the zero, of surfaces that stayed where they were.
-  [[nodiscard]] double drift() const { return 1.0 / drift_; }
+  [[nodiscard]] double drift() const { return drift_; }
   /// Rise of the support along its normal since the zero, metres; nothing if it is not seen.
   [[nodiscard]] std::optional<double> support_rise_m() const { return support_rise_m_; }
 
@@ -100,6 +106,8 @@ class SensorAtRest {
   };
 
   [[nodiscard]] SeenCorners Detect(const Frame& frame) const;
+  /// Whether the sensor has no noise, so that images may be the same for a while.
+  [[nodiscard]] bool RepeatedAtZero() const;
   /// Blocks at the body's outline, where a pixel is of one surface or the other: what is measured
   /// wrong there is another error as soon as the body moves.
   void DropOutlines(const std::vector<float>& zero);
@@ -131,6 +139,7 @@ class SensorAtRest {
   double static_error_ = 0.0, static_error_m_ = 0.0;
   std::size_t frames_in_zero_ = 0;
 
+  bool is_without_noise_ = false;
   BlockImage image_;
   std::vector<float> recent_;  ///< Inverse depth, low-pass over some tenths of a second.
   std::vector<FaceBlock> faces_;

@@ -134,18 +134,20 @@ Frame RestFrames::At(double time_s, bool covered) {
   frame.index = next_++;
   frame.color_time_s = frame.depth_time_s = time_s;
   frame.color_rgb = color_;
-  const double breath = std::pow(std::sin(std::numbers::pi * time_s / kBreath_s), 4);
+  constexpr double kSteps = 16.0;
+  double breath = std::pow(std::sin(std::numbers::pi * time_s / kBreath_s), 4);
+  if (noise_m_ == 0.0F) breath = std::round(kSteps * breath) / kSteps;
   cv::addWeighted(exhaled_m_, 1.0 - breath, inhaled_m_, breath, 0.0, frame.depth_m);
-  std::normal_distribution<float> noise(0.0F, 0.001F);
+  if (covered) frame.depth_m.setTo(0.6, frame.depth_m > 0.0);
+  std::normal_distribution<float> noise;
   for (int row = 0; row < frame.depth_m.rows; ++row) {
     auto* z = frame.depth_m.ptr<float>(row);
     for (int column = 0; column < frame.depth_m.cols; ++column) {
       const bool is_edge =
           exhaled_m_.at<float>(row, column) == 0.0F || inhaled_m_.at<float>(row, column) == 0.0F;
-      z[column] = is_edge ? 0.0F : z[column] + noise(random_);
+      z[column] = is_edge ? 0.0F : stretch_ * z[column] + noise_m_ * noise(random_);
     }
   }
-  if (covered) frame.depth_m.setTo(0.6, frame.depth_m > 0.0);
   return frame;
 }
 

@@ -34,6 +34,10 @@ class RestFrames {
   [[nodiscard]] Frame At(double time_s, bool covered = false);
   /// The body lies elsewhere from now on. @param T_motion  Scene frame.
   void Move(const Pose& T_motion);
+  /// All depth is this many times as long from now on, as of a sensor that warms up.
+  void Stretch(double factor) { stretch_ = static_cast<float>(factor); }
+  /// Without noise, and the breath in steps, as simulated bodies have it.
+  void Silence() { noise_m_ = 0.0F; }
   /// The sensor was pushed.
   void Push(const Eigen::Vector3d& shift_m);
 
@@ -44,6 +48,7 @@ class RestFrames {
   Pose T_camera_scene_ = Pose::Identity(), T_motion_ = Pose::Identity();
   cv::Mat exhaled_m_, inhaled_m_, color_;
   std::mt19937 random_;
+  float stretch_ = 1.0F, noise_m_ = 0.001F;
   std::int64_t next_ = 0;
 };
 

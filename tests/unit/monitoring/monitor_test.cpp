@@ -221,6 +221,89 @@ TEST_F(MonitorTest, OneThatWasAwayIsUsedAgainOnlyWhereItStood) {
   EXPECT_EQ(monitor_->share(0), SensorShare::kMoved);
 }
 
+TEST_F(MonitorTest, OneThatIsSilentFromTheZeroOnIsUsedOnlyWhereItStood) {
+  AddSensor(1.0);
+  AddSensor(-1.0);
+  Begin();
+  const auto is_zeroed = [&](std::size_t i) {
+    return monitor_->sensor(i).stage() == RestStage::kReady;
+  };
+  while (!is_zeroed(0) || !is_zeroed(1)) (void)RunUntil(time_s_ + kMonitoredFrame_s);
+  while (!monitor_->zero_time_s() || time_s_ < *monitor_->zero_time_s() + 1.5) {
+    (void)monitor_->Add(sensors_[1]->At(time_s_), 1);
+    time_s_ += kMonitoredFrame_s;
+  }
+  sensors_[0]->Push({0.002, 0.001, 0.0});
+  for (const MonitorLine& line : RunUntil(time_s_ + 1.5))
+    EXPECT_EQ(line.sensors_used, 1) << line.time_s;
+  EXPECT_EQ(monitor_->share(0), SensorShare::kMoved);
+}
+
+TEST_F(MonitorTest, AnImageThatIsRepeatedWithNewStampsIsNone) {
+  AddSensor(1.0);
+  AddSensor(-1.0);
+  Begin();
+  ASSERT_EQ(RunUntil(112.0).back().sensors_used, 2);
+  const Frame last = sensors_[0]->At(time_s_);
+  ASSERT_TRUE(monitor_->Add(last, 0));
+  const auto repeat_until = [&](double end_s, bool with_second) {
+    std::vector<MonitorLine> of_second;
+    for (; time_s_ < end_s; time_s_ += kMonitoredFrame_s) {
+      Frame again = last;
+      again.color_time_s = again.depth_time_s = time_s_ + 0.01;
+      EXPECT_FALSE(monitor_->Add(again, 0)) << "it would be an old number as a new one";
+      EXPECT_EQ(monitor_->LineAside(again, 0).state, MonitorState::kBlind);
+      EXPECT_EQ(monitor_->LineAside(again, 0).advice, LiveAdvice::kUnknown);
+      if (!with_second) continue;
+      if (const auto line = monitor_->Add(sensors_[1]->At(time_s_ + 0.03), 1))
+        of_second.push_back(*line);
+    }
+    return of_second;
+  };
+  const std::vector<MonitorLine> alone = repeat_until(114.0, true);
+  EXPECT_EQ(alone.back().sensors_used, 1);
+  EXPECT_EQ(monitor_->share(0), SensorShare::kNoImage);
+  (void)repeat_until(114.5, false);
+  // Live again: its place is judged first, as after any time without an image.
+  const std::vector<MonitorLine> back = RunUntil(116.0);
+  ASSERT_EQ(back[1].sensor, 1U);
+  EXPECT_EQ(back[1].sensors_used, 1);
+  EXPECT_EQ(back.back().sensors_used, 2);
+}
+
+TEST_F(MonitorTest, ASensorWithoutNoiseLosesNoImage) {
+  AddSensor(1.0);
+  sensors_[0]->Silence();
+  Begin();
+  ASSERT_EQ(RunUntil(111.0).back().state, MonitorState::kMonitoring);
+  const double period_s = kMonitoredFrame_s;
+  std::size_t lines = 0;
+  // Longer than the gap at the zero: the body holds its breath.
+  const Frame held = sensors_[0]->At(time_s_);
+  for (int i = 0; i < 30; ++i, time_s_ += period_s) {
+    Frame frame = held;
+    frame.color_time_s = frame.depth_time_s = time_s_;
+    const auto line = monitor_->Add(frame);
+    lines += line && line->state == MonitorState::kMonitoring ? 1 : 0;
+  }
+  EXPECT_EQ(lines, 30U);
+}
+
+TEST_F(MonitorTest, DriftOfDepthIsMeasuredAndLeavesTheNumbers) {
+  AddSensor(1.0);
+  Begin();
+  ASSERT_EQ(RunUntil(111.0).back().state, MonitorState::kMonitoring);
+  EXPECT_NEAR(monitor_->sensor().drift(), 1.0, 2e-4);
+  // Over a time that is long for what follows the drift, 10 s.
+  for (int i = 1; i <= 30; ++i) {
+    sensors_[0]->Stretch(1.0 + 1e-4 * i);
+    (void)RunUntil(time_s_ + 1.0);
+  }
+  const std::vector<MonitorLine> warm = RunUntil(time_s_ + 30.0);
+  EXPECT_NEAR(warm.back().drift, 1.003, 2e-4);
+  EXPECT_NEAR(OffBy(warm.back(), Eigen::Vector3d::Zero()), 0.0, 0.5) << "3.1 mm if it counted";
+}
+
 TEST_F(MonitorTest, TheMapShowsHowTheBodyLiesNowAndWhatIsNotSeen) {
   AddSensor(1.0);
   Begin();
