@@ -132,10 +132,11 @@ std::optional<StreamOffset> EstimateStreamOffset(const std::vector<ImageMotion::
     at.push_back(CorrelationAt(color, depth, lag * kLagStep_s, longest_s));
   const auto best = std::ranges::max_element(at, {}, &Correlation::value);
   const auto index = static_cast<int>(best - at.begin());
-  if (best->value < kLeastCorrelation || index == 0 || index == 2 * kLags) return std::nullopt;
+  constexpr int kLeastReach = 2;
+  const int room = std::min(index, 2 * kLags - index);
+  if (best->value < kLeastCorrelation || room < kLeastReach) return std::nullopt;
   // A parabola through the values about two frames around, since the peak is as wide as that.
-  const int reach = std::clamp(static_cast<int>(0.4 * longest_s / kLagStep_s), 2,
-                               std::min(index, 2 * kLags - index));
+  const int reach = std::clamp(static_cast<int>(0.4 * longest_s / kLagStep_s), kLeastReach, room);
   const auto value = [&](int i) { return at[static_cast<std::size_t>(i)].value; };
   const double left = value(index - reach), right = value(index + reach);
   const double bend = left + right - 2 * best->value;

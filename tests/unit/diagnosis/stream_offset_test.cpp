@@ -66,6 +66,27 @@ TEST(StreamOffsetTest, ASteadyOrShortSweepShowsNone) {
   EXPECT_FALSE(EstimateStreamOffset({}, {}));
 }
 
+// At the last offsets that are tried there is no room for a parabola about the peak.
+TEST(StreamOffsetTest, AnOffsetAtTheEdgeOfWhatIsTriedIsNone) {
+  // Shaken, so that the peak is sharp, and 200 images a second.
+  const auto rates = [](double offset_s) {
+    std::vector<ImageMotion::Rate> made;
+    for (int i = 0; i < 1200; ++i) {
+      const double time_s = 0.005 * i - offset_s;
+      Eigen::Vector2d px_per_s = Eigen::Vector2d::Zero();
+      for (const double rate : {3.1, 7.3, 12.9, 21.7, 33.1, 47.9, 61.3})
+        px_per_s += Eigen::Vector2d(std::cos(rate * time_s), std::sin(rate * time_s + rate));
+      made.push_back({0.005 * i, px_per_s});
+    }
+    return made;
+  };
+  for (const double side : {-1.0, 1.0}) {
+    EXPECT_TRUE(EstimateStreamOffset(rates(0), rates(side * 0.590)));
+    EXPECT_FALSE(EstimateStreamOffset(rates(0), rates(side * 0.595)));
+    EXPECT_FALSE(EstimateStreamOffset(rates(0), rates(side * 0.600)));
+  }
+}
+
 TEST(StreamOffsetTest, TheSpeedIsInWidthsOfTheImage) {
   cv::Mat wall(72, 200, CV_8UC3);
   cv::RNG random(3);
