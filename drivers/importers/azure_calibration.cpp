@@ -10,6 +10,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "drivers/importers/recorded_file.hpp"
 #include "words/foreign.hpp"
 #include "words/recording.hpp"
 
@@ -97,11 +98,7 @@ AzureOptics OpticsOf(const ordered_json& cameras, const char* purpose, const Azu
   const auto t_m = NumbersIn<3>(placed, "Translation");
   Eigen::Matrix3d rotation;
   for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = turn[static_cast<std::size_t>(i)];
-  if (!((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3) ||
-      !(rotation.determinant() > 0))
-    throw DataError(say::foreign::Rotation());
-  optics.T_camera_device =
-      Eigen::Translation3d(t_m[0], t_m[1], t_m[2]) * Eigen::Quaterniond(rotation).normalized();
+  optics.T_camera_device = Eigen::Translation3d(t_m[0], t_m[1], t_m[2]) * RotationOf(rotation);
   return optics;
 }
 

@@ -141,6 +141,12 @@ void FileRecording::TakeHello(const RecordingDefaults& defaults) {
     facts_.calibration = side_car.filename().string();
     info_.warnings.push_back(say::foreign::SideCar(facts_.calibration));
   }
+  // A recorder that was killed leaves its last messages in a log beside the database.
+  fs::path log = file_;
+  log += "-wal";
+  if (const auto bytes = fs::file_size(log, error);
+      !error && bytes > 0 && facts_.format.ends_with(".db3"))
+    info_.warnings.push_back(say::foreign::LogOfWrites(log.filename().string()));
   facts_.camera = hello_.camera;
   info_.room_markers = defaults.room_markers;
   TakeOver(hello_.camera, info_);

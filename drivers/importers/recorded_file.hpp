@@ -11,10 +11,13 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/mat.hpp>
 
+#include "algo/base/errors.hpp"
 #include "algo/base/message.hpp"
+#include "words/foreign.hpp"
 
 namespace plumb {
 
@@ -24,6 +27,14 @@ struct FileBytes {
   /// False if the file is shorter, or cannot be read.
   std::function<bool(std::uint64_t offset, std::span<std::uint8_t> bytes)> read;
 };
+
+/// @throws DataError for what is no rotation, such as the zeros that some drivers leave.
+[[nodiscard]] inline Eigen::Quaterniond RotationOf(const Eigen::Matrix3d& stated) {
+  if (!((stated * stated.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3) ||
+      !(stated.determinant() > 0))
+    throw DataError(say::foreign::Rotation());
+  return Eigen::Quaterniond(stated).normalized();
+}
 
 /// What a recording states besides its images.
 struct RecordedFacts {

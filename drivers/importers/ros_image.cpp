@@ -2,6 +2,8 @@
 #include "drivers/importers/ros_image.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
@@ -61,17 +63,43 @@ std::pair<cv::Mat, int> Pixels(const RosImage& image, const std::array<Encoding,
   return {pixels, encoding->to_rgb};
 }
 
+constexpr std::size_t kPackedHeader = 12;
+
 /// The PNG of 16 bits of grey in a packed image; empty if there is none. The plug-in of
 /// image_transport for depth writes 12 bytes before it.
 std::span<const std::uint8_t> GreyPng(const RosImage& image) {
   constexpr std::array<std::uint8_t, 8> kPng = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-  for (const std::size_t before : {std::size_t{0}, std::size_t{12}}) {
+  for (const std::size_t before : {std::size_t{0}, kPackedHeader}) {
     if (image.data.size() < before + 26) continue;
     const auto png = image.data.subspan(before);
     if (std::equal(kPng.begin(), kPng.end(), png.begin()) && png[24] == 16 && png[25] == 0)
       return png;
   }
   return {};
+}
+
+/// Whether the plug-in has packed floats: as v = a / z + b, of which a and b are in its header.
+bool HasInverseDepth(const RosImage& image) {
+  return image.is_packed && image.encoding.starts_with("32FC1");
+}
+
+/// A depth in metres, as stored.
+std::uint16_t UnitsOf(float z_m) {
+  return z_m > 0 && z_m < 65534.0 / kUnitsPerMetre
+             ? static_cast<std::uint16_t>(z_m * kUnitsPerMetre + 0.5)
+             : std::uint16_t{0};
+}
+
+cv::Mat UnpackInverse(const RosImage& image) {
+  std::array<float, 2> terms{};
+  std::memcpy(terms.data(), image.data.data() + kPackedHeader - sizeof terms, sizeof terms);
+  const auto [a, b] = terms;
+  cv::Mat units = DecodeDepthImage(GreyPng(image), "depth");
+  for (int y = 0; y < units.rows; ++y)
+    for (int x = 0; x < units.cols; ++x)
+      if (auto& value = units.at<std::uint16_t>(y, x); value != 0)
+        value = UnitsOf(a / (static_cast<float>(value) - b));
+  return units;
 }
 
 }  // namespace
@@ -132,7 +160,12 @@ std::optional<RosImageKind> KindOf(const RosImage& image) {
     return std::ranges::find(encodings, image.encoding, &Encoding::name) != encodings.end();
   };
   if (image.is_packed) {
-    if (!GreyPng(image).empty()) return RosImageKind::kDepth;
+    if (const auto png = GreyPng(image); !png.empty()) {
+      if (!HasInverseDepth(image)) return RosImageKind::kDepth;
+      // Without the header nothing says what the values mean.
+      return png.data() == image.data.data() ? std::nullopt
+                                             : std::optional(RosImageKind::kDepthInMetres);
+    }
     // Infrared images are packed, too; what cannot be unpacked says so later.
     const bool is_grey = image.encoding.starts_with("mono") || image.encoding.starts_with("8UC1") ||
                          image.encoding.starts_with("16UC1") || image.encoding.starts_with("32FC1");
@@ -154,14 +187,14 @@ cv::Mat ColorOf(const RosImage& image) {
 }
 
 cv::Mat DepthOf(const RosImage& image) {
+  if (HasInverseDepth(image)) return UnpackInverse(image);
   if (image.is_packed) return DecodeDepthImage(GreyPng(image), "depth");
   const cv::Mat pixels = Pixels(image, kDepthEncodings).first;
   if (pixels.type() == CV_16UC1) return pixels;
   cv::Mat units(pixels.size(), CV_16UC1, cv::Scalar(0));
   for (int y = 0; y < pixels.rows; ++y)
     for (int x = 0; x < pixels.cols; ++x)
-      if (const float z_m = pixels.at<float>(y, x); z_m > 0 && z_m < 65534.0 / kUnitsPerMetre)
-        units.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(z_m * kUnitsPerMetre + 0.5);
+      units.at<std::uint16_t>(y, x) = UnitsOf(pixels.at<float>(y, x));
   return units;
 }
 

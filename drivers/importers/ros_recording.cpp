@@ -203,7 +203,7 @@ void RosRecording::NoteRos(const RosTopic& topic, const RosMessage& message, Ros
     Eigen::Vector3d t_m;
     for (int i = 0; i < 9; ++i) turn(i % 3, i / 3) = reader.Get<double>();
     for (int i = 0; i < 3; ++i) t_m(i) = reader.Get<double>();
-    color_.from_reference = Eigen::Translation3d(t_m) * Eigen::Quaterniond(turn).normalized();
+    color_.from_reference = Eigen::Translation3d(t_m) * RotationOf(turn);
     depth_.from_reference = Eigen::Isometry3d::Identity();
   } else if (topic.type == "tf2_msgs/TFMessage" && topic.name.ends_with("tf_static")) {
     frames_.Note(reader);

@@ -155,13 +155,6 @@ CameraFile AssumedCamera(const fs::path& folder, int width, int height) {
   return camera;
 }
 
-cv::Mat ToMetres(const cv::Mat& depth_units, double units_per_metre) {
-  cv::Mat depth_m;
-  depth_units.convertTo(depth_m, CV_32F, 1.0 / units_per_metre);
-  depth_m.setTo(0.0F, depth_units == kSaturated);
-  return depth_m;
-}
-
 void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics& camera,
                     const Message& what) {
   if (image.cols == camera.width && image.rows == camera.height) return;
@@ -294,7 +287,7 @@ Decoded TumRecording::Decode(std::size_t i) const {
   const cv::Mat depth =
       depth_is_exr_ ? ReadExrDepth(plan.depth_file) : ReadDepthImage(plan.depth_file);
   CheckImageSize(plan.depth_file, depth, depth_intrinsics_, say::recording::Depth());
-  decoded.frame.depth_m = depth_is_exr_ ? depth : ToMetres(depth, depth_scale_);
+  decoded.frame.depth_m = depth_is_exr_ ? depth : DepthInMetres(depth, depth_scale_);
   if (registration_) decoded.frame.depth_m = registration_->Register(decoded.frame.depth_m);
   return decoded;
 }

@@ -62,6 +62,23 @@ Ros2Message ColorMessage(const Ros2& ros, int i) {
                               TextOf(EncodeJpeg(rgb, 95)))};
 }
 
+/// As compressed_depth_image_transport packs floats, with its defaults: depth_max 10 m and
+/// depth_quantization 100.
+std::string PackedFloats(double stamp_s, const std::string& frame, const cv::Mat& depth_m,
+                         bool has_header = true) {
+  const float a = 100.0F * (100.0F + 1.0F), b = 1.0F - a / 10.0F;
+  cv::Mat inverse(depth_m.size(), CV_16UC1, cv::Scalar(0));
+  for (int row = 0; row < inverse.rows; ++row)
+    for (int column = 0; column < inverse.cols; ++column)
+      if (const float z_m = depth_m.at<float>(row, column); z_m > 0 && z_m < 10)
+        inverse.at<std::uint16_t>(row, column) = static_cast<std::uint16_t>(a / z_m + b);
+  std::string data(has_header ? 4 : 0, '\0');
+  for (const float term : {a, b})
+    if (has_header) data.append(reinterpret_cast<const char*>(&term), sizeof term);
+  return testing::Ros2Packed(stamp_s, frame, "32FC1; compressedDepth png",
+                             data + TextOf(EncodePng(inverse)));
+}
+
 Ros2Message DepthMessage(const Ros2& ros, int i) {
   const bool is_float = ros.depth_encoding == "32FC1";
   cv::Mat depth(kDepthHeight, kDepthWidth, is_float ? CV_32FC1 : CV_16UC1,
@@ -76,6 +93,9 @@ Ros2Message DepthMessage(const Ros2& ros, int i) {
     return {"/camera/depth/image_rect_raw", "sensor_msgs/msg/Image",
             testing::Ros2Image(stamp_s, frame, ros.depth_encoding, kDepthWidth, kDepthHeight,
                                PixelsOf(depth))};
+  if (is_float)
+    return {"/camera/depth/image_rect_raw/compressedDepth", "sensor_msgs/msg/CompressedImage",
+            PackedFloats(stamp_s, frame, depth)};
   return {"/camera/depth/image_rect_raw/compressedDepth", "sensor_msgs/msg/CompressedImage",
           testing::Ros2Packed(stamp_s, frame, "16UC1; compressedDepth png",
                               std::string(12, '\1') + TextOf(EncodePng(depth)))};
@@ -182,6 +202,61 @@ TEST(Ros2FactsTest, DepthInMetresKeepsItsUnitAndItsHoles) {
   EXPECT_NEAR(depth.at<std::uint16_t>(5, 5) / units_per_metre, 1.503, 1e-4);
   EXPECT_EQ(depth.at<std::uint16_t>(0, 0), 0);
   EXPECT_EQ(depth.at<std::uint16_t>(0, 1), 0);
+}
+
+TEST(Ros2FactsTest, PackedFloatsAreInverseDepth) {
+  std::vector<Ros2Message> messages = Messages({.depth_encoding = "32FC1", .packed = true});
+  cv::Mat depth_m(kDepthHeight, kDepthWidth, CV_32FC1, cv::Scalar(NAN));
+  for (int row = 1; row < depth_m.rows; ++row) depth_m.row(row) = 0.5F * static_cast<float>(row);
+  for (Ros2Message& message : messages)
+    if (message.topic.ends_with("compressedDepth"))
+      message.data = PackedFloats(StampOf(0) + 1e-9 * static_cast<double>(message.time_ns),
+                                  "camera_depth_optical_frame", depth_m);
+  const std::vector<std::uint8_t> bytes = testing::InContainer(messages, Container::kMcapPlain);
+  const auto file = OpenRecordedFile(InMemory(bytes));
+  const double units_per_metre = file->facts().camera["depth_scale"];
+  const cv::Mat units = file->Depth(1);
+  EXPECT_EQ(units.at<std::uint16_t>(0, 3), 0);
+  for (int row = 1; row <= 16; ++row) {
+    const double z_m = 0.5 * row;  // a step of v is z^2 / a
+    EXPECT_NEAR(units.at<std::uint16_t>(row, 3) / units_per_metre, z_m, z_m * z_m / 10100 + 2e-4);
+  }
+  EXPECT_EQ(units.at<std::uint16_t>(20, 3), 0) << "farther than is packed";
+  for (Ros2Message& message : messages)
+    if (message.topic.ends_with("compressedDepth"))
+      message.data = PackedFloats(StampOf(0) + 1e-9 * static_cast<double>(message.time_ns),
+                                  "camera_depth_optical_frame", depth_m, false);
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)FactsOf(messages); }), HasSubstr("no depth images"))
+      << "nothing says what the values mean";
+}
+
+TEST(Ros2FactsTest, ATurnThatIsNoRotationIsRefused) {
+  for (const double one : {1.0, 0.0}) {  // the zeros of a driver that sets none
+    testing::Cdr extrinsics;
+    for (int i = 0; i < 9; ++i) extrinsics.Add(i % 4 == 0 ? one : 0.0);
+    for (const double t_m : {0.015, 0.0, 0.0}) extrinsics.Add(t_m);
+    std::vector<Ros2Message> messages = Messages({.frames = false});
+    messages.insert(messages.begin(),
+                    {"/camera/extrinsics/depth_to_color", "realsense2_camera_msgs/msg/Extrinsics",
+                     extrinsics.message()});
+    if (one > 0)
+      EXPECT_EQ(FactsOf(messages).camera["T_color_depth"][3], 0.015);
+    else
+      EXPECT_THAT(MessageOf<DataError>([&] { (void)FactsOf(messages); }),
+                  HasSubstr("not a rotation"));
+  }
+}
+
+TEST(Ros2FactsTest, ALogOfWritesBesideTheFileIsSaid) {
+  const TempFolder folder;
+  WriteWholeFile(folder / "sweep.db3", testing::AsDatabase(Messages()));
+  const auto warnings = [&] {
+    return EnglishTexts(OpenImported(folder / "sweep.db3")->info().warnings);
+  };
+  WriteWholeFile(folder / "sweep.db3-wal", std::string_view());
+  EXPECT_THAT(warnings(), Not(Contains(HasSubstr("sweep.db3-wal"))));
+  WriteWholeFile(folder / "sweep.db3-wal", std::string_view("frames"));
+  EXPECT_THAT(warnings(), Contains(HasSubstr("sweep.db3-wal")));
 }
 
 TEST(Ros2FactsTest, WithoutTransformsThatIsSaid) {
