@@ -15,7 +15,7 @@ constexpr double kPatch_px = 6.0;   // of 640 columns: the size of a window that
 constexpr double kBeat_hz = 0.7;    // between the two sensors' frame rates
 constexpr float kLost = 1.04F;      // of unit variance: 15 % of the pixels (Maimone & Fuchs 2012)
 constexpr float kSometimes = 0.3F;  // by so much the border of what is lost moves with the beat
-constexpr float kWrong = 1.0F;      // 16 % of the pixels
+constexpr float kWrong = 1.0F;      // 32 % of the others, 27 % of all
 constexpr double kMost_m = 3.0 * kMillimetre;  // Boehm 2012: 1 to 3 mm
 
 }  // namespace

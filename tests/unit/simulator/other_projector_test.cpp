@@ -51,8 +51,8 @@ TEST(OtherProjectorTest, TakesAShareOfThePixelsAndFalsifiesAnother) {
     all.farthest_m = std::max(all.farthest_m, now.farthest_m);
   }
   EXPECT_NEAR(all.lost, 0.15, 0.04);
-  EXPECT_GT(all.wrong, 0.10);
-  EXPECT_LT(all.wrong, 0.35);
+  // 27 % are wrong, most of the time by more than 0.1 mm.
+  EXPECT_NEAR(all.wrong, 0.24, 0.04);
   EXPECT_LE(all.farthest_m, 0.0031);
   EXPECT_GT(all.farthest_m, 0.0025);
 }
