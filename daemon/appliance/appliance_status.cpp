@@ -279,7 +279,12 @@ void Appliance::ReadStored(Status& status) {
   if (session_.IsOpen())
     status.scans_today = store_->scans.CountSince(session_.patient_id(), StartOfDay());
   if (last_result_) status.last_result = store_->scans.Find(last_result_->id);
-  if (status.last_result) status.last_result->age_s = AgeOf(status.last_result->id);
+  if (status.last_result) {
+    status.last_result->age_s = AgeOf(status.last_result->id);
+    // Whoever began another sweep had a reason: its failure does not make this result valid again.
+    status.last_result->is_superseded =
+        scan_.id != last_result_->id && scan_.session_id == last_result_->session_id;
+  }
 }
 
 void Appliance::ReadAll() {

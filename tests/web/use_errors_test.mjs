@@ -318,7 +318,7 @@ await h.step('a result that can no longer be acted on says what was found, and c
   h.tell('moved y -8 HFS');
   const shown = await scan();
   await anna.getByRole('heading', { name: /^Correction to apply/ }).waitFor();
-  await anna.getByText('every part as in the reference').first().waitFor();
+  await anna.getByText('heights of all measured parts').first().waitFor();
   equal(await anna.getByText('Correct the posture first').count(), 0, 'nothing to correct');
   equal(await anna.locator('.number .arrow').count(), 1, 'while it is valid it commands');
   // After a restart only the wall clock gives its age, and somebody may have changed that clock.

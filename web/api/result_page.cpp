@@ -236,7 +236,10 @@ bool IsOld(const Scan& scan, bool has_newer, const Wanted& wanted) {
   const std::optional<double> age_s = SteadyAge_s(scan, wanted.status);
   const std::optional<TreatmentSession>& session = wanted.status.session;
   const bool is_on_couch = scan.patient_id.empty() || (session && session->id == scan.session_id);
-  return !age_s || *age_s > kResultValid_s || has_newer || wanted.runs() || !is_on_couch;
+  const bool has_other_reference = session && session->reference && !scan.reference_id.empty() &&
+                                   session->reference->id != scan.reference_id;
+  return !age_s || *age_s > kResultValid_s || has_newer || wanted.runs() || !is_on_couch ||
+         wanted.status.last_result->is_superseded || has_other_reference;
 }
 
 /// "5 min ago": by the steady clock if that has measured it, otherwise by the wall clock.

@@ -331,6 +331,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
   PutMessages(json["storage"], "warning", status.storage.warnings);
   // This age decides what may be acted on, so the wall clock does not replace the steady one.
   if (status.last_result && !status.last_result->age_s) json["last_result"]["age_s"] = nullptr;
+  if (status.last_result) json["last_result"]["superseded"] = status.last_result->is_superseded;
   AddDailyCheck(json, status.daily_check, "check_overdue", "check_failed");
   return json;
 }

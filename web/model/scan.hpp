@@ -87,6 +87,8 @@ struct Scan {
   std::string session_by = {};  ///< Who opened its session; empty if there is none.
   /// Time since its end by a monotonic clock; not set if only the wall clock is available.
   std::optional<double> age_s = {};
+  /// Of the last result: another sweep of its session has begun since, however that ended.
+  bool is_superseded = false;
   std::filesystem::path folder =
       {};  ///< DIR/scans/ID; contains scene/, result/ and recording/ as far as they exist.
 };

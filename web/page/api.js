@@ -119,6 +119,12 @@ export const sendFile = (path, file, failed, onPart, headers = {}) => new Promis
 });
 export const get = (path, background = false) => ask('GET', api(path), undefined, { background });
 export const getOrNull = (path) => get(path, true).catch(() => null);
+/// Null only where the appliance says that there is none: what it could not be asked for is not
+/// left out.
+export const getIfThere = (path) => get(path, true).catch((error) => {
+  if (error.status >= 400 && error.status < 500) return null;
+  throw error;
+});
 /// For pictures that are asked for again and again.
 export const fetchPicture = (path) => fetch(api(path), {
   headers: { 'X-Plumb-Background': '1' }, cache: 'no-store',

@@ -148,17 +148,20 @@ export function numbersLine({ numbers }) {
 
 export const toleranceOf = (reference) => reference?.plan.tolerance ?? kTolerance;
 
+/// About which point the numbers are: a plan may have no isocentre.
+export const pointOf = (reference) =>
+  (reference?.plan.isocentre_m ? S.result.atIsocentre : S.result.atMiddle);
+
 /// Only a result that says MOVE commands moves, and only while it is valid; later its words say
 /// what was found.
 export function sixNumbers(result, details, valid = true) {
   const weak = new Set((details?.motion?.weak_directions ?? []).map(({ name }) => name));
-  const roomKnown = details?.body?.room_known !== false;
   const commands = result.verdict === 'move';
   const alongCouch = Boolean(result.along_couch);
   const cards = kAxes.map((axis, i) => !isLeftOut(axis, result.numbers[i], alongCouch)
     && card(axis, result.numbers[i], {
       name: said(result.axes, axis.name), weak: weak.has(axis.name), commands, valid, alongCouch,
-      pictured: valid && (roomKnown || axis.name === 'vertical'),
+      pictured: valid && (alongCouch || axis.name === 'vertical'),
     }));
   return [h('ol', { class: 'numbers' }, cards), couchNotes(alongCouch)];
 }

@@ -42,9 +42,9 @@ export function targetOf(reading, { value, still }, { factor, digits, period = n
 }
 
 /// Only for a result that commands moves, and where the room's axes are known.
-export function couchReadings({ result, details }) {
+export function couchReadings({ result }) {
   const text = S.result;
-  const roomKnown = live.status?.room?.known && details?.body?.room_known !== false;
+  const roomKnown = live.status?.room?.known && result?.along_couch;
   if (result?.verdict !== 'move' || !roomKnown) return null;
   // Rotations are listed only if the couch profile defines how the couch counts them.
   const moved = result.numbers.filter((row, i) => row.value !== null

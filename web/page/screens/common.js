@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parts that several screens show.
-import { get, getOrNull, live, since_s } from '../api.js';
+import {
+  get, getIfThere, getOrNull, live, since_s,
+} from '../api.js';
 import { clear, h } from '../dom.js';
 import { kMarks } from '../numbers.js';
 import { S, said, saidEach } from '../words.js';
@@ -136,14 +138,14 @@ export function follow(listener, tick, every_ms = 1000) {
 /// What belongs to a scan; null where there is none, or it cannot be had.
 export async function partsOf(scan) {
   const [reference, details, scene, quality] = await Promise.all([
-    scan.reference_id ? getOrNull(`references/${scan.reference_id}`) : null,
-    scan.result ? getOrNull(`results/${scan.id}`) : null,
+    scan.reference_id ? getIfThere(`references/${scan.reference_id}`) : null,
+    scan.result ? getIfThere(`results/${scan.id}`) : null,
     getOrNull(`scans/${scan.id}/files/scene.json`), qualityOf(scan)]);
   return { reference, details, scene, quality };
 }
 
-/// How good the scan is, as the appliance judges it; null if that is not available.
-export const qualityOf = (scan) => getOrNull(`scans/${scan.id}/quality`);
+/// How good the scan is, as the appliance judges it; null if there is nothing to judge.
+export const qualityOf = (scan) => getIfThere(`scans/${scan.id}/quality`);
 
 /// Parts of the body, in words; none: every part is as in the reference.
 export const findings = (parts) => h('ul', { class: 'findings' }, parts.length

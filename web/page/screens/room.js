@@ -9,9 +9,9 @@ import { legend } from '../drawings/error_map.js';
 import { isLanguage, keepLanguage, languageOf } from '../language.js';
 import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../drawings/map_frame.js';
 import { loadMap, paintErrors } from '../drawings/maps.js';
-import { sixNumbers, toleranceOf } from '../numbers.js';
+import { pointOf, sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseTheme } from '../preferences.js';
-import { S, saidEach } from '../words.js';
+import { S, said, saidEach } from '../words.js';
 import {
   acceptanceMark, ageText, cautionsOf, faultWords, findings, flagList, isAdvice, isCold,
   lastKnownNote, minutesOf, partsOf, sentence, sidesOf,
@@ -215,8 +215,8 @@ function result() {
       loadMap(scan.id, 'region').catch(() => null)]);
     const grid = scene.heightmap;
     const view = viewOf(grid, region);
-    const said = S.result.mapPicture;
-    const canvas = h('canvas', { class: 'still-map', role: 'img', 'aria-label': said });
+    const canvas = h('canvas', { class: 'still-map', role: 'img',
+      'aria-label': S.result.mapPicture });
     const tolerance_mm = toleranceOf(reference).shift_mm;
     drawCropped(canvas, view, (whole) =>
       paintErrors(whole, values, tolerance_mm / 1000, region));
@@ -245,8 +245,8 @@ function result() {
       clear(strip, scan.result ? verdictStrip(data, isValid) : withoutResult(scan));
       strip.querySelector('details')?.remove();  // a display has nothing to open it with
       if (six) {
-        clear(six, h('h2', { class: 'visually-hidden' }, S.result.atIsocentre),
-          details?.body?.room_known === false && h('p', { class: 'caution' }, S.result.roomUnknown),
+        clear(six, h('h2', { class: 'visually-hidden' }, pointOf(reference)),
+          !scan.result.along_couch && h('p', { class: 'caution' }, S.result.roomUnknown),
           sixNumbers(scan.result, details, isValid));
       }
     };
@@ -267,6 +267,10 @@ function result() {
     await map(data, box).catch(() => {});
     if (scan.result) say(S.result.verdicts[scan.result.verdict] ?? '');
   };
+  // Nothing is shown without what is doubtful about it.
+  const attempt = (scan, key) => load(scan, key).catch(() => {
+    setTimeout(() => { if (shown === key) attempt(scan, key); }, kAsk_ms);
+  });
   return {
     element: place,
     show(scan) {
@@ -278,7 +282,7 @@ function result() {
         age = () => {};
         id = null;
         clear(place);
-        if (scan) load(scan, key);
+        if (scan) attempt(scan, key);
       }
     },
     tick() {
@@ -292,6 +296,11 @@ function result() {
 
 function withoutResult(scan) {
   const text = S.room;
+  if (scan.outcome !== 'done') {
+    return h('section', { class: 'verdict no_answer' },
+      h('p', { class: 'word' }, S.result.failed),
+      h('p', { class: 'why' }, sentence(said(scan, 'failure') ?? '')));
+  }
   const reference = scan.purpose === 'reference';
   return h('section', { class: 'verdict none' },
     h('p', { class: 'word' }, reference ? text.reference : text.unassigned),

@@ -16,20 +16,27 @@ export function ageOf(scan, received) {
   return (told.age_s ?? Infinity) + since_s(told.at);
 }
 
-/// Why this result must not be used: "running", "superseded", "closed" (the session of its scan is
-/// not the one that is open, even if that is the same patient's), "old", "offline" (without a
-/// connection it is not known whether one of these holds by now); null: it is valid. The appliance
-/// measures the age of its last result since its start by a steady clock. Any other age is the wall
-/// clock's, which may have been changed, so it counts as old.
+/// Why this result must not be used: "running", "superseded" (another sweep of its session has
+/// begun since), "other_reference" (the session compares with another one by now), "closed" (its
+/// session is not the one that is open, even if that is the same patient's), "old", "offline"
+/// (without a connection it is not known whether one of these holds by now); null: it is valid. The
+/// appliance measures the age of its last result since its start by a steady clock. Any other age
+/// is the wall clock's, which may have been changed, so it counts as old.
 export function whyNotValid(scan, received) {
   if (!scan.result) return null;
   const { status } = live;
   if (status?.state === 'scanning' || status?.state === 'working') return 'running';
-  if (status?.last_result && status.last_result.id !== scan.id
-      && sessionOf(status.last_result) === sessionOf(scan)) return 'superseded';
+  const last = status?.last_result;
+  if (last && sessionOf(last) === sessionOf(scan) && (last.id !== scan.id || last.superseded)) {
+    return 'superseded';
+  }
   if (ageOf(scan, received) > kResult.valid_s) return 'old';
   const isOpen = sessionOf(scan) === (status?.session?.id ?? null);
   if (status && scan.patient_id && !isOpen) return 'closed';
+  const reference = status?.session?.reference;
+  if (reference && scan.reference_id && reference.id !== scan.reference_id) {
+    return 'other_reference';
+  }
   if (status?.last_result?.id !== scan.id) return 'old';
   return live.connected ? null : 'offline';
 }
@@ -69,6 +76,7 @@ export function validityNote(scan, received, review) {
     running: [text.running, text.runningText],
     superseded: [text.superseded, text.supersededText],
     closed: [text.closed, text.closedText],
+    other_reference: [text.otherReference, text.otherReferenceText],
     old: [text.old, text.oldText],
     offline: [text.offline, text.offlineText],
   };
