@@ -214,6 +214,7 @@ void FakeAppliance::Cancel(const Actor& actor, Done done) {
                       "in this state there is nothing to cancel; it requires scanning or working"));
   if (!is_check_) scans.back().outcome = ScanOutcome::kCancelled;
   if (!is_check_) scans.back().failure = Message::Verbatim("cancelled");
+  if (status.last_result && !is_check_) status.last_result->is_superseded = true;
   CloseCheck();
   const std::string id = status.scan->id;
   status.scan.reset();

@@ -168,6 +168,36 @@ await h.step('the result opens by itself even if the message of it was lost on t
   await anna.reload();
 });
 
+await h.step('a sweep that was begun and discarded does not make the result before it valid again',
+  async () => {
+  h.tell('moved y -8 HFS');
+  await scan();
+  await anna.locator('.verdict.move').getByText('MOVE', { exact: true }).waitFor();
+  h.tell('slow');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.getByRole('button', { name: 'Scan again' }).click();
+  await anna.locator('.chip[data-state=scanning]').waitFor();
+  equal((await h.api(anna, 'cancel', 'POST')).status, 200, 'discarded');
+  await anna.locator('.chip[data-state=ready]').waitFor();
+  await anna.goto(`${h.url}#/result`);
+  await anna.locator('.old-note').getByText('SUPERSEDED').waitFor();
+  equal(await anna.locator('svg.arrow').count(), 0, 'nothing to apply');
+  equal(await anna.locator('.couch').count(), 0, 'no couch readings');
+  h.tell('swift');
+});
+
+await h.step('a result is not shown while what is doubtful about it cannot be had', async () => {
+  const quality = '**/api/v1/scans/*/quality';
+  await scan();
+  await anna.route(quality, (route) => route.abort());
+  await anna.reload();
+  await anna.getByText('The appliance is not responding.').first().waitFor();
+  equal(await anna.locator('.number').count(), 0, 'no numbers');
+  await anna.unroute(quality);
+  await anna.reload();
+  await anna.locator('.number').first().waitFor();
+});
+
 await h.step('couch readings: the sum is done, only for a move, only where the room is known',
   async () => {
   h.tell('moved y -8 HFS');  // put right by +8 mm toward the gantry, which counts up

@@ -232,6 +232,38 @@ TEST_F(ApplianceTest, AScanOfAnEarlierSessionOfThePatientIsNotAcceptedInTheNext)
   });
 }
 
+TEST_F(ApplianceTest, ASweepThatIsDiscardedDoesNotMakeTheResultBeforeItValidAgain) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
+  Play([&] {
+    MakeReady();
+    std::string patient;
+    const auto press = [&](ButtonPress how) {
+      EXPECT_EQ(appliance_->Press(how, kTester).English(), "");
+    };
+    On([&] {
+      patient = AddApproved(*shared_->store.get(), kTester).patient;
+      OpenForFraction(*appliance_, shared_->store, patient, kTester);
+      press(ButtonPress::kShort);
+      press(ButtonPress::kShort);
+    });
+    ASSERT_TRUE(Becomes([&] { return !IsRunning() && appliance_->WebStatus().last_result; }));
+    std::string scan;
+    On([&] {
+      scan = appliance_->WebStatus().last_result->id;
+      EXPECT_FALSE(appliance_->WebStatus().last_result->is_superseded);
+      press(ButtonPress::kShort);
+      press(ButtonPress::kLong);
+    });
+    ASSERT_TRUE(Becomes([&] { return !IsRunning(); }));
+    On([&] {
+      ASSERT_TRUE(appliance_->WebStatus().last_result);
+      EXPECT_EQ(appliance_->WebStatus().last_result->id, scan);
+      EXPECT_TRUE(appliance_->WebStatus().last_result->is_superseded);
+    });
+  });
+}
+
 TEST_F(ApplianceTest, APlanThatCannotBeReadRefusesTheScanInWords) {
   parts_.demo_patient.clear();
   parts_.config.appliance.warm_up_min = 0;

@@ -11,7 +11,7 @@ import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../drawings
 import { loadMap, paintErrors } from '../drawings/maps.js';
 import { pointOf, sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseTheme } from '../preferences.js';
-import { S, said, saidEach } from '../words.js';
+import { S, saidEach, textOf } from '../words.js';
 import {
   acceptanceMark, ageText, cautionsOf, faultWords, findings, flagList, isAdvice, isCold,
   lastKnownNote, minutesOf, partsOf, sentence, sidesOf,
@@ -299,7 +299,7 @@ function withoutResult(scan) {
   if (scan.outcome !== 'done') {
     return h('section', { class: 'verdict no_answer' },
       h('p', { class: 'word' }, S.result.failed),
-      h('p', { class: 'why' }, sentence(said(scan, 'failure') ?? '')));
+      h('p', { class: 'why' }, sentence(textOf(scan.failure_message, scan.failure) ?? '')));
   }
   const reference = scan.purpose === 'reference';
   return h('section', { class: 'verdict none' },
