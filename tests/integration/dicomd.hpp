@@ -56,6 +56,12 @@ class Dicomd {
     std::filesystem::remove_all(sent);
   }
 
+  /// As if everything had come so long ago.
+  void SetAge(std::chrono::seconds age) const {
+    for (const auto& file : std::filesystem::directory_iterator(folder_ / "spool"))
+      std::filesystem::last_write_time(file, std::filesystem::file_time_type::clock::now() - age);
+  }
+
  private:
   std::filesystem::path folder_;
   std::unique_ptr<Process> process_;
