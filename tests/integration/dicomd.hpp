@@ -70,7 +70,7 @@ class Dicomd {
 
 /// What a page shows once the appliance has looked, and `enough` holds. It asks again as the page
 /// does, because the folder is another account's, and no event tells of it.
-inline nlohmann::json Settled(HttpClient& client, const std::string& path,
+inline nlohmann::json Settled(test::HttpClient& client, const std::string& path,
                               const std::function<bool(const nlohmann::json&)>& enough) {
   nlohmann::json found;
   for (int i = 0; i < 1200; ++i) {
