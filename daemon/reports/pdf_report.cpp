@@ -282,8 +282,8 @@ void NumberLine(Pages& pages, const CouchRow& number, const Catalogue& language)
            language),
       8.5, kGrey);
   ToleranceBar(pages, kMargin + 180, line + 6, 76, number);
-  constexpr double kWordsAt = 372, kWordsSize = 8;
-  constexpr double kJudgementAt = 265, kJudgementSize = 8.5;
+  constexpr double kWordsAt = 380, kWordsSize = 8;
+  constexpr double kJudgementAt = 279, kJudgementSize = 8.5;
   pages.y = line - 1.3 * kJudgementSize;  // the first line of the judgement is on this line
   pages.Paragraph(kMargin + kJudgementAt, kWordsAt - kJudgementAt - 4,
                   Text(JudgementWord(number.judged.judgement), language), kJudgementSize,

@@ -128,11 +128,9 @@ std::vector<Message> CautionsOf(const Scan& scan, const ScanFiles& files, double
   return cautions;
 }
 
-/// What the comparison could not rely on.
+/// What the comparison could not rely on. That the room's calibration was not used is a warning.
 void AddRemarksTo(std::vector<Message>& remarks, const StoredResult& result) {
   if (result.body && !result.body->room_known) remarks.push_back(say::result::ReportRoomUnknown());
-  if (const auto& room = result.room_calibration; room && !room->used)
-    remarks.push_back(say::result::ReportRoomNotUsed(room->why_not_used));
   if (const auto& alignment = result.alignment) {
     for (const auto& [id, residual_m] : alignment->markers_rejected)
       remarks.push_back(say::result::ReportMarkerIgnored(id, residual_m / kMillimetre));

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# toolchain/provision: twenty units of one table, again, and tables that are wrong.
+# provision.py PLUMBD: toolchain/provision with twenty units of one table, again, and taken over by
+# plumbd; and tables that are wrong.
 import pathlib
 import subprocess
 import sys
 import tempfile
 import tomllib
 
+PLUMBD = pathlib.Path(sys.argv[1]).resolve()
 PROVISION = pathlib.Path(__file__).resolve().parents[2] / "toolchain" / "provision"
 ZONES = "serial,time_zone\n"
 HEADER = "serial,host_name,address,gateway,dns,time_servers,display\n"
@@ -25,6 +27,25 @@ def files(folder):
         for path in folder.rglob("*")
         if path.is_file()
     }
+
+
+def check_taken_over(folder, count):
+    """Each unit's plumbd takes over what the table says, and nothing of another one."""
+    for n in range(1, count + 1):
+        unit, state = folder / f"unit-{n}", folder / f"state-{n}"
+        for made in (unit, state):
+            made.mkdir()
+        subprocess.run(
+            [PLUMBD, "--provision", folder / "out" / f"PL-{n:04}" / "plumb-provision.toml",
+             "--unit", unit, "--state", state],
+            check=True, stdout=subprocess.DEVNULL,
+        )  # fmt: skip
+        told = {name: data.decode() for name, data in files(unit).items()}
+        assert told["serial"].strip() == f"PL-{n:04}", told
+        assert told["host-name"].strip() == f"plumb-{n}", told
+        assert f"Address=192.168.10.{n}/24\n" in told["network"], told
+        assert "NTP=ntp.example\n" in told["time-servers"], told
+        assert (state / "provisioned-display").read_text().strip().endswith(f" Room {n}")
 
 
 def check_twenty(folder):
@@ -53,6 +74,7 @@ def check_twenty(folder):
     assert (folder / "out" / "PL-0007" / "display.key").stat().st_mode & 0o777 == 0o600
     assert run(folder, HEADER + "".join(rows)).returncode == 0
     assert files(folder / "out") == made, "a second run gives other files"
+    check_taken_over(folder, 20)
     assert run(folder, ZONES + "Z,Europe/Berlin\n").returncode == 0
     unit = tomllib.loads((folder / "out" / "Z" / "plumb-provision.toml").read_text())
     assert unit == {"unit": {"serial": "Z", "time_zone": "Europe/Berlin"}}, unit

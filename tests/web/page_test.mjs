@@ -423,8 +423,9 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
 await h.step('the surface opens in 3-D', async () => {
   const surface = '**/maps/mesh';
   let go;
+  const mayGo = new Promise((ready) => { go = ready; });
   await anna.route(surface, async (route) => {
-    await new Promise((ready) => { go = ready; });
+    await mayGo;
     await route.abort();
   });
   await anna.getByRole('button', { name: 'Open the 3-D view' }).click();

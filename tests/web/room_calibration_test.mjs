@@ -31,7 +31,7 @@ async function scanBoard() {
 await h.step('without a calibration directions are the patient’s, and a technician only reads',
   async () => {
   await anna.goto(`${h.url}#/check`);
-  await card(anna).getByText('The room has not been calibrated: directions are those of the '
+  await card(anna).getByText('The axes of the room are not known: directions are those of the '
     + 'patient or of the reference marker, never of the couch. Calibrate the room').waitFor();
   equal(await card(anna).getByRole('button').count(), 0, 'nothing to start or to sign');
   await bob.goto(`${h.url}#/check`);

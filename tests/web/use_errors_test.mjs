@@ -292,7 +292,7 @@ await h.step('where the room was never said: the words are the patient’s, no a
   equal((await anna.locator('.number h3').allInnerTexts()).join(),
     'Vertical,Patient left/right,Patient head/feet,Tilt left/right,Tilt head/feet,Yaw',
     'the cards');
-  await anna.getByText('The room has not been calibrated: directions are those of the patient or '
+  await anna.getByText('The axes of the room are not known: directions are those of the patient or '
     + 'of the reference marker, never of the couch.').waitFor();
   equal(await anna.locator('.couch').count(), 0, 'no couch readings');
   await anna.locator('.map-row .map-box .ways').waitFor();
@@ -309,7 +309,8 @@ await h.step('where the room was never said: the words are the patient’s, no a
   equal(await card('Longitudinal').locator('.word').innerText(), 'toward gantry',
     'in a known room');
   equal(await card('Longitudinal').locator('.arrow').count(), 1, 'with its arrow');
-  equal(await anna.getByText('The room has not been calibrated').count(), 0, 'nothing to warn of');
+  equal(await anna.getByText('The axes of the room are not known').count(), 0,
+    'nothing to warn of');
 });
 
 await h.step('a result that can no longer be acted on says what was found, and commands nothing',
