@@ -5,7 +5,9 @@
 #include <array>
 #include <cerrno>
 #include <cstddef>
+#include <cstdint>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -97,8 +99,18 @@ ReadPlan ReadPlanningWithImages(const PlanningFiles& files, const PlanningImages
   std::optional<StructureSet> drawn;
   if (!files.structures.empty()) drawn = ReadStructureSet(files.structures, files.structures_name);
   CtSkin skin(images.threshold_hu);
-  images.for_each([&](const CtImage& image, const std::string& name) { skin.Add(image, name); });
-  return {.scene = MakePlannedScene(drawn, plan, skin, choice), .patient_id = plan.file.patient_id};
+  double first_mm = std::numeric_limits<double>::infinity(), last_mm = -first_mm;
+  images.for_each([&](const CtImage& image, const std::string& name) {
+    skin.Add(image, name);
+    first_mm = std::min(first_mm, image.origin_mm.z());
+    last_mm = std::max(last_mm, image.origin_mm.z());
+  });
+  ReadPlan read{.scene = MakePlannedScene(drawn, plan, skin, choice),
+                .patient_id = plan.file.patient_id};
+  if (read.scene.planning->skin_threshold_hu)  // otherwise a contour counts
+    read.scene.warnings.push_back(
+        say::planning::ImagesEnds(static_cast<std::int64_t>(skin.num_images()), first_mm, last_mm));
+  return read;
 }
 
 CtImageVisit WithinTime(std::chrono::seconds most, const std::stop_token& stop,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <functional>
+#include <ranges>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -28,7 +29,6 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostListed = 100;
 constexpr int kMostReadAtOnce = 8;  // each may take seconds
 constexpr std::size_t kMostNoteBytes = 4096, kMostNotesBytes = std::size_t{1} << 20;
-constexpr std::chrono::seconds kReadingImages{2};  // at each call
 constexpr std::size_t kMostWord = 64;
 constexpr const char* kCtImage = "1.2.840.10008.5.1.4.1.1.2";
 
@@ -82,8 +82,13 @@ std::vector<std::string> NamesIn(const fs::path& spool) {
 
 }  // namespace
 
-ReceivedFiles::ReceivedFiles(fs::path spool, fs::path notes, std::string key)
-    : spool_(std::move(spool)), notes_(std::move(notes)), key_(std::move(key)), images_(key_) {}
+ReceivedFiles::ReceivedFiles(fs::path spool, fs::path notes, std::string key,
+                             std::chrono::milliseconds reading_images)
+    : spool_(std::move(spool)),
+      notes_(std::move(notes)),
+      key_(std::move(key)),
+      reading_images_(reading_images),
+      images_(key_) {}
 
 void ReceivedFiles::Load() {
   if (std::exchange(is_loaded_, true)) return;
@@ -190,15 +195,18 @@ void ReceivedFiles::ReadSome(const Found& found) {
   for (const ReceivedFile& file : found.files) {
     if (IsRead(file.name) || num_read == kMostReadAtOnce) continue;
     ++num_read;
-    const std::string reference = known_[file.name].reference_id;
-    known_[file.name] = ReadOne(file.name);
-    known_[file.name].reference_id = reference;
+    Known known = ReadOne(file.name);
+    if (const auto before = known_.find(file.name); before != known_.end())
+      known.reference_id = before->second.reference_id;
+    known_[file.name] = std::move(known);
   }
-  for (const auto until = Steady::now() + kReadingImages; const auto& image : found.images) {
+  // The oldest first: those of a series that has come as a whole must not wait for the next one.
+  for (const auto until = Steady::now() + reading_images_;
+       const auto& image : found.images | std::views::reverse) {
     if (images_.IsKnown(image.name)) continue;
-    if (Steady::now() >= until) break;
     images_.Read(spool_, image.name);
     is_changed = true;
+    if (Steady::now() >= until) break;
   }
   if (is_changed || num_read > 0) Store();
 }
@@ -208,12 +216,13 @@ ReceivedFiles::Listing ReceivedFiles::List() {
   Load();
   Found found = Look();
   ReadSome(found);
-  Listing listing{.entries = {},
-                  .series = images_.SeriesOf(found.images),
-                  .images = found.num_images,
-                  .unlisted = found.unlisted,
-                  .damaged_images = images_.num_damaged(),
-                  .image_fault = images_.fault()};
+  Listing listing{
+      .entries = {},
+      .series = images_.SeriesOf(found.images),
+      .images = found.num_images,
+      .unlisted = found.unlisted + found.num_images - static_cast<int>(found.images.size()),
+      .damaged_images = images_.num_damaged(),
+      .image_fault = images_.fault()};
   for (const auto& image : found.images) listing.unread += images_.IsKnown(image.name) ? 0 : 1;
   for (ReceivedFile& file : found.files) {
     Entry entry{.file = std::move(file), .patient_hash = {}};
@@ -253,17 +262,36 @@ void ReceivedFiles::JoinPlans(Listing& listing) const {
   }
 }
 
-std::optional<std::vector<fs::path>> ReceivedFiles::ImagesOf(const std::string& series) {
+ReceivedFiles::SeriesFiles ReceivedFiles::ImagesOf(const std::string& series) {
   const std::lock_guard lock(mutex_);
   Load();
   const Found found = Look();
   ReadSome(found);
-  for (const auto& image : found.images)
-    if (!images_.IsKnown(image.name)) return std::nullopt;
-  std::vector<fs::path> files;
-  for (const std::string& name : images_.Of(series, found.images)) files.push_back(PathOf(name));
-  if (files.empty()) throw DataError(say::scan::NoReceivedFile());
-  return files;
+  SeriesFiles chosen;
+  if (const int beyond = found.num_images - static_cast<int>(found.images.size()); beyond > 0) {
+    chosen.why_not =
+        say::scan::ImagesTooMany(found.num_images, static_cast<std::int64_t>(found.images.size()));
+    return chosen;
+  }
+  for (const std::string& name : images_.Of(series, found.images))
+    chosen.files.push_back(PathOf(name));
+  chosen.why_not = WhyNotWhole(chosen.files, found.images);
+  if (chosen.why_not.empty() && chosen.files.empty()) throw DataError(say::scan::NoReceivedFile());
+  return chosen;
+}
+
+Message ReceivedFiles::WhyNotWhole(const std::vector<fs::path>& files,
+                                   const std::vector<ReceivedImages::Image>& images) const {
+  // What came longer after the newest one belongs to another sending.
+  const auto end =
+      files.empty() ? fs::file_time_type::max() : fs::last_write_time(files.front()) + kSeriesPause;
+  for (const ReceivedImages::Image& image : images)
+    if (!images_.IsKnown(image.name) && fs::last_write_time(spool_ / (image.name + ".dcm")) < end)
+      return say::scan::ImagesBeingRead();
+  const auto now = fs::file_time_type::clock::now();
+  // A clock that was set back since must not hold it up for longer.
+  const bool is_arriving = !files.empty() && now < end && now > end - 2 * kSeriesPause;
+  return is_arriving ? say::scan::ImagesArriving() : Message();
 }
 
 fs::path ReceivedFiles::PathOf(const std::string& name) const {

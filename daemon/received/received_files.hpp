@@ -2,10 +2,10 @@
 // What plumb-dicomd received, and what became of it.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +21,9 @@ class ReceivedFiles {
   /// @param spool  Of plumb-dicomd.
   /// @param notes  Our own file. Damaged notes are discarded, and every file is read again.
   /// @param key  For PatientHash(); of the Patient ID only that is kept.
-  ReceivedFiles(std::filesystem::path spool, std::filesystem::path notes, std::string key);
+  /// @param reading_images  For how long each call reads images, at least one.
+  ReceivedFiles(std::filesystem::path spool, std::filesystem::path notes, std::string key,
+                std::chrono::milliseconds reading_images = std::chrono::seconds(2));
 
   struct Entry {
     ReceivedFile file;
@@ -30,22 +32,32 @@ class ReceivedFiles {
   struct Listing {
     std::vector<Entry> entries;                  ///< Newest first.
     std::vector<ReceivedImages::Series> series;  ///< Likewise.
-    int images = 0, unlisted = 0;
-    int unread = 0;  ///< Files and images: another call reads more of them.
+    int images = 0;
+    int unlisted = 0;  ///< Older files and images, which are not looked at.
+    int unread = 0;    ///< Files and images: another call reads more of them.
     int damaged_images = 0;
     Message image_fault;  ///< Why one of those cannot be used.
   };
-  /// Files are read by plumb-dicom-reader, a few at each call, and images for two seconds.
+  /// Files are read by plumb-dicom-reader, a few at each call, and images for a while.
   /// @throws IoError if the folder or the notes cannot be read or written.
   [[nodiscard]] Listing List();
 
   /// @throws DataError if there is no such file.
   [[nodiscard]] std::filesystem::path PathOf(const std::string& name) const;
 
-  /// The images of a series; nothing while not all images are read.
+  /// A sender takes less between two images of a series: one whose newest image is not that old
+  /// may still be arriving.
+  static constexpr std::chrono::seconds kSeriesPause{60};
+  struct SeriesFiles {
+    std::vector<std::filesystem::path> files;
+    /// Why these may not be all: the series may still be arriving, an image that came before the
+    /// end of kSeriesPause is not read yet, or there are more images than are looked at. Empty:
+    /// they are.
+    Message why_not;
+  };
+  /// The images of a series.
   /// @throws DataError if there are none; IoError as above.
-  [[nodiscard]] std::optional<std::vector<std::filesystem::path>> ImagesOf(
-      const std::string& series);
+  [[nodiscard]] SeriesFiles ImagesOf(const std::string& series);
 
   /// A draft was made of them. @throws IoError
   void NoteReference(const std::vector<std::string>& names, const std::string& reference_id);
@@ -74,12 +86,16 @@ class ReceivedFiles {
   /// Reads what has not been read yet, for a while, and keeps it.
   void ReadSome(const Found& found);
   [[nodiscard]] bool IsRead(const std::string& name) const;
+  /// @param files  Of a series, newest first. @param images  All that were found.
+  [[nodiscard]] Message WhyNotWhole(const std::vector<std::filesystem::path>& files,
+                                    const std::vector<ReceivedImages::Image>& images) const;
   /// Names the structure set and the series of each plan.
   void JoinPlans(Listing& listing) const;
   [[nodiscard]] Known ReadOne(const std::string& name) const;
 
   const std::filesystem::path spool_, notes_;
   const std::string key_;
+  const std::chrono::milliseconds reading_images_;
   std::mutex mutex_;
   bool is_loaded_ = false;
   std::map<std::string, Known> known_;  ///< By name.

@@ -37,16 +37,19 @@ bool ReceivedImages::Keep(const std::vector<Image>& images) {
 }
 
 void ReceivedImages::Read(const std::filesystem::path& spool, const std::string& name) {
-  std::string& series = series_of_[name];
+  std::string series;
+  Facts facts;
   try {
     const CtImage image = ReadCtImage(spool / (name + ".dcm"), name);
-    if (image.series_uid.empty()) return;
     series = Uid(image.series_uid);
-    facts_.try_emplace(series, Facts{.frame_uid = Uid(image.file.frame_of_reference_uid),
-                                     .patient_hash = PatientHash(key_, image.file.patient_id)});
+    facts = {.frame_uid = Uid(image.file.frame_of_reference_uid),
+             .patient_hash = PatientHash(key_, image.file.patient_id)};
   } catch (const DataError& error) {
     fault_ = error.message();
   }
+  // Known only now: one that could not be read for another cause is read again.
+  if (!series.empty()) facts_.try_emplace(series, std::move(facts));
+  series_of_[name] = std::move(series);
 }
 
 std::vector<ReceivedImages::Series> ReceivedImages::SeriesOf(

@@ -39,6 +39,7 @@ class ReceivedImages {
   [[nodiscard]] bool Keep(const std::vector<Image>& images);
   [[nodiscard]] bool IsKnown(const std::string& name) const { return series_of_.contains(name); }
   /// Reads one by plumb-dicom-reader, and keeps what it is or why it cannot be used.
+  /// @throws IoError if the reader cannot be started: the image is not known then.
   void Read(const std::filesystem::path& spool, const std::string& name);
 
   /// Of the images that are known.

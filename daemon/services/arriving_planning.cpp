@@ -8,6 +8,7 @@
 #include "daemon/planning/patient_hash.hpp"
 #include "daemon/planning/planning_import.hpp"
 #include "daemon/services/patient_key.hpp"
+#include "daemon/services/store_access.hpp"
 #include "web/model/limits.hpp"
 
 namespace plumb {
@@ -40,9 +41,10 @@ ArrivingPlanning::~ArrivingPlanning() {
   if (!folders_.staging.empty()) fs::remove_all(folders_.staging, ignored);
 }
 
-void ArrivingPlanning::Read(const web::SentPlanning& sent, const std::stop_token& stop) noexcept {
+void ArrivingPlanning::Read(const web::SentPlanning& sent, const WhyNot& why_not,
+                            const std::stop_token& stop) noexcept {
   try {
-    MakeScene(sent, stop);
+    MakeScene(sent, why_not, stop);
   } catch (const DataError& error) {
     refusal_ = Refused(ChangeResult::kInvalid, error.message());
   } catch (const std::exception& error) {
@@ -50,7 +52,8 @@ void ArrivingPlanning::Read(const web::SentPlanning& sent, const std::stop_token
   }
 }
 
-void ArrivingPlanning::MakeScene(const web::SentPlanning& sent, const std::stop_token& stop) {
+void ArrivingPlanning::MakeScene(const web::SentPlanning& sent, const WhyNot& why_not,
+                                 const std::stop_token& stop) {
   const fs::path& staging = folders_.staging;
   fs::remove_all(staging);
   fs::create_directories(staging);
@@ -61,6 +64,16 @@ void ArrivingPlanning::MakeScene(const web::SentPlanning& sent, const std::stop_
   if (sent.structures_bytes > 0) files.structures = staging / "structures.dcm";
   const SentParts parts{.structures_bytes = sent.structures_bytes, .plan_bytes = sent.plan_bytes};
   SplitPlanning(sent.file, parts, files);
+  const auto hash_of = [this](const std::string& patient_id) {
+    return PatientHash(PatientKey(folders_.state), patient_id);
+  };
+  if (sent.threshold_hu) {
+    const TreatmentPlan plan = ReadTreatmentPlan(files.plan, files.plan_name);
+    if (const Message why = why_not(hash_of(plan.file.patient_id)); !why.empty()) {
+      refusal_ = AnswerOf(why);
+      return;
+    }
+  }
   PlanningChoice choice;
   if (!sent.roi.empty()) choice.roi = sent.roi;
   if (!sent.beam.empty()) choice.beam = sent.beam;
@@ -70,7 +83,7 @@ void ArrivingPlanning::MakeScene(const web::SentPlanning& sent, const std::stop_
                         : ReadPlanning(files, choice);
   fs::remove(files.plan);  // they name the patient
   if (!files.structures.empty()) fs::remove(files.structures);
-  patient_hash_ = PatientHash(PatientKey(folders_.state), patient_id);
+  patient_hash_ = hash_of(patient_id);
   CompareWithEarlierPlan(folders_.earlier, scene);
   posture_ = scene.planning->posture;
   WriteScene(scene, staging / "scene");

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -30,9 +31,13 @@ class ArrivingPlanning {
   ArrivingPlanning& operator=(const ArrivingPlanning&) = delete;
   ~ArrivingPlanning();
 
+  /// Why files of this keyed hash of a Patient ID are not taken; empty: they are. Beside the loop.
+  using WhyNot = std::function<Message(const std::string& patient_hash)>;
   /// Beside the loop; never throws. Then there is a refusal, or the scene lies in staging().
+  /// @param why_not  Asked before images are read, which may take minutes.
   /// @param stop  Noticed between two images.
-  void Read(const web::SentPlanning& sent, const std::stop_token& stop) noexcept;
+  void Read(const web::SentPlanning& sent, const WhyNot& why_not,
+            const std::stop_token& stop) noexcept;
 
   [[nodiscard]] const std::optional<Change>& refusal() const { return refusal_; }
   [[nodiscard]] const std::filesystem::path& staging() const { return folders_.staging; }
@@ -40,7 +45,7 @@ class ArrivingPlanning {
   [[nodiscard]] const std::string& patient_hash() const { return patient_hash_; }
 
  private:
-  void MakeScene(const web::SentPlanning& sent, const std::stop_token& stop);
+  void MakeScene(const web::SentPlanning& sent, const WhyNot& why_not, const std::stop_token& stop);
 
   Folders folders_;
   PatientPosture posture_ = PatientPosture::kHeadFirstSupine;

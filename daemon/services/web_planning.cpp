@@ -98,7 +98,7 @@ class WebPlanning final : public web::PlanningService {
 
   void ImportReceived(const Actor& actor, const std::string& patient_id,
                       const web::ReceivedChoice& choice, Done done) override {
-    if (std::exchange(is_importing_, true)) return done(AnswerOf(say::upkeep::StoreBusy()));
+    if (std::exchange(is_importing_, true)) return done(AnswerOf(say::scan::ImportRuns()));
     done = [this, done = std::move(done)](const Change& change) {
       is_importing_ = false;
       done(change);
@@ -161,8 +161,8 @@ class WebPlanning final : public web::PlanningService {
       ReceivedFiles& files = Files(store);
       if (!choice.series.empty()) {
         auto images = files.ImagesOf(choice.series);
-        if (!images) return Refused(ChangeResult::kConflict, say::scan::ImagesBeingRead());
-        sent.images = *std::move(images);
+        if (!images.why_not.empty()) return AnswerOf(images.why_not);
+        sent.images = std::move(images.files);
         sent.threshold_hu = choice.threshold_hu;
       }
       std::optional<fs::path> structures;

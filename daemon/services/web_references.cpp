@@ -98,8 +98,7 @@ class WebReferences final : public web::ReferenceService {
                    Done done) override {
     if (!store_.Read(&Store::patients, [&](PatientStore& all) { return all.Find(patient_id); }))
       return done(Refused(ChangeResult::kNotFound, say::store::NoPatient()));
-    // The result of an open session could not be accepted any more: a newer scan would be there.
-    if (session_.patient_id() == patient_id) return done(AnswerOf(say::store::SessionOpen()));
+    if (RefuseIf(WhyNoNewScan(patient_id), done)) return;
     const Settings settings =
         store_.Read(&Store::settings, [](SettingsStore& stored) { return stored.Get(); });
     // An upload and received files may be on their way at the same time.
@@ -111,13 +110,16 @@ class WebReferences final : public web::ReferenceService {
         ArrivingPlanning::Folders{.staging = store_.Read(staging),
                                   .earlier = EarlierPlanning(patient_id),
                                   .state = store_.Read(state)});
-    const auto work = [import, sent, stop = stop_] { import->Read(sent, stop); };
+    const auto why_not = [=, this](const std::string& hash) {
+      return WhyNotTaken(sent, WhyOtherPatient(patient_id, hash));
+    };
+    const auto work = [import, sent, why_not, stop = stop_] { import->Read(sent, why_not, stop); };
     const auto read = [=, this, plan = DefaultPlan(settings)]() mutable {
       if (import->refusal()) return done(*import->refusal());
+      // It may have been opened in the minutes that an import takes.
+      if (RefuseIf(WhyNoNewScan(patient_id), done)) return;
       const Message doubt = WhyOtherPatient(patient_id, import->patient_hash());
-      if (!doubt.empty() && !sent.is_same_patient) return done(AnswerOf(doubt));
-      if (!doubt.empty() && sent.reason.empty())
-        return done(AnswerOf(say::store::PlanningNeedsReason()));
+      if (RefuseIf(WhyNotTaken(sent, doubt), done)) return;  // another import may have ended
       plan.posture = Name(import->posture());
       plan.isocentre_m = {0, 0, 0};
       plan.couch_markers = false;
@@ -135,7 +137,7 @@ class WebReferences final : public web::ReferenceService {
       });
     };
     if (!background_.RunInBackground(web::BackgroundPool::kImports, work, read))
-      done(Refused(ChangeResult::kFailed, say::upkeep::StoreBusy()));
+      done(AnswerOf(say::scan::ImportRuns()));
   }
 
   void PlanReference(const Actor& actor, const std::string& id, int revision,
@@ -218,6 +220,19 @@ class WebReferences final : public web::ReferenceService {
     const auto scan = reference ? ScanOf(reference->scan_id) : std::optional<Scan>();
     if (!scan || scan->folder.empty() || !scan->sensor_serial.empty()) return std::nullopt;
     return ReadStoredScene(scan->folder / "scene").scene.planning;
+  }
+
+  /// Why no scan may be stored beside the sensor's; empty: one may. The result of an open session
+  /// could not be accepted any more: a newer scan would be there.
+  [[nodiscard]] Message WhyNoNewScan(const std::string& patient_id) const {
+    return session_.patient_id() == patient_id ? say::store::SessionOpen() : Message();
+  }
+
+  /// @param doubt  As of WhyOtherPatient().
+  static Message WhyNotTaken(const web::SentPlanning& sent, const Message& doubt) {
+    if (doubt.empty()) return {};
+    if (!sent.is_same_patient) return doubt;
+    return sent.reason.empty() ? say::store::PlanningNeedsReason() : Message();
   }
 
   /// What speaks against these files being this patient's; empty: nothing.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -303,13 +304,19 @@ TEST_F(DaemonPlanningTest, FromReceivedImagesToSixNumbersInACalibratedRoom) {
   EXPECT_EQ(import({{"series", series["uid"]}}).status, 400) << "at which threshold?";
   EXPECT_EQ(import({{"series", series["uid"]}, {"threshold_hu", 1}}).status, 400);
   EXPECT_EQ(import({{"series", "2.25.404"}, {"threshold_hu", -300}}).status, 404);
-  const auto imported = import({{"series", series["uid"]}, {"threshold_hu", -350}});
+  const json wanted = {{"series", series["uid"]}, {"threshold_hu", -350}};
+  const auto early = import(wanted);
+  EXPECT_EQ(early.status, 409) << early.body;
+  EXPECT_EQ(early.json()["error_message"]["id"], "scan.images_arriving") << early.body;
+  dicomd_->SetAge(std::chrono::minutes(2));
+  const auto imported = import(wanted);
   ASSERT_EQ(imported.status, 201) << imported.body;
   const std::string reference = imported.json()["id"];
   const json scene = SceneOf(reference);
   EXPECT_EQ(scene["planning"]["skin_threshold_hu"], -350);
   EXPECT_THAT(scene["warnings"].dump(),
-              AllOf(HasSubstr("CT images at -350 HU"), HasSubstr("the couch, whose top")));
+              AllOf(HasSubstr("CT images at -350 HU"), HasSubstr("the couch, whose top"),
+                    HasSubstr("planning.images_ends")));
   Approve(reference, /*skin_of_images=*/true);
   EXPECT_THAT(engineer_->Get("/api/v1/audit").body, HasSubstr("CT images at -350 HU confirmed"));
 

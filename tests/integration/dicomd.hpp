@@ -56,6 +56,12 @@ class Dicomd {
     std::filesystem::remove_all(sent);
   }
 
+  /// As if everything had come so long ago.
+  void SetAge(std::chrono::seconds age) const {
+    for (const auto& file : std::filesystem::directory_iterator(folder_ / "spool"))
+      std::filesystem::last_write_time(file, std::filesystem::file_time_type::clock::now() - age);
+  }
+
  private:
   std::filesystem::path folder_;
   std::unique_ptr<Process> process_;
@@ -64,7 +70,7 @@ class Dicomd {
 
 /// What a page shows once the appliance has looked, and `enough` holds. It asks again as the page
 /// does, because the folder is another account's, and no event tells of it.
-inline nlohmann::json Settled(HttpClient& client, const std::string& path,
+inline nlohmann::json Settled(test::HttpClient& client, const std::string& path,
                               const std::function<bool(const nlohmann::json&)>& enough) {
   nlohmann::json found;
   for (int i = 0; i < 1200; ++i) {

@@ -73,16 +73,31 @@ check "it is noted as restored, for the log of the database that is back" \
   "$(cat state/restored.json)"
 run roll-back
 check "once" '^old$' "$(cat state/plumb.db)"
-convert
-printf '#!/bin/sh\ncase "$1" in */state/plumb.db-seals) exit 1 ;; esac\nexec /bin/mv "$@"\n' >bin/mv
-chmod +x bin/mv
-run put-back
-check "what cannot be put back as a whole stays as it was" \
-  '^1 new plumb.db plumb.db-mark plumb.db-seals plumb.db-wal $' \
-  "$code $(cat state/plumb.db) $(cd state && echo plumb.db* | tr '\n' ' ')"
-rm bin/mv
-run put-back
-check "until it can be" '^0 old$' "$code $(cat state/plumb.db)"
+# PROGRAM OF_WHAT: fails once for a first argument of that pattern, and works otherwise.
+failing() {
+  rm -rf has-failed
+  printf '#!/bin/sh\ncase "$1" in %s) mkdir %s/has-failed 2>/dev/null && exit 1 ;; esac\n' \
+    "$2" "$work" >"bin/$1"
+  printf 'exec /bin/%s "$@"\n' "$1" >>"bin/$1"
+  chmod +x "bin/$1"
+}
+unchanged='before-checksums plumb.db plumb.db-mark plumb.db-seals plumb.db-wal rows.key scans'
+for fault in "mv */state/plumb.db-seals" "mv */state/rows.key" "sync */restored.json" \
+  "mv */before-checksums/plumb.db" "mv */before-checksums/plumb.db-since" \
+  "mv */before-checksums"; do
+  convert
+  set -f; failing $fault; set +f
+  run put-back
+  check "what cannot be put back as a whole stays as it was ($fault)" \
+    "^1 new old $unchanged \$" \
+    "$code $(cat state/plumb.db state/before-checksums/plumb.db | xargs) $(
+      cd state && echo * | tr '\n' ' ')"
+  rm bin/mv bin/sync 2>/dev/null || true
+  run put-back
+  check "until it can be ($fault)" '^0 old new before-restore-1 plumb.db restored.json scans $' \
+    "$code $(cat state/plumb.db state/before-restore-1/plumb.db | xargs) $(
+      cd state && echo * | tr '\n' ' ')"
+done
 convert
 touch state/before-checksums/good
 run roll-back

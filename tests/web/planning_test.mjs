@@ -49,6 +49,7 @@ await h.step('structure set and plan become a draft whose isocentre is read-only
   await send(planner, '');
   await planner.waitForURL(/#\/plan\//);
   await planner.locator('.planning-facts', { hasText: 'BODY' }).waitFor();
+  equal(await planner.getByText('CT images, from z').count(), 0, 'a contour says where it ends');
   plan = planner.url();
   const axes = planner.locator('.triple input');
   for (let i = 0; i < 3; ++i) {
@@ -142,12 +143,18 @@ await h.step('without a contour the skin of CT images counts, at a stated thresh
   await planner.getByText('Reference from the planning CT').click();
   const threshold = planner.getByLabel('Threshold of the skin (HU)');
   equal(await threshold.isVisible(), false, 'shown only once images are chosen');
+  const importAll = planner.getByRole('button', { name: 'Import', exact: true });
+  const structures = planner.getByLabel('Structure set', { exact: true });
+  await importAll.click();
+  equal(await structures.getAttribute('aria-invalid'), 'true', 'it is missing');
   await planner.getByLabel('Take the skin from the CT images').check();
+  equal(await structures.getAttribute('aria-invalid'), null, 'nobody asks for it any more');
+  equal(await planner.locator('.field', { has: structures }).locator('.field-error').count(), 0,
+    'nor is it called empty');
   equal(await threshold.inputValue(), '-300', 'where planning systems draw it');
   await planner.getByLabel('Plan', { exact: true }).setInputFiles(h.file('data/plan.dcm'));
   const images = readdirSync(h.file('data/images')).map((name) => h.file(`data/images/${name}`));
   const files = planner.getByLabel('CT images', { exact: true });
-  const importAll = planner.getByRole('button', { name: 'Import', exact: true });
   await files.setInputFiles(images.toSpliced(images.length / 2, 1));
   await threshold.fill('1');
   await importAll.click();
@@ -162,6 +169,9 @@ await h.step('without a contour the skin of CT images counts, at a stated thresh
   const facts = planner.locator('.planning-facts');
   await facts.getByText('CT images at -350 HU, ±').waitFor();
   await facts.getByText('only the frame of reference shows').waitFor();
+  const ends = await facts.getByText(`${images.length} CT images, from z = `).innerText();
+  const [first, last] = ends.match(/-?\d+\.\d(?= mm)/g).map(Number);
+  check(last - first > 0, `both ends: ${ends}`);
   await facts.getByText('are added to the uncertainty along its normal').waitFor();
   await h.look(planner, 'planning-images-plan');
   await planner.getByRole('button', { name: 'Save plan' }).click();
@@ -195,6 +205,38 @@ await h.step('another patient’s files are refused until a person has looked', 
     .fill('the clinic changed its numbers');
   await planner.getByRole('button', { name: 'Import' }).click();
   await planner.waitForURL(/#\/plan\//);
+});
+
+await h.step('an import that ends when another screen is shown leaves that screen', async () => {
+  h.tell('received');
+  const sent = /patients\/.*\/planning\/received/;
+  for (const [answer, said] of [
+    [{ status: 201, json: { id: 'r1' } }, 'The planning CT of CT-1 has been imported'],
+    [{ status: 409, json: { error: 'no room' } },
+      'The planning CT of CT-1 has not been imported: no room']]) {
+    let end;
+    const ended = new Promise((resolve) => { end = resolve; });
+    const asked = new Promise((resolve) => {
+      planner.route(sent, async (route) => {
+        resolve();
+        await ended;
+        await route.fulfill(answer);
+      });
+    });
+    // Also where a question for the list has no answer.
+    await planner.route('**/api/v1/planning/received', (route) => route.abort(), { times: 1 });
+    await planner.goto(`${h.url}#/patients`);
+    await planner.goto(`${h.url}#/patient/${patient}`);
+    await planner.getByText('Reference from the planning CT').click();
+    await planner.getByRole('row', { name: 'Plan THORAX' }).getByRole('button', { name: 'Import' })
+      .click();
+    await asked;
+    await planner.goto(`${h.url}#/patients`);
+    end();
+    await planner.getByText(said).first().waitFor();
+    equal(new URL(planner.url()).hash, '#/patients', 'what is shown stays');
+    await planner.unroute(sent);
+  }
 });
 
 await h.step('what the planning system sent is listed and imported from there', async () => {

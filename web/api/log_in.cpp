@@ -43,6 +43,15 @@ Response Redirect(const std::string& where) {
   return response;
 }
 
+/// Leads the page without scripts to where it says that the log-in was refused.
+/// @param by  "1", or "directory": by that of the clinic, not for a wrong password.
+Respond Refusing(const LogInForm& form, const Respond& respond, const std::string& by = "1") {
+  return [respond, by, is_form = form.is_form](Response response) {
+    respond(is_form && response.status == 403 ? Redirect("/result?failed=" + by)
+                                              : std::move(response));
+  };
+}
+
 }  // namespace
 
 Response BusyWithPasswords() {
@@ -197,14 +206,14 @@ void Accounts::FinishDirectoryLogIn(const Actor& actor, const DirectoryAnswer& a
                                     const Respond& respond) {
   if (!answer.refusal.empty()) {
     LogFailedLogIn(actor, answer.refusal);
-    return respond(ErrorResponse(403, answer.refusal));
+    return Refusing(form, respond, "directory")(ErrorResponse(403, answer.refusal));
   }
   if (!answer.matches) return FinishLogIn(actor, {}, form, counters, respond);
   if (!answer.role) {
     TakeGuessBack(counters);
     EndAllOf(actor.user);
     audit_.Log(actor, "login.failed", "", say::audit::NoRoleInDirectory());
-    return respond(ErrorResponse(403, say::web::NoRoleInDirectory()));
+    return Refusing(form, respond, "directory")(ErrorResponse(403, say::web::NoRoleInDirectory()));
   }
   const std::optional<User> known = users_.FindUser(actor.user);
   if (known && known->role == *answer.role)
@@ -239,9 +248,7 @@ void Accounts::LogFailedLogIn(const Actor& actor, const Message& why) {
 void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, const LogInForm& form,
                            const std::vector<std::string>& counters, const Respond& respond) {
   const auto still = users_.FindUser(actor.user);
-  const Respond fail = [respond, is_form = form.is_form](Response response) {
-    respond(is_form && response.status == 403 ? Redirect("/result?failed=1") : std::move(response));
-  };
+  const Respond fail = Refusing(form, respond);
   if (stored.empty() || !still || still->disabled || still->password_hash != stored) {
     LogFailedLogIn(actor, {});
     return fail(ErrorResponse(403, say::web::WrongLogIn()));

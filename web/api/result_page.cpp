@@ -378,6 +378,16 @@ const Catalogue& LanguageOf(const Request& request) {
   return named != nullptr ? *named : EnglishCatalogue();
 }
 
+/// What the form says above its fields.
+std::string AboveLoginForm(const Request& request, const Catalogue& language) {
+  if (const auto failed = request.query.find("failed"); failed != request.query.end())
+    return Word(failed->second == "directory" ? say::result::kPageDirectoryRefuses
+                                              : say::result::kPageWrongPassword,
+                language);
+  if (request.query.contains("first")) return Word(say::result::kPageFirstPassword, language);
+  return {};
+}
+
 /// @param why_none  Why nobody can log in; empty: they can.
 Response LoginPage(const Request& request, const Catalogue& language, const Message& why_none) {
   const std::string body =
@@ -385,11 +395,7 @@ Response LoginPage(const Request& request, const Catalogue& language, const Mess
           ? fmt::format("<h1>{}</h1><p role=\"alert\">{}</p>",
                         Word(say::result::kPageOutOfOrder, language),
                         Text(say::result::PageNobodyCan(Said(why_none, language)), language))
-          : LoginForm(language, request.query.contains("failed")
-                                    ? Word(say::result::kPageWrongPassword, language)
-                                : request.query.contains("first")
-                                    ? Word(say::result::kPageFirstPassword, language)
-                                    : std::string());
+          : LoginForm(language, AboveLoginForm(request, language));
   Response response = BodyResponse("text/html; charset=utf-8", Document(language, body, ""));
   if (!why_none.empty()) response.status = 503;
   return response;

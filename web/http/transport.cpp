@@ -192,7 +192,9 @@ struct Transport::Callbacks {
                                              std::uint64_t bytes) {
     const HttpServerOptions& options = transport.options_;
     if (options.upload_folder.empty()) return ErrorResponse(409, say::web::NoUploads());
-    if (!transport.upload_.expired()) return ErrorResponse(409, say::web::AnotherUpload());
+    if (!transport.upload_.expired())
+      return ErrorResponse(
+          409, transport.has_whole_upload_ ? say::web::UploadInUse() : say::web::AnotherUpload());
     if (bytes == 0) return ErrorResponse(411, say::web::UploadLength());
     const std::uint64_t most = exchange.route->most_bytes > 0
                                    ? std::min(exchange.route->most_bytes, options.max_upload_bytes)
@@ -219,6 +221,7 @@ struct Transport::Callbacks {
       return ErrorResponse(507, say::web::DiskTooFull(static_cast<double>(space.available >> 20)));
     }
     transport.upload_ = exchange.request.upload;
+    transport.has_whole_upload_ = false;
     if (Connection* known = ConnectionOf(exchange.connection)) known->uploading = true;
     return std::nullopt;
   }
@@ -276,6 +279,7 @@ struct Transport::Callbacks {
       if (!exchange->started && !exchange->HasWholeUpload()) return MHD_YES;
       if (!exchange->started) {
         exchange->started = true;
+        if (exchange->request.upload) transport.has_whole_upload_ = true;
         const ScopedLoopLabel label(
             transport.options_, transport.options_.doing ? exchange->route->Name() : std::string());
         Gate::Handle(*exchange->route, exchange->request,

@@ -83,6 +83,7 @@ class Transport {
   ConnectionTable connections_;
   std::list<Exchange*> exchanges_;
   std::weak_ptr<UploadFile> upload_;  ///< One at a time.
+  bool has_whole_upload_ = false;     ///< It is not being sent any more, but worked on.
   std::size_t unsent_bytes_ = 0;      ///< Size of the bodies that the library holds.
   /// The last one is served. Handshakes in progress may still use earlier ones, so they are kept;
   /// they are few, because a person replaces them.

@@ -54,7 +54,7 @@ struct Received {
   std::vector<ReceivedFile> files = {};     ///< Newest first, no images.
   std::vector<ReceivedSeries> series = {};  ///< Newest first.
   int images = 0;                           ///< CT images, read or not.
-  int unlisted = 0;                         ///< Older files than those of the list.
+  int unlisted = 0;                         ///< Older files and images, not looked at.
   int unread = 0;                           ///< Files and images whose turn has not come yet.
   int damaged_images = 0;                   ///< They cannot be used.
   Message image_fault = {};                 ///< Why one of these cannot.

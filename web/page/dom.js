@@ -46,6 +46,20 @@ export function field(label, control, words) {
     words && h('p', { class: 'hint', id: hintId }, words));
 }
 
+/// Fills in a number that is stored. It is accepted as it is, also beyond the bounds or between the
+/// steps of what people enter: a file may have set it, and it must not hold up everything else.
+export function fillNumber(input, value, { min, max, step }) {
+  const isOutside = value < min || value > max;
+  Object.assign(input, {
+    min: isOutside ? Math.min(min, value) : min,
+    max: isOutside ? Math.max(max, value) : max,
+    step: isOutside ? 'any' : step,
+    value: value ?? '',
+  });
+  if (input.validity.stepMismatch) input.step = 'any';
+  return input;
+}
+
 export const checkbox = (label, checked, properties) => {
   const box = h('input', { type: 'checkbox', ...properties });
   box.checked = checked;

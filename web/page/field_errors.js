@@ -7,11 +7,13 @@ import { S } from './words.js';
 let counter = 0;
 const written = (limit) => limit.replace('.', S.decimal);
 
-function wordsFor({ validity, dataset, min, max, minLength }) {
+function wordsFor({ validity, dataset, min, max, minLength, step }) {
   const text = S.invalid;
+  if (validity.badInput) return text.number;  // its value counts as missing, too
   if (validity.valueMissing) return text.missing;
   if (validity.tooShort) return text.short(minLength);
   if (validity.patternMismatch && dataset.code !== undefined) return text.code;
+  if (validity.stepMismatch) return text.step(written(step || '1'));
   return min && max ? text.range(written(min), written(max)) : text.other;
 }
 
@@ -47,4 +49,10 @@ export function tellFieldErrors() {
     setTimeout(() => { hasFocused = false; });
   }, true);
   document.addEventListener('input', ({ target }) => forget(target), true);
+  // What another control asks for no longer, or is accepted after all. A listener of the screen
+  // may decide that, so that this one comes after it.
+  const forgetAccepted = () => document.querySelectorAll('[aria-invalid]').forEach((control) => {
+    if (!control.willValidate || control.validity.valid) forget(control);
+  });
+  for (const event of ['change', 'submit']) document.addEventListener(event, forgetAccepted);
 }

@@ -13,6 +13,9 @@ export const kBounds = {
 };
 export const kFraction = { min: 1, max: 999, step: 1 };
 
+/// Of the skin in CT images, in HU; `value` is where a person begins.
+export const kThreshold = { min: -900, max: 0, value: -300 };
+
 /// For how long a result is shown as one to act on (web/model/scan.hpp).
 export const kResult = { valid_s: 120 };
 

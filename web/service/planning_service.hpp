@@ -27,7 +27,8 @@ class PlanningService {
   /// As it is known now; files that came since are read beside it (Received::is_settled).
   [[nodiscard]] virtual Received GetReceived() = 0;
   /// As ReferenceService::AddPlanning(): a draft, with every check and question of an upload.
-  /// kNotFound for files that are not there any more, kConflict while images are still read.
+  /// kNotFound for files that are not there any more, kConflict while another import runs, and
+  /// where the series may still be arriving, is not read yet, or is one of too many images.
   virtual void ImportReceived(const Actor& actor, const std::string& patient_id,
                               const ReceivedChoice& choice, Done done) = 0;
   /// As it is known now; the clinic's worklist is asked at most once a minute. Changes nothing.

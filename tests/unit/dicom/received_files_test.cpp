@@ -2,6 +2,11 @@
 // The folder of plumb-dicomd as the appliance reads it, and today's list made of a worklist.
 #include "daemon/received/received_files.hpp"
 
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <chrono>
 #include <fstream>
 #include <functional>
 
@@ -27,6 +32,10 @@ class ReceivedFilesTest : public ::testing::Test {
 
   [[nodiscard]] fs::path spool() const { return folder_ / "spool"; }
   [[nodiscard]] ReceivedFiles Files() const { return {spool(), folder_ / "received.json", key_}; }
+  /// Reads one image at each call.
+  [[nodiscard]] ReceivedFiles SlowFiles() const {
+    return {spool(), folder_ / "received.json", key_, std::chrono::milliseconds(0)};
+  }
   /// As plumb-dicomd keeps a file.
   void Keep(const std::string& name, const std::string& bytes,
             const std::string& class_uid = "1.2.840.10008.5.1.4.1.1.481.5") const {
@@ -111,6 +120,16 @@ class ReceivedImagesTest : public ReceivedFilesTest {
           i, kCt, images[i].series_uid + std::to_string(i));
     }
   }
+  /// As if all that is there had come so long ago, or the files of that name.
+  void SetAge(std::chrono::seconds age, const std::string& name = {}) const {
+    const auto time = fs::file_time_type::clock::now() - age;
+    for (const auto& entry : fs::directory_iterator(spool()))
+      if (name.empty() || entry.path().stem() == name) fs::last_write_time(entry, time);
+  }
+  [[nodiscard]] static std::string WhyNot(ReceivedFiles& files, const std::string& series) {
+    return files.ImagesOf(series).why_not.id();
+  }
+
   /// Once everything is read.
   static ReceivedFiles::Listing Settled(ReceivedFiles& files) {
     ReceivedFiles::Listing listing = files.List();
@@ -144,7 +163,9 @@ TEST_F(ReceivedImagesTest, ImagesAreSortedIntoSeriesOfThePlansFrame) {
   ASSERT_EQ(listing.entries.size(), 2U);
   EXPECT_THAT(listing.entries[0].file.series, ::testing::ElementsAre(series));
   EXPECT_TRUE(listing.entries[0].file.has_skin);
-  EXPECT_EQ(files.ImagesOf(series)->size(), static_cast<std::size_t>(count));
+  SetAge(ReceivedFiles::kSeriesPause);
+  EXPECT_EQ(WhyNot(files, series), "");
+  EXPECT_EQ(files.ImagesOf(series).files.size(), static_cast<std::size_t>(count));
   EXPECT_THROW((void)files.ImagesOf("2.25.404"), DataError);
   EXPECT_THROW((void)files.ImagesOf(""), DataError);
   EXPECT_EQ(ReadTextFile(folder_ / "received.json", 1 << 20).find("OTHER-1"), std::string::npos);
@@ -156,10 +177,63 @@ TEST_F(ReceivedImagesTest, OfAnInstanceThatWasSentTwiceTheNewestCounts) {
   ReceivedFiles files = Files();
   const auto listing = Settled(files);
   ASSERT_EQ(listing.series.size(), 1U);
-  const auto images = *files.ImagesOf(listing.series[0].facts.uid);
+  const auto images = files.ImagesOf(listing.series[0].facts.uid).files;
   EXPECT_EQ(static_cast<int>(images.size()), listing.series[0].facts.images);
   EXPECT_EQ(images.size(), SmallImages().size());
   for (const fs::path& image : images) EXPECT_GE(image.stem().string(), NameOf(20));
+}
+
+TEST_F(ReceivedImagesTest, ASeriesIsWholeAMinuteAfterItsNewestImage) {
+  KeepImages(0);
+  ReceivedFiles files = Files();
+  const std::string series = Settled(files).series.at(0).facts.uid;
+  const std::string newest = NameOf(static_cast<int>(SmallImages().size()) - 1);
+  SetAge(ReceivedFiles::kSeriesPause);
+  EXPECT_EQ(WhyNot(files, series), "");
+  SetAge(std::chrono::seconds(0), newest);
+  EXPECT_EQ(WhyNot(files, series), "scan.images_arriving");
+  SetAge(ReceivedFiles::kSeriesPause / 2, newest);
+  EXPECT_EQ(WhyNot(files, series), "scan.images_arriving");
+  SetAge(-2 * ReceivedFiles::kSeriesPause, newest);
+  EXPECT_EQ(WhyNot(files, series), "") << "the clock was set back";
+}
+
+TEST_F(ReceivedImagesTest, ImagesThatCameLaterDoNotHoldUpASeriesThatIsThere) {
+  KeepImages(0);
+  ReceivedFiles first = Files();
+  const std::string series = Settled(first).series.at(0).facts.uid;
+  SetAge(3 * ReceivedFiles::kSeriesPause);
+  const auto of_other = [](CtImage& image) { image.series_uid = "2.25.777"; };
+  KeepImages(20, of_other);
+  ReceivedFiles files = SlowFiles();
+  EXPECT_EQ(WhyNot(files, series), "");
+  EXPECT_EQ(files.ImagesOf("2.25.777").files.back().stem().string(), NameOf(20))
+      << "the oldest is read first";
+  EXPECT_GT(files.List().unread, 1);
+  SetAge(3 * ReceivedFiles::kSeriesPause);
+  EXPECT_EQ(WhyNot(files, series), "scan.images_being_read") << "they may be of this series";
+  (void)Settled(files);
+  EXPECT_EQ(WhyNot(files, series), "");
+}
+
+TEST_F(ReceivedImagesTest, MoreImagesThanAreLookedAtAreCountedAndNoneIsImported) {
+  const auto keep = [&](std::size_t number) {
+    const std::string name = fmt::format("20260301-093000-{:016x}", number);
+    std::ofstream(spool() / (name + ".dcm")) << "x";
+    std::ofstream(spool() / (name + ".json")) << fmt::format(R"({{"class_uid":"{}"}})", kCt);
+    return name;
+  };
+  for (std::size_t i = 0; i < ReceivedImages::kMost; ++i) (void)keep(i);
+  ReceivedFiles files = SlowFiles();
+  EXPECT_EQ(WhyNot(files, "2.25.777"), "scan.images_being_read");
+  EXPECT_EQ(files.List().unlisted, 0);
+  const std::string beyond = keep(ReceivedImages::kMost);
+  EXPECT_EQ(WhyNot(files, "2.25.777"), "scan.images_too_many");
+  const auto listing = files.List();
+  EXPECT_EQ(listing.images, static_cast<int>(ReceivedImages::kMost) + 1);
+  EXPECT_EQ(listing.unlisted, 1);
+  fs::remove(spool() / (beyond + ".dcm"));
+  EXPECT_EQ(WhyNot(files, "2.25.777"), "scan.images_being_read");
 }
 
 TEST_F(ReceivedImagesTest, EachIsReadOnceAndDamagedOnesAreCountedWithTheirFault) {
@@ -190,6 +264,48 @@ TEST_F(ReceivedImagesTest, EachIsReadOnceAndDamagedOnesAreCountedWithTheirFault)
     ReceivedFiles files = Files();
     EXPECT_EQ(Settled(files).damaged_images, static_cast<int>(SmallImages().size())) << wrong;
   }
+}
+
+/// So few file descriptors are left that a folder can be listed, and no program started.
+class FewDescriptors {
+ public:
+  FewDescriptors() {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    const int free = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    ::close(free);
+    const rlimit few{.rlim_cur = static_cast<rlim_t>(free) + 1, .rlim_max = before_.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &few);
+  }
+  FewDescriptors(const FewDescriptors&) = delete;
+  FewDescriptors& operator=(const FewDescriptors&) = delete;
+  ~FewDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(ReceivedFilesTest, AFileWhoseReaderCannotBeStartedIsReadLater) {
+  KeepSmallCt();
+  ReceivedFiles files = Files();
+  {
+    const FewDescriptors few;
+    EXPECT_THROW((void)files.List(), IoError);
+  }
+  const auto entries = files.List().entries;
+  EXPECT_EQ(entries.at(0).file.kind, ReceivedKind::kPlan);
+  EXPECT_EQ(entries.at(1).file.kind, ReceivedKind::kStructures);
+}
+
+TEST_F(ReceivedImagesTest, AnImageWhoseReaderCannotBeStartedIsReadLater) {
+  KeepImages(0);
+  ReceivedFiles files = Files();
+  {
+    const FewDescriptors few;
+    EXPECT_THROW((void)files.List(), IoError);
+  }
+  const auto listing = Settled(files);
+  EXPECT_EQ(listing.damaged_images, 0);
+  EXPECT_EQ(listing.series.at(0).facts.images, static_cast<int>(SmallImages().size()));
 }
 
 TEST_F(ReceivedFilesTest, WithoutAnExternalContourThatIsSaidOfThePlan) {

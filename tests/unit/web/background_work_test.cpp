@@ -250,6 +250,34 @@ TEST_F(AsideTest, AnUploadGoesNoFasterThanTheDiskAndKeepsNobodyWaiting) {
   }
 }
 
+TEST_F(AsideTest, ASecondUploadIsToldWhetherTheFirstArrivesOrIsWorkedOn) {
+  loop_->Do([&] { service_.hold_completions = true; });
+  const auto send = [&](const std::string& name) {
+    HttpConnection connection(port_);
+    connection.Send("POST /api/v1/update/bundles/" + name +
+                    " HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer_->cookie +
+                    "\r\nX-CSRF-Token: " + engineer_->csrf_token +
+                    "\r\nContent-Type: application/octet-stream\r\nContent-Length: 5004\r\n\r\n" +
+                    "hsqs" + std::string(5000, 'x'));
+    return connection;
+  };
+  HttpConnection first = send("a.raucb");
+  WaitUntilHeld();
+  EXPECT_THAT(send("b.raucb").Read().body, ::testing::HasSubstr("another file is being uploaded"));
+  DoHeld();
+  for (bool is_worked_on = false; !is_worked_on;)
+    loop_->Do([&] { is_worked_on = !service_.held.empty(); });
+  const HttpAnswer refused = send("b.raucb").Read();
+  EXPECT_EQ(refused.status, 409);
+  EXPECT_THAT(refused.body, ::testing::HasSubstr("is still being worked on"));
+  loop_->Do([&] {
+    for (const auto& finish : std::exchange(service_.held, {})) finish();
+  });
+  EXPECT_EQ(first.Read().status, 200);
+  while (DoHeld() > 0) {  // its removal
+  }
+}
+
 TEST_F(AsideTest, AnUploadThatTheDiskDoesNotTakeIsRefused) {
   loop_->Do([&] { service_.refuse_background_work = true; });
   HttpConnection connection(port_);

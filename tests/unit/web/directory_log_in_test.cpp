@@ -19,6 +19,7 @@ namespace plumb::test {
 namespace {
 
 using nlohmann::json;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -212,6 +213,25 @@ TEST_F(DirectoryLogInTest, AnAccountThatTheDirectoryLocksIsNamedAndEachAttemptCo
   int status = 403;
   for (int i = 0; i < 20 && status == 403; ++i) status = LogIn(anna, "anna").status;
   EXPECT_EQ(status, 429) << "or guesses here would keep the account locked";
+}
+
+TEST_F(DirectoryLogInTest, ThePageWithoutScriptsSaysThatTheDirectoryRefuses) {
+  const auto where = [&](const std::string& name, const std::string& password) {
+    HttpClient client(port_);
+    client.extra_headers["Content-Type"] = "application/x-www-form-urlencoded";
+    const HttpAnswer answer =
+        client.Ask("POST", "/login", "name=" + name + "&password=" + password);
+    EXPECT_EQ(answer.status, 303) << answer.body;
+    return answer.Header("location");
+  };
+  const std::string password = "correct+horse%20battery";
+  EXPECT_EQ(where("visitor", password), "/result?failed=directory") << "none of the groups";
+  EXPECT_EQ(where("anna", "wrong"), "/result?failed=1");
+  SetRefusal(say::directory::RefusesPerson("locked"));
+  EXPECT_EQ(where("anna", password), "/result?failed=directory");
+  HttpClient anna(port_);
+  EXPECT_THAT(anna.Get("/result?failed=directory").body,
+              AllOf(HasSubstr("directory does not let you in"), Not(HasSubstr("or password"))));
 }
 
 TEST_F(DirectoryLogInTest, WhileTheDirectoryThinksOthersGoOn) {

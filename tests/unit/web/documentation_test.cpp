@@ -7,6 +7,7 @@
 #include <regex>
 #include <set>
 
+#include "algo/planning/ct_skin.hpp"
 #include "algo/verdict/default_tolerance.hpp"
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/model/limits.hpp"
@@ -84,7 +85,7 @@ std::string TextOf(const std::string& file) {
 
 /// The numbers that a file states as "NAME: {..., KEY: number, ...}" or "NAME = {...}".
 std::set<double> Stated(const std::string& text, const std::string& name, const std::string& key) {
-  const std::regex place("\\b" + name + "(: | = )\\{[^}]*\\b" + key + ": ([0-9.]+)");
+  const std::regex place("\\b" + name + "(: | = )\\{[^}]*\\b" + key + ": (-?[0-9.]+)");
   std::set<double> numbers;
   for (std::sregex_iterator at(text.begin(), text.end(), place), end; at != end; ++at)
     numbers.insert(std::stod((*at)[2]));
@@ -116,6 +117,9 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
     EXPECT_THAT(Stated(page, of_page, "maxlength"), ElementsAre(most)) << of_page;
     EXPECT_THAT(Stated(api, of_api, "maxLength"), ElementsAre(most)) << of_api;
   }
+  EXPECT_THAT(Stated(page, "kThreshold", "min"), ElementsAre(kMinSkinThreshold_hu));
+  EXPECT_THAT(Stated(page, "kThreshold", "max"), ElementsAre(kMaxSkinThreshold_hu));
+  EXPECT_THAT(Stated(page, "kThreshold", "value"), ElementsAre(kSkinThreshold_hu));
   EXPECT_THAT(Stated(page, "kResult", "valid_s"), ElementsAre(kResultValid_s));
   EXPECT_THAT(Stated(page, "kTolerance", "shift_mm"), ElementsAre(kDefaultShiftTolerance_mm));
   EXPECT_THAT(Stated(page, "kTolerance", "rotation_deg"),

@@ -28,14 +28,15 @@ export function faultWords(status) {
   return `${words}. ${S.faultHints[status.fault_kind] ?? ''}`.trim();
 }
 
-const kSettling_ms = 1000;
+const kSettling_ms = 1000, kNoAnswer_ms = 5000;
 /// Shows what the appliance knows at once, and again until it has finished looking, as long as
-/// `element` is on the page.
+/// `element` is on the page. A question without an answer is asked again.
 export async function whenSettled(path, element, show) {
   const found = await getOrNull(path);
-  if (!found || !element.isConnected) return;
-  show(found);
-  if (!found.is_settled) setTimeout(() => whenSettled(path, element, show), kSettling_ms);
+  if (!element.isConnected) return;
+  if (found) show(found);
+  if (found?.is_settled) return;
+  setTimeout(() => whenSettled(path, element, show), found ? kSettling_ms : kNoAnswer_ms);
 }
 
 /// The session that a scan belongs to, or null.

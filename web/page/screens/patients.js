@@ -451,7 +451,7 @@ export async function showPatient(place, id) {
   }, label);
   clear(place, heading,
     may('scan') && card(text.open, session, opening),
-    card(text.references, references, may('plan') && planningUpload(id)),
+    card(text.references, references, may('plan') && planningUpload(id, patient.code)),
     card(text.history, scans,
       h('div', { class: 'row below' },
         file(`report.pdf?language=${document.documentElement.lang}`, text.report),

@@ -2,15 +2,13 @@
 // The planning CT as reference: its upload, and what its files state.
 import { postLong, sendFile } from '../api.js';
 import {
-  action, checkbox, clear, field, fixed, form, h, hint, localTime, redraw, row, table,
+  action, checkbox, clear, done, field, fixed, form, h, hint, localTime, redraw, row, table,
 } from '../dom.js';
-import { kReason } from '../limits.js';
+import { kReason, kThreshold } from '../limits.js';
 import { S, said, saidEach } from '../words.js';
 import { sentence, whenSettled } from './common.js';
 
 const kDicom = '.dcm,application/dicom';
-
-const kThreshold = { min: -900, max: 0, value: -300 };  // HU; plumb import-dicom has the same
 
 /// Whether, and at which threshold, the skin is that of CT images. A person decides it each time.
 function skinOfImages() {
@@ -103,8 +101,9 @@ function receivedList(patient, skin, take) {
 }
 
 /// Sends structure set and plan, or takes those that were received; the plan screen then shows the
-/// draft made of them.
-export function planningUpload(patient) {
+/// draft made of them, unless another screen is shown by then: an import may take minutes.
+/// @param code  Names the patient there.
+export function planningUpload(patient, code) {
   const text = S.planning;
   const file = () => h('input', { type: 'file', accept: kDicom, required: true });
   const [structures, plan] = [file(), file()];
@@ -133,10 +132,14 @@ export function planningUpload(patient) {
     const inputs = { roi, isocentre_of: beam, reason };
     const fields = Object.fromEntries(Object.entries(inputs)
       .map(([key, input]) => [key, input.value.trim()]).filter(([, value]) => value));
+    const begun = location.hash;
+    const isHere = () => location.hash === begun;
     try {
       const { id } = await send(fields, !doubt.hidden && same.box.checked);
-      location.hash = `#/plan/${id}`;
+      if (isHere()) location.hash = `#/plan/${id}`;
+      else done(text.imported(code));
     } catch (error) {
+      if (!isHere()) throw new Error(text.notImported(code, error.message));
       if (error.body?.error_message?.id.startsWith('store.planning_patient')) {
         clear(doubt, h('h3', {}, text.otherTitle),
           h('p', { class: 'caution' }, sentence(error.message)), same.element);

@@ -3,7 +3,7 @@ import {
   get, live, may, post, postLong, put,
 } from '../api.js';
 import {
-  action, card, checkbox, clear, done, field, form, h, hint, localTime, select,
+  action, card, checkbox, clear, done, field, fillNumber, form, h, hint, localTime, select,
 } from '../dom.js';
 import { kBounds } from '../limits.js';
 import { S, said, saidEach } from '../words.js';
@@ -93,9 +93,9 @@ export async function showSettings(place) {
   const editable = may('settings');
   const inputs = {};
   const numbers = Object.entries(kBounds).map(([name, bounds]) => {
-    inputs[name] = h('input', {
-      type: 'number', ...bounds, value: settings[name], required: true, disabled: !editable,
-    });
+    inputs[name] = fillNumber(
+      h('input', { type: 'number', required: true, disabled: !editable }), settings[name], bounds,
+    );
     return field(text[name], inputs[name]);
   });
   const flags = kFlags.map((name) => {
@@ -134,7 +134,9 @@ export async function showSettings(place) {
     posture.value = stored.posture;
     acceptLive.value = stored.accept_live;
     paper.value = stored.paper;
-    for (const name of Object.keys(kBounds)) inputs[name].value = stored[name];
+    for (const [name, bounds] of Object.entries(kBounds)) {
+      fillNumber(inputs[name], stored[name], bounds);
+    }
     for (const name of kFlags) inputs[name].turn(stored[name]);
     alert?.remove();
     done(S.saved);
