@@ -172,7 +172,7 @@ await h.step('a sweep that was begun and discarded does not make the result befo
   async () => {
   h.tell('moved y -8 HFS');
   await scan();
-  await anna.locator('.verdict.move').getByText('MOVE', { exact: true }).waitFor();
+  await anna.locator('.verdict.move').waitFor();
   h.tell('slow');
   await anna.goto(`${h.url}#/scan`);
   await anna.getByRole('button', { name: 'Scan again' }).click();
