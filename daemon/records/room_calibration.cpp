@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/room_calibration.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/records/check_json.hpp"
 #include "daemon/scan_files/scan_files.hpp"
+#include "words/check.hpp"
 #include "words/store.hpp"
 
 namespace plumb {
@@ -167,9 +169,16 @@ std::optional<Message> WhyRoomIsDue(const SignedRoom& room, const MarkerBaseline
     if (item.name != "misfit" && item.name != "moved") continue;
     if (!answer) answer.emplace();
     if (item.passed || !answer->empty()) continue;
-    *answer = item.name == "moved" ? say::store::RoomMarkerMoved(item.note, item.value)
-                                   : say::store::RoomMisfit(item.value);
+    *answer = item.name == "misfit" ? say::store::RoomMisfit(item.value)
+              : item.note.Is(say::check::kTurned)
+                  ? say::store::RoomMarkerTurned(item.note)
+                  : say::store::RoomMarkerMoved(item.note, item.value);
   }
+  // Enough was seen, and it does not fit: all were moved, or two groups of them.
+  const auto shared = std::count_if(seen.markers.begin(), seen.markers.end(), [&](const auto& one) {
+    return room.fit.markers_iec.contains(one.first);
+  });
+  if (!answer && shared >= limits.min_markers) return say::store::RoomMarkersMoved(shared);
   return answer;
 }
 
