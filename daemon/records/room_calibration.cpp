@@ -143,8 +143,13 @@ SignedRoom SignedRoomIn(const std::string& text) {
     room.fit.T_iec_reference = PoseIn(json.at("T_iec_reference"));
     room.fit.shift_m = json.at("shift_m").get<double>();
     room.fit.turn_rad = json.at("turn_rad").get<double>();
-    for (const Json& scan : json.at("scans"))
+    for (const Json& scan : json.at("scans")) {
       room.check_ids.push_back(scan.at("check").get<std::string>());
+      room.fit.board_shift_m =
+          std::max(room.fit.board_shift_m, scan.at("shift_uncertainty_m").get<double>());
+      room.fit.board_turn_rad =
+          std::max(room.fit.board_turn_rad, scan.at("turn_uncertainty_rad").get<double>());
+    }
     auto markers = MarkersIn(json.at("markers_iec"));
     if (!markers || markers->empty()) throw DataError(say::store::RoomMarkersUnreadable());
     room.fit.markers_iec = std::move(*markers);

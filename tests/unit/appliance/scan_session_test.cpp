@@ -78,11 +78,17 @@ class ScanSessionTest : public ::testing::Test {
   std::unique_ptr<ScanSession> session_;
 };
 
-TEST(TakeOtherRoomTest, BothRoomsCalibrationsAreInTheIntervals) {
+// What is stated of the lasers stays apart from what the calibrations found of themselves: nothing
+// stated is not exact.
+TEST(TakeOtherRoomTest, BothRoomsCalibrationsAreInTheIntervalsBesideTheLasers) {
   ImportedRoom elsewhere{.unit = "plumb-a", .version = 2, .room = SignedRoom{}};
   elsewhere.room->fit.markers_iec = {{4, {}}};
   elsewhere.room->fit.shift_m = 0.004;
-  const RoomAxes here{.version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .shift_m = 0.012};
+  elsewhere.room->fit.board_shift_m = 0.003;
+  elsewhere.room->fit.turn_rad = 0.0012;
+  elsewhere.room->fit.board_turn_rad = 0.0005;
+  const RoomAxes here{
+      .version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .u95_m = 0.012, .u95_rad = 0.002};
   CompareOptions compare;
   compare.iec_u95_m = 0.003;
   const auto used = TakeOtherRoom(elsewhere, here, compare);
@@ -91,8 +97,14 @@ TEST(TakeOtherRoomTest, BothRoomsCalibrationsAreInTheIntervals) {
   ASSERT_TRUE(compare.reference_room);
   EXPECT_TRUE(compare.reference_room->markers.contains(4));
   EXPECT_TRUE(compare.room_markers.contains(5));
-  EXPECT_NEAR(compare.reference_room->u95_m.value_or(0), 0.005, 1e-12);
-  EXPECT_NEAR(compare.iec_u95_m.value_or(0), std::hypot(0.003, 0.012), 1e-12);
+  EXPECT_EQ(compare.reference_room->u95_m, 0.003);
+  EXPECT_FALSE(compare.reference_room->u95_rad);
+  EXPECT_NEAR(compare.reference_room->calibration_u95_m, 0.005, 1e-12);
+  EXPECT_NEAR(compare.reference_room->calibration_u95_rad, 0.0013, 1e-12);
+  EXPECT_EQ(compare.iec_u95_m, 0.003);
+  EXPECT_FALSE(compare.iec_u95_rad);
+  EXPECT_EQ(compare.calibration_u95_m, 0.012);
+  EXPECT_EQ(compare.calibration_u95_rad, 0.002);
 }
 
 TEST(TakeOtherRoomTest, WithoutACalibrationOnEitherSideThereIsNoAnswer) {
@@ -143,13 +155,17 @@ TEST(TakeRoomTest, APlanningCtIsMetByTheRoomsMarkersWithTheSpreadOfTheCalibratio
   compare.isocentre_m = Eigen::Vector3d(1, 2, 3);
   compare.T_iec_reference = Pose::Identity();
   compare.iec_u95_m = 0.003;
-  RoomAxes room{.version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .shift_m = 0.004};
+  RoomAxes room{
+      .version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .u95_m = 0.004, .u95_rad = 0.001};
   const auto used = TakeRoom(room, planned, compare);
   ASSERT_TRUE(used.has_value());
   EXPECT_TRUE(used->why_not_used.empty());
   EXPECT_FALSE(compare.isocentre_m) << "the origin of its frame";
   EXPECT_TRUE(compare.room_markers.contains(5));
-  EXPECT_NEAR(compare.iec_u95_m.value_or(0), 0.005, 1e-12);
+  EXPECT_EQ(compare.iec_u95_m, 0.003);
+  EXPECT_FALSE(compare.iec_u95_rad) << "nothing stated is not exact";
+  EXPECT_EQ(compare.calibration_u95_m, 0.004);
+  EXPECT_EQ(compare.calibration_u95_rad, 0.001);
 
   CompareOptions without;
   EXPECT_FALSE(TakeRoom(std::nullopt, planned, without));

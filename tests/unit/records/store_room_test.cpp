@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The room's calibration in the store: from check scans over the board to a signed version.
+#include <cmath>
 #include <filesystem>
 
 #include <gmock/gmock.h>
@@ -64,6 +65,11 @@ TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_EQ(room->digest, candidate.digest);
   EXPECT_EQ(room->room_markers.reference, 0);
   EXPECT_EQ(room->check_ids, (std::vector<std::string>{"3", "2", "1"}));
+  const BoardFit& board = candidate.scans.at(0).scan->board;
+  EXPECT_NEAR(room->fit.board_shift_m, board.shift_uncertainty_m, 1e-9);
+  EXPECT_NEAR(room->fit.board_turn_rad, board.turn_uncertainty_rad, 1e-9);
+  EXPECT_NEAR(room->fit.U95_m(), std::hypot(0.0006, board.shift_uncertainty_m), 1e-6);
+  EXPECT_GE(room->fit.U95_rad(), board.turn_uncertainty_rad);
   // The mean of boards at 0, 0 and 0.6 mm along x.
   EXPECT_TRUE(room->fit.T_iec_reference.isApprox(
       Pose(Eigen::Translation3d(-0.0002, 0, 0)) * SceneFromRoom().inverse(), 1e-6));
