@@ -153,8 +153,10 @@ void ScanSession::Run(const std::stop_token& stop) {
     outcome_.kind = EndedScan::Kind::kFailed;
     outcome_.reason = Explain(error);
   }
-  if (outcome_.kind != EndedScan::Kind::kDone && stop.stop_requested())
+  if (outcome_.kind != EndedScan::Kind::kDone && stop.stop_requested()) {
     outcome_.kind = EndedScan::Kind::kCancelled;
+    outcome_.check.reset();  // one that is discarded as it fails is not a failed check
+  }
   Save();
   // The stored reference was good, and only now differs.
   if (outcome_.kind == EndedScan::Kind::kDone && job_.unit_profile &&
@@ -384,6 +386,7 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
       comparison->warnings.push_back(
           say::room::CalibrationNotUsed(room->version, room->why_not_used));
     }
+    if (!outcome_.drift.empty()) comparison->warnings.push_back(outcome_.drift);
     pictures = DrawResult(*comparison, reference.height_map ? &*reference.height_map : nullptr,
                           {.tolerance_m = job_.compare.limits.shift_tolerance_m,
                            .subtitle = PictureSubtitle(*comparison)});

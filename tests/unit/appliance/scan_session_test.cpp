@@ -8,6 +8,7 @@
 #include <future>
 #include <mutex>
 #include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,6 +26,7 @@ namespace {
 using ::testing::ElementsAre;
 using testing::FakeBus;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Kind = EndedScan::Kind;
 
 class ScanSessionTest : public ::testing::Test {
@@ -226,6 +228,68 @@ TEST_F(ScanSessionTest, WhatIsKnownOfTheSensorReachesTheSceneAndAScanWithoutMark
   scan_with("B");
   EXPECT_EQ(shelf->Versions("A").size(), 1U);
   EXPECT_TRUE(shelf->Versions("B").empty());
+}
+
+// Whoever acts on a result, or reads its report, learns that its sensor has changed.
+TEST_F(ScanSessionTest, AUnitThatNoLongerAgreesWithItsProfileIsAWarningOfTheResult) {
+  auto shelf = std::make_shared<ProfileShelf>(folder_ / "profiles");
+  SensorProfile known = ProfileOfAnyUnit(job_.info.intrinsics);
+  known.covariance(kLensAt, kLensAt) = 1e-8;
+  known.num_sweeps = 4;
+  (void)shelf->Add("A", known);
+  const auto warnings = [&](bool has_drifted) {
+    const auto profile = std::make_shared<UnitProfile>(shelf, "A", job_.info.intrinsics);
+    ReconstructorOptions as_the_sweep;
+    profile->Begin(as_the_sweep);
+    job_.unit_profile = profile;
+    callbacks_.update = [&](const ScanUpdate&) {
+      SensorProfile learned = *as_the_sweep.profile;
+      learned.covariance(kLensAt, kLensAt) = 0.5e-8;
+      if (has_drifted) learned.mean[kLensAt] += 0.01;
+      as_the_sweep.on_learned(learned);
+    };
+    outcome_.reset();
+    std::filesystem::remove_all(folder_ / "result");
+    Start();
+    Push(12);
+    session_->feed()->Close();
+    const EndedScan outcome = WaitForEnd();
+    EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason.English();
+    EXPECT_EQ(outcome.drift.empty(), !has_drifted);
+    session_.reset();  // nothing calls back any more
+    return outcome.result_json;
+  };
+  EXPECT_EQ(warnings(true), "") << "no reference, no result";
+  std::filesystem::rename(folder_ / "scene", folder_ / "reference");
+  job_.reference_scene = folder_ / "reference";
+  EXPECT_THAT(warnings(true), HasSubstr("no longer agrees with its profile"));
+  EXPECT_THAT(warnings(false), Not(HasSubstr("no longer agrees with its profile")));
+}
+
+TEST_F(ScanSessionTest, ACheckThatIsDiscardedAsItFailsIsNotAFailedCheck) {
+  std::promise<void> started;
+  bool cancels = false;
+  std::vector<bool> has_check;
+  callbacks_.save = [&](const EndedScan& outcome) {
+    has_check.push_back(outcome.check.has_value());
+  };
+  callbacks_.begin = [&]() -> std::filesystem::path {
+    started.get_future().wait();
+    if (cancels) session_->Cancel();
+    throw DataError(Message::Verbatim("no depth"));
+  };
+  job_.check.emplace();
+  const auto ended = [&] {
+    started = std::promise<void>();
+    outcome_.reset();
+    Start();
+    started.set_value();
+    return WaitForEnd().kind;
+  };
+  EXPECT_EQ(ended(), Kind::kNoScene);
+  cancels = true;
+  EXPECT_EQ(ended(), Kind::kCancelled);
+  EXPECT_THAT(has_check, ElementsAre(true, false));
 }
 
 TEST_F(ScanSessionTest, FramesThatTrackingIsTooLateForAreDroppedAndCounted) {
