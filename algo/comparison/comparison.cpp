@@ -263,6 +263,8 @@ class Comparer {
     return {.T_iec_reference = options_.T_iec_reference,
             .u95_m = options_.iec_u95_m,
             .u95_rad = options_.iec_u95_rad,
+            .calibration_u95_m = options_.calibration_u95_m,
+            .calibration_u95_rad = options_.calibration_u95_rad,
             .markers = options_.room_markers,
             .why_not = options_.why_no_room};
   }

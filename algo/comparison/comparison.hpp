@@ -43,6 +43,7 @@ struct CompareOptions {
   /// half-widths of the 95 % interval of T_iec_reference at the isocentre. Not set: exact, with a
   /// warning.
   std::optional<double> iec_u95_m, iec_u95_rad;
+  double calibration_u95_m = 0.0, calibration_u95_rad = 0.0;  ///< See CalibratedRoom.
   /// The taught markers of the room, in the frame that T_iec_reference maps from. Empty: that frame
   /// is found by the current scan's reference marker alone.
   MarkerMap room_markers;

@@ -31,6 +31,20 @@ double ScaleOf(const std::vector<std::pair<const SceneMarker*, const SceneMarker
   return spread_before > 0 ? std::sqrt(spread_now / spread_before) : kNotKnown;
 }
 
+// How far a marker lies from where the others place it.
+struct Displacement {
+  double centre_m = 0.0, corners_m = 0.0;
+  double turn_rad = 0.0;
+};
+
+Displacement DisplacementOf(const MarkerCorners& known, const Pose& T_known_seen,
+                            const MarkerCorners& seen) {
+  const RigidFit own = FitRigid(known, seen);
+  return {.centre_m = (T_known_seen * CentreOf(seen) - CentreOf(known)).norm(),
+          .corners_m = CornerDistance(known, T_known_seen, seen),
+          .turn_rad = own.valid ? RotationAngle(T_known_seen.inverse() * own.T_a_b) : 0.0};
+}
+
 std::int64_t CountOf(const std::vector<std::int64_t>& ids) {
   return static_cast<std::int64_t>(ids.size());
 }
@@ -140,23 +154,32 @@ class Checker {
     const std::vector<int>& agreeing = outcome.alignment->markers_used;
     std::vector<std::pair<const SceneMarker*, const SceneMarker*>> good;
     for (const int id : agreeing) good.emplace_back(&baseline_->markers.at(id), &seen_.at(id));
-    double moved_m = 0.0;
+    const double misfit_mm = outcome.alignment->rms_m / kMillimetre;
+    AtMost("misfit", misfit_mm, limits_.max_misfit_m / kMillimetre, "mm", {},
+           say::check::Misfit(misfit_mm, limits_.max_misfit_m / kMillimetre));
+    Moved(*outcome.alignment);
+    const double scale = 100 * (ScaleOf(good) - 1);
+    AtMost("scale", scale, 100 * limits_.max_scale_error, "%", {}, say::check::Scale(scale));
+  }
+
+  // By the corners: the centre of a marker that was stuck on again upside down has not moved.
+  void Moved(const Alignment& alignment) {
+    Displacement most;
     std::optional<int> worst;  // The alignment used at least one of them.
     for (const auto& [id, marker] : seen_) {
       const auto known = baseline_->markers.find(id);
       if (known == baseline_->markers.end()) continue;
-      const Pose T = FitWithout(id, agreeing).value_or(outcome.alignment->T_reference_current);
-      const double off_m = (T * CentreOf(marker.corners) - CentreOf(known->second.corners)).norm();
-      if (!worst || off_m > moved_m) moved_m = off_m, worst = id;
+      const Pose T = FitWithout(id, alignment.markers_used).value_or(alignment.T_reference_current);
+      const Displacement off = DisplacementOf(known->second.corners, T, marker.corners);
+      if (!worst || off.corners_m > most.corners_m) most = off, worst = id;
     }
-    const double misfit_mm = outcome.alignment->rms_m / kMillimetre,
-                 moved_mm = moved_m / kMillimetre;
-    AtMost("misfit", misfit_mm, limits_.max_misfit_m / kMillimetre, "mm", {},
-           say::check::Misfit(misfit_mm, limits_.max_misfit_m / kMillimetre));
+    const double moved_mm = most.corners_m / kMillimetre;
+    const bool is_turned =
+        most.corners_m > limits_.max_moved_m && most.centre_m <= limits_.max_moved_m;
+    const Message turned = say::check::Turned(worst.value(), most.turn_rad / kDegree);
     AtMost("moved", moved_mm, limits_.max_moved_m / kMillimetre, "mm",
-           say::check::Marker(worst.value()), say::check::Moved(worst.value(), moved_mm));
-    const double scale = 100 * (ScaleOf(good) - 1);
-    AtMost("scale", scale, 100 * limits_.max_scale_error, "%", {}, say::check::Scale(scale));
+           is_turned ? turned : say::check::Marker(*worst),
+           is_turned ? turned : say::check::Moved(*worst, moved_mm));
   }
 
   void Sides() {
@@ -210,6 +233,7 @@ MarkerCheck CheckMarkers(const Scene& scene, const std::optional<MarkerBaseline>
 std::vector<Message> ChangesOfBaseline(const MarkerBaseline& baseline,
                                        const MarkerBaseline& wanted) {
   constexpr double kShown_m = 1 * kMillimetre;
+  constexpr double kShownTurned_m = 2 * kMillimetre;  // a corner is known less well than a centre
   std::vector<Message> changes;
   std::vector<std::int64_t> gone, added;
   for (const auto& [id, marker] : baseline.markers)
@@ -227,11 +251,12 @@ std::vector<Message> ChangesOfBaseline(const MarkerBaseline& baseline,
   for (const auto& [id, marker] : wanted.markers) {
     const auto known = baseline.markers.find(id);
     if (known == baseline.markers.end()) continue;
-    const double moved_m = (outcome.alignment->T_reference_current * CentreOf(marker.corners) -
-                            CentreOf(known->second.corners))
-                               .norm();
-    if (moved_m >= kShown_m)
-      changes.push_back(say::check::BaselineMoved(id, moved_m / kMillimetre));
+    const Displacement off = DisplacementOf(known->second.corners,
+                                            outcome.alignment->T_reference_current, marker.corners);
+    if (off.centre_m >= kShown_m)
+      changes.push_back(say::check::BaselineMoved(id, off.centre_m / kMillimetre));
+    else if (off.corners_m >= kShownTurned_m)
+      changes.push_back(say::check::Turned(id, off.turn_rad / kDegree));
   }
   if (changes.empty()) changes.push_back(say::check::BaselineSame());
   return changes;

@@ -17,7 +17,8 @@ namespace plumb {
 /// Limits of CheckMarkers(). These are starting values; a room may set tighter ones.
 struct MarkerCheckLimits {
   double max_misfit_m = 3 * kMillimetre;  ///< RMS over the corners after the rigid fit.
-  /// Distance of one marker's centre from where all others place it.
+  /// RMS distance of one marker's corners from where all others place them: it sees a marker that
+  /// was turned in its place, too.
   double max_moved_m = 5 * kMillimetre;
   /// Measured side of a marker over its nominal length, minus 1; only where sides are measured.
   double max_side_error = 0.03;
@@ -56,7 +57,8 @@ struct MarkerBaseline {
 [[nodiscard]] MarkerBaseline BaselineOf(const Scene& scene, const MarkerCheckLimits& limits = {});
 
 /// What becomes otherwise if `wanted` takes the place of `baseline`, for people: markers that are
-/// gone, new, or moved by at least 1 mm after the rigid fit. Never empty.
+/// gone, new, moved by at least 1 mm after the rigid fit, or turned by 2 mm at the corners. Never
+/// empty.
 [[nodiscard]] std::vector<Message> ChangesOfBaseline(const MarkerBaseline& baseline,
                                                      const MarkerBaseline& wanted);
 

@@ -98,8 +98,9 @@ PlacedScan PlaceInRoom(const Scene& scan, const CalibratedRoom& room, Preset pre
     PlaceByReferenceMarker(scan, room, min_markers, result);
   }
   if (!room.u95_m || !room.u95_rad) result.warnings.push_back(say::comparison::RoomTakenAsExact());
-  result.uncertainty.room_u95_m = room.u95_m.value_or(0.0);
-  result.uncertainty.room_u95_rad = room.u95_rad.value_or(0.0);
+  result.uncertainty.room_u95_m = std::hypot(room.u95_m.value_or(0.0), room.calibration_u95_m);
+  result.uncertainty.room_u95_rad =
+      std::hypot(room.u95_rad.value_or(0.0), room.calibration_u95_rad);
   return result;
 }
 

@@ -144,6 +144,10 @@ std::variant<BoardFit, Message> FitRoomBoard(const RoomBoard& board, const Marke
   return fit;
 }
 
+double RoomFit::U95_m() const { return std::hypot(shift_m, board_shift_m); }
+
+double RoomFit::U95_rad() const { return std::hypot(turn_rad, board_turn_rad); }
+
 std::variant<RoomFit, Message> FitRoom(std::span<const RoomScan> scans) {
   if (scans.empty()) throw std::invalid_argument("FitRoom() needs a scan");
   std::vector<Pose> boards;  // in the first scan's frame
@@ -159,6 +163,10 @@ std::variant<RoomFit, Message> FitRoom(std::span<const RoomScan> scans) {
     boards.push_back(T_first_scan * scans[i].board.T_scene_board);
   }
   RoomFit fit;
+  for (const RoomScan& scan : scans) {
+    fit.board_shift_m = std::max(fit.board_shift_m, scan.board.shift_uncertainty_m);
+    fit.board_turn_rad = std::max(fit.board_turn_rad, scan.board.turn_uncertainty_rad);
+  }
   Eigen::Vector3d cross = Eigen::Vector3d::Zero();
   Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
   for (const Pose& board : boards) {

@@ -84,6 +84,13 @@ struct RoomFit {
   Pose T_iec_reference = Pose::Identity();  ///< From the first scan's frame to IEC axes.
   double shift_m = 0.0;                     ///< Largest distance of the cross between two scans.
   double turn_rad = 0.0;                    ///< Largest rotation of the board between two scans.
+  /// Largest of the scans' BoardFit::shift_uncertainty_m and turn_uncertainty_rad.
+  double board_shift_m = 0.0, board_turn_rad = 0.0;
+
+  /// Half-widths of 95 % as far as the scans show them: what they differ by, and how well each
+  /// places the board. What all scans share, as lasers that miss the isocentre, is in neither.
+  [[nodiscard]] double U95_m() const;
+  [[nodiscard]] double U95_rad() const;
 };
 
 /// Aligns the scans by the room's markers, which do not move, and averages the positions of the

@@ -80,11 +80,7 @@ RigidFit FitSubset(std::span<const SharedMarker> shared, const Subset& subset, b
 
 // Root mean square corner distance of one marker under an alignment.
 double MarkerResidual(const SharedMarker& marker, const Pose& T_reference_current) {
-  double sum = 0.0;
-  for (std::size_t corner = 0; corner < 4; ++corner) {
-    sum += (marker.reference[corner] - T_reference_current * marker.current[corner]).squaredNorm();
-  }
-  return std::sqrt(sum / 4.0);
+  return CornerDistance(marker.reference, T_reference_current, marker.current);
 }
 
 // Weighted as in the fit: the point about which its rotation and translation are uncorrelated.
@@ -423,6 +419,13 @@ AlignmentOutcome AlignGood(std::span<const SharedMarker> shared, MarkerConsensus
 }
 
 }  // namespace
+
+double CornerDistance(const MarkerCorners& to, const Pose& T_to_from, const MarkerCorners& from) {
+  double sum = 0.0;
+  for (std::size_t corner = 0; corner < to.size(); ++corner)
+    sum += (to[corner] - T_to_from * from[corner]).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(to.size()));
+}
 
 AlignmentOutcome AlignScenes(const MarkerMap& reference, const MarkerMap& current, Preset preset,
                              const MarkerConsensusOptions& options, int min_markers) {

@@ -56,6 +56,11 @@ struct AlignmentOutcome {
   std::vector<Message> warnings;       ///< For example markers that moved.
 };
 
+/// Root mean square distance of a marker's corners from where T_to_from places them. Unlike the
+/// distance of its centres it sees a marker that was turned in its place.
+[[nodiscard]] double CornerDistance(const MarkerCorners& to, const Pose& T_to_from,
+                                    const MarkerCorners& from);
+
 /// Rigid transform between the corners of the markers (ids) in both maps (paper, eq. of the scene
 /// alignment; Horn).
 ///

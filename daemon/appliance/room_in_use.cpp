@@ -89,8 +89,8 @@ std::optional<RoomAxes> RoomInUse::OfJob() const {
     return RoomAxes{room_.calibration->version,
                     room_.calibration->fit.markers_iec,
                     room_.due,
-                    room_.calibration->fit.shift_m,
-                    room_.calibration->fit.turn_rad,
+                    room_.calibration->fit.U95_m(),
+                    room_.calibration->fit.U95_rad(),
                     WhyTooOld(room_.calibration->signed_at, WallClock::now(),
                               config_.appliance.room_max_age_days)};
   if (!room_.due.empty()) return RoomAxes{0, {}, room_.due};

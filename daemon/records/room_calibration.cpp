@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/records/room_calibration.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/records/check_json.hpp"
 #include "daemon/scan_files/scan_files.hpp"
+#include "words/check.hpp"
 #include "words/store.hpp"
 
 namespace plumb {
@@ -141,8 +143,13 @@ SignedRoom SignedRoomIn(const std::string& text) {
     room.fit.T_iec_reference = PoseIn(json.at("T_iec_reference"));
     room.fit.shift_m = json.at("shift_m").get<double>();
     room.fit.turn_rad = json.at("turn_rad").get<double>();
-    for (const Json& scan : json.at("scans"))
+    for (const Json& scan : json.at("scans")) {
       room.check_ids.push_back(scan.at("check").get<std::string>());
+      room.fit.board_shift_m =
+          std::max(room.fit.board_shift_m, scan.at("shift_uncertainty_m").get<double>());
+      room.fit.board_turn_rad =
+          std::max(room.fit.board_turn_rad, scan.at("turn_uncertainty_rad").get<double>());
+    }
     auto markers = MarkersIn(json.at("markers_iec"));
     if (!markers || markers->empty()) throw DataError(say::store::RoomMarkersUnreadable());
     room.fit.markers_iec = std::move(*markers);
@@ -167,9 +174,16 @@ std::optional<Message> WhyRoomIsDue(const SignedRoom& room, const MarkerBaseline
     if (item.name != "misfit" && item.name != "moved") continue;
     if (!answer) answer.emplace();
     if (item.passed || !answer->empty()) continue;
-    *answer = item.name == "moved" ? say::store::RoomMarkerMoved(item.note, item.value)
-                                   : say::store::RoomMisfit(item.value);
+    *answer = item.name == "misfit" ? say::store::RoomMisfit(item.value)
+              : item.note.Is(say::check::kTurned)
+                  ? say::store::RoomMarkerTurned(item.note)
+                  : say::store::RoomMarkerMoved(item.note, item.value);
   }
+  // Enough was seen, and it does not fit: all were moved, or two groups of them.
+  const auto shared = std::count_if(seen.markers.begin(), seen.markers.end(), [&](const auto& one) {
+    return room.fit.markers_iec.contains(one.first);
+  });
+  if (!answer && shared >= limits.min_markers) return say::store::RoomMarkersMoved(shared);
   return answer;
 }
 

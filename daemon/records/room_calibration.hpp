@@ -54,7 +54,8 @@ struct SignedRoom {
 [[nodiscard]] SignedRoom SignedRoomIn(const std::string& json);
 
 /// Why the markers that a check saw show that the room has changed since it was calibrated, as one
-/// sentence; empty if it has not. Nothing if it saw too little to decide.
+/// sentence; empty if it has not. Nothing if it saw too little to decide: fewer of its markers than
+/// place a scan.
 [[nodiscard]] std::optional<Message> WhyRoomIsDue(const SignedRoom& room,
                                                   const MarkerBaseline& seen,
                                                   const MarkerCheckLimits& limits);

@@ -51,6 +51,19 @@ Scene ReadApprovedScene(const std::filesystem::path& folder,
   }
 }
 
+namespace {
+
+/// The current scan is placed by the signed calibration. What the configuration states of the
+/// lasers stays as it is: a calibration cannot know it, and its absence is warned of.
+void JoinBySigned(const RoomAxes& room, CompareOptions& compare) {
+  compare.T_iec_reference = Pose::Identity();
+  compare.room_markers = room.markers_iec;
+  compare.calibration_u95_m = room.u95_m;
+  compare.calibration_u95_rad = room.u95_rad;
+}
+
+}  // namespace
+
 std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Scene& reference,
                                    CompareOptions& compare) {
   if (reference.planning) compare.isocentre_m.reset();  // the origin of its frame
@@ -72,11 +85,7 @@ std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Sc
       compare.why_no_room = say::room::NotForPlan(room->too_old);
       return used;
     }
-    // What the calibration's scans differ by, beside what the configuration states of the lasers.
-    compare.T_iec_reference = Pose::Identity();
-    compare.room_markers = room->markers_iec;
-    compare.iec_u95_m = std::hypot(compare.iec_u95_m.value_or(0.0), room->shift_m);
-    compare.iec_u95_rad = std::hypot(compare.iec_u95_rad.value_or(0.0), room->turn_rad);
+    JoinBySigned(*room, compare);
     return used;
   }
   compare.T_iec_reference = RoomOf(room->markers_iec, reference.markers);
@@ -87,15 +96,15 @@ std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Sc
 std::optional<ResultRoom> TakeOtherRoom(const ImportedRoom& elsewhere,
                                         const std::optional<RoomAxes>& here,
                                         CompareOptions& compare) {
-  const double lasers_m = compare.iec_u95_m.value_or(0.0),
-               lasers_rad = compare.iec_u95_rad.value_or(0.0);
   CalibratedRoom& theirs = compare.reference_room.emplace();
   theirs.why_not = elsewhere.why_not;
   if (elsewhere.room) {
     const RoomFit& fit = elsewhere.room->fit;
     theirs.T_iec_reference = Pose::Identity();
-    theirs.u95_m = std::hypot(lasers_m, fit.shift_m);
-    theirs.u95_rad = std::hypot(lasers_rad, fit.turn_rad);
+    theirs.u95_m = compare.iec_u95_m;
+    theirs.u95_rad = compare.iec_u95_rad;
+    theirs.calibration_u95_m = fit.U95_m();
+    theirs.calibration_u95_rad = fit.U95_rad();
     theirs.markers = fit.markers_iec;
   }
   compare.T_iec_reference.reset();
@@ -103,10 +112,7 @@ std::optional<ResultRoom> TakeOtherRoom(const ImportedRoom& elsewhere,
                         : here->why_not.empty() ? here->too_old
                                                 : here->why_not;
   if (!compare.why_no_room.empty()) return std::nullopt;
-  compare.T_iec_reference = Pose::Identity();
-  compare.room_markers = here->markers_iec;
-  compare.iec_u95_m = std::hypot(lasers_m, here->shift_m);
-  compare.iec_u95_rad = std::hypot(lasers_rad, here->turn_rad);
+  JoinBySigned(*here, compare);
   return ResultRoom{here->version, {}};
 }
 
@@ -147,8 +153,10 @@ void ScanSession::Run(const std::stop_token& stop) {
     outcome_.kind = EndedScan::Kind::kFailed;
     outcome_.reason = Explain(error);
   }
-  if (outcome_.kind != EndedScan::Kind::kDone && stop.stop_requested())
+  if (outcome_.kind != EndedScan::Kind::kDone && stop.stop_requested()) {
     outcome_.kind = EndedScan::Kind::kCancelled;
+    outcome_.check.reset();  // one that is discarded as it fails is not a failed check
+  }
   Save();
   // The stored reference was good, and only now differs.
   if (outcome_.kind == EndedScan::Kind::kDone && job_.unit_profile &&
@@ -378,6 +386,7 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
       comparison->warnings.push_back(
           say::room::CalibrationNotUsed(room->version, room->why_not_used));
     }
+    if (!outcome_.drift.empty()) comparison->warnings.push_back(outcome_.drift);
     pictures = DrawResult(*comparison, reference.height_map ? &*reference.height_map : nullptr,
                           {.tolerance_m = job_.compare.limits.shift_tolerance_m,
                            .subtitle = PictureSubtitle(*comparison)});

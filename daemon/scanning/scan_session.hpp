@@ -41,9 +41,8 @@ struct CheckJob {
 struct RoomAxes {
   int version = 0;
   MarkerMap markers_iec;
-  Message why_not;  ///< Why it is not used at present; empty if it is.
-  /// Largest differences between two of its scans: its uncertainty for a planning CT.
-  double shift_m = 0.0, turn_rad = 0.0;
+  Message why_not;                    ///< Why it is not used at present; empty if it is.
+  double u95_m = 0.0, u95_rad = 0.0;  ///< RoomFit::U95_m() and U95_rad().
   /// Why it is too old to join what shares no marker with the scan; empty if it is not.
   Message too_old = {};
 };

@@ -8,6 +8,7 @@
 #include <future>
 #include <mutex>
 #include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,6 +26,7 @@ namespace {
 using ::testing::ElementsAre;
 using testing::FakeBus;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Kind = EndedScan::Kind;
 
 class ScanSessionTest : public ::testing::Test {
@@ -78,11 +80,17 @@ class ScanSessionTest : public ::testing::Test {
   std::unique_ptr<ScanSession> session_;
 };
 
-TEST(TakeOtherRoomTest, BothRoomsCalibrationsAreInTheIntervals) {
+// What is stated of the lasers stays apart from what the calibrations found of themselves: nothing
+// stated is not exact.
+TEST(TakeOtherRoomTest, BothRoomsCalibrationsAreInTheIntervalsBesideTheLasers) {
   ImportedRoom elsewhere{.unit = "plumb-a", .version = 2, .room = SignedRoom{}};
   elsewhere.room->fit.markers_iec = {{4, {}}};
   elsewhere.room->fit.shift_m = 0.004;
-  const RoomAxes here{.version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .shift_m = 0.012};
+  elsewhere.room->fit.board_shift_m = 0.003;
+  elsewhere.room->fit.turn_rad = 0.0012;
+  elsewhere.room->fit.board_turn_rad = 0.0005;
+  const RoomAxes here{
+      .version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .u95_m = 0.012, .u95_rad = 0.002};
   CompareOptions compare;
   compare.iec_u95_m = 0.003;
   const auto used = TakeOtherRoom(elsewhere, here, compare);
@@ -91,8 +99,14 @@ TEST(TakeOtherRoomTest, BothRoomsCalibrationsAreInTheIntervals) {
   ASSERT_TRUE(compare.reference_room);
   EXPECT_TRUE(compare.reference_room->markers.contains(4));
   EXPECT_TRUE(compare.room_markers.contains(5));
-  EXPECT_NEAR(compare.reference_room->u95_m.value_or(0), 0.005, 1e-12);
-  EXPECT_NEAR(compare.iec_u95_m.value_or(0), std::hypot(0.003, 0.012), 1e-12);
+  EXPECT_EQ(compare.reference_room->u95_m, 0.003);
+  EXPECT_FALSE(compare.reference_room->u95_rad);
+  EXPECT_NEAR(compare.reference_room->calibration_u95_m, 0.005, 1e-12);
+  EXPECT_NEAR(compare.reference_room->calibration_u95_rad, 0.0013, 1e-12);
+  EXPECT_EQ(compare.iec_u95_m, 0.003);
+  EXPECT_FALSE(compare.iec_u95_rad);
+  EXPECT_EQ(compare.calibration_u95_m, 0.012);
+  EXPECT_EQ(compare.calibration_u95_rad, 0.002);
 }
 
 TEST(TakeOtherRoomTest, WithoutACalibrationOnEitherSideThereIsNoAnswer) {
@@ -143,13 +157,17 @@ TEST(TakeRoomTest, APlanningCtIsMetByTheRoomsMarkersWithTheSpreadOfTheCalibratio
   compare.isocentre_m = Eigen::Vector3d(1, 2, 3);
   compare.T_iec_reference = Pose::Identity();
   compare.iec_u95_m = 0.003;
-  RoomAxes room{.version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .shift_m = 0.004};
+  RoomAxes room{
+      .version = 7, .markers_iec = {{5, {}}}, .why_not = {}, .u95_m = 0.004, .u95_rad = 0.001};
   const auto used = TakeRoom(room, planned, compare);
   ASSERT_TRUE(used.has_value());
   EXPECT_TRUE(used->why_not_used.empty());
   EXPECT_FALSE(compare.isocentre_m) << "the origin of its frame";
   EXPECT_TRUE(compare.room_markers.contains(5));
-  EXPECT_NEAR(compare.iec_u95_m.value_or(0), 0.005, 1e-12);
+  EXPECT_EQ(compare.iec_u95_m, 0.003);
+  EXPECT_FALSE(compare.iec_u95_rad) << "nothing stated is not exact";
+  EXPECT_EQ(compare.calibration_u95_m, 0.004);
+  EXPECT_EQ(compare.calibration_u95_rad, 0.001);
 
   CompareOptions without;
   EXPECT_FALSE(TakeRoom(std::nullopt, planned, without));
@@ -210,6 +228,68 @@ TEST_F(ScanSessionTest, WhatIsKnownOfTheSensorReachesTheSceneAndAScanWithoutMark
   scan_with("B");
   EXPECT_EQ(shelf->Versions("A").size(), 1U);
   EXPECT_TRUE(shelf->Versions("B").empty());
+}
+
+// Whoever acts on a result, or reads its report, learns that its sensor has changed.
+TEST_F(ScanSessionTest, AUnitThatNoLongerAgreesWithItsProfileIsAWarningOfTheResult) {
+  auto shelf = std::make_shared<ProfileShelf>(folder_ / "profiles");
+  SensorProfile known = ProfileOfAnyUnit(job_.info.intrinsics);
+  known.covariance(kLensAt, kLensAt) = 1e-8;
+  known.num_sweeps = 4;
+  (void)shelf->Add("A", known);
+  const auto warnings = [&](bool has_drifted) {
+    const auto profile = std::make_shared<UnitProfile>(shelf, "A", job_.info.intrinsics);
+    ReconstructorOptions as_the_sweep;
+    profile->Begin(as_the_sweep);
+    job_.unit_profile = profile;
+    callbacks_.update = [&](const ScanUpdate&) {
+      SensorProfile learned = *as_the_sweep.profile;
+      learned.covariance(kLensAt, kLensAt) = 0.5e-8;
+      if (has_drifted) learned.mean[kLensAt] += 0.01;
+      as_the_sweep.on_learned(learned);
+    };
+    outcome_.reset();
+    std::filesystem::remove_all(folder_ / "result");
+    Start();
+    Push(12);
+    session_->feed()->Close();
+    const EndedScan outcome = WaitForEnd();
+    EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason.English();
+    EXPECT_EQ(outcome.drift.empty(), !has_drifted);
+    session_.reset();  // nothing calls back any more
+    return outcome.result_json;
+  };
+  EXPECT_EQ(warnings(true), "") << "no reference, no result";
+  std::filesystem::rename(folder_ / "scene", folder_ / "reference");
+  job_.reference_scene = folder_ / "reference";
+  EXPECT_THAT(warnings(true), HasSubstr("no longer agrees with its profile"));
+  EXPECT_THAT(warnings(false), Not(HasSubstr("no longer agrees with its profile")));
+}
+
+TEST_F(ScanSessionTest, ACheckThatIsDiscardedAsItFailsIsNotAFailedCheck) {
+  std::promise<void> started;
+  bool cancels = false;
+  std::vector<bool> has_check;
+  callbacks_.save = [&](const EndedScan& outcome) {
+    has_check.push_back(outcome.check.has_value());
+  };
+  callbacks_.begin = [&]() -> std::filesystem::path {
+    started.get_future().wait();
+    if (cancels) session_->Cancel();
+    throw DataError(Message::Verbatim("no depth"));
+  };
+  job_.check.emplace();
+  const auto ended = [&] {
+    started = std::promise<void>();
+    outcome_.reset();
+    Start();
+    started.set_value();
+    return WaitForEnd().kind;
+  };
+  EXPECT_EQ(ended(), Kind::kNoScene);
+  cancels = true;
+  EXPECT_EQ(ended(), Kind::kCancelled);
+  EXPECT_THAT(has_check, ElementsAre(true, false));
 }
 
 TEST_F(ScanSessionTest, FramesThatTrackingIsTooLateForAreDroppedAndCounted) {

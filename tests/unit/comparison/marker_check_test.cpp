@@ -15,6 +15,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 constexpr double kLength_m = 0.104;
 
@@ -89,6 +90,67 @@ TEST(MarkerCheckTest, TheLimitOfAMoveIsWhereItIsSaid) {
     EXPECT_EQ(far.status, MarkerCheckStatus::kFailed);
     EXPECT_THAT(EnglishTexts(far.reasons), Contains(HasSubstr("marker 7 moved 5 mm")));
   }
+}
+
+// About its own centre, by an axis of the marker.
+void Turn(Scene& scene, int id, double angle_deg,
+          const Eigen::Vector3d& axis = Eigen::Vector3d::UnitZ()) {
+  const Eigen::Vector3d centre = CentreOf(scene.markers[id].corners);
+  const Eigen::AngleAxisd turn(angle_deg * kDegree, axis);
+  for (Eigen::Vector3d& corner : scene.markers[id].corners)
+    corner = centre + turn * (corner - centre);
+}
+
+TEST(MarkerCheckTest, AMarkerThatWasTurnedInItsPlaceIsNamedWithItsAngle) {
+  for (const int angle_deg : {5, 90, 180}) {
+    Scene scene = Room();
+    Turn(scene, 7, angle_deg);
+    const MarkerCheck check = Against(scene);
+    EXPECT_EQ(check.status, MarkerCheckStatus::kFailed) << angle_deg;
+    EXPECT_FALSE(Item(check, "moved").passed);
+    EXPECT_THAT(EnglishTexts(check.reasons),
+                ElementsAre("marker 7 was turned by " + std::to_string(angle_deg) + " deg"));
+    EXPECT_EQ(Item(check, "moved").note, check.reasons.at(0)) << "no centre that moved";
+    EXPECT_TRUE(Item(check, "misfit").passed);
+  }
+  Scene lifted = Room();  // at one of its sides
+  Turn(lifted, 7, 8, Eigen::Vector3d::UnitX());
+  EXPECT_THAT(EnglishTexts(Against(lifted).reasons), ElementsAre("marker 7 was turned by 8 deg"));
+  Scene moved = Room();
+  Turn(moved, 7, 90);
+  Move(moved, 7, {0.02, 0, 0});
+  EXPECT_THAT(EnglishTexts(Against(moved).reasons), ElementsAre(HasSubstr("marker 7 moved 1")));
+}
+
+// Each corner lies 73.5 mm from the centre: it moves by 5 mm at 3.9 deg.
+TEST(MarkerCheckTest, TheLimitOfATurnIsThatOfAMoveAtTheCorners) {
+  Scene scene = Room();
+  Turn(scene, 7, 3.85);
+  const MarkerCheck near = Against(scene);
+  EXPECT_EQ(near.status, MarkerCheckStatus::kPassed);
+  EXPECT_NEAR(Item(near, "moved").value, 4.94, 0.01);
+  EXPECT_EQ(Item(near, "moved").note.English(), "marker 7");
+  scene = Room();
+  Turn(scene, 7, 3.95);
+  EXPECT_EQ(Against(scene).status, MarkerCheckStatus::kFailed);
+  MarkerCheckLimits tight;
+  tight.max_moved_m = 0.002;
+  scene = Room();
+  Turn(scene, 7, 1.5);
+  EXPECT_EQ(CheckMarkers(scene, BaselineOf(Room()), tight).status, MarkerCheckStatus::kPassed);
+  Turn(scene, 7, 0.2);
+  EXPECT_EQ(CheckMarkers(scene, BaselineOf(Room()), tight).status, MarkerCheckStatus::kFailed);
+}
+
+TEST(MarkerCheckTest, AnotherBaselineNamesWhatWasTurned) {
+  const auto changes = [](double angle_deg) {
+    Scene scene = Room();
+    Turn(scene, 7, angle_deg);
+    return EnglishTexts(ChangesOfBaseline(BaselineOf(Room()), BaselineOf(scene)));
+  };
+  EXPECT_THAT(changes(180), ElementsAre("marker 7 was turned by 180 deg"));
+  EXPECT_THAT(changes(3), ElementsAre("marker 7 was turned by 3 deg"));
+  EXPECT_THAT(changes(1), ElementsAre(Not(HasSubstr("turned"))));
 }
 
 TEST(MarkerCheckTest, AMoveWithinTheLimitPasses) {

@@ -189,6 +189,29 @@ TEST(PlannedReferenceTest, ARoomWithoutAnUncertaintyIsTakenAsExactAndSaid) {
   EXPECT_NEAR(stated.motion->uncertainty.room(0, 0), std::pow(0.1 * kDegree / 1.96, 2), 1e-9);
 }
 
+// With and without a statement of the lasers: a signed calibration widens the intervals, and is no
+// statement.
+TEST(PlannedReferenceTest, WhatACalibrationFoundOfItselfCountsButStatesNothingOfTheLasers) {
+  const Scene current = Current(Pose::Identity());
+  const auto share = [](const Comparison& comparison) {
+    return comparison.motion ? comparison.motion->uncertainty.room(0, 0) : -1.0;
+  };
+  CompareOptions options = InRoom();
+  options.calibration_u95_rad = 0.2 * kDegree;
+  const Comparison stated = Compare(PlannedScene(), current, options);
+  EXPECT_THAT(stated.warnings, Not(Says(say::comparison::kRoomTakenAsExact)));
+  EXPECT_NEAR(share(stated),
+              (std::pow(0.1 * kDegree, 2) + std::pow(0.2 * kDegree, 2)) / std::pow(1.96, 2), 1e-9);
+  options.iec_u95_m.reset();
+  options.iec_u95_rad.reset();
+  options.calibration_u95_m = 0.002;
+  const Comparison unstated = Compare(PlannedScene(), current, options);
+  EXPECT_THAT(unstated.warnings, Says(say::comparison::kRoomTakenAsExact));
+  EXPECT_NEAR(share(unstated), std::pow(0.2 * kDegree / 1.96, 2), 1e-9);
+  ASSERT_TRUE(unstated.motion);
+  EXPECT_GT(unstated.motion->uncertainty.room(3, 3), 0.9 * std::pow(0.002 / 1.96, 2));
+}
+
 TEST(PlannedReferenceTest, TheSkinCountsMostlyUpwards) {
   const Comparison comparison = Compare(PlannedScene(), Current(Pose::Identity()), InRoom());
   ASSERT_TRUE(comparison.motion);

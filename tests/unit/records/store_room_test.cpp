@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The room's calibration in the store: from check scans over the board to a signed version.
+#include <cmath>
 #include <filesystem>
 
 #include <gmock/gmock.h>
@@ -64,6 +65,11 @@ TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_EQ(room->digest, candidate.digest);
   EXPECT_EQ(room->room_markers.reference, 0);
   EXPECT_EQ(room->check_ids, (std::vector<std::string>{"3", "2", "1"}));
+  const BoardFit& board = candidate.scans.at(0).scan->board;
+  EXPECT_NEAR(room->fit.board_shift_m, board.shift_uncertainty_m, 1e-9);
+  EXPECT_NEAR(room->fit.board_turn_rad, board.turn_uncertainty_rad, 1e-9);
+  EXPECT_NEAR(room->fit.U95_m(), std::hypot(0.0006, board.shift_uncertainty_m), 1e-6);
+  EXPECT_GE(room->fit.U95_rad(), board.turn_uncertainty_rad);
   // The mean of boards at 0, 0 and 0.6 mm along x.
   EXPECT_TRUE(room->fit.T_iec_reference.isApprox(
       Pose(Eigen::Translation3d(-0.0002, 0, 0)) * SceneFromRoom().inverse(), 1e-6));
@@ -123,6 +129,49 @@ TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
   EXPECT_EQ(after(0.0081), "marker 4 moved 8 mm since the room was calibrated");
   EXPECT_THAT(after(0, 2), HasSubstr("marker 4")) << "a check that saw too little says nothing";
   EXPECT_EQ(after(0), "") << "it was put back";
+}
+
+TEST_F(StoreRoomTest, AMarkerThatWasTurnedInItsPlaceMakesItDue) {
+  Scan(), Scan(), Scan();
+  (void)Sign(Candidate().digest);
+  const SignedRoom room = *store_->room.Newest();
+  const auto after = [&](double turn_deg) {
+    MarkerMap markers = MarkersOfRoom();
+    MarkerCorners& corners = markers.at(4).corners;
+    const Eigen::Vector3d centre = CentreOf(corners);
+    const Eigen::AngleAxisd turn(turn_deg * kDegree, Eigen::Vector3d::UnitZ());
+    for (Eigen::Vector3d& corner : corners) corner = centre + turn * (corner - centre);
+    store_->checks.Add(kEve, "S1", CheckOver(0, 0, markers));
+    return store_->room.WhyDue(room, {}).English();
+  };
+  EXPECT_EQ(after(180), "since the room was calibrated: marker 4 was turned by 180 deg");
+  EXPECT_EQ(after(3), "") << "below the limit";
+}
+
+// Not "too little was seen": an older check, which agreed, does not count any more.
+TEST_F(StoreRoomTest, MarkersOfWhichTooFewAgreeMakeItDueWhateverAnOlderCheckSaw) {
+  Scan(), Scan(), Scan();
+  (void)Sign(Candidate().digest);
+  const SignedRoom room = *store_->room.Newest();
+  // The first `moved` of the six, each its own way, and `seen` of them.
+  const auto after = [&](int moved, int seen = 6) {
+    MarkerMap markers = MarkersOfRoom();
+    for (int id = 0; id < moved; ++id) {
+      for (Eigen::Vector3d& corner : markers.at(id).corners)
+        corner += Eigen::Vector3d(0.05 * (id % 2 + 1), 0.03 * id * id, 0.02 * id);
+    }
+    for (int id = seen; id < 6; ++id) markers.erase(id);
+    store_->checks.Add(kEve, "S1", CheckOver(0, 0, markers));
+    return store_->room.WhyDue(room, {}).English();
+  };
+  EXPECT_EQ(after(0), "");
+  EXPECT_EQ(
+      after(6),
+      "the 6 markers that were seen do not lie to each other as when the room was calibrated");
+  EXPECT_EQ(after(0), "") << "they were put back";
+  EXPECT_THAT(after(3, 3), HasSubstr("the 3 markers that were seen"));
+  EXPECT_EQ(after(0), "");
+  EXPECT_EQ(after(2, 2), "") << "two say nothing";
 }
 
 TEST_F(StoreRoomTest, ChecksCountEvenIfTheClockWasSetBackAfterTheSignature) {
