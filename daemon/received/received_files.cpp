@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <functional>
-#include <ranges>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -201,10 +200,10 @@ void ReceivedFiles::ReadSome(const Found& found) {
     known_[file.name] = std::move(known);
   }
   // The oldest first: those of a series that has come as a whole must not wait for the next one.
-  for (const auto until = Steady::now() + reading_images_;
-       const auto& image : found.images | std::views::reverse) {
-    if (images_.IsKnown(image.name)) continue;
-    images_.Read(spool_, image.name);
+  const auto until = Steady::now() + reading_images_;
+  for (auto image = found.images.rbegin(); image != found.images.rend(); ++image) {
+    if (images_.IsKnown(image->name)) continue;
+    images_.Read(spool_, image->name);
     is_changed = true;
     if (Steady::now() >= until) break;
   }
