@@ -11,6 +11,7 @@
 #include "daemon/database/schema.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/unit/records/store_fixture.hpp"
+#include "words/backup.hpp"
 
 namespace plumb {
 namespace {
@@ -211,7 +212,10 @@ TEST_F(RetentionTest, ThatABackupIsVerifiedIsAskedForTwiceAYear) {
     return store->audit.Find({0, 1, action})[0].time;
   };
   EXPECT_FALSE(is_due(WallClock::now() + 10 * kVerifiedEvery)) << "there is no backup";
-  store->audit.Log(kAnna, "backup.make", "", Message());
+  const Message made = say::backup::LogMade("/backups/one", 3, 20, 1000, 0);
+  store->audit.Log(kAnna, "backup.make", "", made);
+  EXPECT_FALSE(is_due(WallClock::now() + 10 * kVerifiedEvery)) << "it is not encrypted";
+  store->audit.Log(kAnna, "backup.make", "", say::backup::LogEncrypted(made));
   const WallClock::time_point first = time_of("backup.make");
   EXPECT_FALSE(is_due(first + hours(24 * 183)));
   EXPECT_TRUE(is_due(first + hours(24 * 183) + seconds(1)));
