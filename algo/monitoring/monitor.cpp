@@ -151,7 +151,7 @@ MonitorLine Monitor::LineAside(const Frame& frame, std::size_t index) const {
   MonitorLine line{.time_s = frame.depth_time_s, .sensor = index, .takes_part = false};
   if (sensor.moved) {
     line.state = MonitorState::kMovedSensor;
-  } else if (sensor.takes_part) {  // a repeated image
+  } else if (sensor.takes_part) {  // Add() took its image for a repetition.
     line.state = MonitorState::kBlind;
   } else if (sensor.at_rest.stage() != RestStage::kMounting) {
     line.state = MonitorState::kBlind;

@@ -31,7 +31,7 @@ constexpr double kDriftTime_s = 10.0;
 constexpr float kRecent = 0.2F;
 constexpr std::size_t kLeastRegionBlocks = 300;
 
-// Where nothing is measured, as of a covered sensor, nothing is repeated.
+// Images without any depth, as a covered sensor gives them, do not count as equal.
 bool IsSameImage(const std::vector<float>& one, const std::vector<float>& other) {
   return one == other && std::ranges::any_of(one, [](float inverse) { return inverse > 0; });
 }
@@ -134,7 +134,7 @@ FitView SensorAtRest::ViewOf(const BlockImage& image, const Eigen::Vector2d& mod
 }
 
 bool SensorAtRest::RepeatedAtZero() const {
-  std::size_t first = 0;  // of those that are the same
+  std::size_t first = 0;  // The first of a run of equal images.
   for (std::size_t i = 1; i < still_.size(); ++i) {
     if (IsSameImage(still_.inverse_depth[i], still_.inverse_depth[i - 1])) continue;
     if (still_.time_s[i - 1] - still_.time_s[first] > kLongestGap_s) return true;

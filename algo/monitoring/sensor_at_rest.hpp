@@ -66,9 +66,9 @@ class SensorAtRest {
   [[nodiscard]] bool Zero(ZeroKind kind = ZeroKind::kAny);
 
   /// Of a frame after the zero: averages it, follows the drift, checks the place some times a
-  /// second. Nothing is done with one that repeats the depth of the one before to the last bit: it
-  /// was measured once. No sensor does so by chance; one without noise, which stood still at the
-  /// zero for longer than kLongestGap_s, is believed.
+  /// second. A frame whose depth equals that of the frame before to the last bit is ignored,
+  /// because the noise of a real sensor never repeats. A sensor without noise is recognised while
+  /// zeroing, by equal images for longer than kLongestGap_s, and its equal images are used.
   [[nodiscard]] SeenImage See(const Frame& frame);
   /// Call after the sensor was away: what it saw of its place before no longer counts.
   void ForgetPlace();

@@ -16,7 +16,8 @@ namespace {
 constexpr double kSamePlace_m = 0.01 * kMillimetre;
 constexpr double kSameHeight_m = 1e-6;
 constexpr double kBesideCut_m = 15 * kMillimetre;
-// Far more than the outlines of a body and its arms have, and few enough for seconds and megabytes.
+// Outlines of a body and its arms have far fewer; at these limits the surface still takes seconds
+// and megabytes.
 constexpr std::size_t kMostSlices = 10'000, kMostParts = 500, kMostCrossings = 50;
 constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 

@@ -281,7 +281,7 @@ ReceivedFiles::SeriesFiles ReceivedFiles::ImagesOf(const std::string& series) {
 
 Message ReceivedFiles::WhyNotWhole(const std::vector<fs::path>& files,
                                    const std::vector<ReceivedImages::Image>& images) const {
-  // What came longer after the newest one belongs to another sending.
+  // An image that came later than this belongs to another transmission.
   const auto end =
       files.empty() ? fs::file_time_type::max() : fs::last_write_time(files.front()) + kSeriesPause;
   for (const ReceivedImages::Image& image : images)

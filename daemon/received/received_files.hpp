@@ -45,8 +45,8 @@ class ReceivedFiles {
   /// @throws DataError if there is no such file.
   [[nodiscard]] std::filesystem::path PathOf(const std::string& name) const;
 
-  /// A sender takes less between two images of a series: one whose newest image is not that old
-  /// may still be arriving.
+  /// A series whose newest image is younger than this may still be arriving. This is an
+  /// assumption: how long senders of clinics pause was not measured.
   static constexpr std::chrono::seconds kSeriesPause{60};
   struct SeriesFiles {
     std::vector<std::filesystem::path> files;

@@ -47,7 +47,7 @@ void ReceivedImages::Read(const std::filesystem::path& spool, const std::string&
   } catch (const DataError& error) {
     fault_ = error.message();
   }
-  // Known only now: one that could not be read for another cause is read again.
+  // The image counts as known only from here on, so that it is read again after any other error.
   if (!series.empty()) facts_.try_emplace(series, std::move(facts));
   series_of_[name] = std::move(series);
 }

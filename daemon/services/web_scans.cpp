@@ -53,9 +53,9 @@ class WebScans final : public web::ScanService {
     const bool is_last = status.last_result && status.last_result->id == id;
     const bool is_valid = is_last && status.last_result->age_s.has_value() &&
                           *status.last_result->age_s <= kResultValid_s;
-    if (scan->result && !is_valid) return done(AnswerOf(say::scan::ResultTooOld()));
-    if (scan->result && status.last_result->is_superseded)
+    if (is_last && status.last_result->is_superseded)
       return done(AnswerOf(say::store::ScanNotNewest()));
+    if (scan->result && !is_valid) return done(AnswerOf(say::scan::ResultTooOld()));
     // Another person may be on the couch by now, or the same one on another day.
     const auto& open = status.session;
     if (!scan->patient_id.empty() && (!open || open->id != scan->session_id))

@@ -40,12 +40,13 @@ def check_taken_over(folder, count):
              "--unit", unit, "--state", state],
             check=True, stdout=subprocess.DEVNULL,
         )  # fmt: skip
-        told = {name: data.decode() for name, data in files(unit).items()}
-        assert told["serial"].strip() == f"PL-{n:04}", told
-        assert told["host-name"].strip() == f"plumb-{n}", told
-        assert f"Address=192.168.10.{n}/24\n" in told["network"], told
-        assert "NTP=ntp.example\n" in told["time-servers"], told
-        assert (state / "provisioned-display").read_text().strip().endswith(f" Room {n}")
+        display = (state / "provisioned-display").read_text()
+        settings = {name: data.decode().strip() for name, data in files(unit).items()}
+        lines = settings["network"].splitlines() + settings["time-servers"].splitlines()
+        found = (settings["serial"], settings["host-name"], display.strip()[-len(f" Room {n}"):],
+                 f"Address=192.168.10.{n}/24" in lines, "NTP=ntp.example" in lines)  # fmt: skip
+        expected = (f"PL-{n:04}", f"plumb-{n}", f" Room {n}", True, True)
+        assert found == expected, f"unit {n}: expected {expected}, found {found}"
 
 
 def check_twenty(folder):

@@ -17,6 +17,7 @@
 #include "tests/unit/records/scan_folder.hpp"
 #include "web/exchange/json.hpp"
 #include "words/scan.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -249,9 +250,16 @@ TEST_F(ApplianceTest, ASweepThatIsDiscardedDoesNotMakeTheResultBeforeItValidAgai
     });
     ASSERT_TRUE(Becomes([&] { return !IsRunning() && appliance_->WebStatus().last_result; }));
     std::string scan;
+    const auto why_not_accepted = [&] {
+      Change accepted;
+      services_->services().scans.AcceptScan(kTester, scan, "",
+                                             [&](const Change& change) { accepted = change; });
+      return accepted.message.English();
+    };
     On([&] {
       scan = appliance_->WebStatus().last_result->id;
       EXPECT_FALSE(appliance_->WebStatus().last_result->is_superseded);
+      EXPECT_NE(why_not_accepted(), say::store::ScanNotNewest().English());
       press(ButtonPress::kShort);
       press(ButtonPress::kLong);
     });
@@ -260,6 +268,7 @@ TEST_F(ApplianceTest, ASweepThatIsDiscardedDoesNotMakeTheResultBeforeItValidAgai
       ASSERT_TRUE(appliance_->WebStatus().last_result);
       EXPECT_EQ(appliance_->WebStatus().last_result->id, scan);
       EXPECT_TRUE(appliance_->WebStatus().last_result->is_superseded);
+      EXPECT_EQ(why_not_accepted(), say::store::ScanNotNewest().English());
     });
   });
 }

@@ -91,6 +91,14 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
     ChangeDatabase("DROP TRIGGER audit_no_update; UPDATE audit SET time = time - " +
                    std::to_string(kDays_us));
   }
+  /// That nobody is asked to verify, while one more backup is made and for some time after.
+  void ExpectNoReminderAfterABackup() {
+    Play([&] {
+      ASSERT_TRUE(Comes([&] { return Backups().size() == 2; }));
+      WaitForTicks(400);
+      On([&] { EXPECT_FALSE(Warns(kVerificationDue)); });
+    });
+  }
   void EncryptBackups() {
     parts_.config.appliance.backup_recipients =
         AgeRecipients({"age1z8q8p3f3getd6h87azd0zc2vzskwttwywjqumzv8yqddd73pwg3svc56n6"});
@@ -173,22 +181,14 @@ TEST_F(ApplianceUpkeepTest, ABackupFromThePageEndsTheWarningOfAFailedOne) {
 TEST_F(ApplianceUpkeepTest, APlainBackupIsOpenedByPlumbdItselfAndAsksNobody) {
   parts_.config.appliance.backup_folder = folder_ / "backups";
   LetABackupBeOld(true);
-  Play([&] {
-    ASSERT_TRUE(Comes([&] { return Backups().size() == 2; }));
-    WaitForTicks(400);
-    On([&] { EXPECT_FALSE(Warns(kVerificationDue)); });
-  });
+  ExpectNoReminderAfterABackup();
 }
 
 TEST_F(ApplianceUpkeepTest, TheDayOnWhichBackupsAreFirstEncryptedIsNotHalfAYearTooLate) {
   parts_.config.appliance.backup_folder = folder_ / "backups";
   EncryptBackups();
   LetABackupBeOld(false);
-  Play([&] {
-    ASSERT_TRUE(Comes([&] { return Backups().size() == 2; }));
-    WaitForTicks(400);
-    On([&] { EXPECT_FALSE(Warns(kVerificationDue)); });
-  });
+  ExpectNoReminderAfterABackup();
 }
 
 TEST_F(ApplianceUpkeepTest, ThatAnEncryptedBackupIsToBeVerifiedIsAWarningUntilItIsNoted) {

@@ -36,6 +36,11 @@ class StoreRoomTest : public ::testing::Test {
       return {refusal.result(), refusal.what()};
     }
   }
+  SignedRoom SignedAfterThreeScans() {
+    Scan(), Scan(), Scan();
+    (void)Sign(Candidate().digest);
+    return store_->room.Newest().value();
+  }
 
   testing::TempFolder folder_;
   WallClock::time_point since_ = WallClock::now() - std::chrono::hours(1);
@@ -114,9 +119,7 @@ TEST_F(StoreRoomTest, AScanThatCannotBeUsedSaysWhy) {
 }
 
 TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
-  Scan(), Scan(), Scan();
-  (void)Sign(Candidate().digest);
-  const SignedRoom room = *store_->room.Newest();
+  const SignedRoom room = SignedAfterThreeScans();
   const auto after = [&](double moved_m, int num_seen = 6) {
     MarkerMap markers = MarkersOfRoom();
     for (Eigen::Vector3d& corner : markers.at(4).corners) corner.x() += moved_m;
@@ -132,9 +135,7 @@ TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
 }
 
 TEST_F(StoreRoomTest, AMarkerThatWasTurnedInItsPlaceMakesItDue) {
-  Scan(), Scan(), Scan();
-  (void)Sign(Candidate().digest);
-  const SignedRoom room = *store_->room.Newest();
+  const SignedRoom room = SignedAfterThreeScans();
   const auto after = [&](double turn_deg) {
     MarkerMap markers = MarkersOfRoom();
     MarkerCorners& corners = markers.at(4).corners;
@@ -150,9 +151,7 @@ TEST_F(StoreRoomTest, AMarkerThatWasTurnedInItsPlaceMakesItDue) {
 
 // Not "too little was seen": an older check, which agreed, does not count any more.
 TEST_F(StoreRoomTest, MarkersOfWhichTooFewAgreeMakeItDueWhateverAnOlderCheckSaw) {
-  Scan(), Scan(), Scan();
-  (void)Sign(Candidate().digest);
-  const SignedRoom room = *store_->room.Newest();
+  const SignedRoom room = SignedAfterThreeScans();
   // The first `moved` of the six, each its own way, and `seen` of them.
   const auto after = [&](int moved, int seen = 6) {
     MarkerMap markers = MarkersOfRoom();

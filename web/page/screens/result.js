@@ -17,7 +17,8 @@ import { meshView } from './mesh_view.js';
 import { recordsOf } from '../monitoring/monitoring_record.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
 
-const kNew_s = 1;  // what the page has just been told is not asked for again
+/// A status that arrived at most this long ago is used instead of a new request.
+const kNew_s = 1;
 
 /// The newest finished scan: of this run of the appliance, else the newest that is stored.
 const newest = async (last) => last
