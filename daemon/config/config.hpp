@@ -159,7 +159,8 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///                    fixed_sensors, sensor_profiles, quota_gb, auto_stop_s, scan_limit_s,
 ///                    keep_recordings, code_check_character, warm_up_min, session_idle_min,
 ///                    room_max_age_days
-///     [sensor]       driver, socket
+///     [sensor]       driver, socket, library, exposure_us
+
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low
 ///     [monitor]      gate_chip, gate_line, gate_active_low
