@@ -93,8 +93,7 @@ std::vector<fs::path> Papers() {
   return papers;
 }
 
-/// Links and pictures of a paper that lead to nothing. The site also looks for pictures in its own
-/// folder of pictures.
+/// Links and pictures of a paper that lead to nothing, wherever the paper is read.
 std::vector<std::string> DeadLinks(const fs::path& paper, const std::string& text) {
   static const std::regex kLink(R"(\]\(([^)\s#]+)(?:#[^)]*)?\))");
   const fs::path root = PLUMB_SOURCE_DIR;
@@ -102,9 +101,7 @@ std::vector<std::string> DeadLinks(const fs::path& paper, const std::string& tex
   for (std::sregex_iterator match(text.begin(), text.end(), kLink), end; match != end; ++match) {
     const std::string target = (*match)[1];
     if (target.find("://") != std::string::npos) continue;
-    if (!fs::exists(root / paper.parent_path() / target) &&
-        !(paper.parent_path() == "docs" && fs::exists(root / "docs/pictures" / target)))
-      dead.push_back(target);
+    if (!fs::exists(root / paper.parent_path() / target)) dead.push_back(target);
   }
   return dead;
 }
