@@ -2,6 +2,7 @@
 #include "tests/integration/command_line.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -108,10 +109,12 @@ fs::path SmallScene(const std::string& name) {
 }
 
 fs::path SharedData(const std::string& name) {
-  const fs::path data = fs::path(PLUMB_SOURCE_DIR) / ".." / "shared" / "data";
-  if (!fs::is_directory(data)) return {};
+  const char* const set = std::getenv("PLUMB_TEST_DATA");
+  const fs::path data =
+      set != nullptr ? fs::path(set) : fs::path(PLUMB_SOURCE_DIR) / ".." / "shared" / "data";
+  if (set == nullptr && !fs::is_directory(data)) return {};
   if (!fs::is_directory(data / name))
-    throw std::runtime_error("no folder " + name + " in " + fs::canonical(data).string());
+    throw std::runtime_error("no folder " + name + " in " + data.string());
   return fs::canonical(data / name);
 }
 

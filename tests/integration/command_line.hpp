@@ -38,8 +38,9 @@ namespace fs = std::filesystem;
 /// Names of the suite's scenes in order: the reference first.
 [[nodiscard]] const std::vector<std::string>& SmallNames();
 
-/// A folder of ../shared/data, which is beside the repository, not in it. Empty where there is no
-/// such data at all. Where there is some, one that is missing is a test that must not be left out.
+/// A folder of the recordings that are not in the repository (tests/README.md): in PLUMB_TEST_DATA,
+/// by default ../shared/data beside the checkout. Empty where neither is there. Where one is, a
+/// folder that is missing in it is a test that must not be left out.
 /// @throws std::runtime_error
 [[nodiscard]] fs::path SharedData(const std::string& name);
 
@@ -66,4 +67,4 @@ class CommandLineTest : public testing::Test {
 /// data.
 #define PLUMB_SHARED_DATA(folder, name)                           \
   const std::filesystem::path folder = ::plumb::SharedData(name); \
-  if (folder.empty()) GTEST_SKIP() << "../shared/data is not there: " << (name)
+  if (folder.empty()) GTEST_SKIP() << "PLUMB_TEST_DATA is not set: " << (name)
