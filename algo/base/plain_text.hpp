@@ -13,7 +13,7 @@ namespace plumb {
 /// separators of lines and paragraphs.
 [[nodiscard]] bool IsPlainText(std::string_view text, bool allow_lines = false);
 
-/// The same text, with U+FFFD for all that is none of plain text: for what devices and other
+/// The same text, with U+FFFD for everything that is not plain text: for what devices and other
 /// programs' files are called, which is not refused for it.
 [[nodiscard]] std::string AsPlainText(std::string_view text);
 

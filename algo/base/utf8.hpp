@@ -13,10 +13,10 @@ namespace plumb {
 /// malformed (overlong, surrogate, beyond U+10FFFF, truncated).
 [[nodiscard]] std::size_t Utf8Length(std::string_view text, std::uint32_t& code);
 
-/// The same text, with U+FFFD for each byte that is none of UTF-8.
+/// The same text, with U+FFFD for each byte that is not UTF-8.
 [[nodiscard]] std::string ValidUtf8(std::string_view text);
 
-/// Of text that is UTF-8.
+/// Number of characters (code points) of valid UTF-8.
 [[nodiscard]] std::size_t Utf8Characters(std::string_view text);
 
 }  // namespace plumb

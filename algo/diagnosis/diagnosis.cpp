@@ -61,6 +61,13 @@ bool IsFactorOfUnits(double ratio) {
   });
 }
 
+// The unit in use that is nearest to a measured one, where one is near; that itself otherwise.
+double NearestUnits(double units_per_metre) {
+  for (const double unit : {1000.0, 5000.0, 10000.0, 4000.0, 256.0, 100.0})
+    if (std::abs(units_per_metre / unit - 1) < 0.5 * kSameSize) return unit;
+  return units_per_metre;
+}
+
 // The largest group of ratios that agree with one of them, of equal ones that which is nearer to
 // what is stated: its median.
 double CommonRatio(const std::vector<MarkerDepth>& markers) {
@@ -120,6 +127,16 @@ bool JudgeSizes(const std::vector<MarkerDepth>& markers, double common,
   return false;
 }
 
+// Where depth and markers differ by more than prints and sensors do.
+Message OfWrongNumber(const Symptoms& symptoms, double common, double side_mm) {
+  if (!IsFactorOfUnits(common))
+    return say::diagnosis::UnitOrSide(common, side_mm, common * symptoms.focal_px);
+  if (!symptoms.depth_unit_assumed || !(symptoms.depth_units_per_metre > 0))
+    return say::diagnosis::DepthUnit(common);
+  return say::diagnosis::DepthUnitUnstated(symptoms.depth_units_per_metre,
+                                           NearestUnits(symptoms.depth_units_per_metre * common));
+}
+
 // @return whether the units are wrong, so that nothing else can be judged.
 bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings) {
   const std::vector<MarkerDepth> markers = WellMeasured(symptoms);
@@ -161,11 +178,16 @@ bool JudgeMarkerDepths(const Symptoms& symptoms, std::vector<Finding>& findings)
                                                                common * symptoms.focal_px)});
     return false;
   }
-  findings.push_back({FindingLevel::kRefusal,
-                      IsFactorOfUnits(common) ? say::diagnosis::DepthUnit(common)
-                                              : say::diagnosis::UnitOrSide(
-                                                    common, side_mm, common * symptoms.focal_px)});
+  findings.push_back({FindingLevel::kRefusal, OfWrongNumber(symptoms, common, side_mm)});
   return true;
+}
+
+// @return whether depth lies beside what colour shows, so that nothing else can be judged by it.
+// Assumed cameras are still judged: where they do not fit, no scene is made.
+bool JudgeDepthCamera(const Symptoms& symptoms, std::vector<Finding>& findings) {
+  if (!symptoms.depth_camera_unknown) return false;
+  findings.push_back({FindingLevel::kRefusal, say::diagnosis::DepthCameraUnknown()});
+  return !symptoms.cameras_assumed;
 }
 
 void JudgeStreams(const Symptoms& symptoms, std::vector<Finding>& findings) {
@@ -264,8 +286,10 @@ std::vector<Finding> Diagnose(const Symptoms& symptoms) {
   JudgeStreams(symptoms, findings);
   const bool clocks_differ =
       findings.size() > before && findings[before].level == FindingLevel::kRefusal;
-  // Depth of another moment disagrees with the markers because of its time.
-  const bool wrong_numbers = !clocks_differ && JudgeMarkerDepths(symptoms, findings);
+  // Depth of another moment disagrees with the markers because of its time, and depth of another
+  // camera because of its place.
+  const bool misplaced = JudgeDepthCamera(symptoms, findings);
+  const bool wrong_numbers = !clocks_differ && (misplaced || JudgeMarkerDepths(symptoms, findings));
   if (!wrong_numbers) JudgeRange(symptoms, findings);
   // Colour images that are mirrored do not fit depth, so the solve finds no calibration.
   const bool mirrored =

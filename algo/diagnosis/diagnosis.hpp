@@ -30,10 +30,12 @@ struct CalibrationFit {
 struct Symptoms {
   std::vector<MarkerDepth> marker_depths;  ///< By id.
   DepthLayout depth_layout = DepthLayout::kAsStated;
-  double marker_length_m = 0.0;     ///< As stated.
-  bool depth_unit_assumed = false;  ///< Nothing states the unit of the depth images.
-  bool cameras_assumed = false;     ///< Nothing states the intrinsics.
-  double focal_px = 0.0;            ///< Of the colour camera, as stated or assumed.
+  double marker_length_m = 0.0;        ///< As stated.
+  bool depth_unit_assumed = false;     ///< Nothing states the unit of the depth images.
+  double depth_units_per_metre = 0.0;  ///< The unit that was taken; 0: not known.
+  bool cameras_assumed = false;        ///< Nothing states the intrinsics.
+  bool depth_camera_unknown = false;   ///< See StreamInfo.
+  double focal_px = 0.0;               ///< Of the colour camera, as stated or assumed.
   std::optional<StreamOffset> stream_offset;
   std::int64_t num_frames = 0;
   std::int64_t num_repeated_depth = 0;  ///< Depth images with every pixel of the one before.

@@ -97,6 +97,12 @@ std::optional<double> DeviationOf(const std::map<int, std::vector<double>>& rati
 
 }  // namespace
 
+std::optional<double> DepthRatioOnFace(const MarkerObservation& marker, const cv::Mat& depth_m,
+                                       const Intrinsics& intrinsics, double length_m) {
+  return RatioOnFace(marker, depth_m, DepthLayout::kAsStated, intrinsics, CalibrationModel{},
+                     length_m);
+}
+
 DepthLayout FindDepthLayout(const TrackingMap& map, const Intrinsics& intrinsics,
                             const CalibrationModel& known, double length_m) {
   const auto deviation_of = [&](DepthLayout layout) {

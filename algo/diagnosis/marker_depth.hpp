@@ -2,6 +2,7 @@
 // Depth on a marker's face against the distance that its size shows, before anything is solved.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "algo/base/intrinsics.hpp"
@@ -18,6 +19,12 @@ struct MarkerDepth {
   double scatter = 0.0;  ///< Standard deviation of one view's ratio, from the median deviation.
   int num_views = 0;     ///< Keyframes with depth on the marker's face.
 };
+
+/// Measured depth over the distance at which a square of the stated side appears as large, median
+/// over the face; nothing without a pose of the marker or enough depth.
+[[nodiscard]] std::optional<double> DepthRatioOnFace(const MarkerObservation& marker,
+                                                     const cv::Mat& depth_m,
+                                                     const Intrinsics& intrinsics, double length_m);
 
 /// How the depth image lies on the colour image.
 enum class DepthLayout { kAsStated, kMirrored, kUpsideDown, kTurned /*by half a turn*/ };

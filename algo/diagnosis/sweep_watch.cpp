@@ -115,7 +115,9 @@ Symptoms SweepWatch::Finish(const StreamInfo& info, bool any_decoded) const {
   Symptoms symptoms;
   symptoms.marker_length_m = info.room_markers.length_m;
   symptoms.depth_unit_assumed = info.depth_unit_assumed;
+  symptoms.depth_units_per_metre = info.depth_units_per_metre;
   symptoms.cameras_assumed = info.intrinsics_assumed;
+  symptoms.depth_camera_unknown = info.depth_camera_unknown;
   symptoms.focal_px = info.intrinsics.fx;
   symptoms.stream_offset = EstimateStreamOffset(color_motion_.rates(), depth_motion_.rates());
   symptoms.num_frames = num_frames_;

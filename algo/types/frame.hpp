@@ -40,6 +40,13 @@ struct StreamInfo {
   UsableDepth usable_depth = {};    ///< Likewise.
   bool intrinsics_assumed = false;  ///< The recording has no calibration; nominal values are used.
   bool depth_unit_assumed = false;  ///< Nothing states the unit of the depth images.
+  double depth_units_per_metre = 0.0;  ///< The unit that was taken; 0: the source has metres.
+  /// Depth is not registered to colour, nothing says where its camera is, and the images do not
+  /// show it: the frames have depth as if it were registered.
+  bool depth_camera_unknown = false;
+  bool depth_camera_estimated = false;  ///< Depth was registered with a camera from the images.
+  /// What nothing states of `room_markers`.
+  bool dictionary_assumed = false, marker_length_assumed = false;
   RoomMarkers room_markers = {};
   std::optional<std::int64_t> num_frames;  ///< Number of image pairs, if known beforehand.
   std::vector<Message> warnings;           ///< Assumptions and omissions of the source.

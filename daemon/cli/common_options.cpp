@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
+#include "algo/diagnosis/depth_unit.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
@@ -18,6 +19,23 @@
 #include "words/output.hpp"
 
 namespace plumb {
+namespace {
+
+/// A source whose depth has the unit that the markers show, where nothing states one.
+/// @param defaults  Of `open`, which opens the source again from its first frame.
+template <typename Source, typename Open>
+std::unique_ptr<FrameSource> WithDepthUnit(std::unique_ptr<Source> source,
+                                           RecordingDefaults& defaults, const Open& open) {
+  if (!source->info().depth_unit_assumed) return source;
+  try {
+    defaults.depth_scale = DepthUnitByMarkers(*source);
+  } catch (const DataError&) {
+    // A damaged image is named where it is read.
+  }
+  return open();
+}
+
+}  // namespace
 
 void MethodOptions::AddTo(CLI::App& app) {
   app.add_option("--preset", preset,
@@ -58,8 +76,14 @@ std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
   RecordingDefaults defaults;
   defaults.room_markers = markers.Or(defaults.room_markers);
   defaults.rate_hz = rate_hz;
-  if (IsImportable(path)) return OpenImported(path, defaults);
-  if (std::filesystem::is_directory(path, error)) return OpenTumRecording(path, defaults);
+  if (IsImportable(path))
+    return WithDepthUnit(OpenImported(path, defaults), defaults,
+                         [&] { return OpenImported(path, defaults); });
+  if (std::filesystem::is_directory(path, error)) {
+    if (!IsTumRecording(path)) RefuseUnreadFormat(path);
+    return WithDepthUnit(OpenTumRecording(path, defaults), defaults,
+                         [&] { return OpenTumRecording(path, defaults); });
+  }
   if (const RecordingKind* kind = BuiltInSensors().KindWithExtension(path.extension().string()))
     return kind->Open(path, defaults);
   // Whatever its name, its contents may be a recording.

@@ -25,19 +25,36 @@ struct ImportArguments {
   bool jpeg = false;
 };
 
+/// Stamps in steps that the files hold: sources may have finer ones.
+class RisingStamps {
+ public:
+  void Apply(Frame& frame) {
+    color_s_ = frame.color_time_s = std::max(frame.color_time_s, color_s_ + kStampStep_s);
+    depth_s_ = frame.depth_time_s = std::max(frame.depth_time_s, depth_s_ + kStampStep_s);
+  }
+
+ private:
+  double color_s_ = -1.0, depth_s_ = -1.0;
+};
+
 int Run(const ImportArguments& options, const CommandContext& context) {
   const Config config = options.method.Read();
   AtomicFolder folder(options.out, RecordingOutput());
   const std::unique_ptr<FrameSource> source =
       OpenRecording(options.source, config.markers, options.rate_hz);
-  const StreamInfo& info = source->info();
+  // Markers that the configuration states are stated; its other values reach the source above.
+  StreamInfo info = source->info();
+  info.dictionary_assumed = info.dictionary_assumed && !config.markers.dictionary;
+  info.marker_length_assumed = info.marker_length_assumed && !config.markers.length_m;
   // 0.2 mm, and 13 m: as fine as the finest sensor, as far as the farthest.
   TumWriter writer(folder.path(), info,
                    {.depth_scale = 5000.0, .jpeg_quality = options.jpeg ? 92 : 0});
   Progress progress(context.language);
   std::int64_t num_frames = 0;
-  while (const std::optional<Frame> frame = source->Next()) {
+  RisingStamps rising;
+  while (std::optional<Frame> frame = source->Next()) {
     if (context.stop.stop_requested()) throw Interrupted(say::cli::Importing());
+    rising.Apply(*frame);
     writer.Add(*frame);
     ++num_frames;
     const auto all = static_cast<double>(std::max<std::int64_t>(1, info.num_frames.value_or(1)));

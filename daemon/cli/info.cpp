@@ -54,26 +54,14 @@ bool IsRecording(const fs::path& path) {
   return BuiltInSensors().KindOf(path) != nullptr || IsTumRecording(path) || IsImportable(path);
 }
 
-/// What was recognised of a recording of another program; null where it states nothing.
-void AddImportedFacts(const ImportedFacts& imported, ordered_json& facts) {
-  const auto stated = [](const std::string& text) {
-    return text.empty() ? ordered_json() : ordered_json(text);
-  };
-  facts["format"] = imported.format;
-  facts["calibration"] = imported.calibration;
-  facts["sensor"] = {{"name", stated(imported.name)},
-                     {"serial", stated(imported.serial)},
-                     {"firmware", stated(imported.firmware)}};
-  facts["color_images"] = imported.color_images;
-  facts["depth_images"] = imported.depth_s.size();
-  const CameraFile& camera = imported.camera;
-  ordered_json& depth = facts["depth"];
-  depth = {{"registered", !camera.depth_camera && !camera.depth_camera_unknown},
-           {"unit_mm", nullptr},
-           {"stereo_baseline_mm", nullptr}};
+/// The unit of the depth images, and the camera that they are from if it is not the colour camera.
+ordered_json DepthFacts(const CameraFile& camera, const StreamInfo& info) {
+  ordered_json depth = {{"registered", !camera.depth_camera && !camera.depth_camera_unknown},
+                        {"unit_mm", nullptr},
+                        {"unit_assumed", info.depth_unit_assumed},
+                        {"camera_estimated", info.depth_camera_estimated}};
   if (camera.depth_scale) depth["unit_mm"] = 1e3 / *camera.depth_scale;
-  if (imported.stereo_baseline_m) depth["stereo_baseline_mm"] = 1e3 * *imported.stereo_baseline_m;
-  if (!camera.depth_camera) return;
+  if (!camera.depth_camera) return depth;
   const Intrinsics& own = camera.depth_camera->intrinsics;
   const Eigen::Vector3d t_m = camera.depth_camera->T_color_depth.translation();
   depth["image_width"] = own.width;
@@ -84,6 +72,24 @@ void AddImportedFacts(const ImportedFacts& imported, ordered_json& facts) {
   depth["colour_from_depth_mm"] = {1e3 * t_m.x(), 1e3 * t_m.y(), 1e3 * t_m.z()};
   depth["colour_from_depth_deg"] =
       Eigen::AngleAxisd(camera.depth_camera->T_color_depth.linear()).angle() / kDegree;
+  return depth;
+}
+
+/// What was recognised of a recording of another program; null where it states nothing.
+void AddImportedFacts(const ImportedFacts& imported, const StreamInfo& info, ordered_json& facts) {
+  const auto stated = [](const std::string& text) {
+    return text.empty() ? ordered_json() : ordered_json(text);
+  };
+  facts["format"] = imported.format;
+  facts["calibration"] = imported.calibration;
+  facts["sensor"] = {{"name", stated(imported.name)},
+                     {"serial", stated(imported.serial)},
+                     {"firmware", stated(imported.firmware)}};
+  facts["color_images"] = imported.color_images;
+  facts["depth_images"] = imported.depth_s.size();
+  ordered_json& depth = facts["depth"] = DepthFacts(imported.camera, info);
+  depth["stereo_baseline_mm"] = nullptr;
+  if (imported.stereo_baseline_m) depth["stereo_baseline_mm"] = 1e3 * *imported.stereo_baseline_m;
 }
 
 ordered_json RecordingFacts(const fs::path& path) {
@@ -120,7 +126,9 @@ ordered_json RecordingFacts(const fs::path& path) {
       {"reference_marker", nullptr},
       {"warnings", EnglishTexts(info.warnings)},
       {"warning_messages", MessagesJson(info.warnings)}};
-  if (imported != nullptr) AddImportedFacts(imported->facts(), facts);
+  if (imported != nullptr) AddImportedFacts(imported->facts(), info, facts);
+  if (const auto* images = dynamic_cast<const TumSource*>(recording.get()))
+    facts["depth"] = DepthFacts(images->camera(), info);
   if (info.room_markers.reference) facts["reference_marker"] = *info.room_markers.reference;
   return facts;
 }

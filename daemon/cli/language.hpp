@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-/// That there is no such language, and which there are.
+/// The message for an unknown language; it lists the known ones.
 [[nodiscard]] Message UnknownLanguage(std::string_view code);
 
 /// "de, en, ...": every code that `--language` takes.

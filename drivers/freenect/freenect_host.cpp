@@ -90,7 +90,7 @@ void FreenectHost::LookAtBus() {
   try {
     serials = Serials();
   } catch (const DeviceError&) {
-    // Whoever lists the sensors next is told why; an open one still says itself when it is gone.
+    // The next listing of sensors tells why; an open sensor still reports its own removal.
     return events().Notify();
   }
   Lose([&](const Watched& watched) {

@@ -12,7 +12,8 @@ const SdkTitle& FreenectTitle() {
   static const SdkTitle title{.name = "libfreenect",
                               .prefix = "libfreenect.so.0.",
                               .least = "0.5",
-                              .guide = "docs/freenect.md"};
+                              .guide = "docs/freenect.md",
+                              .states_camera = false};
   return title;
 }
 

@@ -91,11 +91,8 @@ void FreenectStreams::LockExposure(bool locked) const {
 FreenectSensor::FreenectSensor(std::shared_ptr<FreenectHost> host, SdkOpening opening,
                                const SensorSettings& settings)
     : BoxedSensor(opening.description, opening.box), watched_(std::move(opening.watched)) {
-  const DepthSensorClass& known = ClassOf(DepthSensor::kStructuredLight);
-  StreamInfo info = LiveStreamInfo(settings, opening.description.serial, kKinectWidth,
-                                   kKinectHeight, 0.0, known.noise);
-  info.depth_sensor = DepthSensor::kStructuredLight;
-  SetInfo(std::move(info));
+  SetInfo(LiveStreamInfo(settings, opening.description.serial, kKinectWidth, kKinectHeight, 0.0,
+                         KnownOfClass(DepthSensor::kStructuredLight)));
   opening.box->Begin(kSdkPairsToSettle);
   streams_ = std::make_unique<FreenectStreams>(std::move(host), opening.description.serial,
                                                std::move(opening.box));

@@ -77,6 +77,7 @@ void SendHello(const RecordedFacts& facts, std::size_t num_pairs) {
                         {"recording",
                          {{"format", facts.format},
                           {"firmware", facts.firmware},
+                          {"class_by", facts.class_by},
                           {"stereo_baseline_m", nullptr},
                           {"pairs", num_pairs},
                           {"color_images", facts.color_s.size()},

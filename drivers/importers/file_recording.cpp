@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
@@ -45,6 +46,11 @@ fs::path SideCarOf(const fs::path& file) {
   return side_car;
 }
 
+/// The last stamps of a stream.
+struct Stamps {
+  std::int64_t read_us = -1, given_us = -1;
+};
+
 class FileRecording : public ImportedRecording {
  public:
   FileRecording(fs::path file, const RecordingDefaults& defaults)
@@ -66,18 +72,20 @@ class FileRecording : public ImportedRecording {
   void Read(void* data, std::size_t size);
   Header ReadHeader(Kind& kind);
   void TakeHello(const RecordingDefaults& defaults);
+  void TakeSideCar(const fs::path& side_car);
+  void NoteClass(const std::string& side_car);
   void CheckUsable();
-  cv::Mat ReadImage(Kind wanted, double& time_s, double& last_s);
+  cv::Mat ReadImage(Kind wanted, double& time_s, Stamps& last);
 
   const fs::path file_;
   ReaderProcess reader_;
   Hello hello_;
   ImportedFacts facts_;
+  std::string class_by_;  ///< The name that the class was guessed by; empty: it was not.
   StreamInfo info_;
   std::optional<DepthRegistration> registration_;
   std::int64_t next_index_ = 0;
-  double last_color_s_ = -1.0;
-  double last_depth_s_ = -1.0;
+  Stamps last_color_, last_depth_;
   bool finished_ = false;
 };
 
@@ -119,6 +127,7 @@ void FileRecording::TakeHello(const RecordingDefaults& defaults) {
     const nlohmann::ordered_json stated = hello_.recording;
     facts_.format = stated.at("format").get<std::string>();
     facts_.firmware = stated.at("firmware").get<std::string>();
+    class_by_ = stated.at("class_by").get<std::string>();
     if (!stated.at("stereo_baseline_m").is_null())
       facts_.stereo_baseline_m = stated["stereo_baseline_m"].get<double>();
     facts_.color_images = stated.at("color_images").get<std::int64_t>();
@@ -136,11 +145,9 @@ void FileRecording::TakeHello(const RecordingDefaults& defaults) {
   facts_.serial = hello_.serial;
   facts_.calibration = facts_.format;
   std::error_code error;
-  if (const fs::path side_car = SideCarOf(file_); fs::exists(side_car, error)) {
-    hello_.camera = ParseCameraFile(ReadTextFile(side_car, kMaxSideCar), side_car.string());
-    facts_.calibration = side_car.filename().string();
-    info_.warnings.push_back(say::foreign::SideCar(facts_.calibration));
-  }
+  const fs::path side_car = SideCarOf(file_);
+  if (fs::exists(side_car, error)) TakeSideCar(side_car);
+  NoteClass(side_car.filename().string());
   // A recorder that was killed leaves its last messages in a log beside the database.
   fs::path log = file_;
   log += "-wal";
@@ -150,12 +157,37 @@ void FileRecording::TakeHello(const RecordingDefaults& defaults) {
   facts_.camera = hello_.camera;
   info_.room_markers = defaults.room_markers;
   TakeOver(hello_.camera, info_);
-  if (!hello_.camera.room_markers.dictionary || !hello_.camera.room_markers.length_m) {
+  info_.dictionary_assumed = !hello_.camera.room_markers.dictionary;
+  info_.marker_length_assumed = !hello_.camera.room_markers.length_m;
+  if (info_.dictionary_assumed || info_.marker_length_assumed) {
     info_.warnings.push_back(
         say::recording::MarkersAssumed(info_.room_markers.dictionary, info_.room_markers.length_m));
   }
   if (const std::optional<DepthCamera>& depth = hello_.camera.depth_camera)
     registration_.emplace(depth->intrinsics, hello_.camera.color, depth->T_color_depth);
+}
+
+/// The file beside the recording states cameras and markers; the class that the recording's device
+/// has remains, if the file does not state one.
+void FileRecording::TakeSideCar(const fs::path& side_car) {
+  CameraFile stated = ParseCameraFile(ReadTextFile(side_car, kMaxSideCar), side_car.string());
+  if (stated.depth_sensor)
+    class_by_.clear();
+  else
+    stated.depth_sensor = hello_.camera.depth_sensor;
+  hello_.camera = std::move(stated);
+  facts_.calibration = side_car.filename().string();
+  info_.warnings.push_back(say::foreign::SideCar(facts_.calibration));
+}
+
+void FileRecording::NoteClass(const std::string& side_car) {
+  const std::optional<DepthSensor>& sensor = hello_.camera.depth_sensor;
+  if (!sensor)
+    info_.warnings.push_back(
+        say::foreign::ClassAssumed(std::string(Name(DepthSensor::kStructuredLight)), side_car));
+  else if (!class_by_.empty())
+    info_.warnings.push_back(
+        say::foreign::ClassGuessed(std::string(Name(*sensor)), class_by_, side_car));
 }
 
 void FileRecording::CheckUsable() {
@@ -172,14 +204,16 @@ void FileRecording::CheckUsable() {
     refuse(say::foreign::StateDepthCamera(file_.string(), side_car));
 }
 
-cv::Mat FileRecording::ReadImage(Kind wanted, double& time_s, double& last_s) {
+cv::Mat FileRecording::ReadImage(Kind wanted, double& time_s, Stamps& last) {
   Kind kind{};
   const Header header = ReadHeader(kind);
   if (kind == Kind::kEnd && wanted == Kind::kColor) return {};
   if (kind != wanted) Fail(say::recording::ReaderVersion());
-  time_s = 1e-6 * static_cast<double>(header.stamp_us);
-  if (!(time_s > last_s)) Fail(say::recording::OniStamps());
-  last_s = time_s;
+  // Nanoseconds may rise within one microsecond.
+  if (header.stamp_us < last.read_us) Fail(say::recording::OniStamps());
+  last.read_us = header.stamp_us;
+  last.given_us = std::max(header.stamp_us, last.given_us + 1);
+  time_s = 1e-6 * static_cast<double>(last.given_us);
   cv::Mat image;
   try {
     image = stream::ImageFor(kind, header.size, hello_);
@@ -194,12 +228,12 @@ std::optional<Frame> FileRecording::Next() {
   if (finished_) return std::nullopt;
   if (next_index_ == 0) CheckUsable();
   Frame frame;
-  frame.color_rgb = ReadImage(Kind::kColor, frame.color_time_s, last_color_s_);
+  frame.color_rgb = ReadImage(Kind::kColor, frame.color_time_s, last_color_);
   if (frame.color_rgb.empty()) {
     finished_ = true;
     return std::nullopt;
   }
-  const cv::Mat units = ReadImage(Kind::kDepth, frame.depth_time_s, last_depth_s_);
+  const cv::Mat units = ReadImage(Kind::kDepth, frame.depth_time_s, last_depth_);
   frame.index = next_index_++;
   frame.depth_m = DepthInMetres(units, *hello_.camera.depth_scale);
   if (registration_) frame.depth_m = registration_->Register(frame.depth_m);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/importers/folder_recording.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -27,10 +28,10 @@ class ListedFolder : public ImportedRecording {
  public:
   ListedFolder(ImageFolder contents, ImportedFacts facts, const RecordingDefaults& defaults)
       : facts_(std::move(facts)) {
-    facts_.camera = contents.camera;
     facts_.color_images = std::ssize(contents.color);
     for (const IndexEntry& entry : contents.depth) facts_.depth_s.push_back(entry.time_s);
     frames_ = OpenImageFolder(std::move(contents), defaults);
+    facts_.camera = frames_->camera();
   }
   [[nodiscard]] const StreamInfo& info() const override { return frames_->info(); }
   [[nodiscard]] const ImportedFacts& facts() const override { return facts_; }
@@ -38,15 +39,22 @@ class ListedFolder : public ImportedRecording {
 
  private:
   ImportedFacts facts_;
-  std::unique_ptr<FrameSource> frames_;
+  std::unique_ptr<TumSource> frames_;
 };
 
 }  // namespace
 
+bool EndsLike(std::string_view name, std::string_view ending) {
+  if (name.size() < ending.size()) return false;
+  return std::ranges::equal(name.substr(name.size() - ending.size()), ending, [](char a, char b) {
+    return (a >= 'A' && a <= 'Z' ? static_cast<char>(a - 'A' + 'a') : a) == b;
+  });
+}
+
 bool IsImageName(const std::string& name, std::string_view ending, bool is_depth) {
-  if (!ending.empty()) return name.ends_with(ending);
-  return name.ends_with(".png") ||
-         (!is_depth && (name.ends_with(".jpg") || name.ends_with(".jpeg")));
+  if (!ending.empty()) return EndsLike(name, ending);
+  return EndsLike(name, ".png") ||
+         (!is_depth && (EndsLike(name, ".jpg") || EndsLike(name, ".jpeg")));
 }
 
 Numbered NumberedImages(const fs::path& folder, const std::string& sub, std::string_view ending,

@@ -13,8 +13,11 @@
 
 namespace plumb {
 
+/// Whether a name has this ending, given in small letters, in small or capital ones.
+[[nodiscard]] bool EndsLike(std::string_view name, std::string_view ending);
+
 /// Whether a file's name is that of an image: a PNG or, for colour, a JPEG.
-/// @param ending  Of the name; empty: any image.
+/// @param ending  Of the name, in small letters; empty: any image.
 [[nodiscard]] bool IsImageName(const std::string& name, std::string_view ending, bool is_depth);
 
 /// Names of images, relative to the recording's folder, by the last number in each.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <string_view>
 #include <utility>
 
@@ -34,10 +35,17 @@ struct Layout {
 };
 
 /// The time that a name states: seconds with decimals, or a whole number of milli-, micro- or
-/// nanoseconds since 1970, told apart by its length.
+/// nanoseconds since 1970, told apart by its length. It may stand behind other text ("rgb_12.345"),
+/// from which a number with decimals must be set off: the 1.0002 of "cam1.0002" is none.
 std::optional<double> StampOf(std::string_view stem) {
-  if (stem.empty() || stem.find_first_not_of("0123456789.") != std::string_view::npos)
-    return std::nullopt;
+  constexpr std::size_t kDigitsSince1970 = 9;
+  if (const std::size_t before = stem.find_last_not_of("0123456789."); before != stem.npos) {
+    const bool is_set_off = std::string_view("_- ").find(stem[before]) != std::string_view::npos;
+    stem.remove_prefix(before + 1);
+    const std::size_t point = stem.find('.');
+    if (point != stem.npos && !is_set_off && point < kDigitsSince1970) return std::nullopt;
+  }
+  if (stem.empty() || stem.front() == '.') return std::nullopt;
   const std::optional<double> value = ParseNumber<double>(stem);
   if (!value || stem.find('.') != std::string_view::npos) return value;
   constexpr std::array<std::pair<std::size_t, double>, 3> kUnits = {
@@ -108,14 +116,16 @@ struct FoundCamera {
   std::string sensor_name = {}, serial = {};
 };
 
-FoundCamera CameraOf(const fs::path& folder, const Layout& layout, const fs::path& first_image) {
+FoundCamera CameraOf(const fs::path& folder, const Layout& layout, const std::string& first_color,
+                     const std::string& first_depth) {
   if (const fs::path file = folder / "camera.yaml"; fs::exists(fs::symlink_status(file)))
     return {.camera = ParseCameraFile(ReadTextFile(file, kMaxCameraFile), file.string()),
             .file = "camera.yaml"};
-  const cv::Mat image = ReadColorImage(first_image);
+  const cv::Size color = ReadColorImage(folder / first_color).size();
+  const cv::Size depth = ReadDepthImage(folder / first_depth).size();
   // Some programs keep the calibration beside the images' folders, others among the colour images.
   for (const fs::path& place : {folder, folder / layout.color}) {
-    if (auto found = FindForeignCalibration(place, image.cols, image.rows))
+    if (auto found = FindForeignCalibration(place, color, depth))
       return {.camera = found->camera,
               .file = found->file,
               .rate_hz = found->rate_hz,
@@ -143,6 +153,14 @@ void AddPairs(const Numbered& color, const Numbered& depth, double rate_hz, Imag
   unpaired += std::ssize(depth) - std::ssize(contents.depth);
   if (contents.color.empty()) throw DataError(say::foreign::NoSameNumber(contents.folder.string()));
   if (unpaired > 0) contents.warnings.push_back(say::foreign::NumbersUnpaired(unpaired));
+  // Programs that begin at 0 and at 1 leave one image at either end without partner.
+  const auto is_whole = [](const Numbered& images) {
+    return images.rbegin()->first - images.begin()->first + 1 == std::ssize(images);
+  };
+  const std::int64_t first_color = color.begin()->first, first_depth = depth.begin()->first;
+  if (color.size() == depth.size() && is_whole(color) && is_whole(depth) &&
+      std::abs(first_color - first_depth) == 1)
+    contents.warnings.push_back(say::foreign::NumbersShifted(first_color, first_depth));
 }
 
 /// Images that are numbered only, and their camera.
@@ -150,7 +168,7 @@ FoundCamera TakeNumbered(const fs::path& folder, const Layout& layout,
                          const RecordingDefaults& defaults, ImageFolder& contents) {
   const Numbered color = NumberedImages(folder, layout.color, layout.color_ending, false);
   const Numbered depth = NumberedImages(folder, layout.depth, layout.depth_ending, true);
-  FoundCamera found = CameraOf(folder, layout, folder / color.begin()->second);
+  FoundCamera found = CameraOf(folder, layout, color.begin()->second, depth.begin()->second);
   const double rate_hz = defaults.rate_hz.value_or(found.rate_hz.value_or(kUsualRate_hz));
   contents.warnings.push_back(say::foreign::RateAssumed(rate_hz));
   contents.color.clear();
@@ -176,9 +194,9 @@ std::unique_ptr<ImportedRecording> OpenImageFolderRecording(const fs::path& fold
     contents.depth = StampedIn(folder, layout->depth, true);
   }
   const bool is_stamped = !contents.color.empty() && !contents.depth.empty();
-  const FoundCamera found = is_stamped
-                                ? CameraOf(folder, *layout, folder / contents.color.front().file)
-                                : TakeNumbered(folder, *layout, defaults, contents);
+  const FoundCamera found = is_stamped ? CameraOf(folder, *layout, contents.color.front().file,
+                                                  contents.depth.front().file)
+                                       : TakeNumbered(folder, *layout, defaults, contents);
   contents.camera = found.camera;
   contents.intrinsics_assumed = found.assumed;
   if (found.assumed) contents.warnings.push_back(say::foreign::PublishedCamera(layout->format));

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "algo/base/errors.hpp"
@@ -61,9 +62,17 @@ std::unique_ptr<ImportedRecording> OpenImported(const fs::path& path,
 }
 
 void RefuseUnreadFormat(const fs::path& path) {
-  for (const Unread& unread : kUnread)
-    if (path.extension() == unread.ending)
-      throw DataError(say::foreign::NotReadYet(path.string(), unread.format, unread.command));
+  const auto refuse = [](const fs::path& file) {
+    for (const Unread& unread : kUnread)
+      if (file.extension() == unread.ending)
+        throw DataError(say::foreign::NotReadYet(file.string(), unread.format, unread.command));
+  };
+  refuse(path);
+  std::error_code error;
+  std::set<fs::path> files;  // In an order that does not depend on the disk.
+  for (fs::directory_iterator entry(path, error), end; entry != end; entry.increment(error))
+    files.insert(entry->path());
+  for (const fs::path& file : files) refuse(file);
 }
 
 }  // namespace plumb

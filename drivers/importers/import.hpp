@@ -16,8 +16,8 @@ namespace plumb {
 [[nodiscard]] std::unique_ptr<ImportedRecording> OpenImported(
     const std::filesystem::path& path, const RecordingDefaults& defaults = {});
 
-/// @throws DataError for a recording of a format that Plumb knows but does not read, with the one
-///         command that converts it.
+/// @throws DataError for a recording of a format that Plumb knows but does not read, or a folder
+///         with one, with the one command that converts it.
 void RefuseUnreadFormat(const std::filesystem::path& path);
 
 }  // namespace plumb

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/importers/phone_folder.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <nlohmann/json.hpp>
-#include <opencv2/core/mat.hpp>
+#include <opencv2/core.hpp>
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
@@ -20,6 +22,10 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxMetadata = std::size_t{64} << 20;  // An hour at 60 Hz has 40 MB.
 constexpr double kPhoneUnitsPerMetre = 1000.0;
+constexpr int kSureConfidence = 2;  // ARKit: 0 low, 1 medium, 2 high.
+constexpr std::size_t kSampledMaps = 24;
+// Of the focal length: less is neither seen in a sweep nor worth a word.
+constexpr double kLeastFocalSpread = 0.001;
 
 struct FoundPhone {
   std::string format, file;  ///< Whose folder it is, and what states the camera.
@@ -47,7 +53,7 @@ std::optional<FoundPhone> FindPhone(const fs::path& given) {
 bool HasEnding(const fs::path& folder, const char* ending) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; entry != end; entry.increment(error))
-    if (entry->path().extension() == ending) return true;
+    if (EndsLike(entry->path().filename().string(), ending)) return true;
   return false;
 }
 
@@ -95,7 +101,9 @@ void ListPairs(const FoundPhone& phone, const Numbered& color, const Numbered& d
   std::int64_t unpaired = 0;
   for (const auto& [number, file] : color) {
     const auto partner = depth.find(number);
-    const bool is_stamped = stamps_s.empty() || number < std::ssize(stamps_s);
+    const bool is_stamped =
+        stamps_s.empty() || (number >= 0 && number < std::ssize(stamps_s) &&
+                             !std::isnan(stamps_s[static_cast<std::size_t>(number)]));
     if (partner == depth.end() || !is_stamped) {
       ++unpaired;
       continue;
@@ -108,6 +116,61 @@ void ListPairs(const FoundPhone& phone, const Numbered& color, const Numbered& d
   unpaired += std::ssize(depth) - std::ssize(contents.depth);
   if (contents.color.empty()) throw DataError(say::foreign::NoSameNumber(phone.folder.string()));
   if (unpaired > 0) contents.warnings.push_back(say::foreign::NumbersUnpaired(unpaired));
+}
+
+/// The map of how sure the phone is of a depth image; it has the same number.
+fs::path ConfidenceOf(const fs::path& folder, const fs::path& depth) {
+  return folder / "confidence" / (depth.stem().string() + ".png");
+}
+
+/// 255 where the phone is not sure of the depth. The map may be of another size.
+cv::Mat UnsureDepth(const cv::Mat& map, cv::Size size) {
+  cv::Mat unsure(size, CV_8UC1);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x)
+      unsure.at<std::uint8_t>(y, x) =
+          map.at<cv::Vec3b>(y * map.rows / size.height, x * map.cols / size.width)[0] <
+                  kSureConfidence
+              ? 255
+              : 0;
+  return unsure;
+}
+
+/// Leaves out depth of which the phone itself is not sure, where its app wrote a map of that.
+void LeaveOutUnsureDepth(ImageFolder& contents) {
+  const fs::path folder = contents.folder;
+  std::error_code error;
+  if (!fs::is_directory(folder / "confidence", error)) return;
+  std::int64_t num_without = 0, num_pixels = 0, num_unsure = 0;
+  double most = 0;
+  const std::size_t every = contents.depth.size() / kSampledMaps + 1;
+  for (std::size_t i = 0; i < contents.depth.size(); ++i) {
+    const fs::path file = ConfidenceOf(folder, contents.depth[i].file);
+    if (!HasFile(file)) {
+      ++num_without;
+    } else if (i % every == 0) {
+      const cv::Mat map = ReadColorImage(file);
+      double least_of_map = 0, most_of_map = 0;
+      cv::minMaxIdx(map, &least_of_map, &most_of_map);
+      most = std::max(most, most_of_map);
+      num_pixels += static_cast<std::int64_t>(map.total());
+      num_unsure += cv::countNonZero(UnsureDepth(map, map.size()));
+    }
+  }
+  if (num_pixels == 0) return;
+  if (!(most >= 1 && most <= kSureConfidence)) {
+    contents.warnings.push_back(say::foreign::ConfidenceUnknown((folder / "confidence").string(),
+                                                                static_cast<std::int64_t>(most)));
+    return;
+  }
+  contents.filter_depth = [folder](const fs::path& file, cv::Mat& depth) {
+    if (const fs::path map = ConfidenceOf(folder, file); HasFile(map))
+      depth.setTo(0, UnsureDepth(ReadColorImage(map), depth.size()));
+  };
+  if (num_unsure > 0)
+    contents.warnings.push_back(say::foreign::UnsureDepth(100.0 * static_cast<double>(num_unsure) /
+                                                          static_cast<double>(num_pixels)));
+  if (num_without > 0) contents.warnings.push_back(say::foreign::WithoutConfidence(num_without));
 }
 
 }  // namespace
@@ -135,6 +198,9 @@ std::unique_ptr<ImportedRecording> OpenPhoneFolder(const fs::path& folder,
   if (phone->metadata.stamps_s.empty())
     contents.warnings.push_back(say::foreign::RateAssumed(rate_hz));
   ListPairs(*phone, color, depth, rate_hz, contents);
+  LeaveOutUnsureDepth(contents);
+  if (const double spread = phone->metadata.focal_spread; spread > kLeastFocalSpread)
+    contents.warnings.push_back(say::foreign::FocalChanges(100.0 * spread, phone->metadata.fx));
   const fs::path first_depth = phone->folder / depth.begin()->second;
   contents.camera =
       PhoneCamera(*phone, ReadColorImage(phone->folder / color.begin()->second),

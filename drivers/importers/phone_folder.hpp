@@ -15,7 +15,8 @@ namespace plumb {
 
 /// Depth keeps its own resolution; its camera is the colour camera, smaller. Images belong together
 /// by the numbers in their names, which also choose their stamps.
-/// Depth is PNG in millimetres or OpenEXR in metres.
+/// Depth is PNG in millimetres or OpenEXR in metres. Where the folder `confidence` has a map for an
+/// image, depth with less than the highest confidence is left out.
 /// @throws DataError for colour as a film, with the command that converts it; and as
 ///         OpenTumRecording().
 [[nodiscard]] std::unique_ptr<ImportedRecording> OpenPhoneFolder(

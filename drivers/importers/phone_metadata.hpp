@@ -15,7 +15,11 @@ struct PhoneMetadata {
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< Of the colour images; the apps rectify them.
   int width = 0, height = 0;              ///< 0: not stated.
   std::vector<double> stamps_s = {};      ///< Of the images by their numbers; they rise strictly.
+                                          ///< NaN: the app has no such image.
   std::optional<double> rate_hz = {};     ///< For images without stamps.
+  /// By how much the focal length changes over the recording, as a share of it: autofocus. The
+  /// camera above is then the median of the images'.
+  double focal_spread = 0.0;
   DepthSensor sensor = DepthSensor::kLidar;
 };
 

@@ -40,6 +40,7 @@ struct FileBytes {
 struct RecordedFacts {
   std::string format;                  ///< Such as "RealSense .bag".
   std::string name, serial, firmware;  ///< Of the sensor; empty where nothing states it.
+  std::string class_by;  ///< The name that the class was guessed by; empty: it was not guessed.
   nlohmann::ordered_json camera = nlohmann::ordered_json::object();  ///< Keys of camera.yaml.
   std::vector<double> color_s, depth_s;  ///< Stamps of the images; they rise strictly.
   std::optional<double> stereo_baseline_m;

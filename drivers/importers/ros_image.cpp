@@ -120,7 +120,23 @@ RosCamera ParseRosCamera(RosReader reader) {
   const auto count = reader.Get<std::uint32_t>();
   if (count > 16) throw DataError(say::foreign::LensCount(count));
   for (std::uint32_t i = 0; i < count; ++i) camera.distortion.push_back(reader.Get<double>());
-  for (double& element : camera.matrix) element = reader.Get<double>();
+  for (auto* matrix : {&camera.matrix, &camera.rectification})
+    for (double& element : *matrix) element = reader.Get<double>();
+  for (std::size_t i = 0; i < 12; ++i)
+    if (const auto element = reader.Get<double>(); i % 4 != 3)
+      camera.rectified.at(3 * (i / 4) + i % 4) = element;
+  return camera;
+}
+
+RosCamera Rectified(RosCamera camera, const Message& what) {
+  if (std::ranges::all_of(camera.distortion, [](double d) { return d == 0; })) return camera;
+  // Of a single camera the identity, of a calibrated pair another turn for each of the two.
+  const auto is_near = [](double a, double b) { return std::abs(a - b) < 1e-6; };
+  const std::array<double, 9> identity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  if (!std::ranges::equal(camera.rectification, identity, is_near) || !(camera.rectified[0] > 0))
+    throw DataError(say::foreign::Rectified(what));
+  camera.matrix = camera.rectified;
+  camera.distortion.clear();
   return camera;
 }
 
@@ -154,6 +170,8 @@ RosImage ParseRosImage(RosReader reader, bool is_packed) {
   image.data = reader.Counted();
   return image;
 }
+
+bool IsNamedGrey(const RosImage& image) { return image.encoding.starts_with("mono"); }
 
 std::optional<RosImageKind> KindOf(const RosImage& image) {
   const auto is_of = [&](const auto& encodings) {

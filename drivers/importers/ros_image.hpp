@@ -27,9 +27,15 @@ struct RosCamera {
   std::string model;
   std::vector<double> distortion;
   std::array<double, 9> matrix{};
+  std::array<double, 9> rectification{};  ///< R: how the rectified image's camera is turned.
+  std::array<double, 9> rectified{};      ///< P without its last column: that camera's matrix.
 };
 /// @throws DataError, as everything below.
 [[nodiscard]] RosCamera ParseRosCamera(RosReader reader);
+
+/// The camera of images that were rectified, if those before had a lens.
+/// @throws DataError if the camera_info does not state one that looks the same way.
+[[nodiscard]] RosCamera Rectified(RosCamera camera, const Message& what);
 
 /// The lens as camera.yaml has it. librealsense projects with its "inverse" and "modified" models
 /// as OpenCV does, but for the order of the last two terms.
@@ -46,6 +52,9 @@ struct RosImage {
 };
 [[nodiscard]] RosImage ParseRosImage(RosReader reader, bool is_packed);
 
+/// Whether the pixels are brightness by ROS's convention (REP 118), though some drivers name depth
+/// so.
+[[nodiscard]] bool IsNamedGrey(const RosImage& image);
 /// What the image is; nothing if it is of no kind that is read.
 enum class RosImageKind { kColor, kDepth, kDepthInMetres };
 [[nodiscard]] std::optional<RosImageKind> KindOf(const RosImage& image);

@@ -13,7 +13,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
 #include "drivers/importers/ros_image.hpp"
-#include "drivers/replay/device_class.hpp"
+#include "drivers/importers/ros_topics.hpp"
 #include "words/foreign.hpp"
 #include "words/recording.hpp"
 
@@ -45,6 +45,9 @@ struct RosStream {
   std::string frame;  ///< Of reference, as ROS's drivers name it.
   std::optional<RosCamera> camera;
   std::optional<Eigen::Isometry3d> from_reference;
+  bool is_depth = false;
+  bool is_named_grey = false;  ///< Of depth: so named, as infrared images are.
+  std::optional<double> unit_m = {};
   std::vector<Listed> images;
 };
 
@@ -122,6 +125,7 @@ class RosRecording : public RecordedFile {
     facts_.format = messages_->format();
     messages_->ForEach([this](const RosTopic& topic, const RosMessage& message,
                               std::span<const std::uint8_t> data) { Note(topic, message, data); });
+    ChooseStreams();
     TakeRosCameras();
     CheckStreams();
     StateCamera();
@@ -142,7 +146,10 @@ class RosRecording : public RecordedFile {
   void NoteDevice(RosReader reader);
   void NoteRos(const RosTopic& topic, const RosMessage& message, RosReader reader);
   void NoteRosImage(const RosTopic& topic, const RosMessage& message, RosReader reader);
+  RosStream* CandidateOf(const RosTopic& topic, const RosImage& image, bool is_depth);
+  void ChooseStreams();
   void TakeRosCameras();
+  void GuessClass();
   void CheckStreams() const;
   void StateCamera();
   void StateDepthCamera();
@@ -153,6 +160,8 @@ class RosRecording : public RecordedFile {
   RosStream color_, depth_;
   std::optional<double> depth_unit_m_;
   std::map<std::string, RosCamera, std::less<>> ros_cameras_;  ///< By the parent of their topic.
+  std::vector<RosStream> candidates_;  ///< Topics of ROS's drivers, in the order of the file.
+  std::size_t num_candidates_images_ = 0;
   StaticFrames frames_;
   bool is_aligned_ = false;  ///< Depth is registered to colour: a ROS driver did that.
 };
@@ -212,50 +221,98 @@ void RosRecording::NoteRos(const RosTopic& topic, const RosMessage& message, Ros
   }
 }
 
-/// Whether a driver has put the depth onto the colour image's pixels.
-bool IsAligned(std::string_view topic) {
-  constexpr std::array<std::string_view, 3> kParts = {"/aligned_depth_to_color/",
-                                                      "/depth_registered/", "/depth_to_rgb/"};
-  return std::ranges::any_of(
-      kParts, [&](std::string_view part) { return topic.find(part) != std::string_view::npos; });
+/// The stream of the topic; nothing once there are too many to be those of cameras.
+RosStream* RosRecording::CandidateOf(const RosTopic& topic, const RosImage& image, bool is_depth) {
+  const auto found = std::ranges::find_if(candidates_, [&](const RosStream& stream) {
+    return stream.topic == topic.name && stream.is_depth == is_depth;
+  });
+  if (found != candidates_.end()) return &*found;
+  if (candidates_.size() >= kMostCameras) return nullptr;
+  RosStream& stream = candidates_.emplace_back();
+  stream.topic = topic.name;
+  stream.is_cdr = topic.is_cdr;
+  stream.is_packed = image.is_packed;
+  stream.frame = image.frame;
+  stream.is_depth = is_depth;
+  stream.is_named_grey = IsNamedGrey(image);
+  return &stream;
 }
 
 void RosRecording::NoteRosImage(const RosTopic& topic, const RosMessage& message,
                                 RosReader reader) {
-  const bool is_packed = topic.type == "sensor_msgs/CompressedImage";
-  const RosImage image = ParseRosImage(reader, is_packed);
+  if (IsInfrared(topic.name)) return;
+  const RosImage image = ParseRosImage(reader, topic.type == "sensor_msgs/CompressedImage");
   const std::optional<RosImageKind> kind = KindOf(image);
   if (!kind) return;
   const bool is_depth = *kind != RosImageKind::kColor;
-  RosStream& stream = is_depth ? depth_ : color_;
-  // Depth that the driver has aligned is preferred: nothing of its camera need be known.
-  const bool aligned = is_depth && IsAligned(topic.name);
-  if (stream.topic.empty() || (aligned && !is_aligned_)) {
-    stream.topic = topic.name;
-    stream.is_cdr = topic.is_cdr;
-    stream.is_packed = is_packed;
-    stream.frame = image.frame;
-    stream.images.clear();
-    is_aligned_ = is_aligned_ || aligned;
-  }
-  if (stream.topic != topic.name) return;
-  if (stream.images.size() >= kMostRecordedImages)
+  RosStream* stream = CandidateOf(topic, image, is_depth);
+  if (stream == nullptr) return;
+  if (++num_candidates_images_ > kMostRecordedImages)
     throw DataError(say::foreign::TooManyImages(kMostRecordedImages));
   // Some drivers leave the stamp 0.
   const double stamp_s = image.stamp_s > 0 ? image.stamp_s : message.time_s;
-  stream.images.push_back({.message = message, .header_s = stamp_s});
+  stream->images.push_back({.message = message, .header_s = stamp_s});
   // By ROS's convention (REP 118) 16 bits are millimetres.
-  if (is_depth) depth_unit_m_ = *kind == RosImageKind::kDepthInMetres ? 1.0 / kUnitsPerMetre : 1e-3;
+  if (is_depth)
+    stream->unit_m = *kind == RosImageKind::kDepthInMetres ? 1.0 / kUnitsPerMetre : 1e-3;
+}
+
+/// The topics of depth and of colour that are used: no brightness in place of depth; depth that the
+/// driver has aligned, because nothing of its camera need be known then; colour of its own camera.
+/// Among equals, the first in the file.
+void RosRecording::ChooseStreams() {
+  const auto choose = [&](bool is_depth, const auto& rank) {
+    RosStream* best = nullptr;
+    for (RosStream& stream : candidates_)
+      if (stream.is_depth == is_depth && (best == nullptr || rank(stream) > rank(*best)))
+        best = &stream;
+    return best;
+  };
+  RosStream* depth = choose(true, [](const RosStream& stream) {
+    return (stream.is_named_grey ? 0 : 2) + (IsAligned(stream.topic) ? 1 : 0);
+  });
+  RosStream* color =
+      choose(false, [](const RosStream& stream) { return IsColorInDepth(stream.topic) ? 0 : 1; });
+  if (depth != nullptr && depth_.images.empty()) {
+    depth_unit_m_ = depth->unit_m;
+    depth->from_reference = depth_.from_reference;
+    depth_ = std::move(*depth);
+  }
+  if (color != nullptr && color_.images.empty()) {
+    color->from_reference = color_.from_reference;
+    color_ = std::move(*color);
+  }
+  candidates_.clear();
 }
 
 /// The cameras of the topics that were chosen, and where these are.
 void RosRecording::TakeRosCameras() {
+  // A packed topic has one more part: /camera/color/image_raw/compressed.
+  const auto image_topic = [](const RosStream& stream) {
+    return stream.is_packed ? Above(stream.topic) : stream.topic;
+  };
+  const bool color_is_rectified = IsRectified(image_topic(color_));
+  const bool depth_is_rectified = IsRectified(image_topic(depth_));
+  bool has_lens = false;
   for (RosStream* stream : {&depth_, &color_}) {
-    // A packed topic has one more part: /camera/color/image_raw/compressed.
-    const std::string image = stream->is_packed ? Above(stream->topic) : stream->topic;
-    if (const auto found = ros_cameras_.find(Above(image)); found != ros_cameras_.end())
-      stream->camera = found->second;
+    const std::string image = image_topic(*stream);
+    const auto found = ros_cameras_.find(Above(image));
+    if (found == ros_cameras_.end()) continue;
+    stream->camera = found->second;
+    const bool is_color = stream == &color_;
+    if (is_color)
+      has_lens = std::ranges::any_of(stream->camera->distortion, [](double d) { return d != 0; });
+    if (IsRectified(image))
+      stream->camera = Rectified(*std::move(stream->camera),
+                                 is_color ? say::recording::Colour() : say::recording::Depth());
   }
+  // Depth that was put onto colour's pixels is registered to these only: neither to those that were
+  // rectified (or not) nor to colour in the depth camera's view.
+  is_aligned_ = IsAligned(depth_.topic) && !IsColorInDepth(color_.topic) &&
+                (color_is_rectified == depth_is_rectified || !has_lens);
+  if (IsAligned(depth_.topic)) depth_.from_reference.reset();  // It was of depth's own camera.
+  if (IsAligned(depth_.topic) != IsColorInDepth(color_.topic))
+    color_.from_reference = depth_.from_reference = Eigen::Isometry3d::Identity();  // One view.
   if (depth_.from_reference || depth_.frame.empty() || color_.frame.empty()) return;
   color_.from_reference = frames_.Between(depth_.frame, color_.frame);
   if (color_.from_reference) depth_.from_reference = Eigen::Isometry3d::Identity();
@@ -312,8 +369,21 @@ void RosRecording::StateCamera() {
   } else {
     facts_.warnings.push_back(say::foreign::UnitMissing());
   }
-  if (const auto sensor = ClassOfDevice(facts_.name)) facts_.camera["depth_sensor"] = Name(*sensor);
+  GuessClass();
   StateDepthCamera();
+}
+
+/// The class by the device's name; else, as ROS's drivers do not record one, by what they call
+/// topics and frames.
+void RosRecording::GuessClass() {
+  std::optional<DepthSensor> sensor = ClassOfDevice(facts_.name);
+  for (const std::string& name :
+       {depth_.topic, color_.topic, depth_.frame, color_.frame, facts_.format}) {
+    if (sensor) break;
+    sensor = ClassOfRosName(name);
+    if (sensor) facts_.class_by = Printable(name);
+  }
+  if (sensor) facts_.camera["depth_sensor"] = Name(*sensor);
 }
 
 void RosRecording::StateDepthCamera() {

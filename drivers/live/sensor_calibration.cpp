@@ -56,9 +56,11 @@ void RefuseOtherMarkers(const SensorSettings& room, const CameraFile& camera,
 }
 
 /// What holds where no calibration file states anything else.
-StreamInfo ConfiguredInfo(const SensorSettings& settings, const DepthNoise& depth_noise) {
+StreamInfo ConfiguredInfo(const SensorSettings& settings, const KnownDepth& known) {
   StreamInfo info;
-  info.depth_noise = depth_noise;
+  info.depth_sensor = known.sensor;
+  info.depth_noise = known.noise;
+  info.usable_depth = known.range;
   info.room_markers = settings.room_markers;
   return info;
 }
@@ -71,7 +73,22 @@ auto ForSensor(const std::string& serial, Read&& read) try {
   throw DeviceError(say::sensor::CalibrationUnusable(serial, MessageOf(error)));
 }
 
+/// The text of a unit's file; nothing if there is none.
+std::optional<std::string> TextOfUnit(const SensorSettings& settings, const std::string& serial) {
+  const std::filesystem::path file = CalibrationFile(settings.calibration_folder, serial);
+  std::error_code error;
+  if (settings.calibration_folder.empty() ||
+      !std::filesystem::exists(std::filesystem::symlink_status(file, error)))
+    return std::nullopt;
+  return ForSensor(serial, [&] { return ReadTextFile(file, kMaxFileBytes); });
+}
+
 }  // namespace
+
+KnownDepth KnownOfClass(DepthSensor sensor) {
+  const DepthSensorClass& of_class = ClassOf(sensor);
+  return {.sensor = sensor, .noise = of_class.noise, .range = of_class.range};
+}
 
 std::filesystem::path CalibrationFile(const std::filesystem::path& folder,
                                       const std::string& serial) {
@@ -86,33 +103,39 @@ std::filesystem::path CalibrationFile(const std::filesystem::path& folder,
 
 StreamInfo CalibratedStreamInfo(const SensorSettings& settings, const std::string& text,
                                 const std::string& name, const std::string& serial, int width,
-                                int height, const DepthNoise& depth_noise) {
-  const CameraFile camera =
+                                int height, const KnownDepth& known) {
+  CameraFile camera =
       ForSensor(serial, [&] { return ParseCalibration(text, name, width, height); });
   if (settings.markers_are_the_rooms) RefuseOtherMarkers(settings, camera, name);
-  StreamInfo info = ConfiguredInfo(settings, depth_noise);
+  // The class that the driver knows anyway does not replace what it knows of the model.
+  if (camera.depth_sensor == known.sensor) camera.depth_sensor.reset();
+  StreamInfo info = ConfiguredInfo(settings, known);
   TakeOver(camera, info);
   info.intrinsics = Resized(camera.color, width, height);
   return info;
 }
 
 StreamInfo LiveStreamInfo(const SensorSettings& settings, const std::string& serial, int width,
-                          int height, double horizontal_fov_rad, const DepthNoise& depth_noise) {
+                          int height, double horizontal_fov_rad, const KnownDepth& known) {
   const std::filesystem::path file = CalibrationFile(settings.calibration_folder, serial);
-  std::error_code error;
-  if (!settings.calibration_folder.empty() &&
-      std::filesystem::exists(std::filesystem::symlink_status(file, error))) {
-    return CalibratedStreamInfo(
-        settings, ForSensor(serial, [&] { return ReadTextFile(file, kMaxFileBytes); }),
-        file.string(), serial, width, height, depth_noise);
-  }
-  StreamInfo info = ConfiguredInfo(settings, depth_noise);
+  if (const std::optional<std::string> text = TextOfUnit(settings, serial))
+    return CalibratedStreamInfo(settings, *text, file.string(), serial, width, height, known);
+  StreamInfo info = ConfiguredInfo(settings, known);
   info.intrinsics = Resized(Intrinsics{}, width, height);
   if (horizontal_fov_rad > 0.2 && horizontal_fov_rad < 2.5)
     info.intrinsics.fx = info.intrinsics.fy = 0.5 * width / std::tan(0.5 * horizontal_fov_rad);
   info.intrinsics_assumed = true;
   info.warnings.push_back(say::sensor::NotCalibrated(serial, file.string(), info.intrinsics.fx));
   return info;
+}
+
+std::optional<StreamInfo> StatedCalibration(const SensorSettings& settings,
+                                            const std::string& serial) {
+  const std::optional<std::string> text = TextOfUnit(settings, serial);
+  if (!text) return std::nullopt;
+  const std::string name = CalibrationFile(settings.calibration_folder, serial).string();
+  const Intrinsics camera = ForSensor(serial, [&] { return ParseCameraFile(*text, name).color; });
+  return CalibratedStreamInfo(settings, *text, name, serial, camera.width, camera.height);
 }
 
 }  // namespace plumb

@@ -98,6 +98,10 @@ struct SensorDriver {
   std::string name;           ///< Name for `driver` in the [sensor] table.
   std::string title;          ///< Name for people, such as "OpenNI2".
   bool is_simulated = false;  ///< Its images are rendered: refused where patients are scanned.
+  /// Its units bring a calibration of their own, from the factory or from the program that feeds
+  /// them, for images of any size. Those of other drivers have nominal intrinsics until a file
+  /// states theirs, and images of 640x480 or of the same shape.
+  bool states_camera = false;
   /// Called once, before other threads start. Only simulated sensors use the sweeps.
   /// @throws DeviceError, IoError, std::invalid_argument; Interrupted on a stop request.
   std::function<std::unique_ptr<SensorSetup>(const SensorSettings&, const SimulatedSweeps&,

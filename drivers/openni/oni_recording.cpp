@@ -16,6 +16,7 @@
 #include "drivers/openni/oni_protocol.hpp"
 #include "drivers/program_folders.hpp"
 #include "drivers/replay/camera_file.hpp"
+#include "drivers/replay/registration.hpp"
 #include "words/recording.hpp"
 
 namespace plumb {
@@ -24,6 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxCameraBytes = std::size_t{1} << 16;
+constexpr double kOniUnitsPerMetre = 1000.0;
 
 fs::path ReaderProgram() {
   const std::optional<fs::path> program = FindBesideProgram("lib/plumb/plumb-oni-reader");
@@ -95,12 +97,14 @@ class OniRecording : public FrameSource {
   }
 
   void ReadCamera(const oni::Header& header, const RecordingDefaults& defaults);
+  void TakeDepthCamera(const CameraFile& camera);
   Frame ReadFrame();
 
   fs::path file_;
   std::optional<std::string> side_car_;  ///< Text of the side-car.
   ReaderProcess reader_;
   StreamInfo info_;
+  std::optional<DepthRegistration> registration_;
   std::int64_t next_index_ = 0;
   double last_color_s_ = -1.0;
   double last_depth_s_ = -1.0;
@@ -111,7 +115,6 @@ void OniRecording::ReadCamera(const oni::Header& header, const RecordingDefaults
   info_.room_markers = defaults.room_markers;
   info_.num_frames = header.num_frames;
   const fs::path side_car_file = OniSideCar(file_);
-  bool markers_known = false;
   if (side_car_) {
     const CameraFile camera = ParseCameraFile(*side_car_, side_car_file.string());
     if (camera.color.width != header.width || camera.color.height != header.height) {
@@ -120,8 +123,11 @@ void OniRecording::ReadCamera(const oni::Header& header, const RecordingDefaults
                                                   header.height));
     }
     TakeOver(camera, info_);
-    markers_known = camera.room_markers.dictionary && camera.room_markers.length_m;
+    TakeDepthCamera(camera);
+    info_.dictionary_assumed = !camera.room_markers.dictionary;
+    info_.marker_length_assumed = !camera.room_markers.length_m;
   } else {
+    info_.dictionary_assumed = info_.marker_length_assumed = true;
     info_.intrinsics = Resized(Intrinsics{}, header.width, header.height);
     if (header.horizontal_fov_rad > 0.2F && header.horizontal_fov_rad < 2.5F)
       info_.intrinsics.fx = info_.intrinsics.fy =
@@ -130,10 +136,24 @@ void OniRecording::ReadCamera(const oni::Header& header, const RecordingDefaults
     info_.warnings.push_back(
         say::recording::SideCarMissing(side_car_file.filename().string(), info_.intrinsics.fx));
   }
-  if (!markers_known) {
+  if (info_.dictionary_assumed || info_.marker_length_assumed) {
     info_.warnings.push_back(
         say::recording::MarkersAssumed(info_.room_markers.dictionary, info_.room_markers.length_m));
   }
+}
+
+/// OpenNI2 gives millimetres, and both images in one size.
+void OniRecording::TakeDepthCamera(const CameraFile& camera) {
+  const std::string side_car = OniSideCar(file_).string();
+  if (camera.depth_scale && *camera.depth_scale != kOniUnitsPerMetre)
+    throw DataError(say::recording::OniUnit(side_car, *camera.depth_scale, kOniUnitsPerMetre));
+  info_.depth_camera_unknown = camera.depth_camera_unknown;
+  if (!camera.depth_camera) return;
+  const Intrinsics& depth = camera.depth_camera->intrinsics;
+  if (depth.width != camera.color.width || depth.height != camera.color.height)
+    throw DataError(say::recording::SideCarSize(side_car, depth.width, depth.height,
+                                                camera.color.width, camera.color.height));
+  registration_.emplace(depth, camera.color, camera.depth_camera->T_color_depth);
 }
 
 Frame OniRecording::ReadFrame() {
@@ -150,7 +170,8 @@ Frame OniRecording::ReadFrame() {
   Read(frame.color_rgb.data, frame.color_rgb.total() * frame.color_rgb.elemSize());
   cv::Mat depth_mm(info_.intrinsics.height, info_.intrinsics.width, CV_16UC1);
   Read(depth_mm.data, depth_mm.total() * depth_mm.elemSize());
-  depth_mm.convertTo(frame.depth_m, CV_32F, 1e-3);
+  depth_mm.convertTo(frame.depth_m, CV_32F, 1.0 / kOniUnitsPerMetre);
+  if (registration_) frame.depth_m = registration_->Register(frame.depth_m);
   return frame;
 }
 

@@ -29,6 +29,7 @@ inline constexpr int kOptionExposure = 3, kOptionAutoExposure = 10, kOptionAutoW
                      kOptionAutoExposurePriority = 30, kOptionGlobalTime = 53;
 inline constexpr float kPresetHighAccuracy = 3.0F;
 inline constexpr int kMetadataSensorTimestamp = 2, kMetadataExposure = 3;
+inline constexpr int kDomainHardwareClock = 0, kDomainSystemTime = 1;
 inline constexpr int kDistortionNone = 0, kDistortionModified = 1, kDistortionInverse = 2,
                      kDistortionBrownConrady = 4;
 
@@ -94,6 +95,7 @@ using FrameArrived = void (*)(RsFrame* frame, void* user);
   X(int, get_frame_stride_in_bytes, (const RsFrame*, Error**))                                     \
   X(unsigned long long, get_frame_number, (const RsFrame*, Error**))                               \
   X(double, get_frame_timestamp, (const RsFrame*, Error**))                                        \
+  X(int, get_frame_timestamp_domain, (const RsFrame*, Error**))                                    \
   X(int, supports_frame_metadata, (const RsFrame*, int metadata, Error**))                         \
   X(long long, get_frame_metadata, (const RsFrame*, int metadata, Error**))                        \
   X(void, release_frame, (RsFrame*))

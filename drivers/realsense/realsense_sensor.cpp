@@ -186,6 +186,9 @@ StatedTime RealSenseStreams::TimeOf(const RsFrame* frame) const {
   };
   return {.sensor_us = metadata(kMetadataSensorTimestamp),
           .frame_ms = library_->CallOr(-1.0, library_->get_frame_timestamp, frame),
+          .frame_is_by_camera =
+              library_->CallOr(kDomainHardwareClock, library_->get_frame_timestamp_domain, frame) ==
+              kDomainHardwareClock,
           .exposure_us = metadata(kMetadataExposure)};
 }
 
@@ -210,6 +213,10 @@ void RealSenseStreams::Accept(const RsFrame* frame) {
                        .data = library_->Call(what, library_->get_frame_data, frame)};
   if (!IsWanted(*box_, serial_, image, mode.width, mode.height)) return;
   const std::optional<std::int64_t> stamp = stamps_.StampOf(kind, TimeOf(frame));
+  if (const std::optional<StreamKind> lacking = stamps_.LacksClock())
+    return box_->Fail(say::sdk::NoMetadata(
+        *lacking == StreamKind::kColor ? say::recording::Colour() : say::recording::Depth(),
+        serial_, RealSenseTitle().guide));
   if (!stamp) return box_->CountDiscarded();
   box_->Add(kind, *stamp, CopyOf(image));
 }

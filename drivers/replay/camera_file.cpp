@@ -9,6 +9,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/nearest_name.hpp"
@@ -29,14 +30,17 @@ constexpr double kMaxDepthScale = 1e6;
 constexpr double kMaxBaseline_m = 1.0;
 constexpr int kMaxMarkerId = 65535;
 
-constexpr std::array kKnownKeys = {
-    "image_width",         "image_height",      "camera_matrix",
-    "distortion_model",    "depth_scale",       "distortion_coefficients",
-    "depth_registered",    "depth_image_width", "depth_image_height",
-    "depth_camera_matrix", "depth_noise",       "depth_distortion_coefficients",
-    "T_color_depth",       "marker_dictionary", "marker_length",
-    "reference_marker",    "sensor_serial",     "color_begin_us",
-    "depth_begin_us",      "depth_sensor",      "depth_range"};
+constexpr std::array kKnownKeys = {"image_width",        "image_height",
+                                   "camera_matrix",      "distortion_model",
+                                   "depth_scale",        "distortion_coefficients",
+                                   "depth_registered",   "depth_image_width",
+                                   "depth_image_height", "depth_camera_matrix",
+                                   "depth_noise",        "depth_distortion_coefficients",
+                                   "T_color_depth",      "marker_dictionary",
+                                   "marker_length",      "reference_marker",
+                                   "sensor_serial",      "color_begin_us",
+                                   "depth_begin_us",     "depth_sensor",
+                                   "depth_range",        "assumed"};
 // What OpenCV's calibration program, ROS (camera_info) and RTAB-Map write beside the keys that are
 // read. It says nothing that Plumb would need.
 constexpr std::array kOfCalibrators = {"camera_name",
@@ -103,6 +107,10 @@ std::string KeyMeantBy(const std::string& key) {
 void CheckText(std::string_view text, const std::string& name) {
   if (text.size() > kMaxText)
     throw DataError(say::recording::CameraTooLong(name, text.size(), kMaxText));
+  const std::string_view first = text.substr(0, 2);
+  if (first == "\xFF\xFE" || first == "\xFE\xFF" ||
+      (first.size() == 2 && (first[0] == '\0') != (first[1] == '\0')))
+    throw DataError(say::recording::ListUtf16(name));
   if (text.find('\0') != std::string_view::npos)
     throw DataError(say::recording::CameraZeroBytes(name));
   int depth = 0;
@@ -123,6 +131,8 @@ void CheckText(std::string_view text, const std::string& name) {
 
 /// The text as plain YAML: OpenCV's header `%YAML:1.0` is not a YAML directive.
 std::string WithoutHeader(std::string_view text) {
+  if (constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF"; text.starts_with(kByteOrderMark))
+    text.remove_prefix(kByteOrderMark.size());
   while (text.starts_with('%'))
     text.remove_prefix(
         std::min(text.size(), text.find('\n') == text.npos ? text.size() : text.find('\n') + 1));
@@ -146,12 +156,16 @@ class Keys {
     if (!root_.IsMap()) throw DataError(say::recording::CameraNoKeys(name_));
   }
 
-  /// @throws DataError for a file of another program, and for a key that nobody reads.
+  /// @throws DataError for a file of another program, for a key that nobody reads, and for one that
+  /// stands there twice: which of them is meant, nobody knows.
   void CheckNames() const {
     for (const auto& [key, program] : kForeignKeys)
       if (has(key)) throw DataError(say::recording::CameraForeign(name_, program, key));
+    std::set<std::string> read;
     for (const auto& entry : root_) {
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
+      if (!read.insert(key).second)
+        throw DataError(say::recording::KeyTwice(name_, key.substr(0, 60)));
       const auto is_key = [&](const char* known) { return key == known; };
       if (std::ranges::any_of(kKnownKeys, is_key) || std::ranges::any_of(kOfCalibrators, is_key))
         continue;
@@ -181,6 +195,19 @@ class Keys {
     const YAML::Node node = Required(key);
     if (!node.IsScalar()) throw DataError(say::recording::NotText(Where(key)));
     return node.Scalar();
+  }
+
+  /// A list of texts, or a single one.
+  [[nodiscard]] std::vector<std::string> Texts(const char* key) const {
+    const YAML::Node node = Required(key);
+    if (node.IsScalar()) return {node.Scalar()};
+    std::vector<std::string> texts;
+    for (const YAML::Node& element : node) {
+      if (!node.IsSequence() || !element.IsScalar())
+        throw DataError(say::recording::NotText(Where(key)));
+      texts.push_back(element.Scalar());
+    }
+    return texts;
   }
 
   /// 0 or 1, or as YAML has it, true or false.
@@ -374,9 +401,30 @@ Pose ReadRigid(const Keys& keys, const char* key) {
   return Orthonormalised(T);
 }
 
-void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
-  if (!keys.has("depth_registered")) return;
-  if (keys.Flag("depth_registered")) return;
+/// The model of `distortion_coefficients` is not that of the depth camera's.
+void CheckDepthLens(const Keys& keys, bool color_is_equidistant) {
+  constexpr const char* kKey = "depth_distortion_coefficients";
+  if (!color_is_equidistant || !keys.has(kKey)) return;
+  const std::vector<double> d = keys.Matrix(kKey);
+  if (d.size() == 4 && std::ranges::any_of(d, [](double value) { return value != 0; }))
+    throw DataError(say::recording::LensOfDepth(keys.Where(kKey)));
+}
+
+void ReadDepthCamera(const Keys& keys, bool color_is_equidistant, CameraFile& camera) {
+  std::vector<std::string> stated;
+  for (const char* key : kDepthCameraKeys)
+    if (keys.has(key)) stated.emplace_back(key);
+  if (!keys.has("depth_registered")) {
+    if (!stated.empty())
+      throw DataError(say::recording::RegisteredMissing(keys.name(), std::move(stated)));
+    return;
+  }
+  if (keys.Flag("depth_registered")) {
+    if (!stated.empty())
+      camera.warnings.push_back(say::recording::DepthCameraUnused(keys.name(), std::move(stated)));
+    return;
+  }
+  CheckDepthLens(keys, color_is_equidistant);
   if (!keys.has("depth_camera_matrix") || !keys.has("depth_distortion_coefficients") ||
       !keys.has("T_color_depth")) {
     camera.warnings.push_back(say::recording::DepthCameraUnknown(keys.name()));
@@ -393,6 +441,27 @@ void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
   ReadDistortion(keys, "depth_distortion_coefficients", false, depth.intrinsics);
   depth.T_color_depth = ReadRigid(keys, "T_color_depth");
   camera.depth_camera = depth;
+}
+
+/// What an earlier reader had assumed, by the keys that hold it.
+void ReadAssumed(const Keys& keys, CameraFile& camera) {
+  constexpr const char* kKey = "assumed";
+  if (!keys.has(kKey)) return;
+  const std::array<std::pair<const char*, bool*>, 3> known = {
+      {{kAssumedCamera, &camera.color_assumed},
+       {kAssumedDepthUnit, &camera.depth_unit_assumed},
+       {kAssumedDepthCamera, &camera.depth_camera_estimated}}};
+  const std::vector<std::string> names = keys.Texts(kKey);
+  for (const std::string& name : names) {
+    const auto found =
+        std::ranges::find_if(known, [&](const auto& one) { return name == one.first; });
+    if (found == known.end())
+      throw DataError(
+          say::recording::Assumed(keys.Where(kKey), name.substr(0, 60),
+                                  {kAssumedCamera, kAssumedDepthUnit, kAssumedDepthCamera}));
+    *found->second = true;
+  }
+  if (!names.empty()) camera.warnings.push_back(say::recording::StillAssumed(keys.name(), names));
 }
 
 void ReadDepthNoise(const Keys& keys, CameraFile& camera) {
@@ -470,7 +539,7 @@ CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
   camera.color.height = keys.Integer("image_height");
   CheckSize(keys, camera.color, say::recording::Colour());
   ReadCameraMatrix(keys, "camera_matrix", camera.color);
-  if (keys.has("distortion_coefficients")) {
+  if (keys.has("distortion_coefficients") || is_equidistant) {
     ReadDistortion(keys, "distortion_coefficients", is_equidistant, camera.color);
   } else {
     camera.warnings.push_back(say::recording::NoDistortion(name));
@@ -483,7 +552,8 @@ CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
     }
     camera.depth_scale = scale;
   }
-  ReadDepthCamera(keys, camera);
+  ReadDepthCamera(keys, is_equidistant, camera);
+  ReadAssumed(keys, camera);
   ReadDepthSensor(keys, camera);
   ReadMarkers(keys, camera);
   return camera;
@@ -493,6 +563,9 @@ CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
 
 void TakeOver(const CameraFile& camera, StreamInfo& info) {
   info.intrinsics = camera.color;
+  info.intrinsics_assumed = info.intrinsics_assumed || camera.color_assumed;
+  info.depth_unit_assumed = info.depth_unit_assumed || camera.depth_unit_assumed;
+  info.depth_camera_estimated = info.depth_camera_estimated || camera.depth_camera_estimated;
   if (camera.depth_sensor) {
     info.depth_sensor = *camera.depth_sensor;
     info.depth_noise = ClassOf(info.depth_sensor).noise;

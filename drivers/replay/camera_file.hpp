@@ -2,6 +2,7 @@
 // camera.yaml of a recording: the camera and the markers of the scene.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -21,9 +22,22 @@ struct DepthCamera {
   Pose T_color_depth = Pose::Identity();  ///< From the depth camera's frame to the colour camera's.
 };
 
+/// The keys of camera.yaml that state a depth camera of its own.
+inline constexpr std::array kDepthCameraKeys = {"depth_camera_matrix",
+                                                "depth_distortion_coefficients", "T_color_depth",
+                                                "depth_image_width", "depth_image_height"};
+
+/// What may stand under `assumed`: the keys whose values nothing stated when the file was written.
+inline constexpr const char* kAssumedCamera = "camera_matrix";
+inline constexpr const char* kAssumedDepthUnit = "depth_scale";
+inline constexpr const char* kAssumedDepthCamera = "depth_registered";
+
 /// The validated contents of camera.yaml.
 struct CameraFile {
   Intrinsics color;
+  bool color_assumed = false;  ///< By who wrote the file, as the two below.
+  bool depth_unit_assumed = false;
+  bool depth_camera_estimated = false;      ///< Depth was registered with a camera from its images.
   std::optional<double> depth_scale;        ///< Units of a depth image per metre.
   std::optional<DepthCamera> depth_camera;  ///< Set only if the depth is not registered.
   bool depth_camera_unknown =
@@ -43,7 +57,9 @@ struct CameraFile {
 /// depth_range (nearest and farthest usable depth, metres); for depth_registered 0 also
 /// depth_camera_matrix, depth_distortion_coefficients, T_color_depth (4x4) and, if they differ from
 /// the colour image's, depth_image_width and depth_image_height. Without the first three of these
-/// the depth camera is unknown, with a warning.
+/// the depth camera is unknown, with a warning; any of the five without depth_registered is
+/// refused. assumed: a list of camera_matrix, depth_scale and depth_registered, whose values the
+/// writer of the file had assumed.
 /// @param name  Name of the file for messages.
 /// @throws DataError naming file, key, what was found and what is expected.
 [[nodiscard]] CameraFile ParseCameraFile(std::string_view text, const std::string& name);

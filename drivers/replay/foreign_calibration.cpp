@@ -35,7 +35,7 @@ std::string_view Stripped(std::string_view text) {
 struct Stated {
   int width = 0, height = 0;  ///< 0: not stated.
   double fx = 0, fy = 0, cx = 0, cy = 0;
-  std::vector<double> distortion = {0, 0, 0, 0, 0};
+  std::optional<std::vector<double>> distortion = {};
   bool is_equidistant = false;  ///< The lens, with four coefficients.
   std::optional<double> units_per_metre;
 };
@@ -44,8 +44,8 @@ CameraFile Checked(const Stated& stated, const std::string& name, int width, int
   ordered_json keys = {
       {"image_width", stated.width > 0 ? stated.width : width},
       {"image_height", stated.height > 0 ? stated.height : height},
-      {"camera_matrix", {stated.fx, 0.0, stated.cx, 0.0, stated.fy, stated.cy, 0.0, 0.0, 1.0}},
-      {"distortion_coefficients", stated.distortion}};
+      {"camera_matrix", {stated.fx, 0.0, stated.cx, 0.0, stated.fy, stated.cy, 0.0, 0.0, 1.0}}};
+  if (stated.distortion) keys["distortion_coefficients"] = *stated.distortion;
   if (stated.is_equidistant) keys["distortion_model"] = "equidistant";
   if (stated.units_per_metre) keys["depth_scale"] = *stated.units_per_metre;
   return ParseCameraFile(keys.dump(), name);
@@ -70,6 +70,72 @@ std::string TextIn(const ordered_json& json, const char* name) {
   const auto found = json.find(name);
   return found != json.end() && found->is_string() ? found->get<std::string>().substr(0, 64)
                                                    : std::string();
+}
+
+/// The coefficients of a lens, as a list under one of the usual names or one by one.
+std::optional<std::vector<double>> LensIn(const ordered_json& camera, const std::string& name) {
+  for (const char* key :
+       {"coeffs", "distortion_coefficients", "distortion", "dist_coeffs", "dist", "D"}) {
+    const auto found = camera.find(key);
+    if (found == camera.end() || found->is_null()) continue;
+    if (found->is_object()) return LensIn(*found, name);
+    if (!found->is_array()) continue;
+    // OpenCV's matrices become lists of one list.
+    const ordered_json& list =
+        found->size() == 1 && found->front().is_array() ? found->front() : *found;
+    std::vector<double> lens;
+    for (const auto& element : list) {
+      const ordered_json& value =
+          element.is_array() && element.size() == 1 ? element.front() : element;
+      if (!value.is_number()) throw DataError(say::foreign::NoNumber(name, key));
+      lens.push_back(value.get<double>());
+    }
+    return lens;
+  }
+  if (!camera.contains("k1")) return std::nullopt;
+  const bool has_tangential = camera.contains("p1") || camera.contains("p2");
+  std::vector<const char*> keys = {"k1", "k2", "p1", "p2", "k3"};
+  if (camera.contains("k4") && !has_tangential) keys = {"k1", "k2", "k3", "k4"};
+  if (camera.contains("k4") && has_tangential)
+    keys = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+  std::vector<double> lens;
+  for (const char* key : keys) {
+    if (camera.contains(key) && !camera[key].is_number())
+      throw DataError(say::foreign::NoNumber(name, key));
+    lens.push_back(NumberIn(camera, {key}).value_or(0));
+  }
+  return lens;
+}
+
+/// The lens and its model, as librealsense's Python, OpenCV's users and NeRF's programs name it.
+void TakeLens(const ordered_json& camera, const std::string& name, Stated& stated) {
+  stated.distortion = LensIn(camera, name);
+  std::string stated_model;
+  for (const char* key : {"model", "distortion_model", "camera_model"})
+    if (stated_model.empty()) stated_model = TextIn(camera, key);
+  std::string model;
+  for (const char c : stated_model)
+    if (c != '_' && c != ' ' && c != '-')
+      model += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const auto is_one_of = [&](std::initializer_list<std::string_view> parts) {
+    return std::ranges::any_of(
+        parts, [&](std::string_view part) { return model.find(part) != std::string::npos; });
+  };
+  stated.is_equidistant = is_one_of({"kannala", "fisheye", "equidistant"});
+  if (stated.is_equidistant) {  // Without coefficients no such lens is known.
+    if (!stated.distortion) throw DataError(say::foreign::LensModelOf(name, stated_model));
+    if (stated.distortion->size() > 4 &&
+        std::all_of(stated.distortion->begin() + 4, stated.distortion->end(),
+                    [](double value) { return value == 0; }))
+      stated.distortion->resize(4);
+    return;
+  }
+  const bool bends = stated.distortion && std::ranges::any_of(*stated.distortion, [](double value) {
+                       return value != 0;
+                     });
+  const bool is_known = model.empty() || is_one_of({"brown", "plumbbob", "radtan", "rational",
+                                                    "opencv", "pinhole", "none", "radial"});
+  if (bends && !is_known) throw DataError(say::foreign::LensModelOf(name, stated_model));
 }
 
 std::optional<ForeignCalibration> OfJson(std::string_view text, const std::string& name, int width,
@@ -97,6 +163,7 @@ std::optional<ForeignCalibration> OfJson(std::string_view text, const std::strin
     if (!fx || !fy || !cx || !cy) return std::nullopt;
     stated.fx = *fx, stated.fy = *fy, stated.cx = *cx, stated.cy = *cy;
   }
+  TakeLens(camera, name, stated);
   const double w = NumberIn(camera, {"width", "w", "image_width"}).value_or(0);
   const double h = NumberIn(camera, {"height", "h", "image_height"}).value_or(0);
   stated.width = w > 0 && w < 1e5 ? static_cast<int>(w) : 0;
@@ -141,8 +208,9 @@ std::optional<ForeignCalibration> OfOrbSlam(std::string_view text, const std::st
   const std::vector<const char*> lens = stated.is_equidistant
                                             ? std::vector{"k1", "k2", "k3", "k4"}
                                             : std::vector{"k1", "k2", "p1", "p2", "k3"};
-  stated.distortion.clear();
-  for (const char* coefficient : lens) stated.distortion.push_back(number(camera + coefficient, 0));
+  stated.distortion.emplace();
+  for (const char* coefficient : lens)
+    stated.distortion->push_back(number(camera + coefficient, 0));
   stated.width = static_cast<int>(std::clamp(number("Camera.width", 0), 0.0, 1e5));
   stated.height = static_cast<int>(std::clamp(number("Camera.height", 0), 0.0, 1e5));
   const double factor = number("DepthMapFactor", number("RGBD.DepthMapFactor", 0));
@@ -191,6 +259,42 @@ void Fit(CameraFile& camera, const std::string& name, int width, int height) {
   color = Resized(color, width, height);
 }
 
+/// Whether two cameras are one, within what files round.
+bool IsSame(const Intrinsics& a, const Intrinsics& b) {
+  constexpr double kSameFocal = 1e-3, kSameCentre_px = 0.5;
+  return a.width == b.width && a.height == b.height && std::abs(a.fx / b.fx - 1) < kSameFocal &&
+         std::abs(a.fy / b.fy - 1) < kSameFocal && std::abs(a.cx - b.cx) < kSameCentre_px &&
+         std::abs(a.cy - b.cy) < kSameCentre_px;
+}
+
+bool IsOfDepth(const std::string& name) { return name.find("depth") != std::string::npos; }
+
+/// A file that is too large for a calibration, or cannot be read, is none: programs keep poses and
+/// labels under such names, too.
+std::optional<ForeignCalibration> ParseCandidate(const fs::path& file, const cv::Size& size) {
+  std::string text;
+  try {
+    text = ReadTextFile(file, kMaxBytes);
+  } catch (const DataError&) {
+    return std::nullopt;
+  }
+  return ParseForeignCalibration(text, file.filename().string(), size.width, size.height);
+}
+
+/// A depth camera of its own beside the colour camera shows that depth is not registered.
+void CompareDepthCamera(const fs::path& file, const cv::Size& depth, ForeignCalibration& found) {
+  try {
+    const auto of_depth = ParseCandidate(file, depth);
+    if (!of_depth || IsSame(of_depth->camera.color, found.camera.color)) return;
+  } catch (const DataError&) {
+    // Of images of another shape, or damaged: it is not the colour camera either way.
+  }
+  found.depth_file = file.filename().string();
+  found.camera.depth_camera_unknown = true;
+  found.camera.warnings.push_back(
+      say::foreign::TwoCameras(found.file, found.camera.color.fx, found.depth_file));
+}
+
 bool IsCandidate(const std::string& name) {
   const auto ends = [&](const char* ending) { return name.ends_with(ending); };
   const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
@@ -222,8 +326,9 @@ std::optional<ForeignCalibration> ParseForeignCalibration(std::string_view text,
   return found;
 }
 
-std::optional<ForeignCalibration> FindForeignCalibration(const fs::path& folder, int width,
-                                                         int height) {
+std::optional<ForeignCalibration> FindForeignCalibration(const fs::path& folder,
+                                                         const cv::Size& color,
+                                                         const cv::Size& depth) {
   std::vector<std::string> names;
   std::error_code ignored;
   for (fs::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored))
@@ -234,19 +339,27 @@ std::optional<ForeignCalibration> FindForeignCalibration(const fs::path& folder,
   // camera's pixels.
   const auto rank = [](const std::string& name) {
     const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
-    return has("depth") ? 2 : has("color") || has("rgb") ? 0 : 1;
+    return IsOfDepth(name) ? 2 : has("color") || has("rgb") ? 0 : 1;
   };
   std::ranges::sort(names, {}, [&](const std::string& n) { return std::pair(rank(n), n); });
   std::optional<ForeignCalibration> found;
   for (const std::string& name : names) {
     if (found && rank(name) > rank(found->file)) break;
-    const auto one =
-        ParseForeignCalibration(ReadTextFile(folder / name, kMaxBytes), name, width, height);
+    const auto one = ParseCandidate(folder / name, IsOfDepth(name) ? depth : color);
     if (!one) continue;
     if (found && !(found->camera.color == one->camera.color))
       throw DataError(say::foreign::SeveralCalibrations(found->file, one->file));
     if (!found) found = one;
   }
+  if (!found) return found;
+  if (IsOfDepth(found->file)) {
+    if (depth != color) throw DataError(say::foreign::DepthCameraAlone(found->file));
+    return found;
+  }
+  for (const std::string& name : names)
+    if (IsOfDepth(name) && found->depth_file.empty())
+      CompareDepthCamera(folder / name, depth, *found);
+  if (depth != color) found->camera.depth_camera_unknown = true;
   return found;
 }
 

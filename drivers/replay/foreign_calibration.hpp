@@ -7,14 +7,17 @@
 #include <string>
 #include <string_view>
 
+#include <opencv2/core/types.hpp>
+
 #include "drivers/replay/camera_file.hpp"
 
 namespace plumb {
 
 struct ForeignCalibration {
   CameraFile camera;
-  std::string program;  ///< Whose format it is, such as "ORB-SLAM".
-  std::string file;     ///< Its name.
+  std::string program;          ///< Whose format it is, such as "ORB-SLAM".
+  std::string file;             ///< Its name.
+  std::string depth_file = {};  ///< Of another file that states another camera for depth.
   std::optional<double> rate_hz;
   std::string sensor_name, serial;  ///< Empty where the file does not state them.
 };
@@ -31,9 +34,13 @@ struct ForeignCalibration {
                                                                         const std::string& name,
                                                                         int width, int height);
 
-/// The calibration in the folder, if there is one: a file for the colour camera before others.
-/// @throws DataError also if several files state different cameras.
+/// The calibration in the folder, if there is one: a file for the colour camera before others. A
+/// file that is too large for a calibration is none. If a file for depth states another camera, or
+/// depth has another size, the depth camera is unknown.
+/// @param color, depth  Sizes of the images.
+/// @throws DataError also if several files state different cameras, and if only a depth camera is
+/// stated whose images have another size than colour's.
 [[nodiscard]] std::optional<ForeignCalibration> FindForeignCalibration(
-    const std::filesystem::path& folder, int width, int height);
+    const std::filesystem::path& folder, const cv::Size& color, const cv::Size& depth);
 
 }  // namespace plumb

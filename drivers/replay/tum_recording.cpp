@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <stop_token>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "algo/base/errors.hpp"
@@ -162,26 +163,29 @@ void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics
                                             camera.width, camera.height));
 }
 
-class TumRecording : public FrameSource {
+class TumRecording : public TumSource {
  public:
   TumRecording(const fs::path& folder, const RecordingDefaults& defaults);
   TumRecording(const ImageFolder& contents, const RecordingDefaults& defaults);
   [[nodiscard]] const StreamInfo& info() const override { return info_; }
+  [[nodiscard]] const CameraFile& camera() const override { return camera_; }
   [[nodiscard]] std::optional<Frame> Next() override;
 
  private:
   void FindFrames(const ImageFolder& contents, double least_max_gap_s);
   void ReadCamera(const fs::path& folder, const RecordingDefaults& defaults);
-  void SetCamera(const CameraFile& camera, const RecordingDefaults& defaults);
+  void SetCamera(CameraFile camera, const RecordingDefaults& defaults);
+  void TakeDepthUnit(const RecordingDefaults& defaults);
   void SearchDepthCamera();
+  void CheckDepthSize(const fs::path& file, const cv::Mat& depth) const;
   [[nodiscard]] Decoded Decode(std::size_t i) const;
   void DecodeAll(const std::stop_token& stop);
 
   StreamInfo info_;
+  CameraFile camera_;  ///< With the unit and the depth camera that were taken.
   std::vector<FramePlan> plans_;
-  double depth_scale_ = 0.0;  ///< Units per metre.
   bool depth_is_exr_ = false;
-  Intrinsics depth_intrinsics_;
+  std::function<void(const fs::path&, cv::Mat&)> filter_depth_;
   std::optional<DepthRegistration> registration_;
 
   // Shared with the decoding thread.
@@ -228,35 +232,45 @@ void TumRecording::ReadCamera(const fs::path& folder, const RecordingDefaults& d
   if (fs::exists(fs::symlink_status(file)))
     return SetCamera(ParseCameraFile(ReadTextFile(file, kMaxCameraBytes), file.string()), defaults);
   const cv::Mat image = ReadColorImage(plans_.front().color_file);
-  if (auto found = FindForeignCalibration(folder, image.cols, image.rows)) {
-    info_.warnings.push_back(say::foreign::CalibrationUsed(found->file, found->camera.color.fx));
-    return SetCamera(found->camera, defaults);
+  const cv::Mat depth = ReadDepthImage(plans_.front().depth_file);
+  if (auto found = FindForeignCalibration(folder, image.size(), depth.size())) {
+    if (found->depth_file.empty())
+      info_.warnings.push_back(say::foreign::CalibrationUsed(found->file, found->camera.color.fx));
+    return SetCamera(std::move(found->camera), defaults);
   }
   info_.intrinsics_assumed = true;
   SetCamera(AssumedCamera(folder, image.cols, image.rows), defaults);
 }
 
-void TumRecording::SetCamera(const CameraFile& camera, const RecordingDefaults& defaults) {
+void TumRecording::SetCamera(CameraFile camera, const RecordingDefaults& defaults) {
+  camera_ = std::move(camera);
   info_.room_markers = defaults.room_markers;
-  TakeOver(camera, info_);
-  if (!camera.room_markers.dictionary || !camera.room_markers.length_m) {
+  TakeOver(camera_, info_);
+  info_.dictionary_assumed = !camera_.room_markers.dictionary;
+  info_.marker_length_assumed = !camera_.room_markers.length_m;
+  if (info_.dictionary_assumed || info_.marker_length_assumed) {
     info_.warnings.push_back(
         say::recording::MarkersAssumed(info_.room_markers.dictionary, info_.room_markers.length_m));
   }
-  if (camera.depth_scale) {
-    depth_scale_ = *camera.depth_scale;
-  } else {
-    std::vector<fs::path> images;
-    for (std::size_t i = 0; i < plans_.size(); i += plans_.size() / kSearchedPairs + 1)
-      images.push_back(plans_[i].depth_file);
-    depth_scale_ = DepthUnitsByMedian(images);
-    info_.depth_unit_assumed = true;
-    info_.warnings.push_back(say::recording::DepthScaleAssumed(depth_scale_));
+  if (!camera_.depth_scale) TakeDepthUnit(defaults);
+  info_.depth_units_per_metre = *camera_.depth_scale;
+  if (const std::optional<DepthCamera>& depth = camera_.depth_camera)
+    registration_.emplace(depth->intrinsics, camera_.color, depth->T_color_depth);
+  if (camera_.depth_camera_unknown) SearchDepthCamera();
+}
+
+void TumRecording::TakeDepthUnit(const RecordingDefaults& defaults) {
+  info_.depth_unit_assumed = true;
+  if (defaults.depth_scale) {
+    camera_.depth_scale = defaults.depth_scale;
+    info_.warnings.push_back(say::recording::DepthScaleByMarkers(*camera_.depth_scale));
+    return;
   }
-  depth_intrinsics_ = camera.depth_camera ? camera.depth_camera->intrinsics : camera.color;
-  if (camera.depth_camera)
-    registration_.emplace(depth_intrinsics_, camera.color, camera.depth_camera->T_color_depth);
-  if (camera.depth_camera_unknown) SearchDepthCamera();
+  std::vector<fs::path> images;
+  for (std::size_t i = 0; i < plans_.size(); i += plans_.size() / kSearchedPairs + 1)
+    images.push_back(plans_[i].depth_file);
+  camera_.depth_scale = DepthUnitsByMedian(images);
+  info_.warnings.push_back(say::recording::DepthScaleAssumed(*camera_.depth_scale));
 }
 
 void TumRecording::SearchDepthCamera() {
@@ -267,11 +281,23 @@ void TumRecording::SearchDepthCamera() {
     pairs.push_back({frame.color_rgb, frame.depth_m});
   }
   const std::optional<FoundDepthCamera> found = FindDepthCamera(pairs, info_.intrinsics);
+  camera_.depth_camera_unknown = info_.depth_camera_unknown = !found;
   if (!found) return;
-  const DepthCamera& depth = found->camera;
+  info_.depth_camera_estimated = true;
+  const DepthCamera& depth = camera_.depth_camera.emplace(found->camera);
   registration_.emplace(depth.intrinsics, info_.intrinsics, depth.T_color_depth);
   info_.warnings.push_back(say::recording::DepthCameraFound(
       depth.intrinsics.fx, 1e3 * depth.T_color_depth.translation().x()));
+}
+
+/// Depth of a camera that is not stated can be searched for only on the colour image's pixels.
+void TumRecording::CheckDepthSize(const fs::path& file, const cv::Mat& depth) const {
+  const Intrinsics& color = camera_.color;
+  if (camera_.depth_camera_unknown && (depth.cols != color.width || depth.rows != color.height))
+    throw DataError(say::recording::DepthCameraOfSize(file.string(), depth.cols, depth.rows,
+                                                      color.width, color.height));
+  CheckImageSize(file, depth, camera_.depth_camera ? camera_.depth_camera->intrinsics : color,
+                 say::recording::Depth());
 }
 
 Decoded TumRecording::Decode(std::size_t i) const {
@@ -284,10 +310,10 @@ Decoded TumRecording::Decode(std::size_t i) const {
   decoded.frame.color_rgb = ReadColorImage(plan.color_file);
   CheckImageSize(plan.color_file, decoded.frame.color_rgb, info_.intrinsics,
                  say::recording::Colour());
-  const cv::Mat depth =
-      depth_is_exr_ ? ReadExrDepth(plan.depth_file) : ReadDepthImage(plan.depth_file);
-  CheckImageSize(plan.depth_file, depth, depth_intrinsics_, say::recording::Depth());
-  decoded.frame.depth_m = depth_is_exr_ ? depth : DepthInMetres(depth, depth_scale_);
+  cv::Mat depth = depth_is_exr_ ? ReadExrDepth(plan.depth_file) : ReadDepthImage(plan.depth_file);
+  CheckDepthSize(plan.depth_file, depth);
+  if (filter_depth_) filter_depth_(plan.depth_file, depth);
+  decoded.frame.depth_m = depth_is_exr_ ? depth : DepthInMetres(depth, *camera_.depth_scale);
   if (registration_) decoded.frame.depth_m = registration_->Register(decoded.frame.depth_m);
   return decoded;
 }
@@ -335,6 +361,7 @@ TumRecording::TumRecording(const ImageFolder& contents, const RecordingDefaults&
   info_.warnings = contents.warnings;
   info_.intrinsics_assumed = contents.intrinsics_assumed;
   depth_is_exr_ = contents.depth_is_exr;
+  filter_depth_ = contents.filter_depth;
   FindFrames(contents, defaults.max_stamp_gap_s);
   SetCamera(contents.camera, defaults);
 } catch (const fs::filesystem_error& failure) {
@@ -356,6 +383,8 @@ std::optional<Frame> TumRecording::Next() {
 }
 
 void CheckDefaults(const RecordingDefaults& defaults) {
+  if (defaults.depth_scale && !(*defaults.depth_scale > 0))
+    throw std::invalid_argument("RecordingDefaults: depth_scale must be positive");
   if (!(defaults.max_stamp_gap_s > 0 && defaults.room_markers.length_m > 0 &&
         MarkerDictionary::Find(defaults.room_markers.dictionary))) {
     throw std::invalid_argument("RecordingDefaults: gap, marker length or dictionary out of range");
@@ -364,8 +393,8 @@ void CheckDefaults(const RecordingDefaults& defaults) {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> OpenTumRecording(const fs::path& folder,
-                                              const RecordingDefaults& defaults) {
+std::unique_ptr<TumSource> OpenTumRecording(const fs::path& folder,
+                                            const RecordingDefaults& defaults) {
   CheckDefaults(defaults);
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
@@ -375,8 +404,8 @@ std::unique_ptr<FrameSource> OpenTumRecording(const fs::path& folder,
   return std::make_unique<TumRecording>(folder, defaults);
 }
 
-std::unique_ptr<FrameSource> OpenImageFolder(ImageFolder contents,
-                                             const RecordingDefaults& defaults) {
+std::unique_ptr<TumSource> OpenImageFolder(ImageFolder contents,
+                                           const RecordingDefaults& defaults) {
   CheckDefaults(defaults);
   return std::make_unique<TumRecording>(contents, defaults);
 }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,6 +27,16 @@ struct RecordingDefaults {
   double max_stamp_gap_s = 0.020;
   /// Images a second, for folders of images without time stamps.
   std::optional<double> rate_hz = {};
+  /// Units of a depth image per metre where the recording states none, as its markers show them;
+  /// without it the median of the depth decides.
+  std::optional<double> depth_scale = {};
+};
+
+/// The frames of a recording of images, and how their depth was read.
+class TumSource : public FrameSource {
+ public:
+  /// With the unit and the depth camera that were taken, stated or not.
+  [[nodiscard]] virtual const CameraFile& camera() const = 0;
 };
 
 /// Streams a recording. A separate thread decodes up to three frames ahead, in order, so that
@@ -36,15 +47,15 @@ struct RecordingDefaults {
 /// registered here, see DepthRegistration.
 ///
 /// Opening reads the index and camera.yaml and finds every image, without decoding any (except the
-/// first colour image if camera.yaml is missing: a calibration of another program in the folder is
+/// first pair if camera.yaml is missing: a calibration of another program in the folder is
 /// then taken, see FindForeignCalibration(), or TUM's published intrinsics are assumed, scaled to
 /// its size). Next() throws DataError for an image that is damaged or of another size
 /// than the camera; no frames follow.
 /// @throws DataError if anything is missing, damaged or contradictory, or there are fewer than two
 ///         frames.
 /// @throws std::invalid_argument if the defaults are invalid.
-[[nodiscard]] std::unique_ptr<FrameSource> OpenTumRecording(const std::filesystem::path& folder,
-                                                            const RecordingDefaults& defaults = {});
+[[nodiscard]] std::unique_ptr<TumSource> OpenTumRecording(const std::filesystem::path& folder,
+                                                          const RecordingDefaults& defaults = {});
 
 /// A recording in another layout, whose lists and camera its reader has found.
 struct ImageFolder {
@@ -55,12 +66,15 @@ struct ImageFolder {
   CameraFile camera;
   bool intrinsics_assumed = false;
   bool depth_is_exr = false;  ///< Depth images are OpenEXR in metres, not PNG in units.
+  /// Called on each depth image as stored, which it may change: 0 is no measurement. May be empty;
+  /// must be thread-safe.
+  std::function<void(const std::filesystem::path& file, cv::Mat& depth)> filter_depth = {};
   std::vector<Message> warnings;
 };
 
 /// The same for a recording in another layout.
-[[nodiscard]] std::unique_ptr<FrameSource> OpenImageFolder(ImageFolder contents,
-                                                           const RecordingDefaults& defaults = {});
+[[nodiscard]] std::unique_ptr<TumSource> OpenImageFolder(ImageFolder contents,
+                                                         const RecordingDefaults& defaults = {});
 
 /// True if the folder looks like a recording: it contains rgb.txt or depth.txt.
 [[nodiscard]] bool IsTumRecording(const std::filesystem::path& folder);

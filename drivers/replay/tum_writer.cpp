@@ -11,6 +11,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
+#include "drivers/replay/camera_file.hpp"
 #include "drivers/replay/tum_index.hpp"
 
 namespace plumb {
@@ -19,7 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMaxUnits = 65534.0;  // 65535 is read as "nothing measured"
-constexpr double kStampStep_s = 1e-6;
 
 void MakeFolder(const fs::path& folder) {
   std::error_code error;
@@ -87,10 +87,15 @@ std::string CameraFileText(const StreamInfo& info, double depth_scale) {
       "0., {}, {}, 0., 0., 1. ]\n"
       "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: {}\n   dt: d\n   data: [ {} "
       "]\n"
-      "depth_scale: {}\ndepth_registered: 1\nmarker_dictionary: \"{}\"\nmarker_length: {}\n",
+      "depth_scale: {}\ndepth_registered: {}\n",
       camera.width, camera.height, Real(camera.fx), Real(camera.cx), Real(camera.fy),
       Real(camera.cy), lens.size(), fmt::join(lens, ", "), Real(depth_scale),
-      info.room_markers.dictionary, Real(info.room_markers.length_m));
+      info.depth_camera_unknown ? 0 : 1);
+  // Without these keys the configuration of who reads the recording holds.
+  if (!info.dictionary_assumed)
+    text += fmt::format("marker_dictionary: \"{}\"\n", info.room_markers.dictionary);
+  if (!info.marker_length_assumed)
+    text += fmt::format("marker_length: {}\n", Real(info.room_markers.length_m));
   if (info.room_markers.reference)
     text += fmt::format("reference_marker: {}\n", *info.room_markers.reference);
   const DepthSensorClass& of_class = ClassOf(info.depth_sensor);
@@ -105,6 +110,11 @@ std::string CameraFileText(const StreamInfo& info, double depth_scale) {
         Real(noise.constant_m), Real(noise.linear_m_per_m), Real(noise.quadratic_m_per_m2),
         Real(noise.origin_m), Real(noise.grazing_m));
   }
+  std::vector<const char*> assumed;
+  if (info.intrinsics_assumed) assumed.push_back(kAssumedCamera);
+  if (info.depth_unit_assumed) assumed.push_back(kAssumedDepthUnit);
+  if (info.depth_camera_estimated) assumed.push_back(kAssumedDepthCamera);
+  if (!assumed.empty()) text += fmt::format("assumed: [ {} ]\n", fmt::join(assumed, ", "));
   return text;
 }
 

@@ -12,6 +12,9 @@
 
 namespace plumb {
 
+/// Resolution of the stamps in the files.
+inline constexpr double kStampStep_s = 1e-6;
+
 struct TumWriterOptions {
   /// Units per metre of the depth images; distances above 65534 units are written as not measured.
   double depth_scale = 5000.0;
@@ -31,7 +34,8 @@ struct EncodedFrame {
 /// @throws std::invalid_argument unless the images are CV_8UC3 and CV_32FC1 (metres) of one size.
 [[nodiscard]] EncodedFrame EncodeFrame(const Frame& frame, const TumWriterOptions& options);
 
-/// The text of camera.yaml; ParseCameraFile() gives the same camera back, bit for bit.
+/// The text of camera.yaml; ParseCameraFile() gives the same camera back, bit for bit. What is
+/// assumed stays so: markers that nothing states are left out, and `assumed` lists the rest.
 [[nodiscard]] std::string CameraFileText(const StreamInfo& info, double depth_scale);
 
 /// Writes one recording. Images are written immediately; the indices and camera.yaml are written by

@@ -171,6 +171,7 @@ void AddSdkDriver(SensorRegistry& registry, const std::string& name, const SdkTi
   registry.Add({.name = name,
                 .title = title.name,
                 .is_simulated = false,
+                .states_camera = title.states_camera,
                 .set_up = [make](const SensorSettings& settings, const SimulatedSweeps&,
                                  const std::stop_token&,
                                  const SetUpProgress&) -> std::unique_ptr<SensorSetup> {

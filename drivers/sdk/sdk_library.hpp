@@ -14,10 +14,11 @@
 namespace plumb {
 
 struct SdkTitle {
-  std::string name;    ///< As people know it: "librealsense2".
-  std::string prefix;  ///< Of its files, up to the version: "librealsense2.so.2.".
-  std::string least;   ///< Oldest version that is used: "2.36".
-  std::string guide;   ///< Where the manual says how to install it.
+  std::string name;           ///< As people know it: "librealsense2".
+  std::string prefix;         ///< Of its files, up to the version: "librealsense2.so.2.".
+  std::string least;          ///< Oldest version that is used: "2.36".
+  std::string guide;          ///< Where the manual says how to install it.
+  bool states_camera = true;  ///< As SensorDriver's.
 };
 
 /// A loaded library. It is never unloaded, because such libraries leave threads behind.

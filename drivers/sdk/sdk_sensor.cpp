@@ -51,21 +51,20 @@ CameraFile FactoryCamera(const SdkFactory& factory, const SdkTitle& title,
 
 StreamInfo SdkInfo(const SensorSettings& settings, const SdkUnit& unit, const SdkTitle& title,
                    const CameraFile& factory) {
-  const DepthSensorClass& known = ClassOf(unit.depth_sensor);
+  const KnownDepth known = KnownOfClass(unit.depth_sensor);
   const cv::Size size = SdkColorSize(factory.color.width, factory.color.height);
   StreamInfo info;
   std::error_code error;
   if (std::filesystem::exists(CalibrationFile(settings.calibration_folder, unit.serial), error)) {
-    info = LiveStreamInfo(settings, unit.serial, size.width, size.height, 0.0, known.noise);
-    if (info.usable_depth == UsableDepth()) info.usable_depth = known.range;
+    info = LiveStreamInfo(settings, unit.serial, size.width, size.height, 0.0, known);
   } else {
     info.room_markers = settings.room_markers;
     TakeOver(factory, info);
     info.intrinsics = Resized(factory.color, size.width, size.height);
+    info.depth_sensor = known.sensor;
     info.depth_noise = known.noise;
     info.usable_depth = known.range;
   }
-  info.depth_sensor = unit.depth_sensor;
   if (const auto advice = FirmwareAdvice(unit, title.name)) info.warnings.push_back(*advice);
   return info;
 }

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <utility>
@@ -23,6 +24,7 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kMaxStamp_us = std::int64_t{1} << 53;
+constexpr std::chrono::milliseconds kNextTry{100};
 
 int Listen(const std::filesystem::path& socket) try {
   return ListenUnix(socket);
@@ -72,12 +74,27 @@ void FeederServer::Tell(const json& line) {
 
 void FeederServer::Run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    std::array<pollfd, 2> wait = {{{listening_.get(), POLLIN, 0}, {wake_.get(), POLLIN, 0}}};
-    if (::poll(wait.data(), wait.size(), -1) < 0 || wait[0].revents == 0) continue;
-    const Descriptor connection(
-        ::accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    std::optional<std::chrono::milliseconds> longest;
+    std::array<pollfd, 2> wait = {{{ListeningNow(longest), POLLIN, 0}, {wake_.get(), POLLIN, 0}}};
+    const int timeout_ms = longest ? static_cast<int>(longest->count()) : -1;
+    if (::poll(wait.data(), wait.size(), timeout_ms) < 0 || wait[0].revents == 0) continue;
+    const Descriptor connection = Accept();
     if (connection.get() >= 0) Serve(connection.get());
   }
+}
+
+Descriptor FeederServer::Accept() {
+  Descriptor connection(
+      ::accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+  if (connection.get() < 0) listen_again_ = Clock::now() + kNextTry;
+  return connection;
+}
+
+int FeederServer::ListeningNow(std::optional<std::chrono::milliseconds>& wait) const {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(listen_again_ - Clock::now());
+  if (left.count() <= 0) return listening_.get();
+  wait = wait ? std::min(*wait, left) : left;
+  return -1;
 }
 
 void FeederServer::Serve(int connection) {
@@ -120,20 +137,19 @@ void FeederServer::ReadExactly(int connection, void* to, std::size_t size,
       continue;
     }
     if (got == 0 || (errno != EAGAIN && errno != EINTR)) throw Gone();
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
-    if (left.count() <= 0)
+    std::optional left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
+    if (left->count() <= 0)
       throw DataError(say::stream::Stalled(static_cast<double>(kPatience.count())));
     std::array<pollfd, 3> wait = {
-        {{connection, POLLIN, 0}, {wake_.get(), POLLIN, 0}, {listening_.get(), POLLIN, 0}}};
-    (void)::poll(wait.data(), wait.size(), static_cast<int>(left.count()));
+        {{connection, POLLIN, 0}, {wake_.get(), POLLIN, 0}, {ListeningNow(left), POLLIN, 0}}};
+    (void)::poll(wait.data(), wait.size(), static_cast<int>(left->count()));
     if (wait[1].revents != 0) throw Gone();
     if (wait[2].revents != 0) RefuseSecond();
   }
 }
 
 void FeederServer::RefuseSecond() {
-  const Descriptor second(
-      ::accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+  const Descriptor second = Accept();
   if (second.get() >= 0) SendLine(second.get(), {{"refused", say::stream::OneFeeder().English()}});
 }
 

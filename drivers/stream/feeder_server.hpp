@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -59,6 +60,12 @@ class FeederServer {
   Hello ReadHello(int connection);
   void ReadImage(int connection, const Hello& hello);
   void RefuseSecond();
+  /// The program that waits; nothing (a closed descriptor) if it cannot be accepted now, as where
+  /// the process has no free descriptor. It goes on waiting, and poll() would return at once: the
+  /// socket is then left alone until the next try.
+  [[nodiscard]] Descriptor Accept();
+  /// The socket for poll(), or -1, which it ignores; `wait` is then shortened to the next try.
+  [[nodiscard]] int ListeningNow(std::optional<std::chrono::milliseconds>& wait) const;
 
   const std::filesystem::path socket_;
   Descriptor listening_;
@@ -68,7 +75,8 @@ class FeederServer {
   std::optional<Feeder> feeder_;  ///< Guarded, and the next two.
   std::weak_ptr<FrameBox> box_;
   int connection_ = -1;
-  std::int64_t num_connected_ = 0;
+  std::int64_t num_connected_ = 0;  ///< Of the thread only, and the next one.
+  std::chrono::steady_clock::time_point listen_again_ = {};
   std::jthread thread_;  ///< Last: starts when the members above are initialised.
 };
 

@@ -23,14 +23,23 @@ std::chrono::microseconds LargestGapOf(double rate_hz) {
   return std::chrono::microseconds(static_cast<std::int64_t>(0.49e6 / rate_hz));
 }
 
+/// The unit's own file states the colour camera instead of the feeder; what the feeder states of
+/// its depth camera holds where the file does not state it.
 StreamInfo InfoOf(const SensorSettings& settings, const Feeder& feeder) {
   const std::string& serial = feeder.description.serial;
-  const Intrinsics& color = feeder.hello.camera.color;
+  const CameraFile& fed = feeder.hello.camera;
+  const Intrinsics& color = fed.color;
   std::error_code error;
-  if (std::filesystem::exists(CalibrationFile(settings.calibration_folder, serial), error))
-    return LiveStreamInfo(settings, serial, color.width, color.height, 0.0);
+  if (std::filesystem::exists(CalibrationFile(settings.calibration_folder, serial), error)) {
+    StreamInfo stated;
+    TakeOver(fed, stated);
+    return LiveStreamInfo(
+        settings, serial, color.width, color.height, 0.0,
+        {.sensor = stated.depth_sensor, .noise = stated.depth_noise, .range = stated.usable_depth});
+  }
   nlohmann::json camera = feeder.hello.camera_keys;
   camera.erase("depth_registered");  // Depth is registered here, whatever its camera.
+  for (const char* key : kDepthCameraKeys) camera.erase(key);
   return CalibratedStreamInfo(settings, camera.dump(), "camera", serial, color.width, color.height);
 }
 
@@ -102,6 +111,7 @@ void AddStreamDriver(SensorRegistry& registry) {
       {.name = "stream",
        .title = "stream",
        .is_simulated = false,
+       .states_camera = true,
        .set_up = [](const SensorSettings& settings, const SimulatedSweeps&, const std::stop_token&,
                     const SetUpProgress&) { return std::make_unique<StreamSetup>(settings); }});
 }

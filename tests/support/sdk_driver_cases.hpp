@@ -133,12 +133,22 @@ TYPED_TEST_P(SdkDriverTest, TheUnitsOwnCalibrationTakesPrecedence) {
                              "camera_matrix: [471., 0., {}., 0., 470., {}., 0., 0., 1.]\n"
                              "distortion_coefficients: [0.05, -0.1, 0., 0., 0.]\n",
                              width, height, width / 2, height / 2));
-  const auto sensor = this->Open();
+  auto sensor = this->Open();
   EXPECT_EQ(sensor->info().intrinsics.fx, 471.0);
   EXPECT_EQ(sensor->info().intrinsics.distortion[0], 0.05);
   EXPECT_FALSE(sensor->info().intrinsics_assumed);
   EXPECT_EQ(sensor->info().depth_sensor, usual.depth_sensor);
+  EXPECT_EQ(sensor->info().depth_noise, usual.depth_noise);
   EXPECT_EQ(sensor->info().usable_depth, usual.usable_depth);
+  const std::filesystem::path file =
+      this->folder_ / "calibration" / (TypeParam::Serial() + ".yaml");
+  const std::string text = ReadTextFile(file, 10'000);
+  WriteWholeFile(file, text + "depth_sensor: lidar\ndepth_range: [0.3, 4.0]\n");
+  sensor.reset();
+  const auto other = this->Open();
+  EXPECT_EQ(other->info().depth_sensor, DepthSensor::kLidar);
+  EXPECT_EQ(other->info().depth_noise, ClassOf(DepthSensor::kLidar).noise);
+  EXPECT_EQ(other->info().usable_depth, UsableDepth()) << "stated, though it is a default";
 }
 
 TYPED_TEST_P(SdkDriverTest, WhatCannotBeUsedIsRefusedWithTheReason) {
@@ -170,6 +180,11 @@ TYPED_TEST_P(SdkDriverTest, TheDoctorNamesLibraryAndCameras) {
     has_bad = has_bad || finding.state == SensorFinding::State::kBad;
   }
   EXPECT_EQ(has_bad, text.find("USB 3 port") != std::string::npos);
+  TypeParam::Reset();
+  TypeParam::AttachUsual();
+  EXPECT_EQ(this->Open()->info().intrinsics_assumed,
+            !BuiltInSensors().Choose(TypeParam::kDriver, false).states_camera)
+      << "what the doctor says of a unit without a calibration file";
   this->ExpectNamed(text, TypeParam::DoctorNames());
 }
 

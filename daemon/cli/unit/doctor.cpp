@@ -19,12 +19,10 @@
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/unit/burn_in.hpp"
 #include "daemon/cli/unit/doctor_report.hpp"
+#include "daemon/cli/unit/doctor_sensor.hpp"
 #include "daemon/config/config.hpp"
-#include "daemon/config/sensor_settings.hpp"
 #include "drivers/files/unix_socket.hpp"
 #include "drivers/gpio/gpio.hpp"
-#include "drivers/live/sensor_calibration.hpp"
-#include "drivers/live/sensor_driver.hpp"
 #include "words/doctor.hpp"
 
 namespace plumb {
@@ -49,66 +47,6 @@ Config CheckConfig(DoctorReport& report, const std::optional<fs::path>& wanted) 
                kBadInput);
     return {};
   }
-}
-
-/// The calibration of one attached sensor.
-void CheckCalibration(DoctorReport& report, const SensorSettings& settings,
-                      const std::string& serial) {
-  const fs::path file = CalibrationFile(settings.calibration_folder, serial);
-  std::error_code error;
-  if (!fs::exists(file, error)) {
-    report.Note(say::doctor::Calibration(), say::doctor::NotCalibrated(serial),
-                say::doctor::CalibrateUnit(file.string()));
-    return;
-  }
-  try {
-    const StreamInfo info = LiveStreamInfo(settings, serial, 640, 480, 0.0);
-    report.Good(say::doctor::Calibration(),
-                say::doctor::Calibrated(file.string(), info.intrinsics.fx));
-  } catch (const DeviceError& problem) {
-    report.Bad(say::doctor::Calibration(), problem.message(), {});
-  }
-}
-
-void CheckAttached(DoctorReport& report, const SensorDriver& driver, const SensorSettings& settings,
-                   const std::string& wanted) {
-  const auto setup = driver.set_up(settings, {}, {}, {});
-  const auto provider = setup->MakeProvider();
-  const std::vector<SensorDescription> sensors = provider->List();
-  report.Good(Message::Verbatim(driver.title),
-              say::doctor::Loaded(static_cast<std::int64_t>(sensors.size())));
-  if (sensors.empty())
-    report.Bad(say::doctor::Sensor(), say::doctor::NoSensor(), say::doctor::PlugIn());
-  bool found_wanted = wanted.empty();
-  for (const SensorDescription& sensor : sensors) {
-    found_wanted = found_wanted || sensor.serial == wanted;
-    report.Good(say::doctor::Sensor(), say::doctor::Attached(sensor.name, sensor.serial));
-    CheckCalibration(report, settings, sensor.serial);
-  }
-  if (!found_wanted && !sensors.empty())
-    report.Bad(say::doctor::Sensor(), say::doctor::OtherSerial(wanted), say::doctor::PlugInThat());
-}
-
-void CheckSensor(DoctorReport& report, const Config& config) try {
-  const SensorDriver& driver = BuiltInSensors().Choose(config.appliance.sensor_driver, false);
-  const SensorSettings settings = SensorSettingsOf(config);
-  if (driver.examine) {
-    for (const SensorFinding& finding : driver.examine(settings)) {
-      if (finding.state == SensorFinding::State::kGood)
-        report.Good(finding.what, finding.found);
-      else if (finding.state == SensorFinding::State::kNote)
-        report.Note(finding.what, finding.found, finding.remedy);
-      else
-        report.Bad(finding.what, finding.found, finding.remedy);
-    }
-  }
-  try {
-    CheckAttached(report, driver, settings, config.appliance.sensor_serial);
-  } catch (const DeviceError& error) {
-    report.Bad(Message::Verbatim(driver.title), error.message(), {});
-  }
-} catch (const DataError& problem) {
-  report.Bad(say::doctor::Configuration(), problem.message(), {}, kBadInput);
 }
 
 void CheckGpio(DoctorReport& report) try {

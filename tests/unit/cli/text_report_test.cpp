@@ -58,11 +58,22 @@ TEST(TextReportTest, KeepsItsColumns) {
           HasSubstr("  Lateral          refused: couch-fixed markers show posture only\n"),
           HasSubstr("  Pitch              +0.50 deg   ± 0.20       1 deg  in tolerance       "
                     "head up\n"),
-          HasSubstr("  Roll               +0.90 deg   ± 0.20       1 deg  not surely within  "
+          HasSubstr("  Roll               +0.90 deg   ± 0.20       1 deg  inconclusive       "
                     "patient right side down\n"),
           HasSubstr("  Yaw                +0.10 deg   ±    ?       1 deg  not known          "
                     "head to patient left\n"),
           HasSubstr("T_iec_reference is not set"), HasSubstr("  markers          no alignment\n")));
+}
+
+// A plan may have no isocentre, and that of a planning CT is the origin of the CT's axes.
+TEST(TextReportTest, NamesThePointAboutWhichTheNumbersAre) {
+  Comparison comparison = SomeComparison();
+  comparison.motion.emplace().centroid_m = comparison.correction->isocentre_m;
+  EXPECT_THAT(ComparisonText(Stored(comparison), EnglishCatalogue()),
+              HasSubstr("apply, about the middle of the region (0.100, 0.200, 0.300) m"));
+  comparison.planning.emplace();
+  EXPECT_THAT(ComparisonText(Stored(comparison), EnglishCatalogue()),
+              HasSubstr("apply, at the isocentre\n"));
 }
 
 // Only MOVE asks for moves, and without an answer there is nothing to act on.
@@ -75,7 +86,8 @@ TEST(TextReportTest, TheTableSaysWhatTheVerdictAllows) {
     EXPECT_THAT(text, StartsWith(Text(say::text_report::NoAnswer(), *language) + "\n  " +
                                  Text(say::text_report::NoAlignment(), *language) + "\n"));
     for (const Message& advice :
-         {say::text_report::Correction(0.1, 0.2, 0.3), say::text_report::Measured(0.1, 0.2, 0.3),
+         {say::text_report::Correction(say::text_report::AtIsocentre(0.1, 0.2, 0.3)),
+          say::text_report::Measured(say::text_report::AtIsocentre(0.1, 0.2, 0.3)),
           say::text_report::Tolerance(), say::result::Outside(), say::result::Within(),
           say::direction::HeadUp(), say::direction::HeadToPatientLeft()})
       EXPECT_THAT(text, Not(HasSubstr(Text(advice, *language)))) << language->code;

@@ -57,6 +57,15 @@ struct Row {
   std::vector<std::string> causes;
 };
 
+TEST(DiagnosisTest, TheUnitThatTheMarkersShowIsNamed) {
+  Symptoms symptoms = Sound();
+  symptoms.depth_unit_assumed = true;
+  symptoms.depth_units_per_metre = 5000;
+  ScaleAll(symptoms, 0.2);
+  EXPECT_THAT(Diagnose(symptoms).at(0).message.English(),
+              ::testing::HasSubstr("depth_scale: 1000"));
+}
+
 TEST(DiagnosisTest, NamesTheCauseOfEachFaultAndNothingElse) {
   const std::vector<Row> rows = {
       {"sound", [](Symptoms&) {}, {}},
@@ -70,6 +79,26 @@ TEST(DiagnosisTest, NamesTheCauseOfEachFaultAndNothingElse) {
          s.marker_depths.clear();
        },
        {"depth_unit_unknown!"}},
+      {"5000 that nothing states taken for 1000",
+       [](Symptoms& s) {
+         s.depth_unit_assumed = true;
+         s.depth_units_per_metre = 1000;
+         ScaleAll(s, 5.0);
+       },
+       {"depth_unit_unstated!"}},
+      {"a depth camera that is not known, with depth beside the markers",
+       [](Symptoms& s) {
+         s.depth_camera_unknown = true;
+         for (MarkerDepth& marker : s.marker_depths) marker.scatter = 0.3;
+         s.calibration.chi2 = 9 * 52;
+       },
+       {"depth_camera_unknown!"}},
+      {"a depth camera that is not known beside assumed cameras that do not fit",
+       [](Symptoms& s) {
+         s.depth_camera_unknown = s.cameras_assumed = true;
+         s.calibration.chi2 = 9 * 52;
+       },
+       {"depth_camera_unknown!", "cameras_unstated!"}},
       {"too short for an offset", [](Symptoms& s) { s.stream_offset.reset(); }, {}},
       {"sensor 1.9 % off", [](Symptoms& s) { ScaleAll(s, 1.019); }, {}},
       {"prints at 97 %", [](Symptoms& s) { ScaleAll(s, 0.97); }, {"print_or_sensor"}},

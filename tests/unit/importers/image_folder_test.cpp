@@ -30,6 +30,8 @@ using ::testing::HasSubstr;
 using testing::MessageOf;
 using testing::TempFolder;
 
+const cv::Size kSize(640, 480);
+
 constexpr const char* kOpen3d = R"({"width": 640, "height": 480,
   "intrinsic_matrix": [610.5, 0, 0, 0, 609.25, 0, 318.5, 241.75, 1],
   "depth_scale": 1000.0, "fps": 15.0, "device_name": "Intel RealSense D435", "serial_number": "77"})";
@@ -233,16 +235,162 @@ TEST(ForeignCalibrationTest, WhatCannotBeUsedIsNamed) {
   EXPECT_EQ(ParseForeignCalibration("1 2 3\n", "camera.txt", 640, 480), std::nullopt);
 }
 
+TEST(ForeignCalibrationTest, TheLensOfAJsonIsRead) {
+  const auto lens = [](const std::string& keys) {
+    const std::string text =
+        R"({"fx": 600, "fy": 600, "ppx": 320, "ppy": 240, "width": 640, "height": 480)" + keys +
+        "}";
+    return ParseForeignCalibration(text, "a.json", 640, 480).value().camera;
+  };
+  using Lens = std::array<double, 8>;
+  EXPECT_EQ(lens(R"(, "model": "distortion.inverse_brown_conrady",
+                  "coeffs": [-0.05, 0.06, 0.001, 0.002, -0.02])")
+                .color.distortion,
+            (Lens{-0.05, 0.06, 0.001, 0.002, -0.02}));
+  EXPECT_EQ(lens(R"(, "dist_coeffs": [[0.1, -0.2, 0, 0]])").color.distortion, (Lens{0.1, -0.2}));
+  EXPECT_EQ(lens(R"(, "distortion": [0.1, 0, 0, 0, 0, 0.2, 0, 0])").color.distortion,
+            (Lens{0.1, 0, 0, 0, 0, 0.2}));
+  EXPECT_EQ(lens(R"(, "distortion": {"k1": 0.1, "p2": 0.01})").color.distortion,
+            (Lens{0.1, 0, 0, 0.01}));
+  EXPECT_EQ(
+      lens(R"(, "k1": 0.1, "k2": -0.2, "p1": 0.001, "p2": 0.002, "k3": 0.01)").color.distortion,
+      (Lens{0.1, -0.2, 0.001, 0.002, 0.01}));
+  // 0.3 rad from the axis of an equidistant lens.
+  const CameraFile fisheye =
+      lens(R"(, "camera_model": "OPENCV_FISHEYE", "k1": 0.0, "k2": 0.0, "k3": 0.0, "k4": 0.0)");
+  EXPECT_NEAR(Project(fisheye.color, {std::tan(0.3), 0, 1}).x(), 320 + 600 * 0.3, 0.05);
+  EXPECT_THAT(EnglishTexts(lens("").warnings), Contains(HasSubstr("no distortion_coefficients")));
+  EXPECT_THAT(EnglishTexts(lens(R"(, "coeffs": [0, 0, 0, 0, 0], "model": "f-theta")").warnings),
+              ::testing::IsEmpty())
+      << "without coefficients the model is of no interest";
+  for (const char* refused : {R"(, "model": "distortion.ftheta", "coeffs": [0.1, 0, 0, 0, 0])",
+                              R"(, "camera_model": "fisheye")"})
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)lens(refused); }), HasSubstr("the lens is"))
+        << refused;
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)lens(R"(, "coeffs": ["a"])"); }),
+              HasSubstr("coeffs is not a number"));
+}
+
+constexpr const char* kColorCamera = R"({"fx": 613, "fy": 613, "cx": 320, "cy": 240})";
+constexpr const char* kDepthCamera = R"({"fx": 390, "fy": 390, "cx": 320, "cy": 240})";
+
+TEST(ForeignCalibrationTest, AnotherCameraForDepthIsUnknownUnlessItIsTheSame) {
+  const TempFolder folder;
+  const cv::Size depth(320, 240);
+  const auto find = [&](const cv::Size& depth_size) {
+    return FindForeignCalibration(folder.path(), kSize, depth_size).value();
+  };
+  WriteWholeFile(folder / "color_intrinsics.json", std::string_view(kColorCamera));
+  EXPECT_FALSE(find(kSize).camera.depth_camera_unknown);
+  EXPECT_TRUE(find(depth).camera.depth_camera_unknown) << "of another size";
+  WriteWholeFile(folder / "depth_intrinsics.json", std::string_view(kColorCamera));
+  EXPECT_FALSE(find(kSize).camera.depth_camera_unknown) << "registered";
+  WriteWholeFile(folder / "depth_intrinsics.json", std::string_view(kDepthCamera));
+  const ForeignCalibration both = find(kSize);
+  EXPECT_EQ(both.camera.color.fx, 613);
+  EXPECT_EQ(both.depth_file, "depth_intrinsics.json");
+  EXPECT_TRUE(both.camera.depth_camera_unknown);
+  EXPECT_THAT(EnglishTexts(both.camera.warnings),
+              Contains(AllOf(HasSubstr("color_intrinsics.json"), HasSubstr("depth_intrinsics.json"),
+                             HasSubstr("T_color_depth"))));
+  fs::remove(folder / "color_intrinsics.json");
+  EXPECT_EQ(find(kSize).camera.color.fx, 390) << "colour in the depth camera's view";
+  WriteWholeFile(folder / "depth_intrinsics.json",
+                 std::string_view(R"({"fx": 195, "fy": 195, "cx": 160, "cy": 120})"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)find(depth); }),
+              AllOf(HasSubstr("depth_intrinsics.json"), HasSubstr("depth camera only")));
+}
+
+TEST(ForeignCalibrationTest, LargeAndUnreadableFilesAreNoCalibration) {
+  const TempFolder folder;
+  WriteWholeFile(folder / "camera.json", std::string_view(kColorCamera));
+  for (const char* name : {"annotations.json", "transforms.json"})
+    WriteWholeFile(folder / name, "{\"poses\": \"" + std::string(100'000, 'x') + "\"}");
+  fs::create_symlink("nowhere", folder / "broken.json");
+  EXPECT_EQ(FindForeignCalibration(folder.path(), kSize, kSize).value().camera.color.fx, 613);
+  fs::remove(folder / "camera.json");
+  EXPECT_FALSE(FindForeignCalibration(folder.path(), kSize, kSize));
+}
+
+TEST(ImageFolderTest, TwoCamerasOfDifferentFocalLengthsReachTheFrames) {
+  const TempFolder folder;
+  WriteImages(folder / "color", folder / "depth", "{}.png", "{}.png", 0, 3, 640, 480);
+  WriteWholeFile(folder / "color_intrinsics.json", std::string_view(kColorCamera));
+  WriteWholeFile(folder / "depth_intrinsics.json", std::string_view(kDepthCamera));
+  const auto recording = OpenImported(folder.path());
+  EXPECT_TRUE(recording->info().depth_camera_unknown) << "flat depth shows no edge";
+  EXPECT_TRUE(recording->facts().camera.depth_camera_unknown);
+  EXPECT_THAT(EnglishTexts(recording->info().warnings),
+              Contains(HasSubstr("depth_intrinsics.json")));
+}
+
+TEST(ImageFolderTest, StampsBehindOtherTextAreTakenAsSuch) {
+  for (const auto& [color, depth] :
+       {std::pair{"rgb_13050311{:02}.175304.png", "depth_13050311{:02}.180304.png"},
+        {"rgb13050311{:02}.175304.png", "d13050311{:02}.180304.png"},
+        {"cam-1700000000{:02}0000000.png", "cam-1700000000{:02}5000000.png"}}) {
+    const TempFolder folder;
+    WriteImages(folder / "rgb", folder / "depth", color, depth, 3, 4);
+    WriteWholeFile(folder / "camera.json",
+                   std::string_view(R"({"fx": 60, "fy": 60, "cx": 32, "cy": 24})"));
+    const auto recording = OpenImported(folder.path());
+    EXPECT_EQ(recording->info().num_frames, 4) << color;
+    const Frame first = recording->Next().value();
+    EXPECT_NEAR(first.depth_time_s - first.color_time_s, 0.005, 1e-6) << color;
+  }
+}
+
+TEST(ImageFolderTest, NumbersWithAPointAreNoStamps) {
+  for (const char* name : {"cam1.{:04}.png", "frame.{:04}.png"}) {
+    const TempFolder folder;
+    WriteImages(folder / "rgb", folder / "depth", name, name, 0, 4);
+    WriteWholeFile(folder / "camera.json",
+                   std::string_view(R"({"fx": 60, "fy": 60, "cx": 32, "cy": 24})"));
+    EXPECT_THAT(EnglishTexts(OpenImported(folder.path())->info().warnings),
+                Contains(HasSubstr("no time stamps")))
+        << name;
+  }
+}
+
+TEST(ImageFolderTest, NumbersThatAreShiftedByOneAreNamed) {
+  const TempFolder folder;
+  WriteImages(folder / "rgb", folder / "depth", "{}.png", "{}.png", 0, 4);
+  WriteWholeFile(folder / "camera.json",
+                 std::string_view(R"({"fx": 60, "fy": 60, "cx": 32, "cy": 24})"));
+  const auto warnings = [&] { return EnglishTexts(OpenImported(folder.path())->info().warnings); };
+  EXPECT_THAT(warnings(), ::testing::Not(Contains(HasSubstr("numbered from"))));
+  fs::rename(folder / "rgb/0.png", folder / "rgb/4.png");
+  EXPECT_THAT(warnings(), Contains(HasSubstr("numbered from 1, the depth images from 0")));
+}
+
+TEST(ImageFolderTest, EndingsInCapitalsAreImages) {
+  const TempFolder folder;
+  WriteImages(folder / "rgb", folder / "depth", "{}.PNG", "{}.PNG", 0, 3);
+  WriteWholeFile(folder / "camera.json",
+                 std::string_view(R"({"fx": 60, "fy": 60, "cx": 32, "cy": 24})"));
+  EXPECT_EQ(OpenImported(folder.path())->info().num_frames, 3);
+}
+
+TEST(ImageFolderTest, AFolderWithAPackedBagIsNamedWithTheCommand) {
+  const TempFolder folder;
+  WriteWholeFile(folder / "metadata.yaml", std::string_view("rosbag2_bagfile_information:\n"));
+  WriteWholeFile(folder / "sweep_0.db3.zstd", std::string_view("x"));
+  EXPECT_THAT(MessageOf<DataError>([&] { RefuseUnreadFormat(folder.path()); }),
+              AllOf(HasSubstr("sweep_0.db3.zstd"), HasSubstr("zstd -d")));
+  RefuseUnreadFormat(folder / "metadata.yaml");
+}
+
 TEST(ForeignCalibrationTest, TwoCamerasThatDifferAreRefused) {
   const TempFolder folder;
   WriteWholeFile(folder / "a.json",
                  std::string_view(R"({"fx": 600, "fy": 600, "cx": 320, "cy": 240})"));
   WriteWholeFile(folder / "b.json",
                  std::string_view(R"({"fx": 500, "fy": 500, "cx": 320, "cy": 240})"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)FindForeignCalibration(folder.path(), 640, 480); }),
-              AllOf(HasSubstr("a.json"), HasSubstr("b.json")));
+  EXPECT_THAT(
+      MessageOf<DataError>([&] { (void)FindForeignCalibration(folder.path(), kSize, kSize); }),
+      AllOf(HasSubstr("a.json"), HasSubstr("b.json")));
   fs::rename(folder / "a.json", folder / "rgb.json");
-  EXPECT_EQ(FindForeignCalibration(folder.path(), 640, 480).value().camera.color.fx, 600);
+  EXPECT_EQ(FindForeignCalibration(folder.path(), kSize, kSize).value().camera.color.fx, 600);
 }
 
 TEST(ForeignCalibrationTest, FiveHundredDamagedTextsAreReadOrRefused) {

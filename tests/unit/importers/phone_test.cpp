@@ -29,6 +29,7 @@ using ::testing::Contains;
 using testing::ExrFile;
 using ::testing::HasSubstr;
 using testing::MessageOf;
+using ::testing::Not;
 using testing::TempFolder;
 
 // The keys of a real export, which holds its images upright.
@@ -79,6 +80,107 @@ TEST(PhoneFolderTest, Record3dGivesCameraStampsAndItsClass) {
   EXPECT_NEAR(second.color_rgb.at<cv::Vec3b>(9, 9)[0], 200, 6);
 }
 
+TEST(PhoneFolderTest, ACameraThatFocusesHasItsMedianAndThatIsSaid) {
+  const auto with = [](const std::string& cameras) {
+    std::string text(kRecord3d);
+    return text.insert(1, "\"perFrameIntrinsicCoeffs\":" + cameras + ",");
+  };
+  const TempFolder folder;
+  WriteImages(folder.path(), "{}", {360, 480}, {48, 64});
+  WriteWholeFile(folder / "metadata.json",
+                 with("[[351,351.5,181.25,240.75],[354,354.5,181.5,241],[353,353.5,181.5,241],"
+                      "[356,356.5,181.75,241.25]]"));
+  const auto recording = OpenImported(folder.path());
+  EXPECT_EQ(recording->info().intrinsics.fx, 354);
+  EXPECT_EQ(recording->info().intrinsics.fy, 354.5);
+  EXPECT_EQ(recording->info().intrinsics.cx, 181.5);
+  EXPECT_EQ(recording->info().intrinsics.cy, 241);
+  EXPECT_THAT(EnglishTexts(recording->info().warnings),
+              Contains(AllOf(HasSubstr("changes by 1.4 %"), HasSubstr("354.0 px"))));
+  WriteWholeFile(folder / "metadata.json", with("[[352,352.5,181,240],[352.1,352.5,181,240]]"));
+  const auto steady = OpenImported(folder.path());
+  EXPECT_EQ(steady->info().intrinsics.cx, 181);
+  EXPECT_THAT(EnglishTexts(steady->info().warnings), Not(Contains(HasSubstr("focal length"))));
+  // Of images that are stored turned, or not four numbers: the camera of the whole is kept.
+  for (const char* cameras : {"[[351,351,240,181]]", "[[351,351.5,181]]", "[]", "[[1,\"a\",2,3]]"})
+    EXPECT_EQ(ParseRecord3d(with(cameras), "a")->cx, 181.25) << cameras;
+}
+
+/// Maps of confidence: 2 but for the left third, which has `least`.
+void WriteConfidence(const fs::path& folder, cv::Size size, int least, int most = 2) {
+  fs::create_directories(folder / "confidence");
+  for (int i = 0; i < 4; ++i) {
+    cv::Mat map(size, CV_8UC1, cv::Scalar(most));
+    map.colRange(0, size.width / 3).setTo(least);
+    WritePng(folder / "confidence" / fmt::format("{:06}.png", i), map);
+  }
+}
+
+class ConfidenceTest : public ::testing::Test {
+ protected:
+  ConfidenceTest() {
+    WriteImages(folder_.path(), "{:06}", {360, 240}, {48, 32});
+    WriteWholeFile(folder_ / "camera_matrix.csv", kMatrix);
+    WriteWholeFile(folder_ / "odometry.csv", kOdometry);
+  }
+  struct Read {
+    std::vector<std::string> warnings;
+    float left_m = 0, right_m = 0;  ///< Of the second image.
+  };
+  [[nodiscard]] Read Second() const {
+    const auto recording = OpenImported(folder_.path());
+    (void)recording->Next();
+    const Frame frame = recording->Next().value();
+    return {EnglishTexts(recording->info().warnings), frame.depth_m.at<float>(120, 60),
+            frame.depth_m.at<float>(120, 240)};
+  }
+
+  const TempFolder folder_;
+};
+
+TEST_F(ConfidenceTest, DepthBelowTheHighestIsLeftOutAndCounted) {
+  for (const int least : {0, 1}) {
+    WriteConfidence(folder_.path(), {48, 32}, least);
+    const Read read = Second();
+    EXPECT_EQ(read.left_m, 0.0F) << least;
+    EXPECT_NEAR(read.right_m, 0.801, 1e-5) << least;
+    EXPECT_THAT(read.warnings, Contains(HasSubstr("not sure of 33.3 % of the depth"))) << least;
+  }
+  WriteConfidence(folder_.path(), {48, 32}, 2);
+  const Read read = Second();
+  EXPECT_NEAR(read.left_m, 0.801, 1e-5);
+  EXPECT_THAT(read.warnings, Not(Contains(HasSubstr("not sure"))));
+}
+
+TEST_F(ConfidenceTest, DepthInMetresIsLeftOutToo) {
+  WriteConfidence(folder_.path(), {24, 16}, 1);  // A map of another size.
+  fs::remove_all(folder_ / "depth");
+  fs::create_directories(folder_ / "depth");
+  for (int i = 0; i < 4; ++i)
+    WriteWholeFile(folder_ / fmt::format("depth/{:06}.exr", i),
+                   ExrFile(cv::Mat(32, 48, CV_32FC1, cv::Scalar(0.8))));
+  const Read read = Second();
+  EXPECT_EQ(read.left_m, 0.0F);
+  EXPECT_NEAR(read.right_m, 0.8, 1e-5);
+}
+
+TEST_F(ConfidenceTest, WithoutAMapDepthIsUsedAsItIs) {
+  EXPECT_NEAR(Second().left_m, 0.801, 1e-5) << "no folder";
+  WriteConfidence(folder_.path(), {48, 32}, 0);
+  fs::remove(folder_ / "confidence/000001.png");
+  Read read = Second();
+  EXPECT_NEAR(read.left_m, 0.801, 1e-5);
+  EXPECT_THAT(read.warnings, Contains(HasSubstr("1 depth image has no map")));
+  for (const auto& [least, most] : {std::pair{0, 255}, std::pair{0, 0}}) {
+    WriteConfidence(folder_.path(), {48, 32}, least, most);
+    read = Second();
+    EXPECT_NEAR(read.left_m, 0.801, 1e-5) << "another scale";
+    EXPECT_THAT(read.warnings, Contains(HasSubstr(fmt::format("largest value is {}", most))));
+  }
+  WriteWholeFile(folder_ / "confidence/000000.png", std::string_view("damaged"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)Second(); }), HasSubstr("000000.png"));
+}
+
 TEST(PhoneFolderTest, TheCameraAboveTheScreenProjectsDots) {
   std::string text(kRecord3d);
   text.replace(text.find("\"cameraType\":1"), 14, "\"cameraType\":0");
@@ -102,6 +204,26 @@ TEST(PhoneFolderTest, StrayScannerWithFramesGivesCameraAndStamps) {
   const Frame second = recording->Next().value();
   EXPECT_NEAR(second.color_time_s, 2931.15, 1e-9);
   EXPECT_NEAR(second.depth_m.at<float>(120, 180), 0.802, 1e-5);
+}
+
+TEST(PhoneFolderTest, AFrameThatStrayLeftOutHasNoStamp) {
+  const PhoneMetadata phone =
+      ParseStray(kMatrix, "timestamp, frame\n10.0, 000000\n10.1, 000002\n10.2, 000003\n");
+  ASSERT_EQ(phone.stamps_s.size(), 4U);
+  EXPECT_TRUE(std::isnan(phone.stamps_s[1]));
+  EXPECT_EQ(phone.stamps_s[2], 10.1);
+  EXPECT_THAT(MessageOf<DataError>([] { (void)ParseStray(kMatrix, "t, f\n10.1, 0\n10.0, 2\n"); }),
+              HasSubstr("odometry.csv"));
+  for (const char* rows : {"t, f\n10, 1\n11, 1\n", "t, f\n10, 2000000\n", "t, f\n10, -1\n"})
+    EXPECT_THROW((void)ParseStray(kMatrix, rows), DataError) << rows;
+  const TempFolder folder;
+  WriteImages(folder.path(), "{:06}", {360, 240}, {48, 32});
+  WriteWholeFile(folder / "camera_matrix.csv", kMatrix);
+  WriteWholeFile(folder / "odometry.csv",
+                 std::string_view("t, f\n10.0, 000000\n10.1, 000002\n10.2, 000003\n"));
+  const auto recording = OpenImported(folder.path());
+  EXPECT_EQ(recording->info().num_frames, 3);
+  EXPECT_THAT(EnglishTexts(recording->info().warnings), Contains(HasSubstr("have no partner")));
 }
 
 TEST(PhoneFolderTest, WhatCannotBeReadIsNamedWithTheCommandThatConvertsIt) {

@@ -296,6 +296,210 @@ TEST(Ros2FactsTest, AlignedDepthIsPreferredAndNeedsNoTransforms) {
   EXPECT_EQ(facts.depth_s.size(), static_cast<std::size_t>(kFramesOfRos2));
 }
 
+/// Images of one topic, stamped as the others, with a camera_info beside them.
+void AddTopic(std::vector<Ros2Message>& messages, const std::string& topic,
+              const std::string& encoding, int value, bool first = false) {
+  std::vector<Ros2Message> added = {
+      {topic.substr(0, topic.rfind('/')) + "/camera_info", "sensor_msgs/msg/CameraInfo",
+       testing::Ros2Camera(30.5, 15.25, 11.75, kDepthWidth, kDepthHeight, {0, 0, 0, 0, 0})}};
+  const std::size_t bytes = encoding == "rgb8" ? 3 : 2;
+  for (int i = 0; i < kFramesOfRos2; ++i)
+    added.push_back(
+        {topic, "sensor_msgs/msg/Image",
+         testing::Ros2Image(
+             StampOf(i), "camera_depth_optical_frame", encoding, kDepthWidth, kDepthHeight,
+             std::string(bytes * kDepthWidth * kDepthHeight, static_cast<char>(value)))});
+  messages.insert(first ? messages.begin() : messages.end(), added.begin(), added.end());
+}
+
+/// A pixel of the second depth image.
+int DepthOf(const std::vector<Ros2Message>& messages) {
+  const std::vector<std::uint8_t> bytes = testing::InContainer(messages, Container::kMcapPlain);
+  return OpenRecordedFile(InMemory(bytes))->Depth(1).at<std::uint16_t>(5, 5);
+}
+
+TEST(Ros2FactsTest, InfraredIsNoDepthInAnyOrder) {
+  for (const bool first : {true, false})
+    for (const auto& [topic, encoding] :
+         {std::pair{"/ir/image_raw", "mono16"}, std::pair{"/kinect2/sd/image_ir", "16UC1"},
+          std::pair{"/camera/infra1/image_rect_raw", "16UC1"},
+          std::pair{"/camera/left_ir2/image", "16UC1"},
+          // Brightness by its kind, whatever its name.
+          std::pair{"/camera/amplitude/image_raw", "mono16"}}) {
+      std::vector<Ros2Message> messages = Messages();
+      AddTopic(messages, topic, encoding, 7, first);
+      EXPECT_EQ(DepthOf(messages), 1501) << topic << (first ? " first" : " last");
+    }
+  std::vector<Ros2Message> only = Messages();
+  for (Ros2Message& message : only)
+    if (message.topic.find("/depth/image") != std::string::npos) message.topic = "/ir/image_raw";
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)FactsOf(only); }), HasSubstr("no depth images"));
+}
+
+TEST(Ros2FactsTest, DepthThatIsNamedGreyIsReadWhereThereIsNoOther) {
+  EXPECT_EQ(DepthOf(Messages({.depth_encoding = "mono16"})), 1501);
+  std::vector<Ros2Message> messages = Messages();
+  for (Ros2Message& message : messages)  // Of a robot with such a name.
+    if (message.topic.starts_with("/camera")) message.topic = "/ir" + message.topic;
+  EXPECT_EQ(DepthOf(messages), 1501);
+}
+
+TEST(Ros2FactsTest, ColourInTheDepthCamerasViewGoesWithDepthOfItsOwnCameraOnly) {
+  for (const bool first : {true, false}) {
+    std::vector<Ros2Message> messages = Messages();
+    AddTopic(messages, "/rgb_to_depth/image_raw", "rgb8", 90, first);
+    EXPECT_EQ(FactsOf(messages).camera["camera_matrix"][0], 60.25) << "colour of its own camera";
+    AddTopic(messages, "/depth_to_rgb/image_raw", "16UC1", 3, first);
+    EXPECT_EQ(FactsOf(messages).camera["depth_registered"], 1);
+    EXPECT_EQ(DepthOf(messages), 0x0303);
+  }
+  std::vector<Ros2Message> without = Messages({.frames = false});
+  std::erase_if(without, [](const Ros2Message& message) {
+    return message.topic.starts_with("/camera/color");
+  });
+  AddTopic(without, "/rgb_to_depth/image_raw", "rgb8", 90);
+  const RecordedFacts facts = FactsOf(without);
+  EXPECT_EQ(facts.camera["camera_matrix"][0], 30.5);
+  EXPECT_EQ(facts.camera["depth_registered"], 0);
+  EXPECT_EQ(facts.camera["T_color_depth"][3], 0.0) << "one view";
+  EXPECT_EQ(DepthOf(without), 1501);
+}
+
+constexpr std::array<double, 9> kStraight = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+constexpr std::array<double, 12> kProjection = {58.5, 0, 30.25, 0, 0, 59.5, 22.5, 0, 0, 0, 1, 0};
+
+/// Of colour images on this topic, whose camera_info has these.
+RecordedFacts FactsOfColor(const std::string& topic, const std::vector<double>& lens,
+                           const std::array<double, 9>& r, const std::array<double, 12>& p,
+                           std::vector<Ros2Message> messages = Messages()) {
+  for (Ros2Message& message : messages) {
+    if (message.topic == "/camera/color/image_raw") message.topic = topic;
+    if (message.topic == "/camera/color/camera_info")
+      message.data = testing::Ros2Camera(60.25, 31.5, 23.25, kWidth, kHeight, lens, r, p);
+  }
+  return FactsOf(messages);
+}
+
+TEST(Ros2FactsTest, RectifiedImagesHaveTheProjectionsCameraAndNoLens) {
+  const std::vector<double> lens = {0.15, -0.2, 0.001, 0.002, 0.0};
+  for (const char* name : {"image_rect_color", "image_color_rect", "image_rect"}) {
+    const RecordedFacts facts =
+        FactsOfColor(std::string("/camera/color/") + name, lens, kStraight, kProjection);
+    EXPECT_EQ(facts.camera["camera_matrix"],
+              nlohmann::ordered_json({58.5, 0.0, 30.25, 0.0, 59.5, 22.5, 0.0, 0.0, 1.0}))
+        << name;
+    EXPECT_EQ(facts.camera["distortion_coefficients"],
+              nlohmann::ordered_json({0.0, 0.0, 0.0, 0.0, 0.0}));
+  }
+  for (const char* name : {"image_raw", "image_color", "image_direct"}) {
+    const RecordedFacts facts =
+        FactsOfColor(std::string("/camera/color/") + name, lens, kStraight, kProjection);
+    EXPECT_EQ(facts.camera["camera_matrix"][0], 60.25) << name;
+    EXPECT_EQ(facts.camera["distortion_coefficients"][0], 0.15) << name;
+  }
+  EXPECT_EQ(FactsOfColor("/camera/color/image_rect_color", {0, 0, 0, 0, 0}, kStraight, kProjection)
+                .camera["camera_matrix"][0],
+            60.25)
+      << "nothing was undone";
+}
+
+TEST(Ros2FactsTest, ARectifiedCameraThatIsNotStatedIsRefused) {
+  std::array<double, 9> turned = kStraight;
+  turned[1] = 0.01;
+  turned[3] = -0.01;
+  for (const auto& [r, p] :
+       {std::pair{turned, kProjection}, std::pair{kStraight, std::array<double, 12>()}})
+    EXPECT_THAT(MessageOf<DataError>([&, r = r, p = p] {
+                  (void)FactsOfColor("/camera/color/image_rect_color", {0.1, 0, 0, 0, 0}, r, p);
+                }),
+                AllOf(HasSubstr("colour images are rectified"), HasSubstr("image_raw")));
+}
+
+TEST(Ros2FactsTest, AlignedDepthIsRegisteredToImagesOfItsKindOnly) {
+  std::vector<Ros2Message> messages = Messages({.frames = false});
+  AddTopic(messages, "/camera/aligned_depth_to_color/image_raw", "16UC1", 3);
+  const auto color = [&](const std::string& name, double k1) {
+    return FactsOfColor("/camera/color/" + name, {k1, 0, 0, 0, 0}, kStraight, kProjection, messages)
+        .camera;
+  };
+  EXPECT_EQ(color("image_raw", 0.1)["depth_registered"], 1);
+  EXPECT_EQ(color("image_rect_color", 0.0)["depth_registered"], 1);
+  const nlohmann::ordered_json own = color("image_rect_color", 0.1);
+  EXPECT_EQ(own["depth_registered"], 0) << "depth lies on the pixels that were not rectified";
+  EXPECT_EQ(own["depth_camera_matrix"][0], 30.5);
+  EXPECT_EQ(own["T_color_depth"][3], 0.0);
+}
+
+/// The class of a recording whose topics, or frames, have this in their names, and what is warned.
+std::pair<DepthSensor, std::string> ClassBy(const std::string& topic_begin,
+                                            const std::string& frame = "") {
+  std::vector<Ros2Message> messages = Messages();
+  for (Ros2Message& message : messages) {
+    if (message.topic.starts_with("/camera"))
+      message.topic.replace(0, std::string_view("/camera").size(), topic_begin);
+    for (std::size_t at = 0;
+         !frame.empty() && (at = message.data.find("camera_", at)) != message.data.npos;
+         at += frame.size())
+      message.data.replace(at, frame.size(), frame);
+  }
+  const TempFolder folder;
+  WriteWholeFile(folder / "sweep.mcap", testing::InContainer(messages, Container::kMcapPlain));
+  const auto recording = OpenImported(folder / "sweep.mcap");
+  std::string warned;
+  for (const std::string& text : EnglishTexts(recording->info().warnings))
+    if (text.find("class of the depth camera") != std::string::npos) warned += text;
+  return {recording->info().depth_sensor, warned};
+}
+
+TEST(Ros2ClassTest, IsGuessedByTheNamesOfTopicsAndFramesAndSaid) {
+  for (const auto& [name, sensor] : {std::pair{"/k4a", DepthSensor::kTimeOfFlight},
+                                     std::pair{"/femto_bolt", DepthSensor::kTimeOfFlight},
+                                     std::pair{"/kinect2/hd", DepthSensor::kTimeOfFlight},
+                                     std::pair{"/L515", DepthSensor::kTimeOfFlight},
+                                     std::pair{"/camera/realsense", DepthSensor::kActiveStereo},
+                                     std::pair{"/D455_left", DepthSensor::kActiveStereo},
+                                     std::pair{"/gemini_335", DepthSensor::kActiveStereo}}) {
+    const auto [found, warned] = ClassBy(name);
+    EXPECT_EQ(found, sensor) << name;
+    EXPECT_THAT(warned, AllOf(HasSubstr("taken as " + std::string(Name(sensor))), HasSubstr(name),
+                              HasSubstr("sweep.mcap.yaml")));
+  }
+  EXPECT_EQ(ClassBy("/camera", "openni_").first, DepthSensor::kStructuredLight);
+  EXPECT_THAT(ClassBy("/camera", "openni_").second, HasSubstr("openni"));
+  EXPECT_THAT(ClassBy("/camera").second, AllOf(HasSubstr("structured_light is taken"),
+                                               HasSubstr("depth_sensor in camera.yaml")));
+}
+
+TEST(Ros2ClassTest, DepthAlignedByTheDriverOfRealSenseIsActiveStereo) {
+  std::vector<Ros2Message> messages = Messages();
+  AddTopic(messages, "/camera/aligned_depth_to_color/image_raw", "16UC1", 3);
+  EXPECT_EQ(FactsOf(messages).camera["depth_sensor"], "active_stereo");
+  EXPECT_EQ(FactsOf(messages).class_by, "/camera/aligned_depth_to_color/image_raw");
+}
+
+TEST(Ros2ClassTest, AFileBesideTheRecordingStatesItOrLeavesIt) {
+  const TempFolder folder;
+  std::vector<Ros2Message> messages = Messages();
+  for (Ros2Message& message : messages)
+    if (message.topic.starts_with("/camera")) message.topic.replace(0, 7, "/k4a");
+  WriteWholeFile(folder / "a.mcap", testing::InContainer(messages, Container::kMcapPlain));
+  const std::string camera =
+      "image_width: 64\nimage_height: 48\ncamera_matrix: [60, 0, 32, 0, 60, 24, 0, 0, 1]\n"
+      "distortion_coefficients: [0, 0, 0, 0, 0]\ndepth_scale: 1000\n";
+  const auto open = [&](const std::string& more) {
+    WriteWholeFile(folder / "a.mcap.yaml", camera + more);
+    return OpenImported(folder / "a.mcap");
+  };
+  const auto left = open("");
+  EXPECT_EQ(left->info().depth_sensor, DepthSensor::kTimeOfFlight);
+  EXPECT_EQ(left->info().depth_noise, ClassOf(DepthSensor::kTimeOfFlight).noise);
+  EXPECT_THAT(EnglishTexts(left->info().warnings), Contains(HasSubstr("by the name /k4a")));
+  const auto stated = open("depth_sensor: active_stereo\n");
+  EXPECT_EQ(stated->info().depth_sensor, DepthSensor::kActiveStereo);
+  EXPECT_THAT(EnglishTexts(stated->info().warnings),
+              Not(Contains(HasSubstr("class of the depth camera"))));
+}
+
 TEST(Ros2FactsTest, MessagesOutOfOrderAreSorted) {
   std::vector<Ros2Message> messages = Messages();
   std::swap(messages[messages.size() - 1], messages[messages.size() - 3]);

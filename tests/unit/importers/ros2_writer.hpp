@@ -7,6 +7,7 @@
 #include <sqlite3.h>
 #include <zstd.h>
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <map>
@@ -55,13 +56,16 @@ struct Ros2Message {
 };
 
 inline std::string Ros2Camera(double f, double cx, double cy, std::uint32_t width,
-                              std::uint32_t height, const std::vector<double>& lens) {
+                              std::uint32_t height, const std::vector<double>& lens,
+                              const std::array<double, 9>& r = {},
+                              const std::array<double, 12>& p = {}) {
   Cdr cdr;
   cdr.Header(0.0, "any").Add(height).Add(width).Text("plumb_bob");
   cdr.Add(static_cast<std::uint32_t>(lens.size()));
   for (const double d : lens) cdr.Add(d);
   for (const double k : {f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0}) cdr.Add(k);
-  for (int i = 0; i < 9 + 12; ++i) cdr.Add(0.0);
+  for (const double element : r) cdr.Add(element);
+  for (const double element : p) cdr.Add(element);
   for (int i = 0; i < 6; ++i) cdr.Add(std::uint32_t{0});
   return cdr.Add(std::uint8_t{0}).message();
 }

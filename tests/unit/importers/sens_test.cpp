@@ -31,6 +31,7 @@ using testing::TempFolder;
 constexpr int kFramesOfSens = 4;
 
 struct Sens {
+  std::string name = "StructureSensor";
   std::int32_t color_packing = 2, depth_packing = 1;
   float shift_x = 0.0F;
   std::uint64_t step_us = 33333;
@@ -38,9 +39,8 @@ struct Sens {
 
 std::vector<std::uint8_t> WriteSens(const Sens& sens) {
   Packed file;
-  const std::string name = "StructureSensor";
-  file.Add(std::uint32_t{4}).Add(std::uint64_t{name.size()});
-  std::string bytes = file.bytes() + name;
+  file.Add(std::uint32_t{4}).Add(std::uint64_t{sens.name.size()});
+  std::string bytes = file.bytes() + sens.name;
   Packed rest;
   const auto matrix = [&](const std::array<float, 16>& m) {
     for (const float v : m) rest.Add(v);
@@ -90,6 +90,17 @@ TEST(SensTest, FramesComeBackWithBothCameras) {
     EXPECT_NEAR(frame.color_rgb.at<cv::Vec3b>(20, 20)[0], 200, 6);
   }
   EXPECT_FALSE(recording->Next());
+}
+
+TEST(SensTest, ASensorWithoutANameHasTheUsualClassAndThatIsSaid) {
+  const TempFolder folder;
+  const auto warnings = [&](const std::string& name) {
+    WriteWholeFile(folder / "scene.sens", WriteSens({.name = name}));
+    return EnglishTexts(OpenImported(folder / "scene.sens")->info().warnings);
+  };
+  EXPECT_THAT(warnings(""), Contains(HasSubstr("structured_light is taken")));
+  EXPECT_THAT(warnings("StructureSensor"),
+              ::testing::Not(Contains(HasSubstr("class of the depth camera"))));
 }
 
 TEST(SensTest, WhatIsMissingIsSaid) {

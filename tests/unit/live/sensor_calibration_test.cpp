@@ -92,7 +92,7 @@ TEST_F(SensorCalibrationTest, WithoutARoomTheFileSaysWhichMarkersThereAre) {
 TEST_F(SensorCalibrationTest, TheDepthNoiseIsTheDriversUnlessTheUnitsFileStatesOne) {
   const DepthNoise of_model = {.constant_m = 0.003, .quadratic_m_per_m2 = 0.0};
   const auto noise = [&] {
-    return LiveStreamInfo(room_, "S1", 640, 480, 0.0, of_model).depth_noise;
+    return LiveStreamInfo(room_, "S1", 640, 480, 0.0, {.noise = of_model}).depth_noise;
   };
   EXPECT_EQ(noise(), of_model) << "without a file";
   EXPECT_EQ(Info().depth_noise, DepthNoise()) << "of a driver that states none";
@@ -106,6 +106,30 @@ TEST_F(SensorCalibrationTest, TheDepthNoiseIsTheDriversUnlessTheUnitsFileStatesO
   EXPECT_EQ(noise(), of_unit);
   EXPECT_THAT(Complaint("depth_noise: {constant_m: 2}\n"),
               AllOf(HasSubstr("S1.yaml: depth_noise"), HasSubstr("correct or remove the file")));
+}
+
+TEST_F(SensorCalibrationTest, TheClassIsTheDriversUnlessTheUnitsFileStatesAnother) {
+  KnownDepth known = KnownOfClass(DepthSensor::kTimeOfFlight);
+  known.noise.constant_m = 0.003;
+  known.range = {.nearest_m = 0.5, .farthest_m = 5.0};
+  const auto info = [&] { return LiveStreamInfo(room_, "S1", 640, 480, 0.0, known); };
+  const auto expect_known = [&](const char* when) {
+    EXPECT_EQ(info().depth_sensor, DepthSensor::kTimeOfFlight) << when;
+    EXPECT_EQ(info().depth_noise, known.noise) << when;
+    EXPECT_EQ(info().usable_depth, known.range) << when;
+  };
+  expect_known("no file");
+  Write("");
+  expect_known("a file that states nothing of depth");
+  Write("depth_sensor: time_of_flight\n");
+  expect_known("a file that repeats the class");
+  Write("depth_range: [0.3, 4.0]\n");
+  EXPECT_EQ(info().depth_sensor, DepthSensor::kTimeOfFlight);
+  EXPECT_EQ(info().usable_depth, UsableDepth()) << "stated, though it is a default";
+  Write("depth_sensor: lidar\n");
+  EXPECT_EQ(info().depth_sensor, DepthSensor::kLidar);
+  EXPECT_EQ(info().depth_noise, ClassOf(DepthSensor::kLidar).noise);
+  EXPECT_EQ(info().usable_depth, ClassOf(DepthSensor::kLidar).range);
 }
 
 }  // namespace

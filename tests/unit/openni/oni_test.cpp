@@ -10,6 +10,7 @@
 #include <random>
 #include <thread>
 
+#include <fmt/format.h>
 #include <opencv2/core.hpp>
 
 #include "algo/base/errors.hpp"
@@ -28,6 +29,7 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::MessageOf;
 using testing::TempFolder;
@@ -322,6 +324,34 @@ TEST(OniFileTest, TheBeginsComeBackFromTheSideCar) {
   EXPECT_EQ(begin.color_us, 1'700'000'000'134'187);
   EXPECT_EQ(begin.depth_us, 42);
   EXPECT_EQ(ParseOniBegin("a: 1\ncolor_begin_us: -5\ndepth_begin_us: x\n").color_us, 0);
+}
+
+TEST(OniTest, WhatTheSideCarSaysOfTheDepthIsUsedOrRefused) {
+  const TempFolder folder;
+  const fs::path file = folder / "other.oni";
+  fs::copy_file(Recording(), file);
+  const StreamInfo info = Source()->info();
+  WriteWholeFile(OniSideCar(file), CameraFileText(info, 5000.0));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OpenOniRecording(file); }),
+              AllOf(HasSubstr("depth_scale is 5000"), HasSubstr("millimetres")));
+  const auto unregistered = [&](const std::string& camera) {
+    std::string text = CameraFileText(info, 1000.0);
+    text.replace(text.find("depth_registered: 1"), 19, "depth_registered: 0\n" + camera);
+    WriteWholeFile(OniSideCar(file), text);
+    return OpenOniRecording(file);
+  };
+  EXPECT_TRUE(unregistered("")->info().depth_camera_unknown);
+  const Intrinsics& color = info.intrinsics;
+  const auto moved = unregistered(
+      fmt::format("depth_camera_matrix: [ {}, 0, {}, 0, {}, {}, 0, 0, 1 ]\n"
+                  "depth_distortion_coefficients: [ 0, 0, 0, 0, 0 ]\n"
+                  "T_color_depth: [ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.25, 0, 0, 0, 1 ]\n",
+                  color.fx, color.cx, color.fy, color.cy));
+  EXPECT_FALSE(moved->info().depth_camera_unknown);
+  const cv::Point centre(color.width / 2, color.height / 2);
+  const float as_recorded_m = OpenOniRecording(Recording())->Next()->depth_m.at<float>(centre);
+  ASSERT_GT(as_recorded_m, 0.0F);
+  EXPECT_NEAR(moved->Next()->depth_m.at<float>(centre), as_recorded_m + 0.25, 0.02);
 }
 
 TEST(OniTest, TheDepthNoiseOfTheSideCarComesBack) {

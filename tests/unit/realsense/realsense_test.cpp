@@ -266,6 +266,42 @@ TEST(RealSenseStampsTest, BothStreamsUseTheClockThatBothHave) {
   EXPECT_EQ(stamps.StampOf(StreamKind::kDepth, with), 1'998'000);
 }
 
+TEST(RealSenseStampsTest, ClocksThatDifferAreNamedAndNotMixed) {
+  const StatedTime by_camera{.sensor_us = 5'000, .frame_ms = 5.0, .exposure_us = {}};
+  const StatedTime by_computer{
+      .sensor_us = {}, .frame_ms = 1.7e12, .frame_is_by_camera = false, .exposure_us = {}};
+  RealSenseStamps stamps;
+  EXPECT_FALSE(stamps.StampOf(StreamKind::kColor, by_camera));
+  EXPECT_EQ(stamps.LacksClock(), std::nullopt) << "depth is not known yet";
+  EXPECT_FALSE(stamps.StampOf(StreamKind::kDepth, by_computer));
+  EXPECT_EQ(stamps.LacksClock(), StreamKind::kDepth);
+  EXPECT_FALSE(stamps.StampOf(StreamKind::kColor, by_camera));
+  RealSenseStamps both;  // One clock, if not the camera's.
+  EXPECT_FALSE(both.StampOf(StreamKind::kColor, by_computer));
+  EXPECT_TRUE(both.StampOf(StreamKind::kDepth, by_computer));
+  EXPECT_EQ(both.LacksClock(), std::nullopt);
+}
+
+TEST_F(RealSenseTest, MetadataOfOneStreamOnlyIsNamedAtOnce) {
+  fake::Attach(D435());
+  const auto sensor = Open();
+  const cv::Mat color(720, 1280, CV_8UC3, cv::Scalar(10, 20, 30));
+  RealSenseMaker::Deliver(color, 1, 1'000'000);
+  const cv::Mat depth(480, 848, CV_16UC1, cv::Scalar(2000));
+  EXPECT_TRUE(fake::Deliver(kSerial, {.stream = kStreamDepth,
+                                      .format = kFormatZ16,
+                                      .width = depth.cols,
+                                      .height = depth.rows,
+                                      .stride = static_cast<int>(depth.step),
+                                      .data = depth.data,
+                                      .number = 1,
+                                      .timestamp_ms = 1.7e12,
+                                      .timestamp_domain = kDomainSystemTime,
+                                      .metadata = {}}));
+  ExpectNamed(WhyNotNext(*sensor),
+              {kSerial, "depth images", "metadata of the kernel", "docs/realsense.md"});
+}
+
 TEST(RealSenseLibraryTest, TheNewestFileIsTaken) {
   const TempFolder folder;
   for (const char* name :

@@ -285,12 +285,81 @@ TEST(CameraFileTest, ReadsTheDepthCamera) {
       Eigen::Vector3d(0.025, 0.001, -0.002)));
 }
 
-TEST(CameraFileTest, UnregisteredDepthWithoutItsCameraIsTakenAsRegisteredWithAWarning) {
+TEST(CameraFileTest, UnregisteredDepthWithoutItsCameraIsUnknownWithAWarning) {
   const CameraFile camera =
       ParseCameraFile(With("depth_registered: 1", "depth_registered: 0"), "camera.yaml");
   EXPECT_FALSE(camera.depth_camera);
+  EXPECT_TRUE(camera.depth_camera_unknown);
   ASSERT_THAT(camera.warnings, SizeIs(1));
-  EXPECT_THAT(camera.warnings[0].English(), HasSubstr("taken as registered"));
+  EXPECT_THAT(camera.warnings[0].English(), HasSubstr("searched for in the images"));
+}
+
+TEST(CameraFileTest, ADepthCameraNeedsTheWordWhetherItIsUsed) {
+  const std::string stated = std::string(kDepthCamera).substr(std::string(kDepthCamera).find('\n'));
+  EXPECT_THAT(Refusal(With("depth_registered: 1", stated)),
+              AllOf(HasSubstr("T_color_depth"), HasSubstr("add depth_registered: 0")));
+  EXPECT_THAT(Refusal(With("depth_registered: 1", "depth_image_width: 320")),
+              HasSubstr("depth_image_width"));
+  const CameraFile camera =
+      ParseCameraFile(With("depth_registered: 1", "depth_registered: 1" + stated), "c");
+  EXPECT_FALSE(camera.depth_camera || camera.depth_camera_unknown);
+  ASSERT_THAT(camera.warnings, SizeIs(1));
+  EXPECT_THAT(camera.warnings[0].English(), HasSubstr("are not used"));
+}
+
+TEST(CameraFileTest, AKeyThatIsThereTwiceIsRefused) {
+  EXPECT_THAT(Refusal(std::string(kGood) + "depth_scale: 5000\n"),
+              HasSubstr("the key 'depth_scale' twice"));
+}
+
+TEST(CameraFileTest, AnEquidistantLensNeedsItsCoefficients) {
+  std::string text = kGood;
+  const std::size_t lens = text.find("distortion_coefficients");
+  text.erase(lens, text.find("depth_scale") - lens);
+  EXPECT_THAT(ParseCameraFile(text, "c").warnings, SizeIs(1));
+  for (const char* model : {"distortion_model: equidistant\n", "fisheye_model: 1\n"})
+    EXPECT_THAT(Refusal(text + model), HasSubstr("distortion_coefficients is missing")) << model;
+}
+
+TEST(CameraFileTest, AnEquidistantLensOfTheDepthCameraIsRefused) {
+  std::string text = With("0.2624, -0.9531, -0.0054, 0.0026, 1.1633", "-0.01, 0.03, 0., 0.") +
+                     "distortion_model: equidistant\n";
+  text.replace(text.find("depth_registered: 1"), 19, kDepthCamera);
+  EXPECT_TRUE(ParseCameraFile(text, "c").depth_camera) << "five coefficients, all zero";
+  const std::string five = "depth_distortion_coefficients: [ 0., 0., 0., 0., 0. ]";
+  const auto with_lens = [&](const std::string& lens) {
+    std::string other = text;
+    return other.replace(other.find(five), five.size(), "depth_distortion_coefficients: " + lens);
+  };
+  EXPECT_TRUE(ParseCameraFile(with_lens("[ 0., 0., 0., 0. ]"), "c").depth_camera);
+  EXPECT_THAT(Refusal(with_lens("[ 0.01, 0., 0., 0. ]")),
+              AllOf(HasSubstr("depth_distortion_coefficients"), HasSubstr("equidistant")));
+}
+
+TEST(CameraFileTest, TextOfOtherEncodingsIsReadOrNamed) {
+  EXPECT_EQ(ParseCameraFile(std::string("\xEF\xBB\xBF") + kGood, "c").color.fx, 517.3);
+  for (const bool marked : {true, false}) {
+    std::string wide = marked ? "\xFF\xFE" : "";
+    for (const char* c = kGood; *c != 0; ++c) (wide += *c) += '\0';
+    EXPECT_THAT(Refusal(wide), HasSubstr("UTF-16")) << marked;
+  }
+}
+
+TEST(CameraFileTest, WhatTheWriterHadAssumedStaysAssumed) {
+  const CameraFile camera = ParseCameraFile(
+      std::string(kGood) + "assumed: [ camera_matrix, depth_registered ]\n", "camera.yaml");
+  EXPECT_TRUE(camera.color_assumed && camera.depth_camera_estimated);
+  EXPECT_FALSE(camera.depth_unit_assumed);
+  ASSERT_THAT(camera.warnings, SizeIs(1));
+  EXPECT_THAT(camera.warnings[0].English(), HasSubstr("camera_matrix, depth_registered"));
+  StreamInfo info;
+  TakeOver(camera, info);
+  EXPECT_TRUE(info.intrinsics_assumed && info.depth_camera_estimated);
+  EXPECT_FALSE(info.depth_unit_assumed);
+  EXPECT_TRUE(
+      ParseCameraFile(std::string(kGood) + "assumed: depth_scale\n", "c").depth_unit_assumed);
+  EXPECT_THAT(Refusal(std::string(kGood) + "assumed: [ marker_length ]\n"),
+              AllOf(HasSubstr("marker_length"), HasSubstr("depth_scale")));
 }
 
 TEST(CameraFileTest, ATransformThatIsNotRigidIsNamed) {

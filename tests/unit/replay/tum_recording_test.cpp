@@ -241,6 +241,54 @@ TEST_F(TumRecordingTest, AUnitThatNothingStatesIsTakenFromTheDepthAndSaid) {
   EXPECT_FALSE(OpenTumRecording(recording_)->info().depth_unit_assumed);
 }
 
+TEST_F(TumRecordingTest, TheUnitThatTheMarkersShowIsTakenInstead) {
+  fs::remove(recording_ / "camera.yaml");
+  const auto source = OpenTumRecording(recording_, {.depth_scale = 4000.0});
+  EXPECT_TRUE(source->info().depth_unit_assumed) << "the whole sweep has to confirm it";
+  EXPECT_EQ(source->info().depth_units_per_metre, 4000.0);
+  EXPECT_EQ(source->camera().depth_scale, 4000.0);
+  EXPECT_THAT(EnglishTexts(source->info().warnings),
+              Contains(HasSubstr("4000 units of depth for a metre taken, by the size")));
+  EXPECT_NEAR(source->Next()->depth_m.at<float>(0, 0), 0.5 * 5000 / 4000, 1e-3);
+  EXPECT_THROW((void)OpenTumRecording(recording_, {.depth_scale = -1.0}), std::invalid_argument);
+}
+
+TEST_F(TumRecordingTest, WhatIsAssumedStaysSoWhenItIsWrittenAgain) {
+  fs::remove(recording_ / "camera.yaml");
+  const auto source = OpenTumRecording(recording_);
+  TumWriter writer(folder_ / "again", source->info(), {.jpeg_quality = 0});
+  while (const auto frame = source->Next()) writer.Add(*frame);
+  writer.Finish();
+  const RoomMarkers room = {.dictionary = "DICT_4X4_50", .length_m = 0.15, .reference = 9};
+  const auto again = OpenTumRecording(folder_ / "again", {.room_markers = room});
+  EXPECT_EQ(again->info().intrinsics, source->info().intrinsics);
+  EXPECT_TRUE(again->info().intrinsics_assumed);
+  EXPECT_TRUE(again->info().depth_unit_assumed);
+  EXPECT_EQ(again->info().room_markers, room) << "those of who reads it";
+}
+
+TEST_F(TumRecordingTest, WhatIsStatedStaysSoWhenItIsWrittenAgain) {
+  const auto source = OpenTumRecording(recording_);
+  const std::string text = CameraFileText(source->info(), 5000.0);
+  EXPECT_EQ(text, ReadTextFile(recording_ / "camera.yaml", 1 << 16));
+  EXPECT_EQ(text.find("assumed"), std::string::npos);
+  StreamInfo half = source->info();
+  half.marker_length_assumed = true;
+  const std::string without_length = CameraFileText(half, 5000.0);
+  EXPECT_NE(without_length.find("marker_dictionary"), std::string::npos);
+  EXPECT_EQ(without_length.find("marker_length"), std::string::npos);
+}
+
+TEST_F(TumRecordingTest, DepthOfAnotherSizeNeedsItsCamera) {
+  std::string text = ReadTextFile(recording_ / "camera.yaml", 1 << 16);
+  text.replace(text.find("depth_registered: 1"), 19,
+               "depth_registered: 0\ndepth_image_width: 80\ndepth_image_height: 48");
+  WriteWholeFile(recording_ / "camera.yaml", text);
+  for (int i = 0; i < kNumFrames; ++i) WritePng(DepthFile(i), cv::Mat::ones(48, 80, CV_16UC1));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("80x48"), HasSubstr("nothing states the depth camera"),
+                               HasSubstr("T_color_depth")));
+}
+
 TEST_F(TumRecordingTest, ACalibrationOfAnotherNameIsUsedAndSaid) {
   fs::rename(recording_ / "camera.yaml", recording_ / "camera.yml");
   EXPECT_THAT(EnglishTexts(OpenTumRecording(recording_)->info().warnings),
