@@ -33,7 +33,9 @@ Updates::Updates(EventLoop& loop, Appliance& appliance, CurrentSession& session,
       session_(session),
       restart_(std::move(restart)),
       options_(std::move(options)),
-      sticks_(options_.sticks),
+      sticks_(
+          loop, [root = options_.sticks] { return UsbSticks(root).Bundles(); },
+          [this] { options_.changed(); }),
       updater_(loop,
                UpdaterOptions{
                    .folder = options_.config.folder,
@@ -44,6 +46,7 @@ Updates::Updates(EventLoop& loop, Appliance& appliance, CurrentSession& session,
                    .blocking_reason = [this] { return WhyNotInstall(); },
                    .changed = [this] { options_.changed(); },
                    .run_in_background = options_.run_in_background,
+                   .stop = options_.stop,
                    .ended =
                        [this](const std::string& bundle, const Message& failure) {
                          options_.log(kInstaller, failure.empty() ? "update.done" : "update.fail",
@@ -57,41 +60,54 @@ Updates::Updates(EventLoop& loop, Appliance& appliance, CurrentSession& session,
   session_.SetBlockingReason([this] { return WhyNotScan(); });
   restart_limit_ = loop_.MakeTimer("restart", [this] { OnStillRunning(); });
   if (!options_.config.channel.empty()) WatchChannel();
+  // Later: whoever makes this object may not have its background yet.
+  loop_.Post("channel", alive_.WhileAlive([this] {
+    if (channel_) return;
+    (void)options_.run_in_background(
+        [folder = options_.config.folder] { RemoveChannelParts(folder); });
+  }));
 }
 
 void Updates::WatchChannel() {
   const UpdateConfig& config = options_.config;
   std::string url = config.channel;
   while (url.ends_with('/')) url.pop_back();
-  const auto looked = alive_.WhileAlive([this](const ChannelLook& look) {
-    const bool is_news = look.name != look_.name && !look.name.empty();
-    look_ = look;
-    if (is_news)
-      options_.log(kInstaller, "update.offer", look.name,
-                   say::channel::IsOffered(look.version, look.name));
-    if (!look.failure.empty()) Log(LogLevel::kWarning, look.failure.English());
-    options_.changed();
-  });
+  const auto looked = alive_.WhileAlive([this](const ChannelLook& look) { OnLooked(look); });
   channel_ = std::make_unique<ChannelWatch>(
       ChannelOptions{.url = std::move(url),
                      .channel = config.channel_name,
                      .key = config.channel_key,
                      .trusted = config.trusted,
                      .folder = config.folder,
-                     .seen = options_.state / "channel-seen",
+                     .state = options_.state,
                      .serial = options_.serial,
                      .version = VersionOfSystem(options_.release, std::string(Version())),
-                     .max_bytes = static_cast<std::uint64_t>(config.max_bundle_mb) << 20},
+                     .max_bytes = static_cast<std::uint64_t>(config.max_bundle_mb) << 20,
+                     .again_after = options_.look_again_after,
+                     .first_after = options_.first_look_after,
+                     .may_fetch = [this] { return updater_.is_free(); }},
       [&loop = loop_, looked](const ChannelLook& look) {
         loop.Post("channel", [looked, look] { looked(look); });
       });
+}
+
+void Updates::OnLooked(const ChannelLook& look) {
+  look_ = look;
+  if (look.is_new)
+    options_.log(kInstaller, "update.offer", look.name,
+                 say::channel::IsOffered(look.version, look.name));
+  if (look.is_postponed) (void)updater_.status();  // which looks for an installer again
+  if (!look.failure.empty()) Log(LogLevel::kWarning, look.failure.English());
+  options_.changed();
 }
 
 UpdateStatus Updates::GetUpdate() {
   UpdateStatus status = updater_.status();
   status.channel_failure = look_.failure;
   const bool is_here = std::ranges::find(status.bundles, look_.name) != status.bundles.end();
-  if (is_here) status.offered = say::channel::IsOffered(look_.version, look_.name);
+  // What was installed just now may be what is offered.
+  if (is_here && !status.restart_needed)
+    status.offered = say::channel::IsOffered(look_.version, look_.name);
   return status;
 }
 
@@ -119,10 +135,7 @@ Message Updates::WhyNotRestart() const {
 
 void Updates::AddBundle(const Actor& actor, const std::filesystem::path& file,
                         const std::string& name, Done done) {
-  const Change change = updater_.Add(file, name);
-  options_.log(actor, change.result == ChangeResult::kDone ? "update.upload" : "update.refuse",
-               name, change.message);
-  done(change);
+  updater_.Add(file, name, Logged(actor, "update.upload", name, std::move(done)));
 }
 
 void Updates::RemoveBundle(const Actor& actor, const std::string& name, Done done) {
@@ -133,19 +146,34 @@ void Updates::RemoveBundle(const Actor& actor, const std::string& name, Done don
 
 void Updates::InstallUpdate(const Actor& actor, const std::string& bundle, Done done) {
   if (RefuseIf(WhyNotInstall(), done)) return;
-  updater_.Install(bundle, LogInstall(actor, bundle, std::move(done)));
+  updater_.Install(bundle, Logged(actor, "update.install", bundle, std::move(done)));
 }
 
-Done Updates::LogInstall(const Actor& actor, const std::string& bundle, Done done) {
-  return [this, actor, bundle, done = std::move(done)](const Change& change) {
-    options_.log(actor, change.result == ChangeResult::kDone ? "update.install" : "update.refuse",
-                 bundle, change.message);
+Done Updates::Logged(const Actor& actor, const char* action, const std::string& bundle, Done done) {
+  return [this, actor, action, bundle, done = std::move(done)](const Change& change) {
+    options_.log(actor, change.result == ChangeResult::kDone ? action : "update.refuse", bundle,
+                 change.message);
     done(change);
   };
 }
 
 void Updates::InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile> file,
                           const std::string& name, Done done) {
+  CopyAndInstall(
+      actor, name, [file = std::move(file)] { return file; }, options_.run_in_background, done);
+}
+
+void Updates::InstallFromStick(const Actor& actor, const std::string& bundle, Done done) {
+  const auto open = [root = options_.sticks, bundle] {
+    return std::make_shared<const AttachedFile>(UsbSticks(root).Open(bundle));
+  };
+  CopyAndInstall(
+      actor, bundle, open,
+      [this](std::function<void()> work) { return sticks_.Post(std::move(work)); }, done);
+}
+
+void Updates::CopyAndInstall(const Actor& actor, const std::string& name, OpenFile open,
+                             const Post& post, const Done& done) {
   if (RefuseIf(WhyNotInstall(), done)) return;
   if (const UpdateStatus status = updater_.status(); !status.supported)
     return done(AnswerOf(status.message));
@@ -153,30 +181,19 @@ void Updates::InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile
   copying_ = true;
   const auto copied = alive_.WhileAlive(
       [this, actor, name, done](const std::filesystem::path& copy, const Change& failure) {
-        copying_ = false;
-        if (copy.empty()) {
-          options_.log(actor, "update.refuse", name, failure.message);
-          return done(failure);
-        }
-        const auto drop = [copy, done](const Change& why) {
-          std::error_code ignored;
-          std::filesystem::remove(copy, ignored);
-          done(why);
-        };
-        // A scan may have started during the copying.
-        if (RefuseIf(WhyNotInstall(), drop)) return;
-        AddBundle(actor, copy, name, [this, actor, name, drop, done](const Change& added) {
-          if (added.result != ChangeResult::kDone) return drop(added);
-          updater_.InstallCopy(name, LogInstall(actor, name, done));
-        });
+        OnCopied(actor, name, copy, failure, done);
       });
-  const auto work = [file = std::move(file), folder = options_.config.folder,
+  const auto work = [name, open = std::move(open), folder = options_.config.folder,
                      max_bytes = static_cast<std::uint64_t>(options_.config.max_bundle_mb) << 20,
-                     copied, &loop = loop_] {
+                     stop = options_.stop, copied, &loop = loop_] {
     Change failure;
     std::filesystem::path copy;
     try {
-      copy = CopyBundle(file->fd(), folder, max_bytes);
+      const auto file = open();
+      if (file->fd() < 0)
+        failure = Refused(ChangeResult::kNotFound, say::upkeep::NoStick(name));
+      else
+        copy = CopyBundle(file->fd(), folder, max_bytes, stop);
     } catch (const DataError& error) {
       failure = Refused(ChangeResult::kInvalid, error.message());
     } catch (const std::exception& error) {
@@ -184,17 +201,24 @@ void Updates::InstallFile(const Actor& actor, std::shared_ptr<const AttachedFile
     }
     loop.Post("bundle copied", [copied, copy, failure] { copied(copy, failure); });
   };
-  if (options_.run_in_background(work)) return;
+  if (post(work)) return;
   copying_ = false;
   done(AnswerOf(say::upkeep::DiskBusy()));
 }
 
-void Updates::InstallFromStick(const Actor& actor, const std::string& bundle, Done done) {
-  auto file = std::make_shared<const AttachedFile>(sticks_.Open(bundle));
-  if (file->fd() < 0) {
-    return done(Refused(ChangeResult::kNotFound, say::upkeep::NoStick(bundle)));
-  }
-  InstallFile(actor, std::move(file), bundle, std::move(done));
+void Updates::OnCopied(const Actor& actor, const std::string& name,
+                       const std::filesystem::path& copy, const Change& failure, const Done& done) {
+  copying_ = false;
+  const Done logged = Logged(actor, "update.install", name, done);
+  if (copy.empty()) return logged(failure);
+  const auto drop = [copy, logged](const Change& why) {
+    std::error_code ignored;
+    std::filesystem::remove(copy, ignored);
+    logged(why);
+  };
+  // A scan may have started during the copying.
+  if (RefuseIf(WhyNotInstall(), drop)) return;
+  updater_.InstallCopy(copy, name, logged);
 }
 
 void Updates::RestartSystem(const Actor& actor, Done done) {
@@ -214,8 +238,12 @@ void Updates::ResetToFactory(const Actor& actor, FactoryReset kind, Done done) {
     options_.log(
         actor, "system.factory_reset_request", "",
         kind == FactoryReset::kWipe ? say::audit::EverythingRemoved() : say::audit::RecordsKept());
-    GoDown(actor, [this, done](const Change& change) {
-      if (change.result != ChangeResult::kDone) CancelFactoryReset(options_.state);
+    GoDown(actor, [this, done](Change change) {
+      if (change.result != ChangeResult::kDone) {
+        change.message = CancelFactoryReset(options_.state, change.message);
+        if (change.message.Is(say::upkeep::kResetMayHappen))
+          Log(LogLevel::kError, change.message.English());
+      }
       done(change);
     });
   });
@@ -251,12 +279,7 @@ void Updates::GoDown(const Actor& actor, Done done) {
 }
 
 void Updates::OnStillRunning() {
-  Message why = say::upkeep::RestartNotCarriedOut();
-  try {
-    CancelFactoryReset(options_.state);
-  } catch (const std::exception& error) {
-    why = say::upkeep::ResetMayHappen(MessageOf(error));
-  }
+  const Message why = CancelFactoryReset(options_.state, say::upkeep::RestartNotCarriedOut());
   restarting_ = false;
   options_.log(restarted_by_, "system.restart_failed", "", why);
   Log(LogLevel::kError, why.English());

@@ -2,9 +2,11 @@
 // System updates, the restart after them and the factory reset, for page and control socket.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 
 #include "algo/base/message.hpp"
@@ -23,11 +25,15 @@ struct UpdatesOptions {
   UpdateConfig config;
   std::filesystem::path state;                        ///< State folder for a factory reset.
   std::filesystem::path sticks = "/run/plumb-stick";  ///< See UsbSticks.
+  /// Looks at the channel: see ChannelOptions.
+  std::chrono::milliseconds first_look_after = std::chrono::minutes(5);
+  std::chrono::milliseconds look_again_after = std::chrono::hours(1);
   std::string serial = {};  ///< Of this unit: its place in the fleet; empty: the host's name.
   std::filesystem::path release = "/etc/plumb-release";  ///< See VersionOfSystem().
   std::string bus_address = {};                          ///< Empty: the system bus.
   std::string boot = {};  ///< Unique for each start of the machine; empty if unknown.
   std::function<bool(std::function<void()>)> run_in_background;  ///< See UpdaterOptions.
+  std::stop_token stop = {};                                     ///< Ends copies of bundles.
   std::function<void()> changed;  ///< Called when GetUpdate() has changed.
   std::function<void(const Actor& actor, const char* action, const std::string& subject,
                      const Message& detail)>
@@ -61,9 +67,20 @@ class Updates : public web::UpdateService {
   void ForgetRollBack(const Actor& actor, Done done) override;
 
  private:
+  using OpenFile = std::function<std::shared_ptr<const AttachedFile>()>;
+  using Post = std::function<bool(std::function<void()>)>;
+
   void WatchChannel();
+  void OnLooked(const ChannelLook& look);
   /// Passes the answer on to `done` and writes it to the audit log.
-  [[nodiscard]] Done LogInstall(const Actor& actor, const std::string& bundle, Done done);
+  /// @param action  Of an answer without a refusal.
+  [[nodiscard]] Done Logged(const Actor& actor, const char* action, const std::string& bundle,
+                            Done done);
+  /// See InstallFile(). @param open  Called where `post` runs its work.
+  void CopyAndInstall(const Actor& actor, const std::string& name, OpenFile open, const Post& post,
+                      const Done& done);
+  void OnCopied(const Actor& actor, const std::string& name, const std::filesystem::path& copy,
+                const Change& failure, const Done& done);
   /// Why no update may begin now, during which no scan can begin: a scan runs, or a patient's
   /// session is open (the demo's does not count). Empty if it may.
   [[nodiscard]] Message WhyNotInstall() const;
@@ -82,14 +99,14 @@ class Updates : public web::UpdateService {
   CurrentSession& session_;
   std::unique_ptr<SystemRestart> restart_;
   UpdatesOptions options_;
-  UsbSticks sticks_;
+  StickWatch sticks_;
   bool restarting_ = false, copying_ = false;
   Actor restarted_by_;
   EventLoop::Source restart_limit_;
   ChannelLook look_;  ///< The newest.
   AliveFlag alive_;
-  std::unique_ptr<ChannelWatch> channel_;  ///< Null: no channel is configured.
-  Updater updater_;  // Declared last, so destroyed first: its callbacks use the members above.
+  Updater updater_;                        // After the members that its callbacks use.
+  std::unique_ptr<ChannelWatch> channel_;  ///< Null: no channel is configured. It asks the updater.
 };
 
 }  // namespace plumb

@@ -66,6 +66,7 @@ WebServices::WebServices(Appliance& appliance, SharedParts& shared,
                [this](std::function<void()> work) {
                  return background_.PostToFiles(std::move(work));
                },
+           .stop = stop_.get_token(),
            .changed = [&notices = shared.notices] { notices.TellPage(web::EventKind::kUpdate); },
            .log = [this](const Actor& actor, const char* action, const std::string& subject,
                          const Message& detail) { audit_->Log(actor, action, subject, detail); }}),

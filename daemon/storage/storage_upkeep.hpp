@@ -43,7 +43,7 @@ class StorageUpkeep {
   void ScanEnded();
   void CheckDiskAtOnce();
   /// Stored data has changed.
-  void CountAgain() { is_unusable_due_ = true; }
+  void RecountUnusable() { is_unusable_due_ = true; }
   /// Begins nothing more, and cuts short what is running.
   void Stop() { stop_.request_stop(); }
 
@@ -108,12 +108,13 @@ class StorageUpkeep {
   bool is_unusable_due_ = true;  ///< To be counted again.
   RemovalFacts removals_;
   std::map<std::filesystem::path, Message> backup_faults_;  ///< By the place of the backup.
-  Message record_fault_;              ///< That the audit log is not as it was written.
+  Message record_fault_;              ///< Set if the audit log has been altered.
   bool is_database_checked_ = false;  ///< By the start; the first check here can do without.
   std::int64_t lost_entries_ = 0;     ///< Of the audit log: the state folder was rolled back.
   Message backup_fault_, backup_unrehearsed_;
   std::optional<std::chrono::system_clock::time_point> backup_made_at_;
-  bool is_verification_due_ = false;     ///< Of an encrypted one, by who has its key.
+  /// Somebody with the key has to verify an encrypted backup.
+  bool is_verification_due_ = false;
   bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.
   int ticks_to_disk_check_ = kDiskCheckTicks;
   int ticks_to_removal_ = kMaintenanceTicks;

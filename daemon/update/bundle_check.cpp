@@ -28,6 +28,16 @@ bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
 }  // namespace
 
+bool IsBundleName(std::string_view name) {
+  constexpr std::string_view kEnd = ".raucb", kAlso = "._-";
+  return name.size() > kEnd.size() && name.size() <= 64 && name.ends_with(kEnd) &&
+         name.front() != '.' && name.front() != '-' &&
+         std::all_of(name.begin(), name.end(), [&](char c) {
+           return IsDigit(c) || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                  kAlso.find(c) != std::string_view::npos;
+         });
+}
+
 Message WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes,
                     const std::string& name) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK);

@@ -4,11 +4,16 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <stop_token>
 #include <string>
+#include <string_view>
 
 #include "algo/base/message.hpp"
 
 namespace plumb {
+
+/// NAME.raucb: plain letters without folders, no option, hidden file or address.
+[[nodiscard]] bool IsBundleName(std::string_view name);
 
 /// Bytes of a bundle's signature at most.
 inline constexpr std::uint64_t kMaxSignature = 64 << 10;
@@ -30,7 +35,9 @@ enum class BundleState { kUnknown, kWhole, kDamaged };
 /// Whether a bundle is still what was signed: a digest of its contents must be in the signature.
 /// This does not check who signed it, which is RAUC's task, and only explains RAUC's refusal.
 /// Verity bundles carry their manifest in the signature, and only the manifest is checked.
-[[nodiscard]] BundleState LookForDamage(const std::filesystem::path& file);
+/// kUnknown on a stop request.
+[[nodiscard]] BundleState LookForDamage(const std::filesystem::path& file,
+                                        const std::stop_token& stop = {});
 
 /// Empty if a version consists of numbers separated by dots, as toolchain/image and
 /// toolchain/bundle require; otherwise why not. Other versions cannot be compared: a release

@@ -11,11 +11,13 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "daemon/update/bundle_check.hpp"
+#include "drivers/files/descriptor.hpp"
 
 namespace plumb {
 namespace {
@@ -33,30 +35,18 @@ bool Holds(const Bytes& bytes, const Wanted& wanted) {
   return std::search(bytes.begin(), bytes.end(), wanted.begin(), wanted.end()) != bytes.end();
 }
 
-class File {
- public:
-  explicit File(const std::filesystem::path& path)
-      : fd_(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
-  ~File() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
+std::uint64_t SizeOf(const Descriptor& file) {
+  const off_t end = file.get() < 0 ? -1 : ::lseek(file.get(), 0, SEEK_END);
+  return end < 0 ? 0 : static_cast<std::uint64_t>(end);
+}
 
-  [[nodiscard]] std::uint64_t size() const {
-    const off_t end = fd_ < 0 ? -1 : ::lseek(fd_, 0, SEEK_END);
-    return end < 0 ? 0 : static_cast<std::uint64_t>(end);
-  }
-  [[nodiscard]] std::optional<Bytes> Read(std::uint64_t at, std::size_t count) const {
-    Bytes bytes(count);
-    const ssize_t read = ::pread(fd_, bytes.data(), count, static_cast<off_t>(at));
-    if (read != static_cast<ssize_t>(count)) return std::nullopt;
-    return bytes;
-  }
-
- private:
-  int fd_;
-};
+std::optional<Bytes> Read(const Descriptor& file, std::uint64_t at, std::size_t count) {
+  Bytes bytes(count);
+  if (ReadAllAt(file.get(), at, std::as_writable_bytes(std::span(bytes))) !=
+      static_cast<ssize_t>(count))
+    return std::nullopt;
+  return bytes;
+}
 
 /// The content of a CMS from its own beginning on; its length precedes it.
 std::optional<Bytes> ManifestIn(const Bytes& cms) {
@@ -79,13 +69,15 @@ std::optional<Bytes> ManifestIn(const Bytes& cms) {
   return Bytes(begin, begin + static_cast<std::ptrdiff_t>(length));
 }
 
-std::optional<Digest> DigestOf(const File& file, std::uint64_t count) {
+std::optional<Digest> DigestOf(const Descriptor& file, std::uint64_t count,
+                               const std::stop_token& stop) {
   constexpr std::size_t kStep = 1 << 20;
   crypto_hash_sha256_state state;
   crypto_hash_sha256_init(&state);
   for (std::uint64_t at = 0; at < count; at += kStep) {
+    if (stop.stop_requested()) return std::nullopt;
     const auto bytes =
-        file.Read(at, static_cast<std::size_t>(std::min<std::uint64_t>(kStep, count - at)));
+        Read(file, at, static_cast<std::size_t>(std::min<std::uint64_t>(kStep, count - at)));
     if (!bytes) return std::nullopt;
     crypto_hash_sha256_update(&state, bytes->data(), bytes->size());
   }
@@ -96,17 +88,17 @@ std::optional<Digest> DigestOf(const File& file, std::uint64_t count) {
 
 }  // namespace
 
-BundleState LookForDamage(const std::filesystem::path& path) {
-  const File file(path);
-  const std::uint64_t size = file.size();
+BundleState LookForDamage(const std::filesystem::path& path, const std::stop_token& stop) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK));
+  const std::uint64_t size = SizeOf(file);
   if (size <= 8) return BundleState::kUnknown;
-  const auto tail = file.Read(size - 8, 8);
+  const auto tail = Read(file, size - 8, 8);
   if (!tail) return BundleState::kUnknown;
   std::uint64_t signature = 0;
   for (const unsigned char byte : *tail) signature = signature << 8 | byte;
   if (signature == 0 || signature > kMaxSignature || signature + 8 >= size)
     return BundleState::kUnknown;
-  const auto cms = file.Read(size - 8 - signature, static_cast<std::size_t>(signature));
+  const auto cms = Read(file, size - 8 - signature, static_cast<std::size_t>(signature));
   if (!cms || !Holds(*cms, kSha256)) return BundleState::kUnknown;
 
   if (const auto manifest = ManifestIn(*cms)) {
@@ -114,7 +106,7 @@ BundleState LookForDamage(const std::filesystem::path& path) {
     crypto_hash_sha256(digest.data(), manifest->data(), manifest->size());
     return Holds(*cms, digest) ? BundleState::kWhole : BundleState::kDamaged;
   }
-  const auto digest = DigestOf(file, size - 8 - signature);
+  const auto digest = DigestOf(file, size - 8 - signature, stop);
   if (!digest) return BundleState::kUnknown;
   return Holds(*cms, *digest) ? BundleState::kWhole : BundleState::kDamaged;
 }

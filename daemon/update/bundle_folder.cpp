@@ -66,12 +66,11 @@ bool BundleFolder::Has(const std::string& name) const {
 
 Change BundleFolder::Add(const std::filesystem::path& file, const std::string& name) const {
   if (const Message why = WhyNoBundle(file, max_bytes_, name); !why.empty())
-    return RefusedBecause(ChangeResult::kInvalid, why);
+    return Refused(ChangeResult::kInvalid, why);
   const std::vector<std::string> known = List();
   const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
   if (!is_known && known.size() >= kMaxKept)
-    return RefusedBecause(ChangeResult::kConflict, say::update::TooMany());
-  const DeferredClose replaced(folder_ / name, run_in_background_);
+    return Refused(ChangeResult::kConflict, say::update::TooMany());
   // Otherwise a power cut soon after could leave the name without contents.
   try {
     SyncToDisk(file);
@@ -79,19 +78,22 @@ Change BundleFolder::Add(const std::filesystem::path& file, const std::string& n
       throw IoError(DescribeWriteError(name, errno));
     SyncToDisk(folder_);
   } catch (const std::exception& error) {
-    return RefusedBecause(ChangeResult::kNoSpace, MessageOf(error));
+    return Refused(ChangeResult::kNoSpace, MessageOf(error));
   }
   return {};
 }
 
 Change BundleFolder::Remove(const std::string& name) const {
-  if (!Has(name)) return RefusedBecause(ChangeResult::kNotFound, say::update::NoSuchBundle());
+  if (!Has(name)) return Refused(ChangeResult::kNotFound, say::update::NoSuchBundle());
+  const Message why = Drop(folder_ / name);
+  return why.empty() ? Change{} : Refused(ChangeResult::kFailed, why);
+}
+
+Message BundleFolder::Drop(const std::filesystem::path& file) const {
+  const DeferredClose removed(file, run_in_background_);
   std::error_code error;
-  const DeferredClose removed(folder_ / name, run_in_background_);
-  std::filesystem::remove(folder_ / name, error);
-  if (error)
-    return RefusedBecause(ChangeResult::kFailed, say::update::NotRemoved(name, error.message()));
-  return {};
+  std::filesystem::remove(file, error);
+  return error ? say::update::NotRemoved(file.filename().string(), error.message()) : Message();
 }
 
 void BundleFolder::RemoveUnfinished() const {

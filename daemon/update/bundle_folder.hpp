@@ -13,13 +13,10 @@
 
 namespace plumb {
 
-[[nodiscard]] inline Change RefusedBecause(ChangeResult result, const Message& why) {
-  return Refused(result, why.English());
-}
-
 inline constexpr std::size_t kMaxListedBundles = 32;
 
-/// Files named NAME.raucb. Not thread-safe.
+/// Files named NAME.raucb. Add() may wait for the disk for long and belongs on another thread than
+/// the loop's; the others do not wait.
 class BundleFolder {
  public:
   using RunInBackground = std::function<bool(std::function<void()>)>;
@@ -38,6 +35,8 @@ class BundleFolder {
   /// many.
   [[nodiscard]] Change Add(const std::filesystem::path& file, const std::string& name) const;
   [[nodiscard]] Change Remove(const std::string& name) const;
+  /// Removes any file; large ones are freed in the background. Returns why it could not.
+  [[nodiscard]] Message Drop(const std::filesystem::path& file) const;
   /// Removes incomplete uploads from before a power cut.
   void RemoveUnfinished() const;
 

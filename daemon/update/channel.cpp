@@ -3,24 +3,27 @@
 
 #include <fcntl.h>
 #include <sodium.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <cerrno>
 #include <condition_variable>
-#include <cstring>
+#include <cstdio>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
-#include "algo/base/parse_number.hpp"
+#include "daemon/files/sha256.hpp"
+#include "daemon/loop/give_way.hpp"
 #include "daemon/network/transfer.hpp"
+#include "daemon/update/bundle_check.hpp"
+#include "daemon/update/channel_memory.hpp"
 #include "drivers/files/descriptor.hpp"
 #include "drivers/files/file_io.hpp"
 #include "words/channel.hpp"
+#include "words/update.hpp"
 
 namespace plumb {
 namespace {
@@ -60,60 +63,34 @@ std::string Fetch(const ChannelOptions& options, const std::string& name, std::s
   return std::move(got.text);
 }
 
-std::int64_t SeenNumber(const fs::path& file) {
-  std::error_code error;
-  if (!fs::exists(file, error)) return 0;
-  std::string text = ReadTextFile(file, 64);
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  return ParseNumber<std::int64_t>(text).value_or(0);
-}
-
-/// In one step: half a number would be a lower one.
-void KeepNumber(const fs::path& file, std::int64_t number) {
-  const fs::path next = file.string() + ".new";
-  WriteWholeFile(next, fmt::format("{}\n", number));
-  fs::rename(next, file);
-}
-
 /// Where a download goes on.
 struct OpenPart {
-  int fd = -1;
+  const Descriptor& file;
+  const std::filesystem::path& path;
+  const ChannelOptions& options;
   std::uint64_t had = 0, most = 0, got = 0;
-  int error = 0;
+  SteadyFlush flush;
   Transfer* transfer = nullptr;
+  Message failure = {};  ///< Of writing.
 };
 
-/// Only what continues the part is written: the page of an error is not.
+/// Only what continues the part is written: the page of an error is not. Scans that are made
+/// meanwhile keep their room.
 std::size_t TakePart(char* from, std::size_t size, std::size_t count, void* into) {
   auto& part = *static_cast<OpenPart*>(into);
   const std::size_t bytes = size * count;
   const long expected = part.had > 0 ? 206 : 200;
   if (part.transfer->status() != expected || part.had + part.got + bytes > part.most) return 0;
-  for (std::size_t done = 0; done < bytes;) {
-    const ssize_t written = ::write(part.fd, from + done, bytes - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) {
-      part.error = errno;
-      return 0;
-    }
-    done += static_cast<std::size_t>(written);
+  try {
+    CheckRoom(part.options.folder, part.most - part.had - part.got, part.options.free_bytes);
+    WriteAll(part.file, {from, bytes}, part.path);
+  } catch (const std::exception& error) {
+    part.failure = MessageOf(error);
+    return 0;
   }
+  part.flush.Wrote(bytes);
   part.got += bytes;
   return bytes;
-}
-
-std::string DigestOf(const Descriptor& file) {
-  crypto_hash_sha256_state state;
-  crypto_hash_sha256_init(&state);
-  std::array<std::byte, 1 << 16> buffer{};
-  std::uint64_t offset = 0;
-  for (ssize_t got = 0; (got = ReadAllAt(file.get(), offset, buffer)) > 0;
-       offset += static_cast<std::uint64_t>(got))
-    crypto_hash_sha256_update(&state, reinterpret_cast<const unsigned char*>(buffer.data()),
-                              static_cast<unsigned long long>(got));
-  std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
-  crypto_hash_sha256_final(&state, digest.data());
-  return fmt::format("{:02x}", fmt::join(digest, ""));
 }
 
 /// Parts of files that the index no longer names.
@@ -127,98 +104,173 @@ void RemoveOtherParts(const fs::path& folder, const fs::path& kept) {
 }
 
 /// One attempt to get the rest of a part.
-/// @throws DataError
-void FetchRest(const ChannelOptions& options, const ChannelBundle& bundle, const Descriptor& file,
+/// @throws DataError if it did not come as a whole
+void FetchRest(const ChannelOptions& options, const ChannelBundle& bundle, const fs::path& path,
                const std::stop_token& stop) {
-  const off_t end = ::lseek(file.get(), 0, SEEK_END);
-  OpenPart part{
-      .fd = file.get(), .had = end > 0 ? static_cast<std::uint64_t>(end) : 0, .most = bundle.bytes};
-  if (part.had >= bundle.bytes) return;
+  const Descriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0640));
+  const off_t end = file.get() < 0 ? -1 : ::lseek(file.get(), 0, SEEK_END);
+  if (end < 0) throw IoError(DescribeWriteError(path, errno));
+  const auto had = static_cast<std::uint64_t>(end);
+  if (had >= bundle.bytes) return;
+  CheckRoom(options.folder, bundle.bytes - had, options.free_bytes);
   Transfer transfer(options.url + "/" + bundle.name, kSchemes, options.trusted, stop);
-  part.transfer = &transfer;
+  OpenPart part{.file = file,
+                .path = path,
+                .options = options,
+                .had = had,
+                .most = bundle.bytes,
+                .flush = SteadyFlush(file, had),
+                .transfer = &transfer};
   transfer.SetLimits(std::chrono::seconds(10), kLongestDownload);
   transfer.Set(CURLOPT_LOW_SPEED_LIMIT, kLeastBytesPerSecond);
   transfer.Set(CURLOPT_LOW_SPEED_TIME, kSlowFor_s);
-  transfer.Set(CURLOPT_RESUME_FROM_LARGE, static_cast<curl_off_t>(part.had));
+  transfer.Set(CURLOPT_RESUME_FROM_LARGE, static_cast<curl_off_t>(had));
   transfer.Set(CURLOPT_WRITEFUNCTION, &TakePart);
   transfer.Set(CURLOPT_WRITEDATA, static_cast<void*>(&part));
   const std::string failed = transfer.Perform();
-  ::fsync(file.get());
-  if (part.error != 0) throw DataError(say::channel::NoRoom(bundle.name));
-  if (part.had + part.got == bundle.bytes) return;
+  SyncToDisk(path);
+  if (!part.failure.empty()) throw DataError(part.failure);
+  if (had + part.got == bundle.bytes) return;
   // A server that does not continue files: the next look begins again.
-  if (part.had > 0 && part.got == 0 && transfer.status() == 200) (void)!::ftruncate(file.get(), 0);
+  if (had > 0 && part.got == 0 && transfer.status() == 200) (void)!::ftruncate(file.get(), 0);
   if (part.got == 0)
     throw DataError(say::channel::Unreachable(
         bundle.name, failed.empty() ? fmt::format("HTTP {}", transfer.status()) : failed));
-  throw DataError(say::channel::Incomplete(bundle.name,
-                                           static_cast<std::int64_t>(part.had + part.got),
+  throw DataError(say::channel::Incomplete(bundle.name, static_cast<std::int64_t>(had + part.got),
                                            static_cast<std::int64_t>(bundle.bytes)));
 }
 
-/// @throws DataError
-void Download(const ChannelOptions& options, const ChannelBundle& bundle,
-              const std::stop_token& stop) {
+/// Why nothing is to be fetched; nothing: it is.
+enum class Found { kHere, kRemovedByPerson };
+
+/// @throws DataError if another file has the name, IoError if it cannot be read
+std::optional<Found> FindHere(const ChannelOptions& options, const ChannelMemory& memory,
+                              const ChannelBundle& bundle, const std::stop_token& stop) {
   const fs::path target = options.folder / bundle.name;
+  const std::optional<FileStamp> stamp = StampOf(target);
   std::error_code error;
-  if (fs::exists(target, error)) return;  // offered already, or put there by a person
-  if (bundle.bytes > options.max_bytes) throw DataError(say::channel::NoRoom(bundle.name));
+  if (!stamp && fs::exists(fs::symlink_status(target, error)))
+    throw DataError(say::channel::OtherFile(bundle.name));
+  const auto is_remembered = [&](const FetchedBundle& one) {
+    return one.name == bundle.name && (stamp ? one.stamp == stamp : one.sha256 == bundle.sha256);
+  };
+  const auto own = std::ranges::find_if(memory.fetched, is_remembered);
+  if (own != memory.fetched.end()) {
+    if (!stamp) return Found::kRemovedByPerson;
+    if (own->sha256 == bundle.sha256) return Found::kHere;
+    return std::nullopt;  // made again under its name
+  }
+  if (!stamp) return std::nullopt;
+  if (stamp->bytes != bundle.bytes || SumOfFile(target, stop).sha256 != bundle.sha256)
+    throw DataError(say::channel::OtherFile(bundle.name));
+  return Found::kHere;
+}
+
+/// Those that this unit fetched before; one that a person removed or replaced stays in the memory.
+void RemoveFetched(const ChannelOptions& options, ChannelMemory& memory) {
+  const std::size_t removed = std::erase_if(memory.fetched, [&](const FetchedBundle& one) {
+    const fs::path file = options.folder / one.name;
+    std::error_code error;
+    return StampOf(file) == one.stamp && fs::remove(file, error);
+  });
+  if (removed > 0) KeepChannelMemory(options.state, memory);
+}
+
+/// @throws DataError, IoError, Interrupted
+void Download(const ChannelOptions& options, ChannelMemory& memory, const ChannelBundle& bundle,
+              const std::stop_token& stop) {
+  constexpr std::size_t kMostRemembered = 16;
+  if (bundle.bytes > options.max_bytes)
+    throw DataError(say::update::TooLarge(bundle.name, WholeMegabytes(bundle.bytes),
+                                          WholeMegabytes(options.max_bytes)));
+  std::error_code error;
   fs::create_directories(options.folder, error);
+  RemoveFetched(options, memory);
   // Named by the contents: those of another index are not continued.
   const fs::path path = options.folder / fmt::format(".channel-{}{}", bundle.sha256, kPartEnd);
   RemoveOtherParts(options.folder, path);
-  const fs::space_info space = fs::space(options.folder, error);
-  const std::uintmax_t here = fs::exists(path, error) ? fs::file_size(path, error) : 0;
-  if (!error && bundle.bytes > here && bundle.bytes - here > space.available)
-    throw DataError(say::channel::NoRoom(bundle.name));
-  const Descriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0640));
-  if (file.get() < 0) throw DataError(say::channel::Unreachable(bundle.name, std::strerror(errno)));
-  FetchRest(options, bundle, file, stop);
-  if (DigestOf(file) != bundle.sha256) {
+  FetchRest(options, bundle, path, stop);
+  if (SumOfFile(path, stop).sha256 != bundle.sha256) {
     fs::remove(path, error);
     throw DataError(say::channel::OtherContents(bundle.name));
   }
-  fs::rename(path, target);
-  const Descriptor folder(::open(options.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  ::fsync(folder.get());
+  const std::optional<FileStamp> stamp = StampOf(path);
+  // A person may have put a file of this name there meanwhile.
+  const fs::path target = options.folder / bundle.name;
+  if (::renameat2(AT_FDCWD, path.c_str(), AT_FDCWD, target.c_str(), RENAME_NOREPLACE) != 0) {
+    if (errno == EEXIST) throw DataError(say::channel::OtherFile(bundle.name));
+    throw IoError(DescribeWriteError(target, errno));
+  }
+  SyncToDisk(options.folder);
+  memory.fetched.push_back({.name = bundle.name, .sha256 = bundle.sha256, .stamp = stamp.value()});
+  if (memory.fetched.size() > kMostRemembered) memory.fetched.erase(memory.fetched.begin());
+  KeepChannelMemory(options.state, memory);
+}
+
+/// @throws DataError, IoError, Interrupted
+ChannelLook LookNow(const ChannelOptions& options, const std::stop_token& stop) {
+  ChannelMemory memory = ReadChannelMemory(options.state);
+  std::int64_t& seen = memory.newest[NameOfOrder(options.channel, options.key)];
+  const std::string text = Fetch(options, "index.json", kMaxIndexBytes, stop);
+  const std::string signature = Fetch(options, "index.sig", crypto_sign_BYTES, stop);
+  const ChannelIndex index = ReadChannelIndex(text, signature, options.key, options.channel, seen);
+  if (index.number > seen) {
+    seen = index.number;
+    KeepChannelMemory(options.state, memory);
+  }
+  const std::optional<ChannelBundle> offered = OfferedTo(index, options.serial, options.version);
+  if (!offered) return {};
+  const std::optional<Found> found = FindHere(options, memory, *offered, stop);
+  if (found == Found::kRemovedByPerson) return {};
+  if (!found) {
+    if (options.may_fetch && !options.may_fetch()) {
+      ChannelLook postponed;
+      postponed.is_postponed = true;
+      return postponed;
+    }
+    Download(options, memory, *offered, stop);
+  }
+  return {.name = offered->name,
+          .version = offered->version,
+          .failure = {},
+          .is_new = !found.has_value()};
 }
 
 }  // namespace
 
 ChannelLook LookAtChannel(const ChannelOptions& options, const std::stop_token& stop) {
-  ChannelLook look;
   try {
-    const std::string text = Fetch(options, "index.json", kMaxIndexBytes, stop);
-    const std::string signature = Fetch(options, "index.sig", crypto_sign_BYTES, stop);
-    const std::int64_t seen = SeenNumber(options.seen);
-    const ChannelIndex index =
-        ReadChannelIndex(text, signature, options.key, options.channel, seen);
-    if (index.number > seen) KeepNumber(options.seen, index.number);
-    const std::optional<ChannelBundle> offered = OfferedTo(index, options.serial, options.version);
-    if (!offered) return look;
-    Download(options, *offered, stop);
-    look.name = offered->name;
-    look.version = offered->version;
+    return LookNow(options, stop);
   } catch (const std::exception& error) {
-    look.failure = MessageOf(error);
+    return {.name = {}, .version = {}, .failure = MessageOf(error)};
   }
-  return look;
 }
+
+void RemoveChannelParts(const fs::path& folder) { RemoveOtherParts(folder, {}); }
 
 ChannelWatch::ChannelWatch(ChannelOptions options, std::function<void(const ChannelLook&)> looked)
     : options_(std::move(options)),
       looked_(std::move(looked)),
       thread_([this](const std::stop_token& stop) {
+        GiveWayToScans();
+        ChannelLook last;
         std::mutex mutex;
         std::condition_variable_any stopped;
         std::unique_lock lock(mutex);
         for (auto pause = options_.first_after;;) {
           stopped.wait_for(lock, stop, pause, [] { return false; });
           if (stop.stop_requested()) return;
-          const ChannelLook look = LookAtChannel(options_, stop);
+          ChannelLook look = LookAtChannel(options_, stop);
           if (stop.stop_requested()) return;
+          const bool is_done = look.failure.empty() && !look.is_postponed;
+          if (is_done) {
+            last = look;
+          } else {
+            look.name = last.name;
+            look.version = last.version;
+          }
           looked_(look);
-          pause = look.failure.empty() ? options_.every : options_.again_after;
+          pause = is_done ? options_.every : options_.again_after;
         }
       }) {}
 

@@ -11,7 +11,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
-#include "algo/base/parse_number.hpp"
+#include "daemon/update/bundle_check.hpp"
 #include "words/channel.hpp"
 
 namespace plumb {
@@ -32,31 +32,6 @@ bool IsSigned(std::string_view text, std::string_view signature, std::string_vie
                                      text.size(), bytes.data()) == 0;
 }
 
-/// The numbers of a version; empty if it is none.
-std::vector<int> NumbersOf(std::string_view version) {
-  std::vector<int> numbers;
-  if (version.empty() || version.size() > kLongestVersion) return {};
-  for (;;) {
-    const std::size_t end = std::min(version.find('.'), version.size());
-    const auto number = ParseNumber<int>(version.substr(0, end));
-    if (!number || *number < 0) return {};
-    numbers.push_back(*number);
-    if (end == version.size()) return numbers;
-    version.remove_prefix(end + 1);
-  }
-}
-
-/// A name without folders, which cannot be an option, a hidden file or another address either.
-bool IsChannelFile(const std::string& name) {
-  constexpr std::string_view kEnd = ".raucb";
-  const bool is_plain = std::ranges::all_of(name, [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-           c == '_' || c == '.';
-  });
-  return is_plain && name.size() <= 64 && name.size() > kEnd.size() && name.ends_with(kEnd) &&
-         name.front() != '.' && name.front() != '-';
-}
-
 bool IsDigest(const std::string& text) {
   return text.size() == 2 * crypto_hash_sha256_BYTES && std::ranges::all_of(text, [](char c) {
            return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
@@ -69,7 +44,8 @@ ChannelBundle BundleOf(const nlohmann::json& json) {
                        .bytes = json.at("bytes").get<std::uint64_t>(),
                        .sha256 = json.at("sha256").get<std::string>(),
                        .share = json.at("share").get<double>()};
-  if (!IsChannelFile(bundle.name) || NumbersOf(bundle.version).empty() || bundle.bytes == 0 ||
+  if (!IsBundleName(bundle.name) || bundle.version.size() > kLongestVersion ||
+      !WhyNoVersion(bundle.version).empty() || bundle.bytes == 0 ||
       bundle.bytes > kMostBundleBytes || !IsDigest(bundle.sha256) ||
       !(bundle.share >= 0 && bundle.share <= 1))
     throw DataError(say::channel::NotAnIndex(bundle.name.substr(0, 64)));
@@ -101,11 +77,6 @@ ChannelIndex ReadChannelIndex(std::string_view text, std::string_view signature,
   return index;
 }
 
-bool IsLaterVersion(std::string_view a, std::string_view b) {
-  const std::vector<int> left = NumbersOf(a), right = NumbersOf(b);
-  return !left.empty() && !right.empty() && left > right;
-}
-
 double PlaceInFleet(const std::string& serial, const ChannelBundle& bundle) {
   const std::string text = serial + "\n" + bundle.sha256;
   std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
@@ -115,10 +86,10 @@ double PlaceInFleet(const std::string& serial, const ChannelBundle& bundle) {
 }
 
 std::optional<ChannelBundle> OfferedTo(const ChannelIndex& index, const std::string& serial,
-                                       std::string_view version) {
+                                       const std::string& version) {
   std::optional<ChannelBundle> offered;
   for (const ChannelBundle& bundle : index.bundles) {
-    if (!IsLaterVersion(bundle.version, offered ? offered->version : version)) continue;
+    if (!IsOlder(offered ? offered->version : version, bundle.version)) continue;
     if (PlaceInFleet(serial, bundle) < bundle.share) offered = bundle;
   }
   return offered;

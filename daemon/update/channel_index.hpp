@@ -34,10 +34,6 @@ struct ChannelIndex {
                                             std::string_view key, const std::string& channel,
                                             std::int64_t least_number);
 
-/// True if `a` is a later version than `b`: numbers between dots, compared one by one. What is not
-/// such a version is never later.
-[[nodiscard]] bool IsLaterVersion(std::string_view a, std::string_view b);
-
 /// Place of a unit in the order in which a bundle reaches the fleet, 0 to 1; another one for each
 /// bundle, so that it is not always the same units that are first.
 [[nodiscard]] double PlaceInFleet(const std::string& serial, const ChannelBundle& bundle);
@@ -45,6 +41,6 @@ struct ChannelIndex {
 /// The latest bundle that is later than what runs and has reached this unit's place.
 [[nodiscard]] std::optional<ChannelBundle> OfferedTo(const ChannelIndex& index,
                                                      const std::string& serial,
-                                                     std::string_view version);
+                                                     const std::string& version);
 
 }  // namespace plumb

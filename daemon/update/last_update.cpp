@@ -8,6 +8,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "daemon/scan_files/file_copy.hpp"
 #include "drivers/files/file_io.hpp"
 #include "words/update.hpp"
 
@@ -33,14 +34,10 @@ std::optional<LastUpdate> ReadLastUpdate(const std::filesystem::path& folder) {
 }
 
 void WriteLastUpdate(const std::filesystem::path& folder, const LastUpdate& update) {
-  const std::filesystem::path temporary = folder / ".upload-last-update";  // a start removes it
-  WriteWholeFile(
-      temporary,
+  PlaceFile(
+      folder, kFile,
       Json{{"version", update.version}, {"from_slot", update.from_slot}, {"boot", update.boot}}
           .dump(-1, ' ', false, Json::error_handler_t::replace));
-  SyncToDisk(temporary);
-  std::filesystem::rename(temporary, folder / kFile);
-  SyncToDisk(folder);
 }
 
 void RemoveLastUpdate(const std::filesystem::path& folder) {

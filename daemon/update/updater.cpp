@@ -2,6 +2,7 @@
 #include "daemon/update/updater.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <map>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "daemon/update/bus.hpp"
 #include "daemon/update/last_update.hpp"
 #include "words/update.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 
@@ -37,18 +39,28 @@ std::string Shown(const char* text) {
   return shown;
 }
 
+UpdaterOptions WithDefaults(UpdaterOptions options) {
+  if (!options.now) options.now = [] { return std::chrono::steady_clock::now(); };
+  if (!options.run_in_background)
+    options.run_in_background = [](const std::function<void()>& work) {
+      work();
+      return true;
+    };
+  return options;
+}
+
 }  // namespace
 
 struct Updater::Impl {
   Impl(EventLoop& on, UpdaterOptions given)
       : loop(on),
-        options(std::move(given)),
+        options(WithDefaults(std::move(given))),
         folder(options.folder, options.max_bytes, options.run_in_background),
         bus(on, "bus", [this] { OnBroken(); }) {
-    if (!options.now) options.now = [] { return std::chrono::steady_clock::now(); };
     watch = loop.MakeTimer("update progress", [this] { CheckProgress(); });
     folder.RemoveUnfinished();
-    last = ReadLastUpdate(options.folder);
+    // What an unknown start has installed, this one may run or not.
+    if (!options.boot.empty()) last = ReadLastUpdate(options.folder);
     Connect();
   }
   ~Impl() {
@@ -58,6 +70,12 @@ struct Updater::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
+  /// What the look at a bundle has found before RAUC is asked.
+  struct Finding {
+    Message why_no_bundle;
+    BundleState state = BundleState::kUnknown;
+  };
+
   EventLoop& loop;
   UpdaterOptions options;
   BundleFolder folder;
@@ -66,8 +84,7 @@ struct Updater::Impl {
   std::optional<LastUpdate> last;
   bool roll_back_reported = false;
   std::chrono::steady_clock::time_point looked_at;
-  bool is_there = false;
-  bool is_installing = false;
+  std::atomic<bool> is_there = false, is_installing = false;  ///< Written by the loop alone.
   std::string slot, compatible;
   Message step, outcome;
   std::string last_error;  ///< In RAUC's words.
@@ -85,8 +102,9 @@ struct Updater::Impl {
   bool is_called = false;  ///< RAUC has been asked to install.
   bool has_begun = false;  ///< It has then reported less than 100 %.
   double fraction = 0.0;
-  std::string bundle;
-  std::string copy;  ///< Bundle to remove when its installation ends.
+  std::string bundle;          ///< Its name, for people.
+  std::filesystem::path file;  ///< Where it lies.
+  std::filesystem::path copy;  ///< File to remove when its installation ends.
   Done done;
 
   void Disconnect() {
@@ -132,7 +150,7 @@ struct Updater::Impl {
 
   /// Another file has this name by now, or none has.
   void ForgetBundle(const std::string& name) {
-    states.erase(name);
+    states.erase((options.folder / name).string());
     Notify();
   }
 
@@ -166,10 +184,9 @@ struct Updater::Impl {
 
   /// If the installation was given up, RAUC may still be reading the file: it has it open, so that
   /// the contents remain.
-  void RemoveCopy(const std::string& name) {
-    const Change removed = folder.Remove(name);
-    if (removed.result == ChangeResult::kFailed) Log(LogLevel::kWarning, removed.message.English());
-    states.erase(name);
+  void RemoveCopy(const std::filesystem::path& path) {
+    if (const Message why = folder.Drop(path); !why.empty()) Log(LogLevel::kWarning, why.English());
+    states.erase(path.string());
   }
 
   /// The next start must know what was installed, and from which system.
@@ -199,19 +216,59 @@ struct Updater::Impl {
     return last && is_there ? WhyRolledBack(*last, slot, options.boot, options.version) : Message();
   }
 
+  /// Whether it is done or why not, on the loop once the work is done elsewhere.
+  template <typename Work, typename Then>
+  [[nodiscard]] bool InBackground(const char* what, Work work, Then then) {
+    return options.run_in_background(
+        [what, work = std::move(work), then = std::move(then), is_alive = alive, &on = loop] {
+          on.Post(what, [found = work(), then, is_alive] {
+            if (*is_alive) then(found);
+          });
+        });
+  }
+
+  [[nodiscard]] Message WhyNotNow() const {
+    if (bus.get() == nullptr || !is_there) return say::update::NoInstaller();
+    return is_installing ? say::update::InstallingThis(bundle) : Message();
+  }
+
+  /// An installation that is asked for meanwhile is looked at after it, in the same background.
+  void Add(const std::filesystem::path& from, const std::string& name, const Done& asked) {
+    if (const Message why = WhyNotNow(); !why.empty())
+      return asked(Refused(ChangeResult::kConflict, why));
+    const bool begins = InBackground(
+        "bundle stored", [into = folder, from, name] { return into.Add(from, name); },
+        [this, name, asked](const Change& change) {
+          if (change.result == ChangeResult::kDone) ForgetBundle(name);
+          asked(change);
+        });
+    if (!begins) asked(Refused(ChangeResult::kConflict, say::upkeep::DiskBusy()));
+  }
+
   void Install(const std::string& name, Done asked) {
-    if (bus.get() == nullptr || !is_there)
-      return asked(RefusedBecause(ChangeResult::kConflict, say::update::NoInstaller()));
-    if (is_installing)
-      return asked(RefusedBecause(ChangeResult::kConflict, say::update::InstallingThis(bundle)));
-    if (!folder.Has(name))
-      return asked(RefusedBecause(ChangeResult::kNotFound, say::update::NoSuchBundle()));
-    const std::filesystem::path file = options.folder / name;
-    if (const Message why = WhyNoBundle(file, options.max_bytes, name); !why.empty())
-      return asked(RefusedBecause(ChangeResult::kInvalid, why));
+    if (WhyNotNow().empty() && !folder.Has(name))
+      return asked(Refused(ChangeResult::kNotFound, say::update::NoSuchBundle()));
+    Begin(options.folder / name, name, std::move(asked));
+  }
+
+  void InstallCopy(const std::filesystem::path& path, const std::string& name, Done asked) {
+    Begin(path, name, [this, path, asked = std::move(asked)](const Change& change) {
+      if (change.result == ChangeResult::kDone) {
+        copy = path;
+      } else {
+        RemoveCopy(path);
+      }
+      asked(change);
+    });
+  }
+
+  void Begin(const std::filesystem::path& from, const std::string& name, Done asked) {
+    if (const Message why = WhyNotNow(); !why.empty())
+      return asked(Refused(ChangeResult::kConflict, why));
     is_installing = true;
     given_up = is_called = has_begun = false;
     bundle = name;
+    file = from;
     fraction = 0.0;
     step = say::update::CheckingSignature();
     last_error.clear();
@@ -219,26 +276,13 @@ struct Updater::Impl {
     done = std::move(asked);
     state = BundleState::kUnknown;
     Notify();
-    const auto look = [this, file, is_alive = alive, &on = loop] {
-      const BundleState found = LookForDamage(file);
-      on.Post("bundle", [this, file, found, is_alive] {
-        if (*is_alive) Ask(file, found);
-      });
+    const auto look = [from, name, most = options.max_bytes, stop = options.stop] {
+      Finding found{.why_no_bundle = WhyNoBundle(from, most, name)};
+      if (found.why_no_bundle.empty()) found.state = LookForDamage(from, stop);
+      return found;
     };
-    if (!options.run_in_background || !options.run_in_background(look)) look();
-  }
-
-  void InstallCopy(const std::string& name, Done asked) {
-    if (is_installing)
-      return Install(name, std::move(asked));  // refused; that installation may use the file
-    Install(name, [this, name, asked = std::move(asked)](const Change& change) {
-      if (change.result == ChangeResult::kDone) {
-        copy = name;
-      } else {
-        RemoveCopy(name);
-      }
-      asked(change);
-    });
+    if (!InBackground("bundle", look, [this](const Finding& found) { Ask(found); }))
+      Refuse(ChangeResult::kConflict, say::upkeep::DiskBusy());
   }
 
  private:
@@ -404,7 +448,7 @@ struct Updater::Impl {
   void Refuse(ChangeResult result, const Message& why) {
     is_installing = false;
     outcome = last_failure = why;
-    Answer(RefusedBecause(result, why));
+    Answer(Refused(result, why));
     Notify();
   }
 
@@ -417,10 +461,9 @@ struct Updater::Impl {
   void Call() {
     is_called = true;
     if (last && RolledBack().empty()) ForgetLast();
-    const std::string path = (options.folder / bundle).string();
     const int result =
         sd_bus_call_method_async(bus.get(), nullptr, kService, kPath, kInstaller, "InstallBundle",
-                                 &Impl::OnBegun, this, "sa{sv}", path.c_str(), 0);
+                                 &Impl::OnBegun, this, "sa{sv}", file.c_str(), 0);
     if (result < 0) Refuse(ChangeResult::kFailed, say::update::InstallerUnreachable());
   }
 
@@ -439,14 +482,15 @@ struct Updater::Impl {
 
   /// A file that RAUC took ownership of in an earlier attempt cannot be read again, but it cannot
   /// have changed since.
-  void Ask(const std::filesystem::path& file, BundleState found) {
+  void Ask(const Finding& found) {
     if (!is_installing) return;
-    if (found != BundleState::kUnknown) {
-      states[bundle] = found;
-    } else if (const auto known = states.find(bundle); known != states.end()) {
-      found = known->second;
+    if (!found.why_no_bundle.empty()) return Refuse(ChangeResult::kInvalid, found.why_no_bundle);
+    state = found.state;
+    if (state != BundleState::kUnknown) {
+      states[file.string()] = state;
+    } else if (const auto known = states.find(file.string()); known != states.end()) {
+      state = known->second;
     }
-    state = found;
     const int result = bus.get() == nullptr ? -1
                                             : sd_bus_call_method_async(
                                                   bus.get(), nullptr, kService, kPath, kInstaller,
@@ -461,6 +505,7 @@ Updater::Updater(EventLoop& loop, UpdaterOptions options)
 Updater::~Updater() = default;
 
 bool Updater::is_installing() const { return impl_->is_installing; }
+bool Updater::is_free() const { return impl_->is_there && !impl_->is_installing; }
 
 UpdateStatus Updater::status() {
   if (!impl_->is_there && std::chrono::steady_clock::now() - impl_->looked_at >= kLookAgain) {
@@ -489,18 +534,13 @@ UpdateStatus Updater::status() {
   return status;
 }
 
-Change Updater::Add(const std::filesystem::path& file, const std::string& name) {
-  if (!impl_->is_there) return RefusedBecause(ChangeResult::kConflict, say::update::NoInstaller());
-  if (impl_->is_installing)
-    return RefusedBecause(ChangeResult::kConflict, say::update::InstallingOne());
-  Change change = impl_->folder.Add(file, name);
-  if (change.result == ChangeResult::kDone) impl_->ForgetBundle(name);
-  return change;
+void Updater::Add(const std::filesystem::path& file, const std::string& name, Done done) {
+  impl_->Add(file, name, done);
 }
 
 Change Updater::Remove(const std::string& name) {
   if (impl_->is_installing)
-    return RefusedBecause(ChangeResult::kConflict, say::update::InstallingOne());
+    return Refused(ChangeResult::kConflict, say::update::InstallingThis(impl_->bundle));
   Change change = impl_->folder.Remove(name);
   if (change.result == ChangeResult::kDone) impl_->ForgetBundle(name);
   return change;
@@ -514,8 +554,8 @@ void Updater::ForgetRollBack() {
 
 void Updater::Install(const std::string& name, Done done) { impl_->Install(name, std::move(done)); }
 
-void Updater::InstallCopy(const std::string& name, Done done) {
-  impl_->InstallCopy(name, std::move(done));
+void Updater::InstallCopy(const std::filesystem::path& copy, const std::string& name, Done done) {
+  impl_->InstallCopy(copy, name, std::move(done));
 }
 
 }  // namespace plumb

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 
 #include "algo/base/message.hpp"
@@ -30,9 +31,10 @@ struct UpdaterOptions {
   /// Called before an installation begins; returns why it may not begin now, or nothing.
   std::function<Message()> blocking_reason;
   std::function<void()> changed;  ///< Called on the loop when status() has changed.
-  /// Runs slow work on another thread: reading a whole bundle, closing a large file without a name.
-  /// False: it is too busy. Empty: everything is done immediately on the loop.
+  /// Runs slow work on another thread, in order: reading or storing a whole bundle, closing a large
+  /// file without a name. False: it is too busy. Empty: everything is done immediately on the loop.
   std::function<bool(std::function<void()>)> run_in_background;
+  std::stop_token stop = {};  ///< Ends the reading of a bundle.
   /// Called on the loop when an installation has ended; no failure: it succeeded.
   std::function<void(const std::string& bundle, const Message& failure)> ended;
   /// Called on the loop, once: the machine has started the system from before the last update, with
@@ -59,19 +61,22 @@ class Updater {
   Updater& operator=(const Updater&) = delete;
 
   [[nodiscard]] bool is_installing() const;
+  /// There is an installer, and it installs nothing. From any thread.
+  [[nodiscard]] bool is_free() const;
   /// Also searches for RAUC if there was none, at most every few seconds.
   [[nodiscard]] UpdateStatus status();
-  /// Moves a file into the bundles: kInvalid if it cannot be a bundle, kConflict if there are too
-  /// many.
-  Change Add(const std::filesystem::path& file, const std::string& name);
+  /// Moves a file into the bundles, durably, in the background: kInvalid if it cannot be a bundle,
+  /// kConflict if there are too many.
+  void Add(const std::filesystem::path& file, const std::string& name, Done done);
   Change Remove(const std::string& name);
   /// Lets RAUC check and install NAME of the folder. `done` is called once it has begun, or with
   /// the reason why not.
   void Install(const std::string& name, Done done);
-  /// Like Install(), for a bundle that was copied here only to be installed. The copy is removed
-  /// when the installation ends or is refused, whatever the outcome: it can be copied again, and
-  /// copies that stay would fill the folder.
-  void InstallCopy(const std::string& name, Done done);
+  /// Like Install(), for a file that was copied only to be installed and is none of the bundles.
+  /// The copy is removed when the installation ends or is refused, whatever the outcome: it can be
+  /// copied again, and copies that stay would fill the disk.
+  /// @param name  Of the bundle, for people.
+  void InstallCopy(const std::filesystem::path& copy, const std::string& name, Done done);
   /// The roll-back was acknowledged and is not reported any more.
   void ForgetRollBack();
 

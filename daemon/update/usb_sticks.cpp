@@ -4,9 +4,11 @@
 #include <fcntl.h>
 
 #include <algorithm>
-#include <string_view>
 #include <system_error>
+#include <utility>
 
+#include "daemon/loop/give_way.hpp"
+#include "daemon/update/bundle_check.hpp"
 #include "daemon/update/bundle_folder.hpp"
 
 namespace plumb {
@@ -15,16 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 // files of a stick that are examined; it may contain anything
 constexpr std::size_t kMaxLookedAt = 4096;
-
-/// Other names on a stick must not appear in a request.
-bool IsBundleName(std::string_view name) {
-  constexpr std::string_view kAlso = "._-";
-  return name.ends_with(".raucb") && name.size() <= 64 && !name.starts_with('.') &&
-         std::all_of(name.begin(), name.end(), [&](unsigned char c) {
-           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                  kAlso.find(static_cast<char>(c)) != std::string_view::npos;
-         });
-}
 
 template <typename See>
 void ForEachEntry(const fs::path& folder, const See& see) {
@@ -42,7 +34,7 @@ std::vector<fs::path> UsbSticks::Files() const {
   ForEachEntry(root_, [&](const fs::path& stick) {
     ForEachEntry(stick, [&](const fs::path& file) {
       std::error_code error;
-      if (files.size() < kMaxListedBundles && IsBundleName(file.filename().string()) &&
+      if (files.size() < kMaxListedBundles && IsBundleName(file.filename().native()) &&
           fs::is_regular_file(fs::symlink_status(file, error)))
         files.push_back(file);
     });
@@ -65,6 +57,25 @@ int UsbSticks::Open(const std::string& name) const {
       return ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   }
   return -1;
+}
+
+StickWatch::StickWatch(EventLoop& loop, std::function<std::vector<std::string>()> look,
+                       std::function<void()> changed)
+    : loop_(loop), look_(std::move(look)), changed_(std::move(changed)) {
+  (void)thread_.Post([] { GiveWayToScans(); });
+}
+
+std::vector<std::string> StickWatch::Bundles() {
+  if (!is_looking_) {
+    const auto looked = alive_.WhileAlive([this](const std::vector<std::string>& found) {
+      is_looking_ = false;
+      if (std::exchange(bundles_, found) != found) changed_();
+    });
+    is_looking_ = thread_.Post([look = look_, looked, &loop = loop_] {
+      loop.Post("sticks", [looked, found = look()] { looked(found); });
+    });
+  }
+  return bundles_;
 }
 
 }  // namespace plumb

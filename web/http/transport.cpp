@@ -21,6 +21,7 @@
 #include "web/http/exchange.hpp"
 #include "web/http/listen_socket.hpp"
 #include "web/http/served_certificate.hpp"
+#include "web/model/kept_free.hpp"
 #include "words/web.hpp"
 
 namespace plumb::web {
@@ -201,7 +202,6 @@ struct Transport::Callbacks {
                                    : options.max_upload_bytes;
     if (bytes > most)
       return ErrorResponse(413, say::web::FileTooLarge(static_cast<double>(most >> 20)));
-    constexpr std::uintmax_t kSpare = 64U << 20;
     try {
       // Removing it takes time in proportion to its size.
       exchange.request.upload = std::shared_ptr<UploadFile>(
@@ -216,9 +216,11 @@ struct Transport::Callbacks {
     }
     std::error_code error;
     const auto space = std::filesystem::space(options.upload_folder, error);
-    if (!error && space.available < bytes + kSpare) {
+    if (!error && space.available < bytes + kKeptFree) {
       exchange.request.upload.reset();
-      return ErrorResponse(507, say::web::DiskTooFull(static_cast<double>(space.available >> 20)));
+      const auto whole_mb = [](std::uint64_t size) { return static_cast<double>(size >> 20); };
+      return ErrorResponse(507,
+                           say::web::DiskTooFull(whole_mb(space.available), whole_mb(kKeptFree)));
     }
     transport.upload_ = exchange.request.upload;
     transport.has_whole_upload_ = false;

@@ -10,9 +10,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/archive/factory_reset.hpp"
 #include "daemon/archive/store_backup.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/result/result_folder.hpp"
+#include "daemon/update/bundle_copy.hpp"
 #include "tests/support/failing_calls.hpp"
 #include "tests/support/skip.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -197,6 +199,40 @@ TEST_F(FailingDiskTest, WhileABackupIsMade) {
     ExpectNothingLost({"000001", "000002", "000003"});
     return failed;
   });
+}
+
+/// Also by the folder's sync, the last call, when the request lies there already.
+TEST_F(FailingDiskTest, AFactoryResetThatCouldNotBeNotedDoesNotTakePlace) {
+  const fs::path request = state() / kFactoryResetFile;
+  const std::string below = folder_.path().string();
+  int num_refused = 0;
+  for (const FailingCall call : {FailingCall::kWrite, FailingCall::kSync, FailingCall::kRename}) {
+    for (long nth = 1; nth <= 2; ++nth) {
+      Prepare();
+      ASSERT_TRUE(Arm({call, nth, EIO, false, below.c_str()}));
+      bool is_noted = true;
+      try {
+        RequestFactoryReset(state(), FactoryReset::kWipe, kAnna);
+      } catch (const IoError&) {
+        is_noted = false;
+        ++num_refused;
+      }
+      (void)Disarm();
+      EXPECT_EQ(fs::exists(request), is_noted) << kCallNames[static_cast<int>(call)] << " " << nth;
+    }
+  }
+  EXPECT_EQ(num_refused, 4) << "one write, two syncs, one renaming";
+}
+
+/// The loop, which gives it a name, need not wait for the disk any more.
+TEST_F(FailingDiskTest, ACopyOfABundleIsOnTheDiskWhenItIsDone) {
+  const std::string below = folder_.path().string();
+  WriteWholeFile(folder_ / "bundle", std::string(100'000, 'x'));
+  const Descriptor file = OpenForReading(folder_ / "bundle");
+  ASSERT_TRUE(Arm({FailingCall::kSync, 1, EIO, false, below.c_str()}));
+  EXPECT_THROW((void)CopyBundle(file.get(), folder_ / "updates", 1 << 20), IoError);
+  EXPECT_EQ(Disarm(), 1);
+  EXPECT_TRUE(fs::is_empty(folder_ / "updates"));
 }
 
 TEST_F(FailingDiskTest, WhileABackupIsMadeInOneFile) {

@@ -4,7 +4,6 @@
 
 #include <sodium.h>
 
-#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <fstream>
@@ -16,80 +15,30 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "daemon/files/sha256.hpp"
+#include "daemon/update/channel_memory.hpp"
 #include "drivers/files/file_io.hpp"
-#include "tests/support/fake_peer.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/update/channel_server.hpp"
+#include "web/model/kept_free.hpp"
 #include "words/channel.hpp"
+#include "words/update.hpp"
 
 namespace plumb {
 namespace {
 
-using testing::FakePeer;
 using testing::PeerConnection;
 
-std::string DigestOfText(const std::string& text) {
-  std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
-  crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(text.data()),
-                     text.size());
-  return fmt::format("{:02x}", fmt::join(digest, ""));
-}
-
-class ChannelTest : public ::testing::Test {
+class ChannelTest : public ::testing::Test, protected testing::ChannelServer {
  protected:
   ChannelTest() {
-    crypto_sign_keypair(public_key_.data(), secret_key_.data());
-    std::string base64(sodium_base64_ENCODED_LEN(32, sodium_base64_VARIANT_ORIGINAL), '\0');
-    sodium_bin2base64(base64.data(), base64.size(), public_key_.data(), public_key_.size(),
-                      sodium_base64_VARIANT_ORIGINAL);
-    base64.pop_back();
-    options_ = {.url = fmt::format("http://127.0.0.1:{}/plumb", server_.port()),
-                .key = base64,
+    options_ = {.url = url(),
+                .key = key(),
                 .folder = folder_ / "updates",
-                .seen = folder_ / "seen",
+                .state = folder_ / "state",
                 .serial = "PL-0007",
                 .version = "0.3.0"};
-    Publish();
-  }
-
-  nlohmann::json Bundle() const {
-    return {{"name", "plumb-0.3.1.raucb"},
-            {"version", version_},
-            {"bytes", bundle_.size()},
-            {"sha256", DigestOfText(bundle_)},
-            {"share", share_}};
-  }
-  void Publish() {
-    index_ =
-        nlohmann::json{
-            {"format", 1}, {"channel", channel_}, {"number", number_}, {"bundles", {Bundle()}}}
-            .dump();
-    signature_.resize(crypto_sign_BYTES);
-    crypto_sign_detached(reinterpret_cast<unsigned char*>(signature_.data()), nullptr,
-                         reinterpret_cast<const unsigned char*>(index_.data()), index_.size(),
-                         secret_key_.data());
-    served_ = bundle_;
-  }
-
-  void Serve(PeerConnection& client) {
-    const std::string head = client.ReadTo("\r\n\r\n");
-    const auto answer = [&](const std::string& body) {
-      client.Write(
-          fmt::format("HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n{}", body.size(), body));
-    };
-    if (head.starts_with("GET /plumb/index.json ")) return answer(index_);
-    if (head.starts_with("GET /plumb/index.sig ")) return answer(signature_);
-    if (!head.starts_with("GET /plumb/plumb-0.3.1.raucb ")) return;
-    if (serve_bundle_) return serve_bundle_(client);
-    const std::size_t range = head.find("Range: bytes=");
-    const std::size_t from = range == std::string::npos ? 0 : std::stoul(head.substr(range + 13));
-    last_from_ = from;
-    const std::string rest = served_.substr(from);
-    client.Write(fmt::format("HTTP/1.1 {}\r\nContent-Length: {}\r\n{}\r\n",
-                             from == 0 ? "200 OK" : "206 Partial", rest.size(),
-                             from == 0 ? std::string()
-                                       : fmt::format("Content-Range: bytes {}-{}/{}\r\n", from,
-                                                     served_.size() - 1, served_.size())));
-    client.Write(rest.substr(0, cut_after_));
+    std::filesystem::create_directories(options_.state);
   }
 
   ChannelLook Look() { return LookAtChannel(options_, stop_.get_token()); }
@@ -107,17 +56,7 @@ class ChannelTest : public ::testing::Test {
     return count;
   }
 
-  std::string bundle_ = std::string(100'000, 'b') + "end", served_, index_, signature_;
-  std::string version_ = "0.3.1", channel_ = "stable";
-  std::int64_t number_ = 5;
-  double share_ = 1.0;
-  std::size_t cut_after_ = std::string::npos;
-  std::function<void(PeerConnection&)> serve_bundle_;
-  std::atomic<std::size_t> last_from_ = 0;
-  std::array<unsigned char, crypto_sign_PUBLICKEYBYTES> public_key_{};
-  std::array<unsigned char, crypto_sign_SECRETKEYBYTES> secret_key_{};
   testing::TempFolder folder_;
-  FakePeer server_{[this](PeerConnection& client) { Serve(client); }};
   ChannelOptions options_;
   std::stop_source stop_;
 };
@@ -127,10 +66,174 @@ TEST_F(ChannelTest, WhatTheIndexNamesIsFetchedOnce) {
   EXPECT_EQ(look.failure.English(), "");
   EXPECT_EQ(look.name, "plumb-0.3.1.raucb");
   EXPECT_EQ(look.version, "0.3.1");
+  EXPECT_TRUE(look.is_new);
   EXPECT_EQ(Fetched(), bundle_);
   serve_bundle_ = [](PeerConnection&) { ADD_FAILURE() << "asked again"; };
+  const ChannelLook again = Look();
+  EXPECT_EQ(again.name, "plumb-0.3.1.raucb");
+  EXPECT_FALSE(again.is_new) << "it was logged";
+  EXPECT_EQ(NumFiles(), 1);
+}
+
+TEST_F(ChannelTest, AnotherFileUnderTheSameNameIsFetchedAnew) {
+  (void)Look();
+  bundle_ = std::string(100'003, 'c');
+  number_ = 6;
+  Publish();
+  EXPECT_TRUE(Look().is_new);
+  EXPECT_EQ(Fetched(), bundle_);
+  EXPECT_EQ(NumFiles(), 1);
+}
+
+TEST_F(ChannelTest, WhatAPersonPutThereIsNeitherReplacedNorRemovedNorOffered) {
+  const auto put = [&](const char* name, const std::string& text) {
+    std::filesystem::create_directories(options_.folder);
+    WriteWholeFile(options_.folder / name, std::string_view(text));
+  };
+  for (const std::string& other : {std::string(bundle_.size(), 'x'), std::string("short")}) {
+    put("plumb-0.3.1.raucb", other);
+    const ChannelLook look = Look();
+    EXPECT_EQ(look.failure, say::channel::OtherFile("plumb-0.3.1.raucb"));
+    EXPECT_EQ(look.name, "");
+    EXPECT_EQ(Fetched(), other);
+  }
+  put("plumb-0.3.1.raucb", bundle_);
+  EXPECT_EQ(Look().name, "plumb-0.3.1.raucb") << "size and digest are those of the index";
+  EXPECT_FALSE(Look().is_new);
+  put("mine.raucb", "mine");
+  NameBundle("plumb-0.3.2.raucb", "0.3.2");
+  EXPECT_EQ(Look().name, "plumb-0.3.2.raucb");
+  EXPECT_EQ(Fetched(), bundle_) << "it was a person's";
+  EXPECT_EQ(NumFiles(), 3);
+}
+
+TEST_F(ChannelTest, WhatAPersonPutInThePlaceOfTheChannelsStays) {
+  (void)Look();
+  WriteWholeFile(options_.folder / "upload", std::string_view("a person's"));
+  std::filesystem::rename(options_.folder / "upload", options_.folder / name_);
+  EXPECT_EQ(Look().failure, say::channel::OtherFile(name_));
+  NameBundle("plumb-0.3.2.raucb", "0.3.2");
+  EXPECT_EQ(Look().name, "plumb-0.3.2.raucb");
+  EXPECT_EQ(Fetched(), "a person's");
+}
+
+TEST_F(ChannelTest, OneBundleInTheFolderIsTheChannels) {
+  (void)Look();
+  NameBundle("plumb-0.3.2.raucb", "0.3.2");
+  EXPECT_EQ(Look().name, "plumb-0.3.2.raucb");
+  EXPECT_EQ(NumFiles(), 1);
+  // Withdrawn again: what the unit removed itself may come back.
+  NameBundle("plumb-0.3.1.raucb", "0.3.1");
   EXPECT_EQ(Look().name, "plumb-0.3.1.raucb");
   EXPECT_EQ(NumFiles(), 1);
+}
+
+TEST_F(ChannelTest, WhatAPersonRemovedIsNotFetchedAgain) {
+  (void)Look();
+  std::filesystem::remove(options_.folder / "plumb-0.3.1.raucb");
+  serve_bundle_ = [](PeerConnection&) { ADD_FAILURE() << "asked again"; };
+  const ChannelLook look = Look();
+  EXPECT_EQ(look.name, "");
+  EXPECT_EQ(look.failure, Message());
+  serve_bundle_ = {};
+  bundle_ += "!";
+  ++number_;
+  Publish();
+  EXPECT_EQ(Look().name, "plumb-0.3.1.raucb") << "other contents are another bundle";
+}
+
+TEST_F(ChannelTest, ADownloadLeavesRoomForScans) {
+  std::uint64_t free = bundle_.size() + kKeptFree - 1;
+  options_.free_bytes = [&](const std::filesystem::path&) { return free; };
+  EXPECT_TRUE(Look().failure.Is(say::update::kDiskFull)) << Look().failure.English();
+  EXPECT_EQ(Fetched(), "");
+  ++free;
+  // The disk does not see the file grow: what is still to come fits at each step.
+  EXPECT_EQ(Look().failure, Message());
+  EXPECT_EQ(Fetched(), bundle_);
+}
+
+TEST_F(ChannelTest, ADownloadStopsWhenScansNeedTheRoom) {
+  int num_looks = 0;
+  options_.free_bytes = [&](const std::filesystem::path&) {
+    return ++num_looks > 2 ? kKeptFree : kKeptFree + bundle_.size();
+  };
+  EXPECT_TRUE(Look().failure.Is(say::update::kDiskFull));
+  EXPECT_EQ(Fetched(), "");
+  EXPECT_EQ(NumFiles(), 1) << "the part, to be continued";
+  num_looks = -1000;
+  EXPECT_EQ(Look().failure, Message());
+  EXPECT_GT(last_from_, 0U);
+  EXPECT_EQ(Fetched(), bundle_);
+}
+
+TEST_F(ChannelTest, NothingIsRemovedOrFetchedWhileABundleIsInstalled) {
+  (void)Look();
+  NameBundle("plumb-0.3.2.raucb", "0.3.2");
+  options_.may_fetch = [] { return false; };
+  EXPECT_TRUE(Look().is_postponed);
+  EXPECT_EQ(NumFiles(), 1);
+  EXPECT_TRUE(std::filesystem::exists(options_.folder / "plumb-0.3.1.raucb"));
+  options_.may_fetch = [] { return true; };
+  EXPECT_EQ(Look().name, "plumb-0.3.2.raucb");
+}
+
+TEST_F(ChannelTest, PartsGoWhenNoChannelIsLookedAtAnyMore) {
+  cut_after_ = 40'000;
+  (void)Look();
+  WriteWholeFile(options_.folder / "mine.raucb", std::string_view("mine"));
+  RemoveChannelParts(options_.folder);
+  EXPECT_EQ(NumFiles(), 1);
+}
+
+TEST_F(ChannelTest, AMemoryThatCannotBeReadIsNotTakenForAnEmptyOne) {
+  (void)Look();
+  const auto file = options_.state / kChannelMemoryFile;
+  const std::string good = ReadTextFile(file, 4096);
+  number_ = 4;
+  Publish();
+  for (const std::string& text :
+       {std::string(), std::string("1x"), std::string("{}"), std::string("[]"),
+        good.substr(0, good.size() / 2), std::string(70'000, ' '),
+        std::string(R"({"newest":{},"fetched":[{"name":"../x.raucb","sha256":"","inode":1,)"
+                    R"("bytes":1,"modified_ns":1}]})")}) {
+    WriteWholeFile(file, std::string_view(text));
+    EXPECT_TRUE(Look().failure.Is(say::channel::kMemoryUnreadable)) << text.substr(0, 40);
+    EXPECT_THAT(Look().failure.English(), ::testing::HasSubstr(file.string()));
+  }
+  WriteWholeFile(file, std::string_view(good));
+  EXPECT_EQ(Look().failure, say::channel::OlderIndex(4, 5));
+}
+
+TEST_F(ChannelTest, EachChannelAndKeyHasItsOwnOrderOfIndexes) {
+  options_.channel = channel_ = "test";
+  number_ = 40;
+  Publish();
+  EXPECT_EQ(Look().failure, Message());
+  options_.channel = channel_ = "stable";
+  number_ = 17;
+  Publish();
+  EXPECT_EQ(Look().failure, Message());
+  number_ = 16;
+  Publish();
+  EXPECT_EQ(Look().failure, say::channel::OlderIndex(16, 17));
+  EXPECT_NE(NameOfOrder("stable", options_.key), NameOfOrder("stable", "another"));
+}
+
+/// A file that the disk cannot read is not one whose contents are others.
+TEST_F(ChannelTest, AReadErrorIsSaidAsOne) {
+  // Reading one's own memory from the address 0 on is an input/output error.
+  std::filesystem::create_symlink("/proc/self/mem", folder_ / "bad");
+  EXPECT_THROW((void)SumOfFile(folder_ / "bad"), IoError);
+}
+
+TEST_F(ChannelTest, ADigestEndsWithAStopRequest) {
+  std::filesystem::create_directories(options_.folder);
+  std::ofstream(options_.folder / "plumb-0.3.1.raucb");
+  std::filesystem::resize_file(options_.folder / "plumb-0.3.1.raucb", bundle_.size());
+  (void)stop_.request_stop();
+  EXPECT_THROW((void)SumOfFile(options_.folder / "plumb-0.3.1.raucb", stop_.get_token()),
+               Interrupted);
 }
 
 TEST_F(ChannelTest, AnIndexThatIsNotSignedByTheKeyIsRefused) {
@@ -307,6 +410,34 @@ TEST_F(ChannelTest, TheWatchLooksAgainAfterAFailure) {
   std::unique_lock lock(mutex);
   ASSERT_TRUE(changed.wait_for(lock, std::chrono::seconds(30), [&] { return looks.size() >= 2; }));
   EXPECT_EQ(looks[1].failure, say::channel::NoSignature());
+}
+
+TEST_F(ChannelTest, TheWatchKeepsAnOfferWhileTheServerIsAway) {
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<ChannelLook> looks;
+  options_.first_after = options_.again_after = options_.every = std::chrono::milliseconds(1);
+  const ChannelWatch watch(options_, [&](const ChannelLook& look) {
+    const std::lock_guard lock(mutex);
+    if (looks.empty()) is_away_ = true;
+    if (looks.size() == 1) is_away_ = false;
+    looks.push_back(look);
+    changed.notify_all();
+  });
+  std::unique_lock lock(mutex);
+  ASSERT_TRUE(changed.wait_for(lock, std::chrono::seconds(30), [&] { return looks.size() >= 3; }));
+  EXPECT_TRUE(looks[0].is_new);
+  EXPECT_FALSE(looks[1].failure.empty());
+  for (const ChannelLook& look : looks) EXPECT_EQ(look.name, "plumb-0.3.1.raucb");
+  EXPECT_EQ(looks[2].failure, Message());
+  EXPECT_FALSE(looks[1].is_new || looks[2].is_new) << "logged once";
+}
+
+TEST(ChannelIndexTest, ASystemWhoseVersionHasAnotherFormIsOfferedWhatIsLater) {
+  const ChannelIndex index{
+      .bundles = {{.name = "a-1.raucb", .version = "0.3.1", .bytes = 1, .sha256 = "0"}}};
+  EXPECT_TRUE(OfferedTo(index, "PL-1", "0.3.0-1"));
+  EXPECT_FALSE(OfferedTo(index, "PL-1", "0.3.1-1"));
 }
 
 }  // namespace

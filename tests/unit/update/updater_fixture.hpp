@@ -61,7 +61,7 @@ class UpdaterTest : public UpdaterOnLoop {
                                                            : Message::Verbatim(blocking_reason_);
                          },
                      .changed = [this] { ++num_changes_; },
-                     .run_in_background = {},
+                     .run_in_background = run_in_background_,
                      .ended =
                          [this](const std::string& bundle, const Message& failure) {
                            ended_ = bundle + ": " + failure.English();
@@ -93,6 +93,7 @@ class UpdaterTest : public UpdaterOnLoop {
   std::chrono::milliseconds answer_within_ = std::chrono::minutes(1);
   int num_changes_ = 0;
   std::string blocking_reason_;
+  std::function<bool(std::function<void()>)> run_in_background_;  ///< Empty: on the loop.
   std::string ended_, roll_backs_;
   std::string boot_ = "first";
   std::atomic<std::chrono::seconds> passed_{std::chrono::seconds(0)};

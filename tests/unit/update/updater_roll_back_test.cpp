@@ -55,6 +55,17 @@ TEST_F(RollBackTest, TheSameStartStillNeedsItsRestart) {
   });
 }
 
+/// Two starts that nobody can name are not the same one.
+TEST_F(RollBackTest, AStartThatIsNotKnownNeedsNoRestart) {
+  boot_ = "";
+  RunBesideLoop([&] {
+    InstallAndEnd();
+    StartAs("");
+    EXPECT_FALSE(StatusNow().restart_needed);
+    EXPECT_EQ(StatusNow().rolled_back, Message());
+  });
+}
+
 TEST_F(RollBackTest, AMachineThatStartsTheSystemBeforeSaysSoUntilSomebodyHasSeenIt) {
   RunBesideLoop([&] {
     InstallAndEnd();

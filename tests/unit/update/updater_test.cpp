@@ -14,6 +14,8 @@
 
 #include "drivers/files/unix_socket.hpp"
 #include "tests/unit/update/updater_fixture.hpp"
+#include "words/update.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 namespace {
@@ -84,7 +86,8 @@ TEST_F(UpdaterTest, AnOlderVersionIsRefused) {
     rauc.version = "0.0.9";
     Start();
     WaitForRauc();
-    EXPECT_THAT(Install("plumb-9.0.raucb").message.English(), HasSubstr("older than 0.1.0"));
+    EXPECT_EQ(Install("plumb-9.0.raucb").message, say::update::Older("0.0.9", "0.1.0"))
+        << "with its id and its arguments, or nobody can translate it";
     EXPECT_EQ(rauc.installed(), "");
   });
 }
@@ -228,9 +231,7 @@ TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
   PlayWithRauc([&](FakeRauc&) {
     EXPECT_FALSE(fs::exists(folder_ / "updates" / ".upload-left")) << "of a run before";
     const auto add = [&](const std::string& from, const std::string& name) {
-      Change change;
-      On([&] { change = updater_->Add(folder_ / "updates" / from, name); });
-      return change;
+      return Add(folder_ / "updates" / from, name);
     };
     WriteBundle(".upload-1");
     EXPECT_EQ(add(".upload-1", "b.raucb").result, ChangeResult::kDone);
@@ -238,8 +239,7 @@ TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
     WriteBundle(".upload-2", "GIF8");
     const Change picture = add(".upload-2", "picture.raucb");
     EXPECT_EQ(picture.result, ChangeResult::kInvalid);
-    EXPECT_EQ(picture.message.English(),
-              "picture.raucb is not a bundle: expected a squashfs image");
+    EXPECT_EQ(picture.message, say::update::NoSquashfs("picture.raucb"));
     for (const char* name : {"c.raucb", "d.raucb", "e.raucb"}) {
       WriteBundle(".upload-3");
       EXPECT_EQ(add(".upload-3", name).result,
@@ -254,35 +254,55 @@ TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
   });
 }
 
-TEST_F(UpdaterTest, ACopyIsRemovedAtTheEndHoweverItEndsAndAnUploadIsKept) {
+/// A copy of a stick, among four bundles that somebody uploaded, one of them of its name.
+class CopyTest : public UpdaterTest {
+ protected:
+  CopyTest() {
+    for (const char* name : {"a.raucb", "b.raucb", "c.raucb"}) WriteBundle(name);
+  }
+  Change InstallNewCopy() {
+    WriteBundle(kCopy);
+    return InstallCopy(copy_, "plumb-9.0.raucb");
+  }
+  void ExpectOnlyUploads(const std::string& when) {
+    EXPECT_FALSE(fs::exists(copy_)) << when;
+    EXPECT_THAT(StatusNow().bundles,
+                ::testing::ElementsAre("a.raucb", "b.raucb", "c.raucb", "plumb-9.0.raucb"))
+        << when;
+  }
+  static constexpr const char* kCopy = ".upload-copy.raucb";
+  const fs::path copy_ = folder_ / "updates" / kCopy;
+};
+
+TEST_F(CopyTest, IsRemovedAtTheEndHoweverItEndsAndAnUploadOfItsNameIsKept) {
   PlayWithRauc([&](FakeRauc& rauc) {
-    const auto listed = [&] { return StatusNow().bundles; };
     for (const bool fails : {false, true}) {
       rauc.fails = fails;
-      WriteBundle("copy.raucb");
-      EXPECT_EQ(InstallCopy("copy.raucb").result, ChangeResult::kDone);
-      EXPECT_THAT(listed(), ::testing::Contains("copy.raucb")) << "RAUC reads it";
-      EXPECT_EQ(InstallCopy("copy.raucb").result, ChangeResult::kConflict);
-      EXPECT_THAT(listed(), ::testing::Contains("copy.raucb")) << "the refusal is another's";
+      EXPECT_EQ(InstallNewCopy().result, ChangeResult::kDone);
+      EXPECT_EQ(rauc.installed(), copy_.string());
+      EXPECT_TRUE(fs::exists(copy_)) << "RAUC reads it";
+      WriteBundle(".upload-other.raucb");
+      EXPECT_EQ(InstallCopy(folder_ / "updates" / ".upload-other.raucb", "x").message,
+                say::update::InstallingThis("plumb-9.0.raucb"));
+      EXPECT_TRUE(fs::exists(copy_)) << "the refusal is another's";
       rauc.Release();
       EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
       EXPECT_EQ(StatusNow().failure.empty(), !fails);
-      EXPECT_THAT(listed(), ::testing::ElementsAre("plumb-9.0.raucb"));
+      ExpectOnlyUploads(fails ? "failed" : "installed");
       EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
       rauc.Release();
       EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
-      EXPECT_THAT(listed(), ::testing::ElementsAre("plumb-9.0.raucb"));
+      ExpectOnlyUploads("an upload was installed");
     }
   });
 }
 
-TEST_F(UpdaterTest, ACopyThatIsRefusedIsRemovedAndAnUploadIsKept) {
+TEST_F(CopyTest, ThatIsRefusedIsRemovedAndAnUploadIsKept) {
   PlayWithRauc([&](FakeRauc& rauc) {
     const auto expect_refusal = [&](const char* which) {
-      WriteBundle("copy.raucb");
-      EXPECT_NE(InstallCopy("copy.raucb").result, ChangeResult::kDone) << which;
+      EXPECT_NE(InstallNewCopy().result, ChangeResult::kDone) << which;
       EXPECT_NE(Install("plumb-9.0.raucb").result, ChangeResult::kDone) << which;
-      EXPECT_THAT(StatusNow().bundles, ::testing::ElementsAre("plumb-9.0.raucb")) << which;
+      ExpectOnlyUploads(which);
     };
     rauc.refuses_signature = true;
     expect_refusal("by the installer");
@@ -292,16 +312,61 @@ TEST_F(UpdaterTest, ACopyThatIsRefusedIsRemovedAndAnUploadIsKept) {
   });
 }
 
-TEST_F(UpdaterTest, ACopyIsRemovedWhenTheBusGoesAway) {
+TEST_F(CopyTest, IsRemovedWhenTheBusGoesAway) {
   PlayWithRauc([&](FakeRauc&) {
-    WriteBundle("copy.raucb");
-    EXPECT_EQ(InstallCopy("copy.raucb").result, ChangeResult::kDone);
+    EXPECT_EQ(InstallNewCopy().result, ChangeResult::kDone);
     bus_.Stop();
     EXPECT_TRUE(Becomes([&] { return !Ended().empty(); }));
-    EXPECT_FALSE(fs::exists(folder_ / "updates" / "copy.raucb"));
-    WriteBundle("copy.raucb");
-    EXPECT_EQ(InstallCopy("copy.raucb").result, ChangeResult::kConflict) << "no installer";
-    EXPECT_FALSE(fs::exists(folder_ / "updates" / "copy.raucb"));
+    EXPECT_FALSE(fs::exists(copy_));
+    EXPECT_EQ(InstallNewCopy().result, ChangeResult::kConflict) << "no installer";
+    EXPECT_FALSE(fs::exists(copy_));
+  });
+}
+
+/// Work beside the loop begins when the test lets it, or is refused.
+TEST_F(UpdaterTest, TheLoopNeitherReadsNorStoresABundle) {
+  std::vector<std::function<void()>> waiting;
+  bool is_busy = false;
+  run_in_background_ = [&](std::function<void()> work) {
+    if (!is_busy) waiting.push_back(std::move(work));
+    return !is_busy;
+  };
+  PlayWithRauc([&](FakeRauc& rauc) {
+    WriteBundle(".upload-1");
+    std::vector<Change> answers;
+    const auto take = [&](const Change& change) { answers.push_back(change); };
+    const auto run_next = [&] {
+      std::function<void()> work;
+      On([&] {
+        work = waiting.at(0);
+        waiting.erase(waiting.begin());
+      });
+      work();
+    };
+    On([&] { updater_->Add(folder_ / "updates" / ".upload-1", "b.raucb", take); });
+    EXPECT_FALSE(fs::exists(folder_ / "updates" / "b.raucb"));
+    run_next();
+    EXPECT_TRUE(fs::exists(folder_ / "updates" / "b.raucb"));
+    On([&] { updater_->Install("b.raucb", take); });
+    EXPECT_EQ(rauc.num_asked, 0);
+    run_next();
+    EXPECT_TRUE(Becomes([&] {
+      bool has_answer = false;
+      On([&] { has_answer = answers.size() == 2; });
+      return has_answer;
+    }));
+    On([&] {
+      EXPECT_EQ(answers[0].result, ChangeResult::kDone);
+      EXPECT_EQ(answers[1].result, ChangeResult::kDone);
+    });
+    rauc.Release();
+    EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
+    is_busy = true;
+    EXPECT_EQ(Install("b.raucb").message, say::upkeep::DiskBusy());
+    EXPECT_FALSE(StatusNow().installing);
+    WriteBundle(".upload-2");
+    EXPECT_EQ(Add(folder_ / "updates" / ".upload-2", "c.raucb").message, say::upkeep::DiskBusy());
+    is_busy = false;
   });
 }
 

@@ -4,6 +4,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <future>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,8 +37,9 @@ TEST_F(UsbSticksTest, WithoutAStickNothingIsOffered) {
 }
 
 TEST_F(UsbSticksTest, BundlesOfAllSticksAreOfferedAndNothingElse) {
-  for (const char* path : {"sdb1/v3.raucb", "sda1/v2.raucb", "sda1/v3.raucb", "sda1/.hidden.raucb",
-                           "sda1/photo.jpg", "sda1/a b.raucb", "sda1/folder/v9.raucb", "v8.raucb"})
+  for (const char* path :
+       {"sdb1/v3.raucb", "sda1/v2.raucb", "sda1/v3.raucb", "sda1/.hidden.raucb", "sda1/photo.jpg",
+        "sda1/a b.raucb", "sda1/-x.raucb", "sda1/folder/v9.raucb", "v8.raucb"})
     Put(path);
   fs::create_directory(folder_ / "sda1" / "v7.raucb");
   fs::create_symlink("/etc/shadow", folder_ / "sda1" / "v6.raucb");
@@ -62,6 +66,35 @@ TEST_F(UsbSticksTest, OneIsReadByItsName) {
 TEST_F(UsbSticksTest, AStickFullOfFilesIsNotLookedThroughForEver) {
   for (int i = 0; i < 40; ++i) Put(("sda1/v" + std::to_string(i) + ".raucb").c_str());
   EXPECT_EQ(sticks_.Bundles().size(), 32U);
+}
+
+/// A stick with bad blocks keeps its reader for minutes.
+TEST(StickWatchTest, AStickThatHangsHoldsNothingUp) {
+  EventLoop loop;
+  std::promise<void> hangs;
+  std::atomic<int> num_looks = 0;
+  int num_changes = 0;
+  StickWatch watch(
+      loop,
+      [&, released = hangs.get_future().share()] {
+        ++num_looks;
+        released.wait();
+        return std::vector<std::string>{"v2.raucb"};
+      },
+      [&] {
+        ++num_changes;
+        EXPECT_THAT(watch.Bundles(), ElementsAre("v2.raucb"));
+        loop.Quit(0);
+      });
+  EventLoop::Source timer = loop.MakeTimer("test", [&] {
+    for (int i = 0; i < 3; ++i) EXPECT_THAT(watch.Bundles(), IsEmpty());
+    hangs.set_value();
+  });
+  timer.ArmAfter({});
+  loop.Run();
+  EXPECT_EQ(num_changes, 1);
+  EXPECT_GE(num_looks, 1);
+  EXPECT_LE(num_looks, 2) << "one after the other, however often it is asked";
 }
 
 }  // namespace
