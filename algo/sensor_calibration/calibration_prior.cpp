@@ -133,11 +133,14 @@ CalibrationPrior PriorOfAnyUnit(double edge_bias_sigma_px, const UnitKnowledge& 
   const ClassSigmas& of_class = ClassOf(unit.sensor).sigmas;
   ApplyClass(of_class, sigma);
   prior.num_terms -= NumAbsent(of_class);
-  if (unit.lens_stated_straight) {
+  // A phone rectifies its colour images and makes each depth image for one of them: there neither a
+  // straight lens nor a common stamp is for want of knowledge.
+  const bool is_phone = unit.sensor == DepthSensor::kLidar;
+  if (unit.lens_stated_straight && !is_phone) {
     sigma[kLensAt + 4] = kUnmeasuredK1;
     sigma[kLensAt + 5] = kUnmeasuredK2;
   }
-  if (unit.one_stamp) DepthTermOf(sigma, kDepthDelay) = kOneStampDelay_s;
+  if (unit.one_stamp && !is_phone) DepthTermOf(sigma, kDepthDelay) = kOneStampDelay_s;
   CalibrationMatrix covariance = sigma.cwiseAbs2().asDiagonal();
   const auto couple = [&](double together, int term, int growth, double share) {
     CalibrationVector direction = CalibrationVector::Zero();

@@ -92,6 +92,9 @@ TEST(CalibrationPrior, ALensThatWasNotMeasuredAndStampsThatWereMadeUpAreWide) {
   EXPECT_NEAR(Sigma(unknown, kLensAt + 4), 0.1, 1e-9);
   EXPECT_NEAR(Sigma(unknown, kLensAt + 5), 0.2, 1e-9);
   EXPECT_NEAR(Sigma(unknown, kDepthAt + kDepthDelay), 0.016, 1e-9);
+  const CalibrationPrior phone = PriorOfAnyUnit(
+      0.04, {.sensor = DepthSensor::kLidar, .lens_stated_straight = true, .one_stamp = true});
+  EXPECT_EQ(phone.information, PriorOf(DepthSensor::kLidar).information);
 }
 
 }  // namespace
