@@ -71,34 +71,37 @@ void MessagesOut::Add(const char* name, Send send, const RetryPauses& pauses) {
            })});
 }
 
-void MessagesOut::Look(const Status& status) {
+void MessagesOut::Look(const Status& status, OccasionMemory::Time now) {
   if (ways_.empty()) return;
-  const auto now = WallClock::now();
-  const auto steady = std::chrono::steady_clock::now();
-  const double up_s = std::chrono::duration<double>(steady - started_).count();
-  const std::vector<Occasion> present = OccasionsOf(status, rules_, up_s, now, LocalTime(now));
-  for (const OccasionMemory::Told& told : memory_.ToTell(present, steady))
+  const auto time = WallClock::now();
+  const double up_s = std::chrono::duration<double>(now - started_).count();
+  const std::vector<Occasion> present = OccasionsOf(status, rules_, up_s, time, LocalTime(time));
+  for (const OccasionMemory::Told& told : memory_.ToTell(present, now))
     Post({.id = NewMessageId(),
           .unit = UnitName(),
-          .time = now,
+          .time = time,
           .kind = told.occasion.kind,
           .is_repeated = told.is_repeated,
           .text = told.occasion.text},
-         /*is_test=*/false);
+         {});
 }
 
 void MessagesOut::Test(std::function<void(const Message&)> done) {
   if (ways_.empty()) return done(say::messages::NoWay());
-  OutMessage message{.id = NewMessageId(),
-                     .unit = UnitName(),
-                     .time = WallClock::now(),
-                     .kind = OccasionKind::kTest,
-                     .text = say::messages::Test()};
-  tests_[message.id] = {.ways = ways_.size(), .failure = {}, .done = std::move(done)};
-  Post(std::move(message), /*is_test=*/true);
+  Post({.id = NewMessageId(),
+        .unit = UnitName(),
+        .time = WallClock::now(),
+        .kind = OccasionKind::kTest,
+        .text = say::messages::Test()},
+       std::move(done));
 }
 
-void MessagesOut::Post(OutMessage message, bool is_test) {
+void MessagesOut::Post(OutMessage message, std::function<void(const Message&)> done) {
+  const bool is_test = static_cast<bool>(done);
+  Open& open = open_[message.id];
+  open.kind = message.kind;
+  open.ways = ways_.size();
+  open.done = std::move(done);
   Log(LogLevel::kNotice,
       fmt::format("message out ({}): {}", Name(message.kind), message.text.English()));
   for (std::size_t i = 0; i < ways_.size(); ++i) {
@@ -120,19 +123,27 @@ void MessagesOut::Note(std::size_t way, const Courier::Attempt& attempt) {
     status.failed += attempt.is_given_up ? 1 : 0;
     Log(LogLevel::kWarning, status.failure.English());
   }
-  if (attempt.failure.empty() || attempt.is_given_up) EndTest(attempt.id, status.failure);
+  if (attempt.failure.empty() || attempt.is_given_up) End(attempt.id, status.failure);
   changed_();
 }
 
-void MessagesOut::EndTest(const std::string& id, const Message& failure) {
-  const auto found = tests_.find(id);
-  if (found == tests_.end()) return;
+void MessagesOut::End(const std::string& id, const Message& failure) {
+  const auto found = open_.find(id);
+  if (found == open_.end()) return;
   Open& open = found->second;
-  if (!failure.empty()) open.failure = failure;
+  if (failure.empty()) {
+    open.is_taken = true;
+  } else {
+    open.failure = failure;
+  }
   if (--open.ways > 0) return;
   const Open ended = std::move(open);
-  tests_.erase(found);
-  ended.done(ended.failure);
+  open_.erase(found);
+  if (ended.done) {
+    ended.done(ended.failure);
+  } else if (!ended.is_taken) {
+    memory_.NotTold(ended.kind);
+  }
 }
 
 std::vector<MessageWay> MessagesOut::status() const {

@@ -29,7 +29,7 @@ class MessagesOut {
                                     std::chrono::minutes(30)});
 
   /// Tells what is new in a status; for regular calls.
-  void Look(const Status& status);
+  void Look(const Status& status, OccasionMemory::Time now = std::chrono::steady_clock::now());
   /// Sends a test message by every way, once. Calls `done` with why one did not take it, or with an
   /// empty message.
   void Test(std::function<void(const Message& failure)> done);
@@ -41,18 +41,21 @@ class MessagesOut {
     MessageWay status;
     std::unique_ptr<Courier> courier;
   };
-  /// A test message whose outcome is not yet known everywhere.
+  /// A message whose outcome is not yet known everywhere.
   struct Open {
+    OccasionKind kind = OccasionKind::kTest;
     std::size_t ways = 0;
+    bool is_taken = false;  ///< By one of them.
     Message failure;
-    std::function<void(const Message&)> done;
+    std::function<void(const Message&)> done;  ///< Of a test.
   };
   using Send = std::string (*)(const OutMessage&, const MessagesSettings&, const std::stop_token&);
 
   void Add(const char* name, Send send, const RetryPauses& pauses);
-  void Post(OutMessage message, bool is_test);
+  void Post(OutMessage message, std::function<void(const Message&)> done);
   void Note(std::size_t way, const Courier::Attempt& attempt);
-  void EndTest(const std::string& id, const Message& failure);
+  /// One way took the message or gave it up.
+  void End(const std::string& id, const Message& failure);
 
   EventLoop& loop_;
   const MessagesSettings settings_;
@@ -60,7 +63,7 @@ class MessagesOut {
   const std::function<void()> changed_;
   const std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
   OccasionMemory memory_;
-  std::map<std::string, Open> tests_;  ///< By the message's id.
+  std::map<std::string, Open> open_;  ///< By the message's id.
   std::vector<Way> ways_;
   AliveFlag alive_;
 };

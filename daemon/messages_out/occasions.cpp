@@ -40,17 +40,19 @@ void AddCheck(const Status& status, const OccasionRules& rules, const std::tm& l
 
 void AddBackup(const Status& status, const OccasionRules& rules, double up_s,
                WallClock::time_point now, std::vector<Occasion>& occasions) {
-  if (Warns(status, say::upkeep::kBackupFailed) ||
-      Warns(status, say::upkeep::kBackupNotRehearsed)) {
+  if (Warns(status, say::upkeep::kBackupFailed)) {
     occasions.push_back({OccasionKind::kBackup, {"failed"}, say::messages::BackupFailed()});
     return;
   }
-  if (!rules.makes_backups) return;
   const double limit_s = 3600 * kIntervalsUntilOverdue * rules.backup_hours;
   const auto& made_at = status.storage.backup_made_at;
   const double age_s = made_at ? std::chrono::duration<double>(now - *made_at).count() : up_s;
-  if (age_s > limit_s)
+  if (rules.makes_backups && age_s > limit_s) {
     occasions.push_back({OccasionKind::kBackup, {"overdue"}, say::messages::BackupOverdue()});
+  } else if (Warns(status, say::upkeep::kBackupNotRehearsed)) {
+    occasions.push_back(
+        {OccasionKind::kBackup, {"not rehearsed"}, say::messages::BackupNotRehearsed()});
+  }
 }
 
 }  // namespace
@@ -99,6 +101,11 @@ std::vector<OccasionMemory::Told> OccasionMemory::ToTell(const std::vector<Occas
   for (auto& [kind, past] : past_)
     if (!lasting.contains(kind)) past.parts.clear();
   return told;
+}
+
+void OccasionMemory::NotTold(OccasionKind kind) {
+  const auto found = past_.find(kind);
+  if (found != past_.end()) found->second.parts.clear();
 }
 
 }  // namespace plumb

@@ -50,7 +50,7 @@ struct OccasionRules {
 
 /// Decides which messages are due: one when an event begins, and one a day for as long as it lasts.
 /// A new event of the same kind waits until an hour after the last message of that kind, so that a
-/// condition that comes and goes does not flood the mailbox.
+/// condition that comes and goes does not flood the mailbox; so does one whose message nobody took.
 class OccasionMemory {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -61,6 +61,8 @@ class OccasionMemory {
 
   /// @param present  All that there is now.
   [[nodiscard]] std::vector<Told> ToTell(const std::vector<Occasion>& present, Time now);
+  /// Every way gave up the last message of that kind.
+  void NotTold(OccasionKind kind);
 
  private:
   struct Past {

@@ -240,9 +240,11 @@ std::string SendWebhook(const OutMessage& message, const MessagesSettings& setti
   transfer.Set(CURLOPT_POSTFIELDS, body.c_str());
   transfer.Set(CURLOPT_WRITEFUNCTION, &ForgetAnswer);
   transfer.Set(CURLOPT_WRITEDATA, static_cast<void*>(&answered));
-  if (std::string failed = transfer.Perform(); !failed.empty()) return failed;
+  const std::string failed = transfer.Perform();
+  // The status decides, whatever becomes of the rest of the answer.
   const long status = transfer.status();
-  return status >= 200 && status < 300 ? "" : fmt::format("HTTP {}", status);
+  if (status >= 200 && status < 300) return "";
+  return status > 0 ? fmt::format("HTTP {}", status) : failed;
 }
 
 }  // namespace plumb

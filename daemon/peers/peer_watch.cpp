@@ -43,7 +43,7 @@ PeerWatch::PeerWatch(EventLoop& loop, const PeersSettings& settings, const std::
   note_ = alive_.WhileAlive(
       [this](std::size_t peer, int opening, Answer answer) { Note(peer, opening, answer); });
   for (const std::string& url : settings.units)
-    peers_.push_back({.url = url, .name = NameOfUnit(url), .answer = Answer::kNone, .thread = {}});
+    peers_.push_back({.url = url, .name = NameOfUnit(url), .thread = {}});
   for (std::size_t i = 0; i < peers_.size(); ++i)
     peers_[i].thread = std::jthread(
         [this, i, url = peers_[i].url](const std::stop_token& stop) { AskAgain(stop, i, url); });
@@ -56,7 +56,10 @@ PeerWatch::~PeerWatch() {
 void PeerWatch::SetOpen(const std::string& session, const std::string& code) {
   session_ = session;
   const bool had_notes = !notes().empty();
-  for (Peer& peer : peers_) peer.answer = Answer::kNone;
+  for (Peer& peer : peers_) {
+    peer.answer = Answer::kNone;
+    peer.was_open = false;
+  }
   {
     const std::lock_guard lock(mutex_);
     code_ = code;
@@ -118,8 +121,10 @@ void PeerWatch::Note(std::size_t peer, int opening, Answer answer) {
     Log(LogLevel::kWarning, said.English());
   else if (before != Answer::kNone)
     Log(LogLevel::kNotice, fmt::format("the open patient is not open in {}", one.name));
-  if (!said.empty() || before != Answer::kNone)
-    changed_(answer == Answer::kOpen ? said : Message());
+  // A network that comes and goes finds nothing new each time.
+  const bool is_news = answer == Answer::kOpen && !one.was_open;
+  if (answer != Answer::kNotKnown) one.was_open = answer == Answer::kOpen;
+  if (!said.empty() || before != Answer::kNone) changed_(is_news ? said : Message());
 }
 
 std::vector<Message> PeerWatch::notes() const {

@@ -48,6 +48,7 @@ class PeerWatch {
   struct Peer {
     std::string url, name;
     Answer answer = Answer::kNone;
+    bool was_open = false;  ///< By the last answer that was understood.
     std::jthread thread;
   };
   void AskAgain(const std::stop_token& stop, std::size_t peer, const std::string& url);

@@ -315,15 +315,31 @@ OwnProof Accounts::ReadProof(Fields& fields, const char* password) {
           .second_factor = OptionalCode(fields, "second_factor")};
 }
 
+void Accounts::CheckPassword(std::string password, std::string hash, bool trusted,
+                             const Respond& respond, std::function<void()> take_guess_back,
+                             std::function<void(bool)> done) {
+  const bool accepted = worker_.Verify(
+      std::move(password), std::move(hash), trusted,
+      [respond, take_guess_back, done = std::move(done)](std::optional<bool> matches) {
+        if (!matches) {
+          take_guess_back();
+          return respond(ErrorResponse(503, say::web::NoMemoryForPassword()));
+        }
+        RespondGuarded(
+            "password", [&] { done(*matches); }, respond);
+      });
+  if (accepted) return;
+  take_guess_back();
+  respond(BusyWithPasswords());
+}
+
 void Accounts::VerifyPassword(const User& user, std::string password,
                               const std::vector<std::string>& counters, const Respond& respond,
                               std::function<void(bool)> done) {
-  if (!IsInDirectory(user.password_hash)) {
-    const bool accepted =
-        worker_.Verify(std::move(password), HashIn(user.password_hash), /*trusted=*/true, done);
-    if (!accepted) respond(BusyWithPasswords());
-    return;
-  }
+  if (!IsInDirectory(user.password_hash))
+    return CheckPassword(
+        std::move(password), HashIn(user.password_hash), /*trusted=*/true, respond,
+        [this, counters] { TakeGuessBack(counters); }, std::move(done));
   if (!options_.ask_directory)
     return respond(ErrorResponse(503, say::web::DirectoryNotConfigured()));
   AskDirectoryOf(user.name, std::move(password), counters, respond,

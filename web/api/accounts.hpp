@@ -138,6 +138,9 @@ class Accounts : public SessionLookup {
   void AskDirectoryOf(const std::string& name, std::string password,
                       const std::vector<std::string>& counters, const Respond& respond,
                       std::function<void(const DirectoryAnswer&)> done);
+  /// Calls `done`, or answers that it cannot be told, which then is no guess.
+  void CheckPassword(std::string password, std::string hash, bool trusted, const Respond& respond,
+                     std::function<void()> take_guess_back, std::function<void(bool matches)> done);
   /// Of a logged-in user; calls `done`, or answers that it cannot be told.
   void VerifyPassword(const User& user, std::string password,
                       const std::vector<std::string>& counters, const Respond& respond,

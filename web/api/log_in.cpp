@@ -190,15 +190,12 @@ void Accounts::LogIn(const Request& request, LogInForm form, const Respond& resp
                           [=, this, counters = counters](const DirectoryAnswer& answer) {
                             FinishDirectoryLogIn(actor, answer, form, counters, respond);
                           });
-  const bool accepted = worker_.Verify(
-      std::move(password), HashIn(stored), is_known,
+  CheckPassword(
+      std::move(password), HashIn(stored), is_known, respond,
+      [this, counters = counters] { TakeGuessBack(counters); },
       [this, actor, stored, form, counters = counters, respond](bool matches) {
-        RespondGuarded(
-            "login",
-            [&] { FinishLogIn(actor, matches ? stored : std::string(), form, counters, respond); },
-            respond);
+        FinishLogIn(actor, matches ? stored : std::string(), form, counters, respond);
       });
-  if (!accepted) respond(BusyWithPasswords());
 }
 
 void Accounts::FinishDirectoryLogIn(const Actor& actor, const DirectoryAnswer& answer,

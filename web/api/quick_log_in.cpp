@@ -84,12 +84,9 @@ void Accounts::LogInQuickly(const Request& request, const std::shared_ptr<Sessio
     }
     respond(WelcomeQuickly(*still, actor));
   };
-  const bool accepted =
-      worker_.Verify(std::move(pin), *hash, /*trusted=*/true, [finish, respond](bool matches) {
-        RespondGuarded(
-            "PIN", [&] { finish(matches); }, respond);
-      });
-  if (!accepted) respond(BusyWithPasswords());
+  CheckPassword(
+      std::move(pin), *hash, /*trusted=*/true, respond,
+      [this, device = *device, name = actor.user] { quick_.GiveBack(device, name); }, finish);
 }
 
 Response Accounts::WelcomeQuickly(const User& user, const Actor& actor) {

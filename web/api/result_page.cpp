@@ -130,15 +130,15 @@ std::string NumberCells(const CouchRow& row, const Catalogue& language) {
 }
 
 /// @param review  The page is for reading or printing, or the result can no longer be acted on.
-std::string TableTitle(Verdict verdict, bool review, const Catalogue& language) {
-  const auto word = [&](MessageId now, MessageId then) {
-    return Word(review ? then : now, language);
+Message TableTitle(const ResultSummary& result, bool review) {
+  const auto title = [&](const auto& now, const auto& then) {
+    return review ? then(result.about) : now(result.about);
   };
-  if (verdict == Verdict::kMove)
-    return word(say::result::kPageToApply, say::result::kPageFoundThen);
-  if (verdict == Verdict::kInTolerance)
-    return word(say::result::kPageRemaining, say::result::kPageRemainedThen);
-  return word(say::result::kPageMeasured, say::result::kPageMeasuredThen);
+  if (result.verdict == Verdict::kMove)
+    return title(say::result::PageToApply, say::result::PageFoundThen);
+  if (result.verdict == Verdict::kInTolerance)
+    return title(say::result::PageRemaining, say::result::PageRemainedThen);
+  return title(say::result::PageMeasured, say::result::PageMeasuredThen);
 }
 
 std::string NumbersTable(const ResultSummary& result, const CouchProfile& couch, bool review,
@@ -156,7 +156,7 @@ std::string NumbersTable(const ResultSummary& result, const CouchProfile& couch,
     heads += fmt::format("<th scope=\"col\">{}</th>", Word(head, language));
   return fmt::format(
       "<table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>{}</tbody></table>{}",
-      TableTitle(result.verdict, review, language), heads, rows, notes);
+      Said(TableTitle(result, review), language), heads, rows, notes);
 }
 
 std::string BodyList(const ResultSummary& result, const Catalogue& language) {

@@ -93,7 +93,7 @@ std::vector<Message> CertificateWarnings(const std::string& pem,
   const std::vector<Certificate> chain = ChainOf(pem);
   for (const Certificate& certificate : chain) {
     unsigned bits = 0;
-    if (&certificate == &chain.front() && HasWeakKey(certificate, bits)) {
+    if (HasWeakKey(certificate, bits)) {
       warnings.push_back(say::web::CertificateWeak(SubjectOf(certificate), bits));
     } else if (const std::string kind = UnopenedKind(certificate); !kind.empty())
       warnings.push_back(say::web::CertificateKind(SubjectOf(certificate), kind));
@@ -142,9 +142,9 @@ TlsIdentity UsableTlsIdentity(const std::string& certificate_pem, const std::str
   for (const Certificate& certificate : chain) {
     if (const std::string kind = UnopenedKind(certificate); !kind.empty())
       throw DataError(say::web::GivenCertificateKind(SubjectOf(certificate), kind));
+    if (unsigned bits = 0; HasWeakKey(certificate, bits))
+      throw DataError(say::web::GivenCertificateWeak(SubjectOf(certificate), bits));
   }
-  if (unsigned bits = 0; HasWeakKey(chain.front(), bits))
-    throw DataError(say::web::GivenCertificateWeak(SubjectOf(chain.front()), bits));
   const std::time_t time = std::chrono::system_clock::to_time_t(now);
   for (const Certificate& certificate : chain) {
     const std::time_t begin = gnutls_x509_crt_get_activation_time(certificate.get());

@@ -18,8 +18,8 @@ inline constexpr std::chrono::hours kWarnBeforeEnd{30 * 24};
 
 /// For people, each with the subject of its certificate: a weak key (RSA of less than
 /// 2048 bits), a kind of key that browsers do not accept, an expiry that has passed or comes within
-/// kWarnBeforeEnd, a validity that has not begun. Checks the first certificate's key and every date
-/// of the chain. Empty if there is nothing to report.
+/// kWarnBeforeEnd, a validity that has not begun. Looks at the whole chain. Empty if there is
+/// nothing to report.
 /// @param pem  The certificate and any that lead from it to an authority; other blocks are ignored.
 /// @throws DataError if it contains no certificate that can be read.
 [[nodiscard]] std::vector<Message> CertificateWarnings(const std::string& pem,

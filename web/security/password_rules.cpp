@@ -95,8 +95,9 @@ Message WhyNotPassword(std::string_view password, std::string_view user) {
   const std::string small = AsciiLower(password), name = AsciiLower(user);
   const std::string_view core = WithoutTail(small);
   if (IsCommon(small) || IsCommon(core)) return say::web::PasswordCommon();
-  if (!name.empty() && (small == name || core == WithoutTail(name) || small == name + name))
-    return say::web::PasswordIsName();
+  const bool is_name =
+      small == name || small == name + name || (!core.empty() && core == WithoutTail(name));
+  if (!name.empty() && is_name) return say::web::PasswordIsName();
   if (IsRepetition(small)) return say::web::PasswordRepeats();
   return {};
 }

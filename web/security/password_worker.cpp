@@ -67,22 +67,25 @@ bool PasswordWorker::Hash(std::string password,
 }
 
 bool PasswordWorker::Verify(std::string password, std::string hash, bool trusted,
-                            std::function<void(bool)> done) {
-  return Enqueue(trusted ? trusted_jobs_ : jobs_,
-                 [this, password = std::move(password), hash = std::move(hash),
-                  done = std::move(done)]() mutable -> std::function<void()> {
-                   // An unknown name takes the same time as a wrong password, so that names cannot
-                   // be probed by timing.
-                   if (dummy_hash_.empty())
-                     dummy_hash_ =
-                         HashPassword("no account", operations_, memory_bytes_).value_or("");
-                   const std::string& against = hash.empty() ? dummy_hash_ : hash;
-                   const bool matches = crypto_pwhash_str_verify(against.c_str(), password.data(),
-                                                                 password.size()) == 0 &&
-                                        !hash.empty();
-                   Wipe(password);
-                   return [done = std::move(done), matches] { done(matches); };
-                 });
+                            std::function<void(std::optional<bool>)> done) {
+  return Enqueue(
+      trusted ? trusted_jobs_ : jobs_,
+      [this, password = std::move(password), hash = std::move(hash),
+       done = std::move(done)]() mutable -> std::function<void()> {
+        // An unknown name takes the same time as a wrong password, so that names cannot
+        // be probed by timing.
+        if (dummy_hash_.empty())
+          dummy_hash_ = HashPassword("no account", operations_, memory_bytes_).value_or("");
+        const std::string& against = hash.empty() ? dummy_hash_ : hash;
+        errno = 0;
+        std::optional<bool> matches =
+            crypto_pwhash_str_verify(against.c_str(), password.data(), password.size()) == 0 &&
+            !hash.empty();
+        // libsodium gives the same answer for a wrong password.
+        if (!*matches && errno == ENOMEM) matches.reset();
+        Wipe(password);
+        return [done = std::move(done), matches] { done(matches); };
+      });
 }
 
 void PasswordWorker::Work(const std::stop_token& stop) {

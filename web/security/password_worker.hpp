@@ -28,10 +28,11 @@ class PasswordWorker {
   [[nodiscard]] bool Hash(std::string password,
                           std::function<void(std::optional<std::string>)> done);
   /// The same for verification. An empty hash never matches but takes as long.
+  /// @param done  Gets nothing if memory was exhausted.
   /// @param trusted  Of a known browser or person: handled before strangers, with a queue of its
   ///         own, so that guesses do not delay it.
   [[nodiscard]] bool Verify(std::string password, std::string hash, bool trusted,
-                            std::function<void(bool)> done);
+                            std::function<void(std::optional<bool>)> done);
 
   /// Readable when something is done.
   [[nodiscard]] int fd() const { return event_fd_; }

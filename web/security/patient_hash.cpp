@@ -7,18 +7,18 @@
 
 #include <fmt/format.h>
 
+#include "web/model/patient.hpp"
+
 namespace plumb::web {
 
 std::string PatientHash(std::string_view code, std::string_view secret) {
-  std::string small(code);
-  for (char& c : small)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  const std::string plain = PlainPatientCode(code);
   std::array<unsigned char, crypto_auth_hmacsha256_BYTES> sum{};
   crypto_auth_hmacsha256_state state;
   crypto_auth_hmacsha256_init(&state, reinterpret_cast<const unsigned char*>(secret.data()),
                               secret.size());
-  crypto_auth_hmacsha256_update(&state, reinterpret_cast<const unsigned char*>(small.data()),
-                                small.size());
+  crypto_auth_hmacsha256_update(&state, reinterpret_cast<const unsigned char*>(plain.data()),
+                                plain.size());
   crypto_auth_hmacsha256_final(&state, sum.data());
   return fmt::format("{:02x}", fmt::join(sum, ""));
 }

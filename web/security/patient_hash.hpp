@@ -7,8 +7,8 @@
 
 namespace plumb::web {
 
-/// HMAC-SHA256 of the code in small letters, because codes that differ in nothing else are the
-/// same; hexadecimal. Who knows the secret can try codes, so it is shared by units only.
+/// HMAC-SHA256 of PlainPatientCode(), because codes that differ in nothing else are the same;
+/// hexadecimal. Who knows the secret can try codes, so it is shared by units only.
 [[nodiscard]] std::string PatientHash(std::string_view code, std::string_view secret);
 
 }  // namespace plumb::web

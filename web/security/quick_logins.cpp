@@ -27,9 +27,10 @@ bool IsRow(const std::string& digits) {
 }  // namespace
 
 Message WhyNotPin(const std::string& pin) {
-  if (std::all_of(pin.begin(), pin.end(), IsPinDigit) && pin.size() >= kMinDigits &&
-      pin.size() <= kMaxDigits)
-    return IsRow(pin) ? say::web::PinTooSimple() : Message();
+  if (std::all_of(pin.begin(), pin.end(), IsPinDigit) && pin.size() >= kMinDigits) {
+    if (IsRow(pin)) return say::web::PinTooSimple();
+    if (pin.size() <= kMaxDigits) return {};
+  }
   const bool is_badge =
       pin.size() >= kMaxDigits && pin.size() <= kMaxPin &&
       std::all_of(pin.begin(), pin.end(), [](char c) { return IsPinDigit(c) || IsBadgeLetter(c); });
@@ -59,6 +60,11 @@ bool QuickLogIns::UseTry(const std::string& device, const std::string& user, Tim
   if (TriesLeft(device, user, now) == 0) return false;
   --shifts_.at({user, device}).tries_left;
   return true;
+}
+
+void QuickLogIns::GiveBack(const std::string& device, const std::string& user) {
+  if (const auto found = shifts_.find({user, device}); found != shifts_.end())
+    found->second.tries_left = std::min(found->second.tries_left + 1, kMaxTries);
 }
 
 void QuickLogIns::Succeeded(const std::string& device, const std::string& user) {

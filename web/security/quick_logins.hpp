@@ -15,8 +15,8 @@ namespace plumb::web {
 
 inline constexpr std::size_t kMaxPin = 64;  ///< Bytes of a PIN or a badge.
 
-/// Why this is neither a PIN (4 to 8 digits) nor the code of a badge (8 to 64 letters and digits);
-/// empty if it is one.
+/// Why this is neither a PIN (4 to 8 digits) nor the code of a badge (8 to 64 letters and digits),
+/// or a row of digits; empty if it is one.
 [[nodiscard]] Message WhyNotPin(const std::string& pin);
 
 /// A log-in with the password opens this way for one shift in the browser that it came from; three
@@ -35,6 +35,8 @@ class QuickLogIns {
   [[nodiscard]] int TriesLeft(const std::string& device, const std::string& user, TimePoint now);
   /// Uses up one of them; false if there is none.
   [[nodiscard]] bool UseTry(const std::string& device, const std::string& user, TimePoint now);
+  /// The last try was not looked at.
+  void GiveBack(const std::string& device, const std::string& user);
   /// The last try was right.
   void Succeeded(const std::string& device, const std::string& user);
   /// In no browser any more.

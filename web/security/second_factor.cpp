@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 
 #include <fmt/format.h>
 #include <gnutls/crypto.h>
@@ -94,10 +93,7 @@ std::vector<std::string> HashesOf(const std::vector<std::string>& recovery_codes
 
 std::optional<SecondFactor> UsedSecondFactor(const SecondFactor& factor, std::string_view text,
                                              std::chrono::system_clock::time_point now) {
-  std::string code;
-  for (const char c : text) {
-    if (c != ' ') code += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  }
+  std::string code = PlainCode(text);
   SecondFactor left = factor;
   if (code.size() == kCodeDigits) {
     const std::int64_t present = TotpStep(now);
@@ -108,6 +104,8 @@ std::optional<SecondFactor> UsedSecondFactor(const SecondFactor& factor, std::st
     }
     return std::nullopt;
   }
+  // Their hashes are of codes as they are shown.
+  code.insert(std::min(code.size(), std::size_t{kRecoveryLetters} / 2), "-");
   const std::string hash = StoredHashOf(code);
   if (std::erase_if(left.recovery_hashes,
                     [&](const std::string& known) { return IsSameSecret(known, hash); }) == 0)

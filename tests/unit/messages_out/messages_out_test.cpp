@@ -5,6 +5,7 @@
 #include <chrono>
 #include <future>
 #include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -96,6 +97,23 @@ TEST_F(MessagesOutTest, ItIsGivenUpAfterTheLastPause) {
   const MessageWay given_up = RunUntil([](const MessageWay& way) { return way.failed == 1; });
   EXPECT_EQ(given_up.waiting, 0);
   EXPECT_EQ(asked_, 3);
+}
+
+TEST_F(MessagesOutTest, WhatNobodyTookIsToldAgainAfterAnHourIfItLasts) {
+  refusals_ = 1;
+  Make({});
+  const auto begin = std::chrono::steady_clock::now();
+  messages_->Look(waiting_, begin);
+  bool is_given_up = false;
+  (void)RunUntil([&](const MessageWay& way) {
+    if (way.failed == 1 && !std::exchange(is_given_up, true)) {
+      messages_->Look(waiting_, begin + std::chrono::minutes(59));
+      EXPECT_EQ(messages_->status().at(0).waiting, 0);
+      messages_->Look(waiting_, begin + std::chrono::minutes(60));
+    }
+    return way.sent == 1;
+  });
+  EXPECT_EQ(asked_, 2);
 }
 
 TEST_F(MessagesOutTest, ATestSaysWhatBecameOfIt) {

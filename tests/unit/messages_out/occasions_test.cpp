@@ -64,6 +64,11 @@ TEST(OccasionsTest, ABackupIsOverdueAfterTwoIntervals) {
   status.storage.warnings = {say::upkeep::BackupFailed(Message::Verbatim("patient Jane"))};
   ASSERT_EQ(Now(status).size(), 1U);
   EXPECT_EQ(Now(status)[0].parts, std::set<std::string>{"failed"});
+  status.storage.warnings = {say::upkeep::BackupNotRehearsed(Message::Verbatim("no room"))};
+  EXPECT_EQ(Now(status, rules)[0].parts, std::set<std::string>{"overdue"});
+  status.storage.backup_made_at = kNow;
+  ASSERT_EQ(Now(status, rules).size(), 1U);
+  EXPECT_EQ(Now(status, rules)[0].text, say::messages::BackupNotRehearsed());
 }
 
 TEST(OccasionsTest, EachKindNamesNoPatientNoFileAndNoReason) {

@@ -300,7 +300,7 @@ TEST_F(SendersTest, AnEndlessAnswerIsNotReadToItsEnd) {
     }
   });
   settings_.webhook = fmt::format("http://127.0.0.1:{}/hook", server.port());
-  EXPECT_THAT(SendWebhook(message_, settings_, stop_.get_token()), Not(IsEmpty()));
+  EXPECT_EQ(SendWebhook(message_, settings_, stop_.get_token()), "") << "200: it was taken";
 }
 
 TEST_F(SendersTest, AServerThatSaysNothingIsLeftAtAStop) {

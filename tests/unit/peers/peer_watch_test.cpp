@@ -99,8 +99,18 @@ TEST_F(PeerWatchTest, AsksByTheHashOnlyAndSaysWhereThePatientIsOpen) {
        {{}}});
   EXPECT_THAT(found_, ElementsAre(is_open, Message(), is_open, Message()));
   EXPECT_THAT(head(), HasSubstr("Authorization: Bearer " + kSecret));
-  EXPECT_THAT(head(), HasSubstr("GET /peers/open?patient=" + web::PatientHash("ANNA-1", kSecret)));
+  EXPECT_THAT(head(), HasSubstr("GET /peers/open?patient=" + web::PatientHash("ANNA1", kSecret)));
   EXPECT_THAT(head(), Not(HasSubstr("Anna")));
+}
+
+TEST_F(PeerWatchTest, AnAnswerThatIsMissingInBetweenMakesNoNews) {
+  Make();
+  watch_->SetOpen("7", "Anna-1");
+  const Message is_open = say::peers::OpenElsewhere(name());
+  Run({{{is_open}, [&] { Answer("no HTTP"); }},
+       {{say::peers::NotKnown(name())}, [&] { Answer(Json("{\"open\": true}")); }},
+       {{is_open}}});
+  EXPECT_THAT(found_, ElementsAre(is_open, Message(), Message()));
 }
 
 TEST_F(PeerWatchTest, WhateverElseIsAnsweredIsNotKnown) {

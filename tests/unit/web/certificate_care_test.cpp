@@ -83,6 +83,9 @@ TEST_F(CertificateCareTest, AWeakKeyIsTold) {
   EXPECT_THAT(
       EnglishTexts(CertificateWarnings(Made("ec -pkeyopt ec_paramgen_curve:P-192", 100), now_)),
       ElementsAre(HasSubstr("192 bits")));
+  const std::string authority = Made("rsa:1024", 100, "authority");
+  EXPECT_THAT(EnglishTexts(CertificateWarnings(Made("rsa:2048", 100) + authority, now_)),
+              ElementsAre(AllOf(HasSubstr("CN=authority"), HasSubstr("1024 bits"))));
 }
 
 TEST_F(CertificateCareTest, AKindOfKeyThatBrowsersDoNotOpenIsTold) {

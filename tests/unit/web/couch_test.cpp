@@ -96,7 +96,7 @@ TEST(CouchTest, WhatTheCouchCannotDoIsSaidAndNeverHiddenOutsideTolerance) {
   EXPECT_THAT(CouchApply(couch).English(), HasSubstr("the 3 numbers"));
   ResultSummary unsure = Move();
   unsure.judgements[4] = NumberJudgement::kUnsure;
-  EXPECT_FALSE(CouchRows(unsure, couch)[4].is_hidden) << "not surely within";
+  EXPECT_FALSE(CouchRows(unsure, couch)[4].is_hidden) << "inconclusive";
 }
 
 TEST(CouchTest, ReadingsWithoutValuesBelowZeroBeginAtZeroAgain) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -43,7 +44,8 @@ TEST(PasswordWorkerTest, AKnownPersonsPasswordIsCheckedBeforeThoseOfStrangers) {
   web::PasswordWorker worker(4, 16 << 20);
   std::vector<std::string> order;
   const auto verify = [&](const std::string& who, bool trusted) {
-    return worker.Verify("guess", "", trusted, [&order, who](bool) { order.push_back(who); });
+    return worker.Verify("guess", "", trusted,
+                         [&order, who](std::optional<bool>) { order.push_back(who); });
   };
   for (int i = 0; i < 8; ++i) EXPECT_TRUE(verify("stranger", false)) << i;
   (void)verify("stranger", false);  // in place of the one that the thread may have taken

@@ -314,6 +314,7 @@ TEST_F(PageCertificateTest, WhatCannotBeServedIsRefusedWithTheReason) {
   expect_refused(Put(made.chain, std::string(16385, 'A')), "key must have 1 to 16384 bytes");
   const Certificate weak = Made("rsa:1024");
   expect_refused(Put(weak.chain, weak.key), "1024 bits");
+  expect_refused(Put(made.chain + weak.chain, made.key), "1024 bits");
   ExpectNothingChanged();
 }
 

@@ -21,7 +21,7 @@ class PeerRoute : public test::WebTest {
 
 TEST_F(PeerRoute, SaysToOtherUnitsWhetherThatPatientIsOpen) {
   Start([&](HttpServerOptions& options) { options.peer_secret = secret_; });
-  const std::string hash = PatientHash("p-7", secret_);
+  const std::string hash = PatientHash("p7", secret_);
   EXPECT_EQ(Ask(hash, secret_).json(), (nlohmann::json{{"open", false}})) << "nobody is";
   loop_->Do([&] {
     TreatmentSession session;

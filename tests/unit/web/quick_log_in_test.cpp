@@ -14,7 +14,8 @@ using ::testing::HasSubstr;
 TEST(QuickLogInsTest, APinHasFourToEightDigitsAndIsNoRow) {
   for (const char* good : {"4711", "12345679", "AB12CD34", "00127734009"})
     EXPECT_EQ(web::WhyNotPin(good).English(), "") << good;
-  for (const char* bad : {"", "471", "abc1", "AB12CD3", "4711 ", "1111", "1234", "87654321"})
+  for (const char* bad : {"", "471", "abc1", "AB12CD3", "4711 ", "1111", "1234", "87654321",
+                          "123456789", "111111111"})
     EXPECT_NE(web::WhyNotPin(bad).English(), "") << bad;
   EXPECT_EQ(web::WhyNotPin(std::string(64, 'a')).English(), "");
   EXPECT_NE(web::WhyNotPin(std::string(65, 'a')).English(), "");
@@ -29,6 +30,10 @@ TEST(QuickLogInsTest, AShiftAndThreeTriesEachInItsBrowser) {
   EXPECT_THAT(quick.People(begun), ::testing::ElementsAre("anna"));
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(quick.UseTry("a", "anna", begun)) << i;
   EXPECT_FALSE(quick.UseTry("a", "anna", begun));
+  quick.GiveBack("a", "anna");
+  EXPECT_EQ(quick.TriesLeft("a", "anna", begun), 1) << "it was not looked at";
+  EXPECT_TRUE(quick.UseTry("a", "anna", begun));
+  quick.GiveBack("b", "anna");
   EXPECT_EQ(quick.TriesLeft("b", "anna", begun), 3) << "another browser";
   EXPECT_EQ(quick.TriesLeft("b", "bob", begun), 0);
   EXPECT_EQ(quick.TriesLeft("b", "anna", end - std::chrono::seconds(1)), 3);

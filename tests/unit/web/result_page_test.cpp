@@ -89,7 +89,7 @@ TEST_F(ResultPageTest, AnAcceptanceWithAReasonIsInTheWordsOfItsVerdict) {
   EXPECT_THAT(accepted(Verdict::kMove),
               HasSubstr("Accepted outside tolerance by anna: as &lt;before&gt;"));
   EXPECT_THAT(accepted(Verdict::kUnsure),
-              AllOf(HasSubstr("Accepted although not surely within tolerance by anna"),
+              AllOf(HasSubstr("Accepted although inconclusive, by anna"),
                     Not(HasSubstr("Accepted outside"))));
 }
 
@@ -221,7 +221,7 @@ TEST_F(ResultPageTest, WhatIsNotSurelyWithinAsksForAnotherScan) {
     result.u95.emplace().vertical_mm = 1.2;
     result.u95->longitudinal_mm = 0.3;
   });
-  EXPECT_THAT(Page(), AllOf(HasSubstr("<td>not surely within</td><td>scan again</td>"),
+  EXPECT_THAT(Page(), AllOf(HasSubstr("<td>inconclusive</td><td>scan again</td>"),
                             HasSubstr("<td>in tolerance</td><td>no move needed</td>"),
                             HasSubstr("Measured difference"), Not(HasSubstr("to apply"))));
 }

@@ -290,6 +290,8 @@ TEST(PasswordRulesTest, WhatIsTriedFirstIsRefusedAndALengthOfTenIsEnough) {
                            "8402 5519 33", "passwordless sea", "\xC3\xA4pfel und birnen"}) {
     EXPECT_TRUE(web::WhyNotPassword(good, "mueller").empty()) << good;
   }
+  EXPECT_TRUE(web::WhyNotPassword("7392 8841-2290", "40717").empty()) << "a staff number";
+  EXPECT_FALSE(web::WhyNotPassword("4071740717", "40717").empty());
   EXPECT_FALSE(web::WhyNotPassword("ninebytes", "x").empty());
   EXPECT_TRUE(web::WhyNotPassword("ten bytes!", "x").empty());
   EXPECT_TRUE(web::WhyNotPassword("ab" + std::string(125, 'x') + "c", "x").empty());
