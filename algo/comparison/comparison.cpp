@@ -30,7 +30,7 @@ constexpr double kCloudReach_m = 0.004;  // disc radius of one point; cloud poin
 constexpr double kCloudSpacing_m = 0.003;
 // fraction of the tolerance from which a direction is reported as weak
 constexpr double kWeakFraction = 0.5;
-// A stated isocentre that is farther from the plan's is said.
+// Distance from the plan's isocentre above which a stated one causes a warning.
 constexpr double kSameIsocentre_m = 1 * kMillimetre;
 // Distance of an isocentre from the middle of the region: a body is 2 m long, a couch 3 m.
 constexpr double kUsualIsocentre_m = 1.0, kPossibleIsocentre_m = 3.0;
@@ -140,7 +140,7 @@ class Comparer {
     result_.verdict = decision.verdict;
     result_.reasons = std::move(decision.reasons);
     result_.judgements = decision.numbers;
-    if (planned_ && reference_.planning) ToMarkerFrame(*options_.T_iec_reference);
+    if (planned_ && reference_.planning) ToMarkerFrame();
     Lap("total", start_s_);
     return std::move(result_);
   }
@@ -157,7 +157,7 @@ class Comparer {
     return false;
   }
 
-  // Whatever is said of a scan holds for what is made of it.
+  // Warnings and refusals of either scan apply to the comparison as well.
   void TakeFindings(const Scene& scene, const Message& scan) {
     for (const Message& warning : scene.warnings)
       result_.warnings.push_back(say::comparison::ScanWarned(scan, warning));
@@ -270,9 +270,10 @@ class Comparer {
   }
 
   // Where shared markers would have stated the motion.
-  void ToMarkerFrame(const Pose& T_iec_reference) {
+  void ToMarkerFrame() {
     if (!result_.motion) return;
     BodyMotion& motion = *result_.motion;
+    const Pose& T_iec_reference = result_.alignment->T_reference_current;
     const Pose T_reference_iec = T_iec_reference.inverse();
     motion.T = T_reference_iec * motion.T * T_iec_reference;
     motion.centroid_m = T_reference_iec * motion.centroid_m;
@@ -490,10 +491,10 @@ class Comparer {
     if (options_.marker_kind == MarkerKind::kCouch) {
       result_.warnings.push_back(say::comparison::CouchMarkers());
     }
-    Lap("trust", since_s);
+    Lap("judge", since_s);
   }
 
-  // Every turn counts at the isocentre by its distance from the body.
+  // An error of rotation moves the isocentre in proportion to its distance from the body.
   void JudgeIsocentre(const Eigen::Vector3d& centroid_m) {
     if (!isocentre_m_) return;
     const double away_m = (*isocentre_m_ - centroid_m).norm();

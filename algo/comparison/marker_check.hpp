@@ -56,7 +56,7 @@ struct MarkerBaseline {
 };
 [[nodiscard]] MarkerBaseline BaselineOf(const Scene& scene, const MarkerCheckLimits& limits = {});
 
-/// What becomes otherwise if `wanted` takes the place of `baseline`, for people: markers that are
+/// What would change if `wanted` takes the place of `baseline`, for people: markers that are
 /// gone, new, moved by at least 1 mm after the rigid fit, or turned by 2 mm at the corners. Never
 /// empty.
 [[nodiscard]] std::vector<Message> ChangesOfBaseline(const MarkerBaseline& baseline,

@@ -29,8 +29,8 @@ struct MotionUncertainty {
   /// Calibrations of the two sensors: see SharedSensor.
   Matrix6d sensor = Matrix6d::Zero();
   Matrix6d breathing = Matrix6d::Zero();  ///< Breathing during the two sweeps.
-  /// Only for a reference from a planning CT: the room's calibration, the threshold by which the
-  /// skin was found in the CT, and the spacing of its slices.
+  /// The calibration of the room, for a planning CT and a reference of another room; for a planning
+  /// CT also the threshold by which the skin was found and the spacing of the slices.
   Matrix6d room = Matrix6d::Zero(), skin = Matrix6d::Zero(), slices = Matrix6d::Zero();
 
   [[nodiscard]] Matrix6d Total() const {

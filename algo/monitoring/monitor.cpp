@@ -28,6 +28,15 @@ constexpr double kOfMotion = 0.003;  // scale errors of depth and map
 // mean over the body, and turns it as over this length.
 constexpr double kStaticShare = 0.1;
 constexpr double kStaticLever_m = 0.25;
+// A rotation moves what is seen as a shift does over this length.
+constexpr double kTurnReach_m = 0.2;
+// The median of absolute residuals as a standard deviation, and the least that is divided by.
+constexpr double kSigmasOfResidual = 1.5, kLeastResidual = 0.1;
+// Neighbouring frames of the zero share their errors: so many count as one, and never fewer than
+// four as independent.
+constexpr double kFramesThatAreOne = 4.0, kFewestInZero = 4.0;
+// Share of the static error's square that belongs together over the body.
+constexpr double kStaticCorrelation = 0.25;
 // The numbers are means over this time, of the frames that agree with the newest.
 constexpr double kMean_s = 0.4;
 constexpr double kAgree = 3.0;  // standard deviations
@@ -239,20 +248,23 @@ Matrix6d Monitor::CovarianceOf(const MotionFit& fit, const SensorSet& set,
   const Matrix6d frame = scale.asDiagonal() * formal * scale.asDiagonal();
   const Matrix6d single = at_rest.inflation.asDiagonal() * formal * at_rest.inflation.asDiagonal();
   const Pose since_zero = fit.T * at_rest.T_zero.inverse();
-  const double shift_m =
-      (since_zero * scene_.centroid_m - scene_.centroid_m).norm() + 0.2 * RotationAngle(since_zero);
-  // The zero itself, and what does not cancel any more.
+  const double shift_m = (since_zero * scene_.centroid_m - scene_.centroid_m).norm() +
+                         kTurnReach_m * RotationAngle(since_zero);
+  // Adds the uncertainty of the zero, and of what is static in the sensor's errors and no longer
+  // cancels after a motion.
   std::size_t frames_in_zero = 0;
   double ratio = 0, static_m = 0;
   for (std::size_t i = 0; i < set.size(); ++i) {
     const SensorAtRest& sensor = sensors_[set[i]].at_rest;
     frames_in_zero += sensor.frames_in_zero();
     static_m = std::max(static_m, sensor.static_error_m());
-    ratio = std::max(ratio, sensor.static_error() / std::max(0.1, 1.5 * at_rest.residual[i]));
+    ratio = std::max(ratio, sensor.static_error() /
+                                std::max(kLeastResidual, kSigmasOfResidual * at_rest.residual[i]));
   }
-  const double of_zero = 1.0 / std::max<double>(4.0, static_cast<double>(frames_in_zero) / 4);
+  const double of_zero =
+      1.0 / std::max(kFewestInZero, static_cast<double>(frames_in_zero) / kFramesThatAreOne);
   const double share = std::min(1.0, shift_m / kStaticReach_m);
-  const double of_static = 0.25 * share * share * ratio * ratio;
+  const double of_static = kStaticCorrelation * share * share * ratio * ratio;
   Matrix6d covariance = frame + (of_zero + of_static) * single;
   const double of_motion_m = std::hypot(kOfMotion * shift_m, kStaticShare * share * static_m);
   covariance.bottomRightCorner<3, 3>().diagonal().array() += of_motion_m * of_motion_m;
@@ -293,7 +305,9 @@ std::optional<MotionFit> Monitor::FitAll(SensorSet& set, MonitorLine& line) {
     MotionFit fit = FitMotion(views, scene_.centroid_m, {.T = T_last_});
     line.visible = fit.visible();
     line.residual = 0;
-    line.reason = fit.converged ? BlindReason::kNone : BlindReason::kCovered;
+    line.reason = fit.converged                  ? BlindReason::kNone
+                  : line.visible < kLeastVisible ? BlindReason::kCovered
+                                                 : BlindReason::kMisfit;
     // The one that sees the least of its own leaves first; what it sees may be something else.
     std::size_t worst = 0;
     for (std::size_t i = 0; i < set.size(); ++i) {

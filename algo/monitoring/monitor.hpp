@@ -35,7 +35,7 @@ enum class BlindReason : std::uint8_t {
   kNone,
   kCovered,    ///< Less than 60 % of the region of the zero is seen.
   kWeak,       ///< A direction is determined less than half as well as at the zero.
-  kMisfit,     ///< The surface fits much worse than at the zero.
+  kMisfit,     ///< The surface fits much worse than at the zero, or not at all.
   kUnguarded,  ///< Too few markers for 10 s: the sensor may have moved unnoticed.
   kNoZero,     ///< The body was not found where it was scanned; with numbers since zero: elsewhere.
 };
@@ -120,11 +120,11 @@ class Monitor {
   Monitor(const Monitor&) = delete;
   Monitor& operator=(const Monitor&) = delete;
 
-  /// @return Nothing for a frame of a sensor that takes no part while another one does, and for one
-  ///         that repeats the image before, which is none (see SensorAtRest::See()).
+  /// @return Nothing for a frame of a sensor that takes no part while another one does, and for a
+  ///         repetition of the previous image (see SensorAtRest::See()).
   [[nodiscard]] std::optional<MonitorLine> Add(const Frame& frame, std::size_t sensor = 0);
-  /// The line of such a frame: unknown, and why that sensor takes no part. It is no advice: the
-  /// others go on.
+  /// The line of such a frame: unknown, and why that sensor takes no part. It carries no
+  /// advice; the other sensors continue.
   [[nodiscard]] MonitorLine LineAside(const Frame& frame, std::size_t sensor) const;
 
   [[nodiscard]] const MonitoredScene& scene() const { return scene_; }

@@ -16,10 +16,10 @@ namespace plumb {
 struct PictureWords {
   std::string_view notice = kResearchNotice;
   std::string_view x_axis = "x (m), reference marker's frame", y_axis = "y (m)";
-  std::string_view error_title = "Height error: current \u2212 reference";
+  std::string_view error_title = "Height difference: current \u2212 reference";
   std::string_view overlay_title = "Overlay: reference blue, current red";
   std::string_view height_title = "Heights of the reference";
-  std::string_view error = "height error", absolute_error = "|height error|";
+  std::string_view error = "height difference", absolute_error = "|height difference|";
   std::string_view millimetres = "in millimetres", centimetres = "in centimetres";
   std::string_view higher = "current is higher", lower = "current is lower";
   std::string_view tolerance = "tolerance";

@@ -118,7 +118,7 @@ class Appliance : private StorageUser {
   void WatchRest();
   [[nodiscard]] bool PressMonitors() const;
   void FollowReference();
-  void BeginSession();
+  void BeginScan();
   [[nodiscard]] ScanJob MakeJob(const Settings& settings);
   /// Whether a stored scene is as it was stored; on the thread that uses it.
   [[nodiscard]] std::function<Message(const std::stop_token&)> SceneCheck(

@@ -62,7 +62,7 @@ Message AnswerOf(const EndedScan& outcome) {
 
 void Appliance::StartScan() {
   try {
-    BeginSession();
+    BeginScan();
   } catch (const std::exception& error) {
     scan_fault_ = say::scan::CouldNotBegin(MessageOf(error));
     Log(LogLevel::kError, scan_fault_.English());
@@ -70,7 +70,7 @@ void Appliance::StartScan() {
   }
 }
 
-void Appliance::BeginSession() {
+void Appliance::BeginScan() {
   running_.reset();  // the previous one has ended
   scan_ = {};
   const bool is_check = session_.check().has_value();
@@ -140,7 +140,10 @@ ScanJob Appliance::MakeJob(const Settings& settings) {
     job.compare.now_s = SteadySeconds;
     job.room = room_.OfJob();
     job.reference_room = [state = storage_.state(), patient = scan_.patient_id,
-                          scan = reference->scan_id] { return RoomOfImport(state, patient, scan); };
+                          scan = reference->scan_id,
+                          most_days = parts_.config.appliance.room_max_age_days] {
+      return UnlessTooOld(RoomOfImport(state, patient, scan), WallClock::now(), most_days);
+    };
   }
   return job;
 }

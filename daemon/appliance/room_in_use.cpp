@@ -52,6 +52,16 @@ Message WhyTooOld(WallClock::time_point signed_at, WallClock::time_point now, do
   return say::room::TooOld(std::floor(age_days), most_days);
 }
 
+std::optional<ImportedRoom> UnlessTooOld(std::optional<ImportedRoom> room,
+                                         WallClock::time_point now, double most_days) {
+  if (!room || !room->room) return room;
+  const Message old = WhyTooOld(room->room->signed_at, now, most_days);
+  if (old.empty()) return room;
+  room->room.reset();
+  room->why_not = say::room::ElsewhereTooOld(room->unit, old);
+  return room;
+}
+
 WallClock::time_point StartOfDay() {
   const std::time_t now = std::time(nullptr);
   std::tm local{};

@@ -73,6 +73,10 @@ class RoomInUse {
 [[nodiscard]] Message WhyTooOld(WallClock::time_point signed_at, WallClock::time_point now,
                                 double most_days);
 
+/// The room of another unit without a calibration that is too old, see WhyTooOld().
+[[nodiscard]] std::optional<ImportedRoom> UnlessTooOld(std::optional<ImportedRoom> room,
+                                                       WallClock::time_point now, double most_days);
+
 /// Midnight, local time.
 [[nodiscard]] WallClock::time_point StartOfDay();
 

@@ -26,7 +26,7 @@ OccasionRules RulesOf(const Config& config) {
 SharedParts::SharedParts(EventLoop& its_loop, ApplianceParts its_parts)
     : loop(its_loop),
       given(std::move(its_parts)),
-      notices([this] { upkeep.CountAgain(); }),
+      notices([this] { upkeep.RecountUnusable(); }),
       storage(loop, StorageOf(given), store_thread, check_thread),
       store(storage.store()),
       upkeep(

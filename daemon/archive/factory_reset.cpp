@@ -19,6 +19,7 @@
 #include "daemon/state_folder/old_copies.hpp"
 #include "drivers/files/file_io.hpp"
 #include "words/backup.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 namespace {
@@ -32,8 +33,9 @@ constexpr const char* kWipe = "wipe";
 constexpr const char* kOfFileSystem = "lost+found";  // root's, on the root of a disk
 constexpr const char* kOfProvisionedDisplay = "provisioned-display";
 /// Items beside the database that are neither records nor belong to the sensor.
-constexpr std::array kOfPageAndUpdates = {"page-key.pem", "page-authority.pem", "device.key",
-                                          kOfProvisionedDisplay, "updates"};
+constexpr std::array kOfPageAndUpdates = {"page-key.pem", "page-authority.pem",
+                                          "device.key",   kOfProvisionedDisplay,
+                                          "updates",      "channel.json"};
 
 struct Request {
   FactoryReset kind = FactoryReset::kKeepRecords;
@@ -119,19 +121,32 @@ Message KeepRecords(const fs::path& state, const Actor& actor) {
   return done;
 }
 
+/// @throws IoError
+void RemoveRequest(const fs::path& state) {
+  if (::unlink((state / kFactoryResetFile).c_str()) == 0) return SyncToDisk(state);
+  if (errno != ENOENT) throw IoError(DescribeWriteError(state / kFactoryResetFile, errno));
+}
+
 }  // namespace
 
 void RequestFactoryReset(const fs::path& state, FactoryReset kind, const Actor& actor) {
   const Json json = {{"kind", kind == FactoryReset::kWipe ? kWipe : kKeep},
                      {"user", actor.user},
                      {"address", actor.address}};
-  PlaceFile(state, kFactoryResetFile, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  try {
+    PlaceFile(state, kFactoryResetFile, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  } catch (const std::exception& error) {
+    throw IoError(CancelFactoryReset(state, MessageOf(error)));
+  }
 }
 
-void CancelFactoryReset(const fs::path& state) {
-  if (::unlink((state / kFactoryResetFile).c_str()) != 0 && errno != ENOENT)
-    throw IoError(DescribeWriteError(state / kFactoryResetFile, errno));
-  SyncToDisk(state);
+Message CancelFactoryReset(const fs::path& state, Message what) {
+  try {
+    RemoveRequest(state);
+    return what;
+  } catch (const std::exception& error) {
+    return say::upkeep::ResetMayHappen(what, MessageOf(error));
+  }
 }
 
 std::optional<Message> CarryOutFactoryReset(const fs::path& state) {
@@ -146,7 +161,7 @@ std::optional<Message> CarryOutFactoryReset(const fs::path& state) {
   } else {
     done = KeepRecords(state, request.actor);
   }
-  CancelFactoryReset(state);
+  RemoveRequest(state);
   return done;
 }
 

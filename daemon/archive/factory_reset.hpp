@@ -17,14 +17,17 @@ namespace plumb {
 inline constexpr const char* kFactoryResetFile = "factory-reset.json";
 
 /// Records the request and who made it, durably. The file gets the folder's owner.
-/// @throws IoError
+/// @throws IoError; what was written by then is withdrawn, or the message says that it may count.
 void RequestFactoryReset(const std::filesystem::path& state, FactoryReset kind, const Actor& actor);
 
-/// Withdraws a request that has not been carried out.
-void CancelFactoryReset(const std::filesystem::path& state);
+/// Withdraws a request that has not been carried out, because of `what`, which a person is told.
+/// @returns `what`, with the addition that the reset may still take place if the request could not
+///          be withdrawn.
+[[nodiscard]] Message CancelFactoryReset(const std::filesystem::path& state, Message what);
 
 /// Carries out a request; an interrupted one starts again. Keeping the records removes accounts,
-/// paired displays, settings, uploaded bundles, and the keys of page and browsers; wiping removes
+/// paired displays, settings, bundles, what is remembered of channels of updates, and the keys of
+/// page and browsers; wiping removes
 /// everything in the folder. The (new) audit log records who requested it.
 /// @returns what was done, as a sentence; nothing without a request.
 /// @throws DataError for a request that cannot be read, which changes nothing; IoError and its

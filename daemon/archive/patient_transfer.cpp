@@ -77,8 +77,10 @@ std::unique_ptr<Database> OpenSource(const fs::path& state, bool is_backup) {
 }
 
 std::optional<std::int64_t> FindCode(Database& database, const std::string& code) {
-  return database.FirstInteger("SELECT id FROM patients WHERE code = ? COLLATE NOCASE AND id > 0",
-                               code);
+  return database.FirstInteger(
+      "SELECT id FROM patients WHERE replace(code, '-', '') = replace(?, '-', '') COLLATE NOCASE "
+      "AND id > 0",
+      code);
 }
 
 /// The record of an earlier import; null if the patient was created here.

@@ -29,8 +29,8 @@ struct ApplianceConfig {
   std::filesystem::path calibration =
       "/var/lib/plumb/calibration";       ///< Contains SERIAL.yaml for each calibrated sensor.
   std::string sensor_serial;              ///< Use only this sensor; empty: the first one.
-  std::string second_sensor_serial = {};  ///< For live monitoring; empty: there is one alone.
-  std::vector<std::string> fixed_sensors = {};  ///< Serials of units that stand for good.
+  std::string second_sensor_serial = {};  ///< For live monitoring; empty: one sensor.
+  std::vector<std::string> fixed_sensors = {};  ///< Serials of those fixed in the room.
   std::string sensor_driver;  ///< Driver of the sensors; empty: the first of the build.
   std::filesystem::path sensor_socket =
       "/run/plumb/sensor.sock";          ///< Where the driver "stream" listens.

@@ -20,6 +20,7 @@
 #include "web/model/reference.hpp"
 #include "web/model/scan.hpp"
 #include "web/model/settings.hpp"
+#include "words/result.hpp"
 #include "words/store.hpp"
 
 namespace plumb {
@@ -239,6 +240,7 @@ ResultSummary SummaryOf(const std::string& result_json) {
     summary.u95 = NumbersOf(correction->u95);
     summary.words = correction->words;
     summary.judgements = correction->judgements;
+    summary.about = IsAboutMiddle(stored) ? say::result::AboutMiddle() : say::result::AtIsocentre();
   }
   if (!stored.body) return summary;
   const auto add = [](std::vector<Message>& list, const Message& words) {

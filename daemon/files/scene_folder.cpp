@@ -149,7 +149,7 @@ Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
         static_cast<std::int64_t>(stored.shape.num_keyframes)));
   }
   scene.trajectory = read("trajectory_all.txt", ReadTrajectory);
-  // Scenes of before had none, and those without a calibration have none.
+  // Absent in scenes of versions before 0.2 and in those without a calibration.
   if (has("sensitivity.json"))
     scene.sensitivity = read("sensitivity.json", [](const fs::path& file) {
       return ParseSensitivityJson(ReadTextFile(file, kMaxSceneBytes), file.string());

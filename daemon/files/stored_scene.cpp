@@ -144,6 +144,9 @@ StoredScene ParseSceneJson(std::string_view text, const std::string& name) {
   if (is_planned != read.scene.planning.has_value() ||
       is_planned != (read.scene.frame == SceneFrame::kIec))
     throw DataError(say::scene_file::PlanningContradicts(name));
+  // Versions before 0.3.0 knew no other depth sensors than those of structured light.
+  if (!is_planned && !json.contains("depth_sensor"))
+    read.scene.depth_sensor = DepthSensor::kStructuredLight;
   const std::string& dictionary = read.scene.room_markers.dictionary;
   if (!dictionary.empty() && !MarkerDictionary::Find(dictionary))
     throw DataError(say::scene_file::UnknownDictionary(name, dictionary.substr(0, 60)));

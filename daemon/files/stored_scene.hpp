@@ -30,7 +30,7 @@ struct SceneShape {
 struct StoredScene {
   Scene scene;
   SceneShape shape;
-  std::optional<SceneSums> sums = {};  ///< Scenes of before state none.
+  std::optional<SceneSums> sums = {};  ///< Absent before version 0.3.
 };
 
 /// Reads and checks scene.json of format 1.

@@ -31,6 +31,7 @@ ImportedRoom RoomIn(const RoomJson& json) {
   if (found.room->digest != json.at("digest").get<std::string>())
     throw DataError(say::room::ElsewhereNotAsSigned(found.unit));
   found.room->version = found.version;
+  found.room->signed_at = FromStored(json.at("signed_at").get<std::int64_t>());
   found.room->signed_by = json.at("signed_by").get<std::string>();
   return found;
 }
@@ -43,16 +44,14 @@ std::filesystem::path ImportedFile(const std::filesystem::path& state, std::int6
 
 RoomJson OwnRoomJson(Database& database) {
   Statement newest = database.Prepare(
-      "SELECT version, signed_by, digest, json FROM room_calibrations ORDER BY version DESC "
-      "LIMIT 1");
+      "SELECT version, signed_at, signed_by, digest, json FROM room_calibrations ORDER BY version "
+      "DESC LIMIT 1");
   if (!newest.Step()) return nullptr;
   std::array<char, 256> name{};
   (void)::gethostname(name.data(), name.size() - 1);
-  return {{"unit", std::string(name.data())},
-          {"version", newest.Integer(0)},
-          {"signed_by", newest.Text(1)},
-          {"digest", newest.Text(2)},
-          {"json", newest.Text(3)}};
+  return {{"unit", std::string(name.data())}, {"version", newest.Integer(0)},
+          {"signed_at", newest.Integer(1)},   {"signed_by", newest.Text(2)},
+          {"digest", newest.Text(3)},         {"json", newest.Text(4)}};
 }
 
 std::optional<ImportedRoom> RoomOfImport(const std::filesystem::path& state,

@@ -19,7 +19,7 @@ namespace plumb {
                                                  std::int64_t patient);
 
 /// The newest signed calibration of this unit as an export carries it: {"unit", "version",
-/// "signed_by", "digest", "json"}; null if none was ever signed.
+/// "signed_at", "signed_by", "digest", "json"}; null if none was ever signed.
 [[nodiscard]] nlohmann::ordered_json OwnRoomJson(Database& database);
 
 struct ImportedRoom {

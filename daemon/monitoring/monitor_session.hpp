@@ -52,7 +52,7 @@ struct MonitorJob {
   std::optional<MonitorRecordPlace> record = {};  ///< Nothing: it is kept in memory only.
   /// Frames of each sensor that may wait: an old number is of no use.
   std::size_t queue_capacity = 4;
-  std::size_t most_lines = 108'000;  ///< Of the record: an hour at 30 Hz; the oldest leave.
+  std::size_t most_lines = 108'000;  ///< Of the record: an hour at 30 Hz; the oldest go.
 };
 
 /// One judged frame.

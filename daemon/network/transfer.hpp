@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One transfer by libcurl, with what every transfer of a unit has in common: it can be stopped, it
-// ends in time, it follows nobody elsewhere, and the other side proves who it is.
+// ends in time, redirections are not followed, and the server's certificate is checked.
 #pragma once
 
 #include <curl/curl.h>

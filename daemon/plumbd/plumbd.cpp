@@ -225,8 +225,8 @@ class Plumbd {
     }
     options.on_guesses = [this](bool are_running) {
       page_.are_guesses_running = are_running;
-      Log(LogLevel::kWarning, are_running ? say::web::GuessesRunning().English()
-                                          : "no password of the page has been guessed at lately");
+      Log(LogLevel::kWarning,
+          are_running ? say::web::GuessesRunning().English() : "no failed log-ins lately");
       NotePage();
     };
     options.is_clock_trusted = [this] { return !shared_.upkeep.is_clock_doubted(); };

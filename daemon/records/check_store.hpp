@@ -44,7 +44,7 @@ class CheckStore {
   [[nodiscard]] std::optional<MarkerBaseline> BaselineMarkers();
   /// @param reason  A person's; it is logged with what becomes otherwise.
   void SetBaseline(const Actor& actor, const std::string& check_id, const std::string& reason);
-  /// What becomes otherwise if this check takes the place of the baseline; empty if there is none,
+  /// What would change if this check takes the place of the baseline; empty if there is none,
   /// or the check saw no markers.
   [[nodiscard]] std::vector<Message> ChangesBy(const std::string& check_id);
 

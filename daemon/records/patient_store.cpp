@@ -300,7 +300,7 @@ void TreatmentStore::Resume(const Actor& actor, const std::string& session_id) {
   const auto resumable =
       patient ? change->FirstInteger(kResumable, *patient, ResumableSince()) : std::nullopt;
   if (!resumable || resumable != session)
-    throw StoreRefusal(ChangeResult::kConflict, say::store::SessionNotResumable());
+    throw StoreRefusal(ChangeResult::kConflict, say::store::SessionNotResumable(kResumable_h));
   CloseOpenSessions(change, actor);
   change->Run("UPDATE sessions SET closed_at = NULL, closed_by = '', opened_by = ? WHERE id = ?",
               actor.user, session);

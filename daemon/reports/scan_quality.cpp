@@ -2,6 +2,7 @@
 #include "daemon/reports/scan_quality.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -12,6 +13,8 @@
 #include "daemon/result/axis_names.hpp"
 #include "daemon/result/result_folder.hpp"
 #include "web/service/result_terms.hpp"
+#include "words/acceptance.hpp"
+#include "words/comparison.hpp"
 #include "words/result.hpp"
 #include "words/text_report.hpp"
 
@@ -182,9 +185,12 @@ ScanQuality QualityOf(const Scan& scan, const ScanFiles& files, double warm_up_m
   if (files.result) AddRemarksTo(quality.remarks, *files.result);
   if (files.scene) {
     // The remarks may hold them already: a comparison repeats the warnings of its scans.
-    for (const Message& warning : files.scene->scene.warnings)
-      if (std::ranges::find(quality.remarks, warning) == quality.remarks.end())
+    for (const Message& warning : files.scene->scene.warnings) {
+      const std::array<Message, 2> said = {
+          warning, say::comparison::ScanWarned(say::acceptance::ScanCurrent(), warning)};
+      if (std::ranges::find_first_of(quality.remarks, said) == quality.remarks.end())
         quality.remarks.push_back(warning);
+    }
   }
   return quality;
 }

@@ -34,10 +34,15 @@ Message Title(Verdict verdict) {
 }
 
 /// Only the verdict MOVE asks for moves.
-Message Heading(Verdict verdict, const Eigen::Vector3d& isocentre_m) {
+Message Heading(const StoredResult& result) {
   const auto say =
-      verdict == Verdict::kMove ? say::text_report::Correction : say::text_report::Measured;
-  return say(isocentre_m.x(), isocentre_m.y(), isocentre_m.z());
+      result.verdict == Verdict::kMove ? say::text_report::Correction : say::text_report::Measured;
+  // A plan's isocentre is the origin of the axes of its scene, not of the reference marker.
+  if (result.compared_with) return say(say::result::AtIsocentre());
+  const auto point =
+      IsAboutMiddle(result) ? say::text_report::AboutMiddle : say::text_report::AtIsocentre;
+  const Eigen::Vector3d& p_m = result.correction->isocentre;
+  return say(point(p_m.x(), p_m.y(), p_m.z()));
 }
 
 Message NumberName(std::string_view name) {
@@ -165,7 +170,7 @@ std::string ComparisonText(const StoredResult& result, const Catalogue& language
   report.Line(report.Said(Title(result.verdict)));
   for (const Message& reason : result.reasons) report.Line("  " + report.Said(reason));
   if (const std::vector<ShownRow> rows = ShownRowsOf(result); !rows.empty()) {
-    report.Line("\n" + report.Said(Heading(result.verdict, result.correction->isocentre)) + "\n");
+    report.Line("\n" + report.Said(Heading(result)) + "\n");
     report.Numbers(rows, result.verdict);
     if (!result.body || !result.body->room_known)
       report.Line("\n  " + report.Said(say::text_report::RoomUnknown()));

@@ -158,7 +158,7 @@ void ScanSession::Run(const std::stop_token& stop) {
     outcome_.check.reset();  // one that is discarded as it fails is not a failed check
   }
   Save();
-  // The stored reference was good, and only now differs.
+  // The profile changes only after the scan has been stored.
   if (outcome_.kind == EndedScan::Kind::kDone && job_.unit_profile &&
       outcome_.why_not_learned.empty())
     job_.unit_profile->LearnFromScan();

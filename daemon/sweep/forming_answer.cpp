@@ -92,7 +92,11 @@ void FormingAnswers::Run(const std::stop_token& stop) {
       // Too little was seen yet, or it was stopped: the sweep's own end reports errors.
     }
     lock.lock();
-    if (made && made->numbers) newest_ = made;
+    if (made && made->numbers) {
+      newest_ = made;
+    } else if (made && newest_) {
+      newest_->is_enough = false;  // what was seen since then gives no answer any more
+    }
     wanted_ = {};
   }
 }

@@ -149,7 +149,7 @@ TEST_F(DaemonTwoSensorsTest, OneGoesOnAloneAndSaysSoAndTheOtherComesBack) {
     return Used("no_image", "used")(status) && IsWithin(status, 5.0);
   });
   EXPECT_EQ(second["monitor"]["one_sensor"],
-            "no image comes from sensor VIRTUAL-0001: VIRTUAL-0002 goes on alone, with wider "
+            "no image comes from sensor VIRTUAL-0001: VIRTUAL-0002 continues alone, with wider "
             "intervals");
   EXPECT_EQ(second["monitor"]["one_sensor_message"]["id"], "monitoring.sensor_silent");
   EXPECT_EQ(second["state"], "monitoring");
@@ -265,7 +265,7 @@ TEST_F(DaemonMonitorTest, TheOutlineIsThatOfTheReferenceOfTheOpenSessionAndOfNot
   plumbd.Press(/*is_long=*/true);
   plumbd.WaitForState("ready");
   ASSERT_EQ(engineer.Post("/api/v1/checks/open").status, 200);
-  EXPECT_EQ(outline().status, 404) << "a daily check is of no patient";
+  EXPECT_EQ(outline().status, 404) << "a daily check belongs to no patient";
   ASSERT_EQ(engineer.Post("/api/v1/checks/leave").status, 200);
   wait_for("an outline again", 200);
   const json session = engineer.Get("/api/v1/status").json()["session"];

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <future>
 #include <memory>
@@ -55,16 +56,21 @@ class UpdaterOnLoop : public ::testing::Test {
     return true;
   }
 
-  /// @param file  Name of a bundle in the updater's folder.
-  Change Install(const std::string& file) { return Ask(&Updater::Install, file); }
-  Change InstallCopy(const std::string& file) { return Ask(&Updater::InstallCopy, file); }
+  /// @param name  Of a bundle in the updater's folder.
+  Change Install(const std::string& name) {
+    return Ask([&](const Done& done) { updater_->Install(name, done); });
+  }
+  Change InstallCopy(const std::filesystem::path& copy, const std::string& name) {
+    return Ask([&](const Done& done) { updater_->InstallCopy(copy, name, done); });
+  }
+  Change Add(const std::filesystem::path& file, const std::string& name) {
+    return Ask([&](const Done& done) { updater_->Add(file, name, done); });
+  }
 
-  Change Ask(void (Updater::*install)(const std::string&, Done), const std::string& file) {
+  /// The answer to what is asked on the loop.
+  Change Ask(const std::function<void(const Done&)>& request) {
     auto answer = std::make_shared<std::promise<Change>>();
-    On([&] {
-      (updater_.get()->*install)(file,
-                                 [answer](const Change& change) { answer->set_value(change); });
-    });
+    On([&] { request([answer](const Change& change) { answer->set_value(change); }); });
     auto future = answer->get_future();
     if (future.wait_for(kPatience) != std::future_status::ready) {
       ADD_FAILURE() << "no answer";

@@ -258,8 +258,7 @@ TEST_F(RaucTest, ASecondAttemptOnARefusedBundleGivesTheSameReason) {
     ASSERT_EQ(::rename((folder_ / "updates" / "good.raucb").c_str(),
                        (folder_ / "updates" / ".upload-1").c_str()),
               0);
-    Change change;
-    On([&] { change = updater_->Add(folder_ / "updates" / ".upload-1", "stranger.raucb"); });
+    const Change change = Add(folder_ / "updates" / ".upload-1", "stranger.raucb");
     EXPECT_EQ(change.result, ChangeResult::kDone) << change.message.English();
     EXPECT_EQ(InstallToTheEnd("stranger"), "");
     EXPECT_TRUE(SlotHolds("b", "good"));

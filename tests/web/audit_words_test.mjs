@@ -39,7 +39,7 @@ const kDetails = [
     'MOVE, Vertical +1.20 mm, Pitch −0.10°; reason: swelling',
     'MOVER, Vertical +1,20 mm, Cabeceo −0,10°; motivo: swelling'],
   ['scan.accept_outside', 'unsure; reason: up; reason: move\nfailed',
-    'NOT SURELY WITHIN; reason: up; reason: move\nfailed',
+    'INCONCLUSIVE; reason: up; reason: move\nfailed',
     'NO CONCLUYENTE; motivo: up; reason: move\nfailed'],
   ['session.open', 'fraction', 'Fraction', 'Fracción'],
   ['session.reference', 'version 2', 'version 2', 'versión 2'],
@@ -68,7 +68,7 @@ const kDetails = [
     'Posture of new references: Head first, supine → Feet first, prone; '
     + 'Markers are fixed to the couch: no → yes',
     'Postura de las referencias nuevas: Cabeza primero, supino → Pies primero, prono; '
-    + 'Los marcadores están fijos a la camilla: no → sí'],
+    + 'Los marcadores están fijos a la mesa: no → sí'],
   ['settings.change', '{"retention_days":[0,365],"auto_stop_s":[2.5]}',
     'Delete scans after … days (0: never): 0 → 365; '
     + 'Stop a sweep after … s without new surface: 2.5',

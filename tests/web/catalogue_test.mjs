@@ -66,7 +66,8 @@ for (const [code, { texts, arguments: given }] of Object.entries(catalogues)) {
 // what only engineers see.
 const kExperts = new RegExp(['cli|foreign|recording|stream|text_report|page\\.certificate',
   'sensor\\.(driver_of_real|driver_of_simulated|unknown_driver|use_driver)',
-  'diagnosis\\.(cameras_or_size|cameras_unstated|depth_unit|depth_unit_unknown|unit_or_side)',
+  'diagnosis\\.(cameras_or_size|cameras_unstated|depth_camera_unknown|unit_or_side)',
+  'diagnosis\\.depth_unit(_unknown|_unstated)?',
   'backup\\.no_recipient', 'comparison\\.room_not_calibrated', 'messages\\.no_way',
   'page\\.login\\.certificate', 'page\\.settings\\.(backup|messages)Hint',
   'scene_file\\.poses_differ']

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The limits of control of the daily checks, without a browser: control_limits_test.mjs SOURCES
+// The control limits of the daily checks, without a browser: control_limits_test.mjs SOURCES
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 

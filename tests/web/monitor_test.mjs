@@ -54,7 +54,7 @@ await h.step('the numbers follow, since zero and against the reference apart', a
   await tech.getByText('▲ OUT: HOLD').waitFor();
   equal(await first(tech, '.live-six.judged'), '+5.2 mm', 'the number has followed');
   await tech.locator('.live-why', { hasText: 'The couch was moved.' }).waitFor();
-  await tech.getByText('Image to number: 42 ms').waitFor();
+  await tech.getByText('Delay from image to value: 42 ms').waitFor();
   await h.look(tech, 'monitor-phone-out', { axe: false });
 });
 
@@ -104,16 +104,17 @@ await h.step('the map shows how the body lies now, and what of it is not seen', 
   });
 });
 
-await h.step('one of two sensors fails: page and room say which one goes on alone', async () => {
+await h.step('one of two sensors fails: page and room say which one continues alone', async () => {
   h.tell('alone VIRTUAL-0002');
   for (const page of [tech, room]) {
-    await page.locator('.live-view .caution', { hasText: 'VIRTUAL-0001 goes on alone' }).waitFor();
+    await page.locator('.live-view .caution', { hasText: 'VIRTUAL-0001 continues alone' })
+      .waitFor();
   }
   await h.look(tech, 'monitor-phone-alone');
   await h.look(room, 'monitor-room-alone');
   h.tell('alone');
   for (const page of [tech, room]) {
-    await page.locator('.live-view .caution', { hasText: 'goes on alone' })
+    await page.locator('.live-view .caution', { hasText: 'continues alone' })
       .waitFor({ state: 'hidden' });
   }
 });
@@ -205,7 +206,7 @@ await h.step('it ends by the button, and its numbers can be had', async () => {
 await h.step('a record beside its scan is read, and says that a power cut ended it', async () => {
   h.tell('recorded 000007');
   await tech.goto(`${h.url}#/monitoring/000007-1`);
-  await tech.getByText('The record is cut off').waitFor();
+  await tech.getByText('The record is incomplete').waitFor();
   await tech.getByText('4.5 mm every 3.8 s').waitFor();
   await tech.locator('dd', { hasText: 'IN: 4.3 min (90 %)' }).waitFor();
   await tech.locator('li', { hasText: 'Too little of the body is seen.' }).waitFor();

@@ -414,14 +414,14 @@ await h.step('no answer: the room display shows three reasons, and no list to op
   await h.look(room, 'room-no-answer', { axe: false, fullPage: false });
 });
 
-await h.step('three words: within, not surely within, outside; no digits below the uncertainty',
+await h.step('three words: within, inconclusive, outside; no digits below the uncertainty',
   async () => {
   h.tell('unsure');
   await press();
   await anna.locator('.verdict.unsure').waitFor();
-  await anna.locator('.verdict', { hasText: 'NOT SURELY WITHIN' }).waitFor();
+  await anna.locator('.verdict', { hasText: 'INCONCLUSIVE' }).waitFor();
   const card = anna.locator('.number', { hasText: 'Vertical' });
-  equal(await card.locator('.judged').innerText(), '≈ not surely within', 'the word');
+  equal(await card.locator('.judged').innerText(), '≈ inconclusive', 'the word');
   equal((await card.locator('.value').innerText()).replace(/\s/g, ''), '−3mm', '−2.8 ±1.2');
   check(/±1\.2 mm$/.test(await card.locator('.half').innerText()), 'a second digit after a 1');
   await card.getByText('tolerance ±3 mm').waitFor();
@@ -443,11 +443,11 @@ await h.step('three words: within, not surely within, outside; no digits below t
   equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0,
     'not in one tap');
   equal(await anna.getByText('Accept outside tolerance').count(), 0, 'no value is outside');
-  await anna.getByText('Accept although not surely within tolerance…').click();
+  await anna.getByText('Accept although inconclusive…').click();
   await anna.getByLabel('Reason', { exact: true }).fill('breathing');
   await anna.getByLabel('Your password').fill(h.password);
-  await anna.getByRole('button', { name: 'Accept although not surely within tolerance' }).click();
-  await anna.getByText(/^≈ Accepted although not surely within tolerance by anna, .*: breathing$/)
+  await anna.getByRole('button', { name: 'Accept although inconclusive' }).click();
+  await anna.getByText(/^≈ Accepted although inconclusive, by anna, .*: breathing$/)
     .waitFor();
 });
 

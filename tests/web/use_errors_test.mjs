@@ -374,7 +374,8 @@ await h.step('a result that can no longer be acted on says what was found, and c
   }
   await h.look(anna, 'result-review', { axe: false });
   await anna.goto(`${h.url}result?scan=${shown.id}`);
-  await anna.getByText('Correction found then, at the isocentre: not to be applied now').waitFor();
+  await anna.getByText(
+    'Correction found then, about the middle of the region: not to be applied now').waitFor();
   check(!/Correction to apply|MOVE/.test(await anna.locator('main').innerText()), 'nor in print');
 });
 
@@ -1118,9 +1119,9 @@ await h.step('an isocentre is in millimetres, seen from the side, and where it i
   equal(await doubt.count(), 0, 'nothing to doubt');
   await h.look(clara, 'plan-side', { axe: false });
   await fill(600, 450, 900);  // 9 cm, typed as something else
-  await doubt.getByText('cannot be meant').waitFor();
+  await doubt.getByText('probably a wrong unit').waitFor();
   await save.click();
-  await clara.getByRole('alert').getByText('cannot be meant').waitFor();
+  await clara.getByRole('alert').getByText('probably a wrong unit').waitFor();
   await fill(600, 450, 300);
   await doubt.getByText(/^The isocentre lies \d+ mm above the skin\.$/).waitFor();
   await save.click();

@@ -160,6 +160,7 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
         {"numbers", RowsJson(*scan.result)},
         {"along_couch", RunsAlongCouch(*scan.result)},
         {"body", BodyJson(*scan.result)}};
+    PutMessage(json["result"], "about", scan.result->about);
     PutMessages(json["result"], "reason", scan.result->reasons);
   }
   return json;

@@ -56,7 +56,7 @@ struct CheckStatus {
   std::vector<CheckRecord> checks;  ///< Newest first.
   std::optional<CheckBaseline> baseline;
   DailyCheck today = DailyCheck::kOverdue;
-  /// What becomes otherwise if the newest check takes the place of the baseline; empty without one.
+  /// What would change if the newest check takes the place of the baseline; empty without one.
   std::vector<Message> changes = {};
 };
 

@@ -42,6 +42,7 @@ struct ResultSummary {
   std::array<Message, 6> words = {};  ///< Directions of the correction; empty if unknown.
   NumberJudgements judgements = {};
   std::array<Message, 6> axes = {};      ///< Their names; empty: along the couch.
+  Message about = {};                    ///< The point about which the correction is stated.
   Tolerance tolerance = {};              ///< By which the numbers were judged.
   std::vector<Message> body_now = {};    ///< "left shoulder 9 mm high", before any correction.
   std::vector<Message> body_after = {};  ///< The same after the correction: the posture.

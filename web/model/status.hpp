@@ -112,7 +112,7 @@ struct RoomOnMap {
   bool contradicts_posture = false;
 };
 
-/// One way by which people outside are told of what needs them.
+/// One way of sending messages out (mail, syslog or webhook) and its state.
 struct MessageWay {
   std::string name;                   ///< mail, syslog or webhook.
   std::int64_t sent = 0, failed = 0;  ///< Since the start; failed: given up.

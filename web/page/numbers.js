@@ -148,10 +148,6 @@ export function numbersLine({ numbers }) {
 
 export const toleranceOf = (reference) => reference?.plan.tolerance ?? kTolerance;
 
-/// About which point the numbers are: a plan may have no isocentre.
-export const pointOf = (reference) =>
-  (reference?.plan.isocentre_m ? S.result.atIsocentre : S.result.atMiddle);
-
 /// Only a result that says MOVE commands moves, and only while it is valid; later its words say
 /// what was found.
 export function sixNumbers(result, details, valid = true) {

@@ -20,7 +20,7 @@ export const lookOf = (code) => plainCode(code).replace(/[._]/g, '').replaceAll(
   .replace(/^0+(?=.)/, '');
 /// Whether the last letter or digit is the check character of those before it (ISO/IEC 7064,
 /// MOD 37,36): as HasCheckCharacter() of web/model/patient.hpp.
-export function hasCheckCharacter(code) {
+function hasCheckCharacter(code) {
   const values = [...plainCode(code).replace(/[._]/g, '')].map((one) => parseInt(one, 36));
   const last = values.pop();
   const sum = values.reduce((before, value) => ((before + value) % 36 || 36) * 2 % 37, 36);

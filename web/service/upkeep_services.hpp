@@ -59,9 +59,10 @@ class UpdateService {
   /// a bundle.
   virtual void AddBundle(const Actor& actor, const std::filesystem::path& file,
                          const std::string& name, Done done) = 0;
-  /// Names of bundles on plugged-in USB sticks.
+  /// Names of bundles on plugged-in USB sticks, as the last look found them. Begins another look;
+  /// EventKind::kUpdate if it finds others.
   [[nodiscard]] virtual std::vector<std::string> StickBundles() = 0;
-  /// Copies one of them to the bundles, then continues as InstallUpdate().
+  /// Copies one of them, then continues as InstallUpdate(); the copy is none of the bundles.
   virtual void InstallFromStick(const Actor& actor, const std::string& bundle, Done done) = 0;
   virtual void RemoveBundle(const Actor& actor, const std::string& name, Done done) = 0;
   virtual void InstallUpdate(const Actor& actor, const std::string& bundle,

@@ -271,6 +271,9 @@ unsigned long long rs2_get_frame_number(const RsFrame* frame, Error**) {
   return frame->image.number;
 }
 double rs2_get_frame_timestamp(const RsFrame* frame, Error**) { return frame->image.timestamp_ms; }
+int rs2_get_frame_timestamp_domain(const RsFrame* frame, Error**) {
+  return frame->image.timestamp_domain;
+}
 int rs2_supports_frame_metadata(const RsFrame* frame, int which, Error**) {
   return frame->image.metadata.contains(which) ? 1 : 0;
 }

@@ -36,6 +36,7 @@ struct FakeImage {
   const void* data = nullptr;
   std::uint64_t number = 0;
   double timestamp_ms = 0.0;
+  int timestamp_domain = realsense::kDomainHardwareClock;
   std::map<int, std::int64_t> metadata;
 };
 

@@ -40,12 +40,14 @@ class FakeRestart : public SystemRestart {
  public:
   void Restart(std::function<void(const Message&)> done) override {
     ++num_asked;
+    if (on_asked) on_asked();
     done(failure.empty() ? Message() : Message::Verbatim(failure));
   }
   [[nodiscard]] std::chrono::milliseconds limit() const override { return stays_up_after; }
   int num_asked = 0;
   std::chrono::milliseconds stays_up_after = std::chrono::minutes(5);
   std::string failure;
+  std::function<void()> on_asked;
 };
 
 class ApplianceTest : public ::testing::Test {

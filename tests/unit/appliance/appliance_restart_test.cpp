@@ -9,6 +9,7 @@
 
 #include "daemon/archive/factory_reset.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 namespace {
@@ -97,6 +98,22 @@ TEST_F(ApplianceRestartTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
                                                  [&](const Change& change) { answer = change; });
       EXPECT_THAT(answer.message.English(), ::testing::HasSubstr("being restarted"));
     });
+  });
+}
+
+TEST_F(ApplianceRestartTest, AResetThatCannotBeTakenBackIsSaidAndThePageGoesOn) {
+  Play([&] {
+    MakeReady();
+    restart_->failure = "the machine cannot be restarted from here: no";
+    restart_->on_asked = [request = folder_ / "state" / kFactoryResetFile] {
+      std::filesystem::remove(request);
+      std::filesystem::create_directories(request);  // nobody can unlink it
+    };
+    const Change answer = AskedToReset(*services_, loop_, FactoryReset::kWipe);
+    EXPECT_EQ(answer.result, ChangeResult::kFailed);
+    EXPECT_TRUE(answer.message.Is(say::upkeep::kResetMayHappen));
+    EXPECT_THAT(answer.message.English(), ::testing::StartsWith(restart_->failure));
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester).English(), ""); });
   });
 }
 

@@ -75,13 +75,16 @@ TEST(FormingAnswersTest, KeepsTheLastAnswerOverOneThatFails) {
   answers.Make([](const std::stop_token&) { return Scene(); }, 3);
   WaitUntilIdle(answers);
   ASSERT_TRUE(answers.Newest().has_value());
+  EXPECT_TRUE(answers.Newest()->is_enough);
   answers.Make([](const std::stop_token&) -> Scene { throw std::runtime_error("too little"); }, 4);
   WaitUntilIdle(answers);
   EXPECT_EQ(answers.Newest()->sweep_s, 3);
+  EXPECT_TRUE(answers.Newest()->is_enough);
   refuses = true;
   answers.Make([](const std::stop_token&) { return Scene(); }, 5);
   WaitUntilIdle(answers);
   EXPECT_EQ(answers.Newest()->sweep_s, 3);
+  EXPECT_FALSE(answers.Newest()->is_enough);
   refuses = false;
   answers.Make([](const std::stop_token&) { return Scene(); }, 6);
   WaitUntilIdle(answers);

@@ -94,17 +94,19 @@ TEST_F(PlanningServicesTest, ASecondImportOfReceivedFilesIsToldThatOneRuns) {
     const auto import = [&](Done done) {
       services_->services().planning.ImportReceived(kTester, "1", choice, std::move(done));
     };
-    On([&] { import([&](const Change& change) { first.set_value(change); });
-      import([&](const Change& change) { second = change;
+    const Done to_first = [&](const Change& change) { first.set_value(change); };
+    const Done to_second = [&](const Change& change) { second = change; };
+    const Done to_third = [&](const Change& change) { third.set_value(change); };
+    On([&] {
+      import(to_first);
+      import(to_second);
+    });
+    EXPECT_EQ(second.result, ChangeResult::kConflict);
+    EXPECT_EQ(second.message.id(), "scan.import_runs") << second.message.English();
+    EXPECT_EQ(first.get_future().get().result, ChangeResult::kNotFound) << "no such files";
+    On([&] { import(to_third); });
+    EXPECT_EQ(third.get_future().get().result, ChangeResult::kNotFound) << "none runs any more";
   });
-});
-EXPECT_EQ(second.result, ChangeResult::kConflict);
-EXPECT_EQ(second.message.id(), "scan.import_runs") << second.message.English();
-EXPECT_EQ(first.get_future().get().result, ChangeResult::kNotFound) << "no such files";
-On([&] { import([&](const Change& change) { third.set_value(change); });
-});
-EXPECT_EQ(third.get_future().get().result, ChangeResult::kNotFound) << "none runs any more";
-});
 }
 
 }  // namespace

@@ -23,6 +23,7 @@
 namespace plumb {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using testing::FakeBus;
 using ::testing::HasSubstr;
@@ -147,6 +148,16 @@ TEST(RoomAgeTest, ACalibrationIsTooOldAfterItsDaysAndNeverWhereNoneAreStated) {
   EXPECT_THAT(after(400 * 24 + 1), HasSubstr("400 days old"));
   EXPECT_EQ(after(-24), "");
   EXPECT_TRUE(WhyTooOld(signed_at, signed_at + std::chrono::hours(24 * 5000), 0).empty());
+
+  ImportedRoom elsewhere{.unit = "plumb-a", .version = 1, .room = SignedRoom{}};
+  elsewhere.room->signed_at = signed_at;
+  const auto there_after = [&](int hours) {
+    return UnlessTooOld(elsewhere, signed_at + std::chrono::hours(hours), 400);
+  };
+  EXPECT_TRUE(there_after(400 * 24)->room);
+  EXPECT_FALSE(there_after(400 * 24 + 1)->room);
+  EXPECT_THAT(there_after(400 * 24 + 1)->why_not.English(),
+              AllOf(HasSubstr("plumb-a"), HasSubstr("400 days old")));
 }
 
 TEST(TakeRoomTest, APlanningCtIsMetByTheRoomsMarkersWithTheSpreadOfTheCalibration) {

@@ -147,6 +147,7 @@ TEST_F(UnitProfileTest, ADiskThatCannotBeWrittenDoesNotFailTheScan) {
   unit.Begin(options_);
   Sweep(options_, 0.001);
   EXPECT_NO_THROW(unit.LearnFromScan());
+  EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "profiles"));
 }
 
 TEST(WhyNotLearned, NamesEachCheckThatAScanHasToPass) {

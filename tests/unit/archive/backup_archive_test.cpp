@@ -248,7 +248,7 @@ TEST_F(BackupArchiveTest, WhatIsNoPlainFileOfABackupIsRefused) {
       {TarEntry("scans/../../evil", '0', "x"), "not plain"},
       {TarEntry("./plumb.db", '0', "x"), "not plain"},
       {TarEntry("scans/a\tb", '0', "x"), "not plain"},
-      {TarEntry("other/file", '0', "x"), "none of a backup"},
+      {TarEntry("other/file", '0', "x"), "does not belong to a backup"},
       {TarEntry("plumb.db", '0', "x"), "plumb.db twice"},
       {TarEntry("SHA256SUMS", '0', "x"), "SHA256SUMS twice"},
       {TarEntry("backup.json", '0', "x"), "backup.json twice"},

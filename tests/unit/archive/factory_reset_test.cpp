@@ -8,6 +8,7 @@
 
 #include "tests/support/message_of.hpp"
 #include "tests/unit/records/store_fixture.hpp"
+#include "words/upkeep.hpp"
 
 namespace plumb {
 namespace {
@@ -142,10 +143,19 @@ TEST_F(FactoryResetTest, AWipeHelpsWithADamagedDatabaseToo) {
 TEST_F(FactoryResetTest, ARequestCanBeTakenBack) {
   (void)Use();
   RequestFactoryReset(state(), FactoryReset::kWipe, kAnna);
-  CancelFactoryReset(state());
-  CancelFactoryReset(state());
+  const Message why = Message::Verbatim("no restart");
+  EXPECT_EQ(CancelFactoryReset(state(), why), why);
+  EXPECT_EQ(CancelFactoryReset(state(), why), why) << "there is none any more";
   EXPECT_FALSE(CarryOutFactoryReset(state()));
   EXPECT_THAT(Open()->patients.List(), SizeIs(1));
+}
+
+TEST_F(FactoryResetTest, ARequestThatCannotBeTakenBackIsSaid) {
+  fs::create_directories(state() / kFactoryResetFile);
+  const Message why = Message::Verbatim("no restart");
+  const Message answer = CancelFactoryReset(state(), why);
+  EXPECT_TRUE(answer.Is(say::upkeep::kResetMayHappen));
+  EXPECT_THAT(answer.English(), HasSubstr("no restart; the requested factory reset may still"));
 }
 
 TEST_F(FactoryResetTest, ARequestThatCannotBeReadResetsNothing) {

@@ -261,6 +261,7 @@ TEST_F(PatientTransferTest, TheRoomOfAReferenceComesAlongAndGoesOn) {
   const auto room = RoomOfImport(there(), patient, scan);
   ASSERT_TRUE(room && room->room) << (room ? room->why_not.English() : "none");
   EXPECT_EQ(room->version, 1);
+  EXPECT_GT(room->room->signed_at, WallClock::now() - std::chrono::hours(1));
   EXPECT_EQ(room->room->fit.markers_iec.size(), testing::MarkersOfRoom().size());
   EXPECT_FALSE(RoomOfImport(there(), patient, "999")) << "a scan that was made here";
   EXPECT_FALSE(RoomOfImport(here(), patient_, reference_)) << "where it came from";

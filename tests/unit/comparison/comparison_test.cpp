@@ -513,7 +513,7 @@ TEST(ComparisonTest, CouchMarkersRefuseShiftsAndJudgePostureOnly) {
       PerfectReference(), MakeSyntheticScene(MovedBy(T_motion, ReferenceOptions())), options);
   EXPECT_EQ(comparison.verdict, Verdict::kInTolerance);
   EXPECT_FALSE(comparison.correction->value.lateral_mm);
-  EXPECT_THAT(EnglishTexts(comparison.warnings), Contains(HasSubstr("posture only")));
+  EXPECT_THAT(EnglishTexts(comparison.warnings), Contains(HasSubstr("only the posture is judged")));
 }
 
 TEST(ComparisonTest, OtherMarkersAreBadInputAndBadOptionsAreTheCallersMistake) {

@@ -237,12 +237,25 @@ TEST(PlannedReferenceTest, TaughtMarkersPlaceTheScanInsteadOfTheReferenceMarker)
   const Comparison comparison = Compare(PlannedScene(), current, options);
   ASSERT_TRUE(comparison.motion);
   const Eigen::Vector3d body(0.6, 0.45, 0.1);
-  EXPECT_LT((comparison.motion->T * body - SmallMotion() * body).norm(), 0.3 * kMillimetre);
+  const auto error_m = [&](const Comparison& one) {
+    return (one.motion->T * (askew * body) - askew * (SmallMotion() * body)).norm();
+  };
+  EXPECT_LT(error_m(comparison), 0.3 * kMillimetre);
   EXPECT_THAT(comparison.warnings, Not(Says(say::comparison::kOneMarkerForPlan)));
+  // A signed calibration has its markers in the axes of the room.
+  CompareOptions is_signed = options;
+  is_signed.T_iec_reference = Pose::Identity();
+  for (auto& [id, marker] : is_signed.room_markers)
+    for (Eigen::Vector3d& corner : marker.corners) corner = RoomPose() * corner;
+  const Comparison by_signed = Compare(PlannedScene(), current, is_signed);
+  ASSERT_TRUE(by_signed.motion && by_signed.correction && comparison.correction);
+  EXPECT_LT(error_m(by_signed), 0.3 * kMillimetre);
+  EXPECT_LT((by_signed.correction->isocentre_m - comparison.correction->isocentre_m).norm(), 1e-6);
+  EXPECT_NEAR(by_signed.correction->value.yaw_deg, comparison.correction->value.yaw_deg, 1e-3);
   options.room_markers.clear();
   const Comparison alone = Compare(PlannedScene(), current, options);
   ASSERT_TRUE(alone.motion);
-  EXPECT_GT((alone.motion->T * body - SmallMotion() * body).norm(), 2 * kMillimetre);
+  EXPECT_GT(error_m(alone), 2 * kMillimetre);
   EXPECT_THAT(alone.warnings, Says(say::comparison::kOneMarkerForPlan));
 }
 

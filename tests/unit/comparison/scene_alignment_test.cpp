@@ -164,8 +164,9 @@ TEST(SceneAlignmentTest, FewerThanThreeSharedMarkersAreNoAnswerInBestOnly) {
   EXPECT_FALSE(best.alignment);
   EXPECT_THAT(
       EnglishTexts(RefusalsOfMarkers(best.markers, 3)),
-      ElementsAre("scan needs at least 3 markers shared with the reference, found 2 (ids 4, 5); "
-                  "keep the markers in view"));
+      ElementsAre(
+          "the scan needs at least 3 markers shared with the reference, found 2 (ids 4, 5); "
+          "keep the markers in view"));
   current.erase(4);
   const AlignmentOutcome paper = AlignScenes(room, current, Preset::kPaper);
   ASSERT_TRUE(paper.alignment);  // four coplanar corners determine a pose

@@ -279,6 +279,15 @@ TEST_F(SceneFolderTest, BreathingThatNobodyCanHaveIsRefused) {
   }
 }
 
+TEST_F(SceneFolderTest, ASweepOfBeforeTheClassesIsOfStructuredLight) {
+  auto json = nlohmann::ordered_json::parse(SceneJson(SmallScene()));
+  json["depth_sensor"] = nullptr;  // as of what no depth camera made
+  EXPECT_EQ(ParseSceneJson(json.dump(), "scene.json").scene.depth_sensor, std::nullopt);
+  json.erase("depth_sensor");
+  EXPECT_EQ(ParseSceneJson(json.dump(), "scene.json").scene.depth_sensor,
+            DepthSensor::kStructuredLight);
+}
+
 TEST_F(SceneFolderTest, WarningsKeepTheirMessages) {
   Scene scene = SmallScene();
   scene.warnings = {say::reconstruction::NoMarker(), say::reconstruction::NoImage(1.57)};

@@ -12,6 +12,7 @@
 #include "tests/support/result_with.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/records/scan_folder.hpp"
+#include "words/result.hpp"
 #include "words/store.hpp"
 
 namespace plumb {
@@ -328,6 +329,19 @@ TEST_F(StoreCareTest, AScanThatCannotBeReadHidesNoOtherOfThePatient) {
     }
     EXPECT_GT(listed[0].started_at, listed[1].started_at) << "a stamp beyond the clock's range";
   }
+}
+
+TEST_F(StoreCareTest, AResultNamesThePointAboutWhichItsNumbersAre) {
+  const auto about = [](const char* centroid_m) {
+    return SummaryOf(testing::ResultWith(fmt::format(
+                         R"({{"verdict":"move","correction":{{"isocentre":[0.1,0.2,0.3],)"
+                         R"("pitch_deg":1,"roll_deg":2,"yaw_deg":3}},)"
+                         R"("motion":{{"centroid_m":{}}}}})",
+                         centroid_m)))
+        .about;
+  };
+  EXPECT_EQ(about("[0.1,0.2,0.3]"), say::result::AboutMiddle());
+  EXPECT_EQ(about("[0.1,0.2,0.4]"), say::result::AtIsocentre());
 }
 
 TEST_F(StoreCareTest, AResultAndACheckAreReadWithTheirMessages) {

@@ -164,9 +164,8 @@ TEST_F(StoreRoomTest, MarkersOfWhichTooFewAgreeMakeItDueWhateverAnOlderCheckSaw)
     return store_->room.WhyDue(room, {}).English();
   };
   EXPECT_EQ(after(0), "");
-  EXPECT_EQ(
-      after(6),
-      "the 6 markers that were seen do not lie to each other as when the room was calibrated");
+  EXPECT_EQ(after(6),
+            "the 6 markers that were seen are not arranged as when the room was calibrated");
   EXPECT_EQ(after(0), "") << "they were put back";
   EXPECT_THAT(after(3, 3), HasSubstr("the 3 markers that were seen"));
   EXPECT_EQ(after(0), "");

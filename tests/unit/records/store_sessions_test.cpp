@@ -213,10 +213,16 @@ TEST_F(StoreSessionsTest, AClosedSessionGoesOnWithItsFractionOnTheSameDay) {
   EXPECT_EQ(store.treatments.Opened()->fraction, 1);
   EXPECT_EQ(store.treatments.Opened()->opened_by, "bert");
   EXPECT_EQ(store.audit.Find({0, 1}).at(0).action, "session.resume");
-  store.treatments.CloseAll(kAnna);
-  store.database().ForChanges()->Run("UPDATE sessions SET closed_at = closed_at - ?",
-                                     std::int64_t{kResumable_h} * 3600 * 1'000'000 + 1'000'000);
-  EXPECT_EQ(resume(session), ChangeResult::kConflict) << "it was yesterday's";
+  const auto close_before = [&](std::int64_t seconds) {
+    store.treatments.CloseAll(kAnna);
+    store.database().ForChanges()->Run(
+        "UPDATE sessions SET closed_at = closed_at - ? WHERE id = CAST(? AS INTEGER)",
+        seconds * 1'000'000, session);
+  };
+  close_before(std::int64_t{kResumable_h} * 3600 - 60);
+  EXPECT_EQ(resume(session), ChangeResult::kDone);
+  close_before(std::int64_t{kResumable_h} * 3600 + 1);
+  EXPECT_EQ(resume(session), ChangeResult::kConflict) << "too long ago";
   EXPECT_EQ(store.scans.Find(scan)->fraction, 1);
 }
 

@@ -18,6 +18,9 @@
 #include "tests/support/synthetic_scene.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/test_language.hpp"
+#include "words/acceptance.hpp"
+#include "words/comparison.hpp"
+#include "words/reconstruction.hpp"
 #include "words/result.hpp"
 
 namespace plumb {
@@ -269,6 +272,18 @@ TEST_F(ReportsTest, EachIgnoredMarkerIsACaution) {
                                        "Marker 31 was ignored: it moved 31 mm."}));
 }
 
+TEST_F(ReportsTest, AWarningOfTheScanThatItsComparisonRepeatsIsSaidOnce) {
+  const Message busy = say::reconstruction::NoImage(1.5), lone = say::reconstruction::NoMarker();
+  ScanFiles files{.scene = StoredScene{}, .result = StoredResult{}, .unreadable = {}};
+  const Message repeated = say::comparison::ScanWarned(say::acceptance::ScanCurrent(), busy);
+  const Message other = say::comparison::ScanWarned(say::acceptance::ScanReference(), busy);
+  files.result->warnings = {other, repeated};
+  files.scene->scene.warnings = {busy, lone};
+  EXPECT_THAT(QualityOf(Scan{}, files, 20).remarks,
+              ::testing::IsSupersetOf({other, repeated, lone}));
+  EXPECT_THAT(QualityOf(Scan{}, files, 20).remarks, Not(::testing::Contains(busy)));
+}
+
 TEST_F(ReportsTest, ARowThatIsWorseThanItShouldBeIsACaution) {
   const auto rows = [&](const std::string& result) {
     const std::string id =
@@ -429,7 +444,7 @@ TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
   EXPECT_THAT(DescribeCourse(sources_, *store_.patients.Find(patient_), EnglishCatalogue())
                   .rows.back()
                   .accepted,
-              HasSubstr("although not surely within tolerance by anna"));
+              HasSubstr("although inconclusive, by anna"));
   EXPECT_EQ(ValueOf(course.identity, "<result.report_first_scans>"), "nothing") << "one answer";
   const std::string other = AddScan(reference, kMove);
   EXPECT_THAT(

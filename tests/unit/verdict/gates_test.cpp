@@ -201,9 +201,9 @@ TEST(AcceptanceTest, TheScanThatKnowsItsMarkersMuchWorseIsNamedWhereANumberIsToo
   };
   EXPECT_THAT(
       reasons(0.0004, 0.00061, 3.1),
-      ElementsAre(HasSubstr("vertical"), HasSubstr("the current scan is the poorer one: it "
-                                                   "knows its markers to 0.61 mm, the other "
-                                                   "scan to 0.40 mm")));
+      ElementsAre(HasSubstr("vertical"), HasSubstr("the current scan is the poorer one: its "
+                                                   "markers are located to within 0.61 mm, "
+                                                   "those of the other scan to 0.40 mm")));
   EXPECT_THAT(reasons(0.0012, 0.0004, 3.1),
               ElementsAre(HasSubstr("vertical"), HasSubstr("the reference scan is the poorer")));
   EXPECT_THAT(reasons(0.0004, 0.00059, 3.1), ElementsAre(HasSubstr("vertical")));
@@ -242,7 +242,7 @@ TEST(AcceptanceTest, ReasonsNameTheValuesThatDecide) {
   Evidence evidence = GoodEvidence();
   evidence.numbers[1] = MeasuredNumber{-2.9, 0.25, say::direction::AwayFromGantry()};
   EXPECT_THAT(EnglishTexts(Decide(evidence, {}).reasons),
-              ElementsAre("not surely within 3 mm and 1 deg: longitudinal -2.9 \u00b10.2 mm"));
+              ElementsAre("not certainly within 3 mm and 1 deg: longitudinal -2.9 \u00b10.2 mm"));
   evidence.numbers[5] = MeasuredNumber{1.5, 0.1, say::direction::HeadToPatientLeft()};
   EXPECT_THAT(EnglishTexts(Decide(evidence, {}).reasons),
               ElementsAre("outside 3 mm and 1 deg: yaw +1.5 deg (head to patient left)"));

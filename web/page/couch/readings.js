@@ -10,7 +10,7 @@ const kMax = { cm: 300, mm: 3000, '°': 360 };
 
 /// A reading as people type it: nothing where it is not a number that a couch could show.
 /// @param period  Where its readings begin at zero again, if they do.
-export function readingOf(text, { unit = 'cm', period = null } = {}) {
+function readingOf(text, { unit = 'cm', period = null } = {}) {
   const words = text.trim().replace(',', '.').replace('−', '-');
   if (!/^[+-]?\d{1,4}(\.\d{1,2})?$/.test(words)) return null;
   const value = Number(words);
@@ -33,7 +33,7 @@ function scaleOf(axis) {
 
 /// The value to set the axis to. A number that does not differ from zero by more than its
 /// uncertainty leaves the axis where it is.
-export function targetOf(reading, { value, still }, { factor, digits, period = null }) {
+function targetOf(reading, { value, still }, { factor, digits, period = null }) {
   const scale = 10 ** digits;
   const target = Math.round(scale * (reading + (still ? 0 : value * factor)));
   // Rounded before: 999.96 is 0.0, and never 1000.0.

@@ -148,6 +148,14 @@ function holeOf({ result, details }) {
   return result?.verdict === 'no_answer' && size > limit ? middle : null;
 }
 
+/// In the axes of the map; nothing where the plan has none and the numbers are about the middle of
+/// the region. The map of a planning CT has its origin at the isocentre.
+function isocentreOnMap({ correction, motion, compared_with: planned }) {
+  if (planned) return [0, 0];
+  const point = correction?.isocentre;
+  return point?.every((value, i) => value === motion?.centroid_m[i]) ? null : point;
+}
+
 /// Figure with map, reading and profile for a scan with a result; falls back to the picture.
 /// @param place  Shows the progress meanwhile.
 export async function errorMap(scan, reference, tolerance_mm, place) {
@@ -167,7 +175,7 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
   const view = viewOf(grid, region);
   const compass = compassOf(live.status?.room, sidesOf(scan, scan.details),
     reference.plan.posture);
-  const isocentre = scan.details?.correction?.isocentre;
+  const isocentre = isocentreOnMap(scan.details ?? {});
 
   const canvas = h('canvas', {
     class: 'map', tabindex: '0', role: 'application', 'aria-label': text.mapLabel,

@@ -5,7 +5,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { cellAt, errorIndex, errorTable, kOutside } from './maps.js';
 import { orientationCube } from './mesh_cube.js';
-import { correctionOf, fractionOf, mapFrameOf } from './mesh_motion.js';
+import { correctionOf, fractionOf, frameOf } from './mesh_motion.js';
 
 function geometryOf({ positions, corners }) {
   const geometry = new THREE.BufferGeometry();
@@ -102,12 +102,13 @@ function boxOfInterest(geometry, grid, region, T) {
 
 /// Draws into `canvas`. Throws where there is no WebGL.
 /// @param surface  {positions, corners}.
-/// @param motion  Of the body, in the map's frame; null: there is no correction to show.
+/// @param motion  Of the body; null: there is no correction to show.
+/// @param T_motion  From the surface's frame to that of the motion; null: the same.
 /// @param words  Of the compass's marks.
 /// Gives setGhost(load, fraction), setFraction(fraction), correct(fraction, deviationAfter),
 /// look(name), cut(way, fraction), picture(), stop().
 export function openMesh(canvas, {
-  surface, grid, deviation, region, T, motion, tolerance_m, compass, words,
+  surface, grid, deviation, region, T, motion, T_motion, tolerance_m, compass, words,
 }) {
   const renderer = new THREE.WebGLRenderer({
     canvas, antialias: true, logarithmicDepthBuffer: true, preserveDrawingBuffer: true,
@@ -224,7 +225,7 @@ export function openMesh(canvas, {
     }
     request();
   };
-  const correction = motion ? correctionOf(T, motion) : null;
+  const correction = motion ? correctionOf(T_motion, motion) : null;
   let corrected = null;
   return {
     look,
@@ -239,7 +240,7 @@ export function openMesh(canvas, {
       body.matrixWorldNeedsUpdate = true;
       if (fraction > 0.5) {
         corrected ??= coloursByError(geometry, grid, deviationAfter, region,
-          rowsOf(mapFrameOf(T).multiply(correction)), tolerance_m);
+          rowsOf(frameOf(T).multiply(correction)), tolerance_m);
       }
       geometry.setAttribute('color', fraction > 0.5 ? corrected : measured);
       request();
@@ -254,7 +255,7 @@ export function openMesh(canvas, {
           color: 0x6ea8ff, alphaHash: true, side: THREE.DoubleSide,
           clippingPlanes: material.clippingPlanes,
         }));
-        if (T) ghost.applyMatrix4(mapFrameOf(T).invert());
+        if (T) ghost.applyMatrix4(frameOf(T).invert());
         scene.add(ghost);
       }
       if (ghost) ghost.visible = isGhostWanted;

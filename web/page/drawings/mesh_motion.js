@@ -5,14 +5,14 @@ import * as THREE from 'three';
 /// Makes a matrix of four rows.
 const matrixOf = (rows) => new THREE.Matrix4().set(...rows.flat());
 
-/// From the frame of a mesh to the map's; the same without T.
-export const mapFrameOf = (T) => (T ? matrixOf(T) : new THREE.Matrix4());
+/// From the frame of a mesh to another; the same without T.
+export const frameOf = (T) => (T ? matrixOf(T) : new THREE.Matrix4());
 
 /// The motion by which the correction moves the current surface, in that surface's frame: it undoes
-/// the motion of the body in the map's frame.
+/// the motion of the body, which is stated in a frame to which T leads.
 export function correctionOf(T, motion) {
-  const toMap = mapFrameOf(T);
-  return toMap.clone().invert().multiply(matrixOf(motion).invert()).multiply(toMap);
+  const toMotion = frameOf(T);
+  return toMotion.clone().invert().multiply(matrixOf(motion).invert()).multiply(toMotion);
 }
 
 /// A fraction of a rigid motion: turned and shifted by it, as seen from `centre`.

@@ -11,7 +11,7 @@ const kBottom = 24;
 const kMaxFractions = 40;
 
 /// Scans of the same session are one fraction; those without a session count by themselves.
-export function fractionsOf(scans) {
+function fractionsOf(scans) {
   const groups = new Map();
   for (const scan of [...scans].reverse()) {
     if (!scan.result?.numbers.length) continue;
@@ -27,7 +27,7 @@ export function fractionsOf(scans) {
 const valueOf = (scan, axis) => scan.result.numbers.find(({ name }) => name === axis.name);
 
 /// A mark of a trend, told apart by its shape as well as by its colour: within a circle, outside a
-/// triangle, not surely within a diamond.
+/// triangle, inconclusive a diamond.
 export function markOf(tone, cx, cy, r) {
   if (tone === 'within') return svg('circle', { cx, cy, r, class: `mark ${tone}` });
   const d = tone === 'outside' ? `M${cx} ${cy - 1.2 * r}l${1.2 * r} ${2.2 * r}h${-2.4 * r}z`

@@ -15,7 +15,7 @@ const kTall = 1000;
 const kMarks = { breatheIn: '↑', breatheOut: '↓', hold: '●', good: '✓' };
 
 /// What to ask for; null where nothing is to be done.
-export function coachOf(monitor) {
+function coachOf(monitor) {
   const hold = monitor?.active ? monitor.breath_hold : null;
   if (!hold) return null;
   const { breathing_mm: height } = monitor;

@@ -59,12 +59,12 @@ export const stateHint = (status) => {
 export const verdictIcon = (verdict) =>
   ({ in_tolerance: '✓', unsure: '≈', move: '↔', no_answer: '?' })[verdict] ?? '–';
 
-/// Mark of an accepted result. One that was accepted with a reason was outside tolerance, or not
-/// surely within it.
+/// Mark of an accepted result. One that was accepted with a reason was outside tolerance, or
+/// inconclusive.
 export const acceptanceMark = (scan) => (!scan.accepted_reason ? kMarks.in_tolerance
   : scan.result?.verdict === 'unsure' ? kMarks.unsure : kMarks.outside);
 
-export const verdictBadge = (verdict) => h('span', { class: `badge ${verdict}` },
+const verdictBadge = (verdict) => h('span', { class: `badge ${verdict}` },
   `${verdictIcon(verdict)} ${S.result.verdicts[verdict] ?? verdict}`);
 
 export const outcomeBadge = (scan) => (scan.result ? verdictBadge(scan.result.verdict)

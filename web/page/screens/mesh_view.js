@@ -138,6 +138,7 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
     });
     try {
       if (!document.createElement('canvas').getContext('webgl2')) throw new Error(text.meshFailed);
+      const T = details?.alignment?.T_reference_current;
       const part = progressIn(place, text.meshLoading);
       const [{ openMesh }, surface] = await Promise.all([import('../drawings/mesh.js'),
         surfaceOf(scan.id, part('surface'))]);
@@ -147,7 +148,9 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
       clear(place, canvas, map?.legend?.(), below);
       view = openMesh(canvas, {
         surface, grid: map?.grid, deviation: map?.deviation, region: map?.region,
-        T: details?.alignment?.T_reference_current, motion: motionOf(scan, details),
+        T, motion: motionOf(scan, details),
+        // Against a planning CT the motion is stated in the frame of the scan.
+        T_motion: details?.compared_with ? null : T,
         tolerance_m: tolerance_mm / 1000,
         compass: map?.compass, words: { ...text.marks, ...text.cube },
       });

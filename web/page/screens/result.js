@@ -7,7 +7,7 @@ import { card, clear, h, hint, keepFocus, warn } from '../dom.js';
 import { errorMap } from '../drawings/error_map.js';
 import { compassOf, mapFrame, marksNote, viewOf } from '../drawings/map_frame.js';
 import { loadMap, paintHeights } from '../drawings/maps.js';
-import { pointOf, sixNumbers, toleranceOf } from '../numbers.js';
+import { sixNumbers, toleranceOf } from '../numbers.js';
 import { trend } from '../drawings/trend.js';
 import { S, said, saidEach } from '../words.js';
 import { actions } from './accept.js';
@@ -114,7 +114,7 @@ function answer(data, valid) {
   const { scan, details } = data;
   return [verdictStrip(data, valid),
     isAdvice(scan) && h('section', { class: 'correction' },
-      h('h2', {}, numbersTitle(scan, valid), ' ', h('small', {}, pointOf(data.reference))),
+      h('h2', {}, numbersTitle(scan, valid), ' ', h('small', {}, said(scan.result, 'about'))),
       !scan.result.along_couch && h('p', { class: 'caution' }, text.roomUnknown),
       sixNumbers(scan.result, details, valid), valid && couchReadings(scan))];
 }

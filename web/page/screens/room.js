@@ -9,9 +9,9 @@ import { legend } from '../drawings/error_map.js';
 import { isLanguage, keepLanguage, languageOf } from '../language.js';
 import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../drawings/map_frame.js';
 import { loadMap, paintErrors } from '../drawings/maps.js';
-import { pointOf, sixNumbers, toleranceOf } from '../numbers.js';
+import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseTheme } from '../preferences.js';
-import { S, saidEach, textOf } from '../words.js';
+import { S, said, saidEach, textOf } from '../words.js';
 import {
   acceptanceMark, ageText, cautionsOf, faultWords, findings, flagList, isAdvice, isCold,
   lastKnownNote, minutesOf, partsOf, sentence, sidesOf,
@@ -83,10 +83,10 @@ async function pair(main, logIn) {
 }
 
 /// Who is open, and whether check and sensor let people scan.
-/// @param said  The large word below says already that no session is open.
+/// @param isSaid  The large word below says already that no session is open.
 /// @param isSwapped  Another patient's session has just taken the place of one.
 /// @param isChecked  The answer below is that of a daily check.
-function top(status, said, isSwapped, isChecked) {
+function top(status, isSaid, isSwapped, isChecked) {
   const text = S.room;
   const { session, sensor } = status;
   const warm = !isCold(sensor.powered_s);
@@ -94,7 +94,7 @@ function top(status, said, isSwapped, isChecked) {
   const isCheck = isChecked
     || (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
   return h('header', { class: 'room-top' },
-    !said && (isSwapped && !isCheck
+    !isSaid && (isSwapped && !isCheck
       ? h('p', { class: 'room-code swapped', role: 'alert' },
         h('small', {}, text.anotherPatient), ' ', session.patient_code)
       : h('p', { class: 'room-code' }, isCheck ? S.purposes.daily_check
@@ -245,7 +245,7 @@ function result() {
       clear(strip, scan.result ? verdictStrip(data, isValid) : withoutResult(scan));
       strip.querySelector('details')?.remove();  // a display has nothing to open it with
       if (six) {
-        clear(six, h('h2', { class: 'visually-hidden' }, pointOf(reference)),
+        clear(six, h('h2', { class: 'visually-hidden' }, said(scan.result, 'about')),
           !scan.result.along_couch && h('p', { class: 'caution' }, S.result.roomUnknown),
           sixNumbers(scan.result, details, isValid));
       }
@@ -368,19 +368,19 @@ function display(main, speak) {
     const mine = last && (last.session_id ?? null) === lastSession;
     const visible = status.state === 'result' && !isCheck && mine ? last : null;
     withCamera(status.state === 'scanning' || (!visible && !isCheck && showsPosture(status)));
-    const said = !visible && !isCheck && saysNoSession(status);
+    const isSaid = !visible && !isCheck && saysNoSession(status);
     if (session && session.patient_id !== patient) {
       if (patient) swapped = now();
       patient = session.patient_id;
     }
     const isSwapped = Boolean(session && swapped && since_s(swapped) < kSwap_s);
-    const marks = JSON.stringify([S.languageName, session, isSwapped, said, isCheck,
+    const marks = JSON.stringify([S.languageName, session, isSwapped, isSaid, isCheck,
       status.peer_notes, status.check_overdue,
       status.check_failed, status.next_purpose, status.sensor.present,
       Math.floor(status.sensor.powered_s / 60)]);
     if (marks !== shownMarks) {
       shownMarks = marks;
-      clear(head, top(status, said, isSwapped, isCheck));
+      clear(head, top(status, isSaid, isSwapped, isCheck));
     }
     if (status.state === 'monitoring') {
       answer.element.hidden = true;
