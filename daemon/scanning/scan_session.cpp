@@ -17,6 +17,7 @@
 #include "daemon/reports/text_report.hpp"
 #include "daemon/result/result_folder.hpp"
 #include "daemon/sweep/explain.hpp"
+#include "words/reconstruction.hpp"
 #include "words/room.hpp"
 #include "words/scan.hpp"
 
@@ -236,8 +237,13 @@ Scene ScanSession::Track(const std::stop_token& stop) {
     Scene scene = RunScan(feed, job_.info, job_.reconstructor, stop,
                           [this](const ScanProgress& progress) { OnProgress(progress); });
     if (recording) recording->Complete(stop);
-    if (const Message warning = thinned.Warning(); !warning.empty())
+    if (const Message warning = thinned.Warning(); !warning.empty()) {
+      // It says of the same frames also how they were chosen, and what to do.
+      std::erase_if(scene.warnings, [](const Message& said) {
+        return said.Is(say::reconstruction::kFramesDropped);
+      });
       scene.warnings.push_back(warning);
+    }
     return scene;
   } catch (...) {
     if (recording && !stop.stop_requested()) KeepFailed(*recording, stop);
