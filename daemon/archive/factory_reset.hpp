@@ -20,7 +20,8 @@ inline constexpr const char* kFactoryResetFile = "factory-reset.json";
 /// @throws IoError; what was written by then is withdrawn, or the message says that it may count.
 void RequestFactoryReset(const std::filesystem::path& state, FactoryReset kind, const Actor& actor);
 
-/// Withdraws a request that has not been carried out, because of `what`, which a person is told.
+/// Withdraws a request that has not been carried out.
+/// @param what  The reason, for people.
 /// @returns `what`, with the addition that the reset may still take place if the request could not
 ///          be withdrawn.
 [[nodiscard]] Message CancelFactoryReset(const std::filesystem::path& state, Message what);

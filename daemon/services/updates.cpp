@@ -60,7 +60,7 @@ Updates::Updates(EventLoop& loop, Appliance& appliance, CurrentSession& session,
   session_.SetBlockingReason([this] { return WhyNotScan(); });
   restart_limit_ = loop_.MakeTimer("restart", [this] { OnStillRunning(); });
   if (!options_.config.channel.empty()) WatchChannel();
-  // Later: whoever makes this object may not have its background yet.
+  // Posted, because the background threads may not exist yet while this object is constructed.
   loop_.Post("channel", alive_.WhileAlive([this] {
     if (channel_) return;
     (void)options_.run_in_background(

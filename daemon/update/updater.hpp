@@ -72,7 +72,7 @@ class Updater {
   /// Lets RAUC check and install NAME of the folder. `done` is called once it has begun, or with
   /// the reason why not.
   void Install(const std::string& name, Done done);
-  /// Like Install(), for a file that was copied only to be installed and is none of the bundles.
+  /// Like Install(), for a file that was copied only to be installed and is not listed as a bundle.
   /// The copy is removed when the installation ends or is refused, whatever the outcome: it can be
   /// copied again, and copies that stay would fill the disk.
   /// @param name  Of the bundle, for people.

@@ -90,7 +90,7 @@ void FreenectHost::LookAtBus() {
   try {
     serials = Serials();
   } catch (const DeviceError&) {
-    // The next listing of sensors tells why; an open sensor still reports its own removal.
+    // The next listing of sensors reports the error; an open sensor reports its own removal.
     return events().Notify();
   }
   Lose([&](const Watched& watched) {

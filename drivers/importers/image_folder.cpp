@@ -35,8 +35,9 @@ struct Layout {
 };
 
 /// The time that a name states: seconds with decimals, or a whole number of milli-, micro- or
-/// nanoseconds since 1970, told apart by its length. It may stand behind other text ("rgb_12.345"),
-/// from which a number with decimals must be set off: the 1.0002 of "cam1.0002" is none.
+/// nanoseconds since 1970; its number of digits tells which. Other text may precede it
+/// ("rgb_12.345"), a short number with decimals only with a separator between them: the 1.0002 of
+/// "cam1.0002" is not a time.
 std::optional<double> StampOf(std::string_view stem) {
   constexpr std::size_t kDigitsSince1970 = 9;
   if (const std::size_t before = stem.find_last_not_of("0123456789."); before != stem.npos) {

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/sensor_model/depth_sensor.hpp"
 #include "drivers/replay/device_class.hpp"
 
@@ -93,10 +94,7 @@ namespace plumb {
       Word{"freenect", DepthSensor::kStructuredLight},
   };
   if (const auto known = ClassOfDevice(name)) return known;
-  std::string small(name);
-  std::ranges::transform(small, small.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
+  const std::string small = AsciiLower(name);
   for (const Word& word : kWords)
     if (small.find(word.part) != std::string::npos) return word.sensor;
   return std::nullopt;

@@ -156,8 +156,8 @@ class Keys {
     if (!root_.IsMap()) throw DataError(say::recording::CameraNoKeys(name_));
   }
 
-  /// @throws DataError for a file of another program, for a key that nobody reads, and for one that
-  /// stands there twice: which of them is meant, nobody knows.
+  /// @throws DataError for a file of another program, an unknown key, or a key that occurs twice,
+  /// because its two values may differ.
   void CheckNames() const {
     for (const auto& [key, program] : kForeignKeys)
       if (has(key)) throw DataError(say::recording::CameraForeign(name_, program, key));

@@ -4,6 +4,8 @@
 #include <array>
 #include <string>
 
+#include "algo/base/ascii_lower.hpp"
+
 namespace plumb {
 namespace {
 
@@ -38,10 +40,8 @@ constexpr std::array kDevices = {
 std::optional<DepthSensor> ClassOfDevice(std::string_view name) {
   // "Kinect for Windows v2" and "kinect_v2" are one device.
   std::string plain;
-  for (const char c : name) {
-    if (c >= 'A' && c <= 'Z') plain += static_cast<char>(c - 'A' + 'a');
+  for (const char c : AsciiLower(name))
     if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) plain += c;
-  }
   if (const std::size_t at = plain.find("forwindows"); at != std::string::npos) plain.erase(at, 10);
   for (const NamedDevice& device : kDevices)
     if (plain.find(device.part) != std::string::npos) return device.sensor;

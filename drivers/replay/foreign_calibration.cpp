@@ -269,8 +269,8 @@ bool IsSame(const Intrinsics& a, const Intrinsics& b) {
 
 bool IsOfDepth(const std::string& name) { return name.find("depth") != std::string::npos; }
 
-/// A file that is too large for a calibration, or cannot be read, is none: programs keep poses and
-/// labels under such names, too.
+/// Nothing for a file that is too large for a calibration or cannot be read: other programs use
+/// such names for poses and labels, too.
 std::optional<ForeignCalibration> ParseCandidate(const fs::path& file, const cv::Size& size) {
   std::string text;
   try {

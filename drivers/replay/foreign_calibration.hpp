@@ -34,9 +34,9 @@ struct ForeignCalibration {
                                                                         const std::string& name,
                                                                         int width, int height);
 
-/// The calibration in the folder, if there is one: a file for the colour camera before others. A
-/// file that is too large for a calibration is none. If a file for depth states another camera, or
-/// depth has another size, the depth camera is unknown.
+/// The calibration in the folder, if there is one: a file for the colour camera before others.
+/// Files that are too large for a calibration are skipped. If a file for depth states another
+/// camera, or depth has another size, the depth camera is unknown.
 /// @param color, depth  Sizes of the images.
 /// @throws DataError also if several files state different cameras, and if only a depth camera is
 /// stated whose images have another size than colour's.

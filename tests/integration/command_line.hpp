@@ -67,4 +67,4 @@ class CommandLineTest : public testing::Test {
 /// data.
 #define PLUMB_SHARED_DATA(folder, name)                           \
   const std::filesystem::path folder = ::plumb::SharedData(name); \
-  if (folder.empty()) GTEST_SKIP() << "PLUMB_TEST_DATA is not set: " << (name)
+  if (folder.empty()) GTEST_SKIP() << "no test data \"" << (name) << "\": set PLUMB_TEST_DATA"

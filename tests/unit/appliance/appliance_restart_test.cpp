@@ -107,7 +107,7 @@ TEST_F(ApplianceRestartTest, AResetThatCannotBeTakenBackIsSaidAndThePageGoesOn) 
     restart_->failure = "the machine cannot be restarted from here: no";
     restart_->on_asked = [request = folder_ / "state" / kFactoryResetFile] {
       std::filesystem::remove(request);
-      std::filesystem::create_directories(request);  // nobody can unlink it
+      std::filesystem::create_directories(request);  // unlink() fails
     };
     const Change answer = AskedToReset(*services_, loop_, FactoryReset::kWipe);
     EXPECT_EQ(answer.result, ChangeResult::kFailed);

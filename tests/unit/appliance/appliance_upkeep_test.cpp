@@ -91,7 +91,7 @@ class ApplianceUpkeepTest : public testing::ApplianceTest {
     ChangeDatabase("DROP TRIGGER audit_no_update; UPDATE audit SET time = time - " +
                    std::to_string(kDays_us));
   }
-  /// That nobody is asked to verify, while one more backup is made and for some time after.
+  /// No verification is asked for while one more backup is made and for some time after.
   void ExpectNoReminderAfterABackup() {
     Play([&] {
       ASSERT_TRUE(Comes([&] { return Backups().size() == 2; }));

@@ -18,7 +18,7 @@
 namespace plumb {
 namespace {
 
-// Flanks of bodies are no couch, whatever their size; a level side of one slice is none either.
+// The flanks of a body are not a couch, however large, nor is a level side of a single slice.
 TEST(CouchTopTest, OnlyALevelSideAlongTheScanIsACouch) {
   const auto slices = [](const std::function<double(double x, int i)>& top) {
     std::vector<ContourSlice> made;

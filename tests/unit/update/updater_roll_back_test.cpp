@@ -55,7 +55,7 @@ TEST_F(RollBackTest, TheSameStartStillNeedsItsRestart) {
   });
 }
 
-/// Two starts that nobody can name are not the same one.
+/// Two unknown boots are not the same boot.
 TEST_F(RollBackTest, AStartThatIsNotKnownNeedsNoRestart) {
   boot_ = "";
   RunBesideLoop([&] {
