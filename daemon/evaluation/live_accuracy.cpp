@@ -121,8 +121,10 @@ class AdviceCheck {
       went_out_s_.reset();
     }
     constexpr double kWellInside = 0.6;
-    if (was_in_ && !in && !sensor_moved && !IsOut(truth, limits_, kWellInside))
+    if (was_in_ && !in && !sensor_moved && !IsOut(truth, limits_, kWellInside)) {
       ++figures_.needless_holds;
+      if (line.state == MonitorState::kBlind) ++figures_.blind_holds;
+    }
     was_out_ = out;
     was_in_ = in;
   }
@@ -331,6 +333,7 @@ std::string LiveJson(const LiveEvaluation& evaluation) {
         {"false_in", f.false_in},
         {"false_moved", f.false_moved},
         {"needless_holds", f.needless_holds},
+        {"blind_holds", f.blind_holds},
         {"hold_after_s", f.hold_after_s},
         {"hold_after_step_s", f.hold_after_step_s},
         {"steps_not_held", f.not_held},

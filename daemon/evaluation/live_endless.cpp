@@ -73,7 +73,7 @@ std::string StemOf(const EndlessOptions& options) {
 // Of all parts together; medians are those of the parts' medians.
 struct Together {
   std::size_t parts = 0, frames = 0, in = 0, out = 0, false_in = 0, false_moved = 0, holds = 0,
-              blind = 0, inside = 0, count = 0;
+              blind_holds = 0, blind = 0, inside = 0, count = 0;
   double seconds = 0, minute_mm = 0;
   std::vector<double> median_mm, p95_mm, median_deg, p95_deg, r, rms_mm, cpu_ms;
   std::map<std::string, std::vector<double>> hold_s;
@@ -88,6 +88,7 @@ struct Together {
     false_in += part.at("false_in").get<std::size_t>();
     false_moved += part.at("false_moved").get<std::size_t>();
     holds += part.at("needless_holds").get<std::size_t>();
+    blind_holds += part.at("blind_holds").get<std::size_t>();
     blind += part.at("states").value("blind", std::size_t{0});
     inside += part.at("intervals").at("inside").get<std::size_t>();
     count += part.at("intervals").at("count").get<std::size_t>();
@@ -116,14 +117,15 @@ struct Together {
     };
     std::string text = fmt::format(
         "{} parts, {} frames, {:.2f} h; {} in, {} with the body out, {} blind\n"
-        "in while out {}; false moved_sensor frames {}; needless holds {} ({:.1f} an hour)\n"
+        "in while out {}; false moved_sensor frames {}; needless holds {} ({:.1f} an hour), {} of "
+        "them blind\n"
         "since zero, median of the parts (least to most): mm median {}, 95th {}; deg median {}, "
         "95th {}\n"
         "intervals that hold {:.1f} %; breathing r {}, RMS mm {}; CPU ms {}\n"
         "largest mean error of a minute {:.2f} mm\n",
         parts, frames, seconds / 3600, in, out, blind, false_in, false_moved, holds,
-        seconds > 0 ? 3600.0 * static_cast<double>(holds) / seconds : 0.0, range(median_mm, 2),
-        range(p95_mm, 2), range(median_deg, 3), range(p95_deg, 3),
+        seconds > 0 ? 3600.0 * static_cast<double>(holds) / seconds : 0.0, blind_holds,
+        range(median_mm, 2), range(p95_mm, 2), range(median_deg, 3), range(p95_deg, 3),
         count > 0 ? 100.0 * static_cast<double>(inside) / static_cast<double>(count) : 0.0,
         range(r, 4), range(rms_mm, 2), range(cpu_ms, 1), minute_mm);
     for (const auto& [size, times] : hold_s) {
