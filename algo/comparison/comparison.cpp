@@ -213,6 +213,15 @@ class Comparer {
     }
     result_.warnings.insert(result_.warnings.begin(), warnings.begin(), warnings.end());
     evidence_.markers = placed.markers;
+    // The gates will see the markers of the scan that is placed last.
+    if (name && placed.alignment) {
+      const std::vector<Message> refusals =
+          RefusalsOfMarkers(placed.markers, options_.limits.min_shared_markers);
+      if (!refusals.empty()) {
+        Refuse(say::acceptance::ScanRefused(*name, refusals.front()));
+        return std::nullopt;
+      }
+    }
     if (placed.alignment) return placed;
     Refuse(name ? say::acceptance::ScanRefused(*name, placed.failure) : placed.failure);
     return std::nullopt;
@@ -273,18 +282,18 @@ class Comparer {
   void ToMarkerFrame() {
     if (!result_.motion) return;
     BodyMotion& motion = *result_.motion;
-    const Pose& T_iec_reference = result_.alignment->T_reference_current;
-    const Pose T_reference_iec = T_iec_reference.inverse();
-    motion.T = T_reference_iec * motion.T * T_iec_reference;
-    motion.centroid_m = T_reference_iec * motion.centroid_m;
+    const Pose& T_iec_current = result_.alignment->T_reference_current;
+    const Pose T_current_iec = T_iec_current.inverse();
+    motion.T = T_current_iec * motion.T * T_iec_current;
+    motion.centroid_m = T_current_iec * motion.centroid_m;
     MotionUncertainty& parts = motion.uncertainty;
     for (Matrix6d* part :
          {&parts.surface, &parts.markers, &parts.distortion, &parts.scale, &parts.frame,
           &parts.sensor, &parts.breathing, &parts.room, &parts.skin, &parts.slices})
-      *part = CovarianceTurned(*part, T_reference_iec.linear());
+      *part = CovarianceTurned(*part, T_current_iec.linear());
     motion.covariance = parts.Total();
     if (result_.correction)
-      result_.correction->isocentre_m = T_reference_iec * result_.correction->isocentre_m;
+      result_.correction->isocentre_m = T_current_iec * result_.correction->isocentre_m;
   }
 
   // From the current scene to the reference frame, including the correction of its scale in the

@@ -292,13 +292,13 @@ struct StoredResult {
 ///         a judgement contradicts the numbers.
 [[nodiscard]] StoredResult ParseResult(std::string_view text, const std::string& name);
 
-/// A correction alone, as the control socket sends it.
 /// Whether the correction is stated about the middle of the region, as where no isocentre is known.
 [[nodiscard]] inline bool IsAboutMiddle(const StoredResult& result) {
   return result.motion && result.correction &&
          result.correction->isocentre == result.motion->centroid_m;
 }
 
+/// A correction alone, as the control socket sends it.
 [[nodiscard]] nlohmann::ordered_json CorrectionJson(const StoredCorrection& correction);
 /// @throws DataError
 [[nodiscard]] StoredCorrection ParseCorrection(const nlohmann::ordered_json& json);

@@ -330,6 +330,21 @@ TEST(TwoRoomsTest, BothCalibrationsAreInTheIntervals) {
   EXPECT_GT(room(without_first)(3, 3), 0.35e-6 / (1.96 * 1.96));
 }
 
+TEST(TwoRoomsTest, AMarkerThatMovedInTheReferencesRoomIsNotUsed) {
+  const Scene current = InOtherRoom(Pose::Identity());
+  CompareOptions options = InTwoRooms();
+  options.reference_room->markers = ReferenceScan().markers;
+  for (Eigen::Vector3d& corner : options.reference_room->markers.rbegin()->second.corners)
+    corner.x() += 0.05;
+  EXPECT_TRUE(Compare(ReferenceScan(), current, options).motion) << "it is left out";
+  // The method as published uses it.
+  options.preset = Preset::kPaper;
+  const Comparison published = Compare(ReferenceScan(), current, options);
+  EXPECT_EQ(published.verdict, Verdict::kNoAnswer);
+  EXPECT_FALSE(published.motion);
+  EXPECT_THAT(published.reasons.at(0).English(), testing::StartsWith("the reference scan"));
+}
+
 TEST(TwoRoomsTest, ARoomThatIsNotCalibratedIsNamed) {
   const Scene current = InOtherRoom(Pose::Identity());
   CompareOptions options = InTwoRooms();
