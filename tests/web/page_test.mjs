@@ -1030,7 +1030,7 @@ await h.step('a keyboard alone logs in, starts a sweep and ends it', async () =>
   equal(await focused(), 'Start sweep', 'the start button is reached from the main part');
   h.tell('slow');
   await keys.keyboard.press('Enter');
-  await keys.getByRole('button', { name: 'End sweep' }).waitFor();
+  await keys.getByRole('button', { name: 'End sweep', disabled: false }).waitFor();
   equal(await focused(), 'End sweep', 'the focus stays on the button');
   await h.setClockOn(keys, 2);  // likewise
   await keys.keyboard.press('Enter');
