@@ -217,6 +217,7 @@ struct StoredReference {
   double skin_u95_mm = 0.0, slice_spacing_mm = 0.0;
   /// Of CT images; not set: a contour was the surface.
   std::optional<double> skin_threshold_hu = {};
+  double clothing_mm = 0.0, ct_breathing_mm = 0.0;  ///< As stated: see StatedSurface.
 
   static void Fields(auto& self, const auto& visit) {
     visit("source", self.source);
@@ -231,6 +232,8 @@ struct StoredReference {
     visit("skin_u95_mm", self.skin_u95_mm);
     visit("slice_spacing_mm", self.slice_spacing_mm);
     visit.IfSet("skin_threshold_hu", self.skin_threshold_hu);
+    visit.OrAsIs("clothing_mm", self.clothing_mm);
+    visit.OrAsIs("ct_breathing_mm", self.ct_breathing_mm);
   }
 };
 
