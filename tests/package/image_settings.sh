@@ -17,7 +17,10 @@ touch root/boot/{vmlinuz-6.1,initrd.img-6.1} root/var/lib/dpkg/status ca.pem
 cat >bin/chroot <<'SCRIPT'
 #!/bin/sh
 shift
-case "$*" in "id -u plumb" | "id -g plumb") echo "${PLUMB_TEST_ID:-500}" ;; esac
+case "$*" in
+  "id -u plumb" | "id -g plumb") echo "${PLUMB_TEST_ID:-500}" ;;
+  "id -u plumb-dicom" | "id -g plumb-dicom") echo "${PLUMB_TEST_DICOM_ID:-501}" ;;
+esac
 SCRIPT
 chmod +x bin/chroot
 export PATH=$work/bin:$PATH
@@ -26,6 +29,8 @@ overlay() {
 }
 PLUMB_TEST_ID=997 overlay
 check "an account with another number is refused" '^1 .*not the number 500' "$code $(cat log)"
+PLUMB_TEST_DICOM_ID=998 overlay
+check "so is the receiver's" '^1 .*plumb-dicom has not the number 501' "$code $(cat log)"
 overlay
 check "the settings are made" '^0 $' "$code $(cat log)"
 
@@ -37,6 +42,10 @@ check "a start needs its own partitions, and no other disk" \
 var-log-journal.mount \$" \
   "$(ls out/normal/local-fs.target.requires | tr '\n' ' ')"
 check "nor does it wait for one" '^$' "$(find out/normal/local-fs.target.wants -name "*backup*")"
+received=$(cat out/normal/var-lib-plumb*dicom.mount)
+check "what is received lies on the data partition" \
+  'What=/data/dicom.*Where=/var/lib/plumb-dicom' "$(tr '\n' ' ' <<<"$received")"
+check "and is mounted once its folder is made" 'After=systemd-tmpfiles-setup.service' "$received"
 backup=$(cat out/normal/var-lib-plumb*backup.mount)
 check "a disk for backups is found by its label" \
   'What=/dev/disk/by-label/plumb-backup.*Where=/var/lib/plumb-backup' "$(tr '\n' ' ' <<<"$backup")"

@@ -18,7 +18,7 @@ chmod +x bin/journalctl
 : >journalctl.calls
 export PATH=$work/bin:$PATH PLUMB_DATA=$work/data
 export PLUMB_STATE=$work/state PLUMB_ETC=$work/etc PLUMB_DELIVERED=$source/toolchain/plumb.toml \
-  PLUMB_GROUP
+  PLUMB_GROUP PLUMB_RECEIVED=$work/received
 start() {
   "$source/systemd/factory-reset" >reset.log 2>&1
   "$plumbd" --state state --control control --listen 127.0.0.1:0 >log 2>&1 &
@@ -48,6 +48,8 @@ curl -sk -m 20 -H 'Content-Type: application/json' -d "$first" \
 end
 mkdir -p state/scans state/calibration
 echo data >state/calibration/S1.yaml
+mkdir -p received/study
+echo image >received/study/1.dcm
 start
 check "with an account there is no setup code" '^0$' "$(grep -c 'setup code' log || true)"
 end
@@ -76,6 +78,7 @@ check "the accounts are gone" 'setup code: ....-....' "$(cat log)"
 check "it is logged" 'factory reset: records kept; 1 account,' "$(cat log)"
 check "the journal is kept" '^$' "$(cat journalctl.calls)"
 check "what belongs to the sensor stays" '^data$' "$(cat state/calibration/S1.yaml)"
+check "what was received stays" '^image$' "$(cat received/study/1.dcm)"
 check "the request is done" '^missing$' "$([ -e state/factory-reset.json ] || echo missing)"
 end
 configure
@@ -88,6 +91,8 @@ start
 check "wiped: the configuration folder" '^plumb.toml$' "$(ls -A etc)"
 check "wiped: the journal" '^-q --rotate --vacuum-time=1s$' "$(cat journalctl.calls)"
 check "wiped: the sensor's files" '^missing$' "$([ -e state/calibration/S1.yaml ] || echo missing)"
+check "wiped: what was received, but not its folder" '^empty$' \
+  "$([ -d received ] && [ -z "$(ls -A received)" ] && echo empty)"
 check "wiped: it is logged" 'factory reset: everything that was stored has been removed' \
   "$(cat log)"
 check "wiped: a new setup code is made" 'setup code: ....-....' "$(cat log)"

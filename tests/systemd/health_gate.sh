@@ -27,7 +27,9 @@ healthy() {
   echo true >rauc
   export PLUMB_GATE_SELF_TEST=no
 }
-run() { "$gate" "$@" >log 2>&1 && code=0 || code=$?; }
+run() { # with the unit's UMask=
+  (umask 077 && "$gate" "$@" >log 2>&1) && code=0 || code=$?
+}
 is_marked() { grep -c 'rauc status mark-good' calls || true; }
 
 healthy
@@ -71,6 +73,7 @@ check "it is noted as restored, for the log of the database that is back" \
   "^\\{\"backup\": \"$work/state/before-checksums/plumb.db\", \"sha256\": \"$(
     echo old | sha256sum | cut -d' ' -f1)\", \"scans\": 2, \"time\": [0-9]{16}\\}$" \
   "$(cat state/restored.json)"
+check "plumbd's account, which is not root, can read that" '^644$' "$(stat -c %a state/restored.json)"
 run roll-back
 check "once" '^old$' "$(cat state/plumb.db)"
 # PROGRAM OF_WHAT: fails once for a first argument of that pattern, and works otherwise.
