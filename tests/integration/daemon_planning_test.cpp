@@ -21,7 +21,6 @@
 #include "tests/support/calibrate_room.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
-#include "web/model/reference.hpp"
 
 namespace plumb {
 namespace {
@@ -107,9 +106,9 @@ class DaemonPlanningTest : public ::testing::Test {
   }
   /// Plans the draft as it is, and has another person approve it.
   /// @param skin_of_images  It must be confirmed that this is the body's.
-  /// @param stated  Of its surface.
-  void Approve(const std::string& reference, bool skin_of_images = false,
-               const ReferencePlan& stated = {}) {
+  /// The last two are stated of its surface.
+  void Approve(const std::string& reference, bool skin_of_images = false, double clothing_mm = 0,
+               double ct_breathing_mm = 0) {
     const std::string path = "/api/v1/references/" + reference;
     const json draft = planner_->Get(path).json();
     json plan = {
@@ -123,8 +122,8 @@ class DaemonPlanningTest : public ::testing::Test {
     plan["isocentre_m"] = {0, 0, 0};
     plan["clothing_mm"] = 30.1;
     EXPECT_EQ(planner_->Put(path + "/plan", plan).status, 400) << "no clothing is so thick";
-    plan["clothing_mm"] = stated.clothing_mm;
-    plan["ct_breathing_mm"] = stated.ct_breathing_mm;
+    plan["clothing_mm"] = clothing_mm;
+    plan["ct_breathing_mm"] = ct_breathing_mm;
     ASSERT_EQ(planner_->Put(path + "/plan", plan).status, 200);
     const json planned = approver_->Get(path).json();
     EXPECT_EQ(planned["room"]["gantry_xy"], (json{0.0, 1.0})) << planned.dump();
@@ -250,7 +249,7 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path()))
     EXPECT_NE(entry.path().extension(), ".dcm") << "the files name the patient";
   EXPECT_FALSE(scene["planning"].contains("skin_threshold_hu")) << "a contour has none";
-  Approve(reference, /*skin_of_images=*/false, {.clothing_mm = 1, .ct_breathing_mm = 1.5});
+  Approve(reference, /*skin_of_images=*/false, /*clothing_mm=*/1, /*ct_breathing_mm=*/1.5);
 
   // The board lies there and no body: whatever is seen, the room is not calibrated.
   const json without = ScanFraction();

@@ -5,13 +5,15 @@
 export const kBounds = {
   shift_tolerance_mm: { min: 0.1, max: 50, step: 0.1 },
   rotation_tolerance_deg: { min: 0.1, max: 20, step: 0.1 },
-  clothing_mm: { min: 0, max: 30, step: 'any' },
-  ct_breathing_mm: { min: 0, max: 30, step: 'any' },
   auto_stop_s: { min: 1, max: 120, step: 1 },
   scan_limit_s: { min: 5, max: 600, step: 1 },
   retention_days: { min: 0, max: 36500, step: 1 },
   idle_logout_min: { min: 1, max: 240, step: 1 },
   breath_window_mm: { min: 1, max: 20, step: 0.5 },
+};
+/// Of what is stated of a planning CT's surface.
+export const kStated = {
+  clothing_mm: { min: 0, max: 30, step: 'any' }, ct_breathing_mm: { min: 0, max: 30, step: 'any' },
 };
 export const kFraction = { min: 1, max: 999, step: 1 };
 

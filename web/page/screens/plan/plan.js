@@ -7,7 +7,7 @@ import {
   select, signedTime, warn,
 } from '../../dom.js';
 import { guardLeaving } from '../../leave.js';
-import { kBounds, kReason } from '../../limits.js';
+import { kBounds, kReason, kStated } from '../../limits.js';
 import { compassOfPlan, marksNote } from '../../drawings/map_frame.js';
 import { loadMap } from '../../drawings/maps.js';
 import { doubtsOf, movableCuts, sideViews } from '../../drawings/side_view.js';
@@ -86,8 +86,8 @@ function controls(reference, model, plan, editable) {
   const couch = checkbox(text.couch, plan.couch_markers, { disabled: !editable });
   // What is stated of the surface of a planning CT; otherwise they are not shown, and not sent.
   const stated = reference.source !== 'planning_ct' ? {}
-    : Object.fromEntries(['clothing_mm', 'ct_breathing_mm'].map((name) =>
-      [name, number(plan[name] ?? 0, { required: true, ...kBounds[name] })]));
+    : Object.fromEntries(Object.entries(kStated).map(([name, limits]) =>
+      [name, number(plan[name] ?? 0, { required: true, ...limits })]));
   /// The field that makes the isocentre neither three numbers nor none.
   const wrongAxis = () => axes.find((axis) => axis.validity.badInput)
     ?? (axes.some((axis) => axis.value !== '') ? axes.find((axis) => axis.value === '')
