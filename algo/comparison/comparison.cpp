@@ -67,6 +67,11 @@ void CheckOptions(const CompareOptions& options) {
     if (!p.allFinite())
       throw std::invalid_argument("comparison: the region holds a value that is not finite");
   }
+  const StatedSurface stated = options.surface.value_or(StatedSurface{});
+  for (const double u95_m : {stated.clothing_u95_m, stated.ct_breathing_u95_m})
+    if (!(u95_m >= 0) || !std::isfinite(u95_m))
+      throw std::invalid_argument(fmt::format(
+          "comparison: what is stated of the surface must be 0 or more, got {}", u95_m));
   if (options.isocentre_m && !options.isocentre_m->allFinite())
     throw std::invalid_argument("comparison: the isocentre is not finite");
   for (const std::optional<Pose>& T :
@@ -107,6 +112,7 @@ class Comparer {
     result_.limits = options.limits;
     result_.marker_consensus = options.markers;
     result_.planning = reference.planning;
+    if (result_.planning && options.surface) result_.planning->surface = *options.surface;
     result_.reference_profile = reference.sensor_profile;
     result_.current_profile = current.sensor_profile;
     evidence_.reference_lost_s = reference.longest_lost_s;
@@ -213,6 +219,15 @@ class Comparer {
     }
     result_.warnings.insert(result_.warnings.begin(), warnings.begin(), warnings.end());
     evidence_.markers = placed.markers;
+    // The gates will see the markers of the scan that is placed last.
+    if (name && placed.alignment) {
+      const std::vector<Message> refusals =
+          RefusalsOfMarkers(placed.markers, options_.limits.min_shared_markers);
+      if (!refusals.empty()) {
+        Refuse(say::acceptance::ScanRefused(*name, refusals.front()));
+        return std::nullopt;
+      }
+    }
     if (placed.alignment) return placed;
     Refuse(name ? say::acceptance::ScanRefused(*name, placed.failure) : placed.failure);
     return std::nullopt;
@@ -224,8 +239,9 @@ class Comparer {
     std::optional<PlacedScan> placed = Place(current_, RoomOfCurrent());
     if (!placed) return false;
     planned_ = PlannedUncertainty{.scans = {placed->uncertainty},
-                                  .skin_u95_m = reference_.planning->skin_u95_m,
-                                  .slice_spacing_m = reference_.planning->slice_spacing_m};
+                                  .skin_u95_m = result_.planning->skin_u95_m,
+                                  .slice_spacing_m = result_.planning->slice_spacing_m,
+                                  .surface = result_.planning->surface};
     result_.alignment = std::move(placed->alignment);
     T_iec_reference_ = Pose::Identity();
     posture_ = reference_.planning->posture;
@@ -273,18 +289,18 @@ class Comparer {
   void ToMarkerFrame() {
     if (!result_.motion) return;
     BodyMotion& motion = *result_.motion;
-    const Pose& T_iec_reference = result_.alignment->T_reference_current;
-    const Pose T_reference_iec = T_iec_reference.inverse();
-    motion.T = T_reference_iec * motion.T * T_iec_reference;
-    motion.centroid_m = T_reference_iec * motion.centroid_m;
+    const Pose& T_iec_current = result_.alignment->T_reference_current;
+    const Pose T_current_iec = T_iec_current.inverse();
+    motion.T = T_current_iec * motion.T * T_iec_current;
+    motion.centroid_m = T_current_iec * motion.centroid_m;
     MotionUncertainty& parts = motion.uncertainty;
-    for (Matrix6d* part :
-         {&parts.surface, &parts.markers, &parts.distortion, &parts.scale, &parts.frame,
-          &parts.sensor, &parts.breathing, &parts.room, &parts.skin, &parts.slices})
-      *part = CovarianceTurned(*part, T_reference_iec.linear());
+    for (Matrix6d* part : {&parts.surface, &parts.markers, &parts.distortion, &parts.scale,
+                           &parts.frame, &parts.sensor, &parts.breathing, &parts.room, &parts.skin,
+                           &parts.slices, &parts.clothing, &parts.ct_breathing})
+      *part = CovarianceTurned(*part, T_current_iec.linear());
     motion.covariance = parts.Total();
     if (result_.correction)
-      result_.correction->isocentre_m = T_reference_iec * result_.correction->isocentre_m;
+      result_.correction->isocentre_m = T_current_iec * result_.correction->isocentre_m;
   }
 
   // From the current scene to the reference frame, including the correction of its scale in the
@@ -420,8 +436,8 @@ class Comparer {
                                   .in_region = on_region};
     if (options_.reference_room) return SensorsApart(input, reference_markers_);
     if (planned_) {
-      planned_->per_skin =
-          MotionPerSkin(reference_cloud_, on_region, motion.T, motion.T * motion.centroid_m);
+      planned_->feigned =
+          FeignedBy(reference_cloud_, on_region, motion.T, motion.T * motion.centroid_m);
       return SensorAlone(input);
     }
     const std::optional<SharedSensor> sensor = JoinSensors(input);

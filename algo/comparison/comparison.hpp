@@ -53,6 +53,8 @@ struct CompareOptions {
   /// Set: the reference was scanned in another room than the current scan, and no marker is shared.
   /// Each scan is placed in IEC axes by its own room, the current one by the fields above.
   std::optional<CalibratedRoom> reference_room;
+  /// Only for a reference from a planning CT; not set: as its scene states.
+  std::optional<StatedSurface> surface = {};
   /// With kCouch only the posture is reported, no shifts.
   MarkerKind marker_kind = MarkerKind::kRoom;
   PatientPosture posture = PatientPosture::kHeadFirstSupine;  ///< Decides the words left and right.

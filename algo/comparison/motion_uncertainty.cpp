@@ -109,6 +109,17 @@ Matrix6d FrameOf(const Alignment& alignment, const Pose& T_motion, const Eigen::
   return jacobian * frame * jacobian.transpose();
 }
 
+/// Of patterns that are independent of each other, each of that half-width.
+template <std::size_t N>
+Matrix6d OfPatterns(double u95_m, const std::array<Vector6d, N>& feigned) {
+  Matrix6d covariance = Matrix6d::Zero();
+  for (const Vector6d& per_metre : feigned) {
+    const Vector6d motion = u95_m / kCover95 * per_metre;
+    covariance += motion * motion.transpose();
+  }
+  return covariance;
+}
+
 // A reference from a planning CT or another room shares no error with the current scan: the frame
 // and the scale of each scan's map count in full, and what the files do not state comes on top.
 void AddPlanned(const UncertaintyInput& input, const Eigen::Vector3d& moved,
@@ -125,8 +136,10 @@ void AddPlanned(const UncertaintyInput& input, const Eigen::Vector3d& moved,
         CovarianceAbout(Isotropic(scan.room_u95_rad / kCover95, scan.room_u95_m / kCover95),
                         planned.isocentre_m, moved);
   }
-  const Vector6d skin = planned.skin_u95_m / kCover95 * planned.per_skin;
-  parts.skin = skin * skin.transpose();
+  const FeignedMotions& feigned = planned.feigned;
+  parts.skin = OfPatterns(planned.skin_u95_m, std::array{feigned.skin});
+  parts.clothing = OfPatterns(planned.surface.clothing_u95_m, feigned.clothing);
+  parts.ct_breathing = OfPatterns(planned.surface.ct_breathing_u95_m, feigned.breathing);
   Vector6d repeated = Vector6d::Zero();
   repeated.tail<3>() << kRepeatedShift_m, kRepeatedShift_m, kRepeatedHeight_m;
   parts.sensor += Matrix6d(repeated.cwiseAbs2().asDiagonal());
@@ -147,6 +160,8 @@ std::vector<std::pair<const char*, const Matrix6d*>> MotionUncertainty::Parts() 
     parts.emplace_back("skin", &skin);
     parts.emplace_back("slices", &slices);
   }
+  if (!clothing.isZero()) parts.emplace_back("clothing", &clothing);
+  if (!ct_breathing.isZero()) parts.emplace_back("ct_breathing", &ct_breathing);
   return parts;
 }
 
@@ -155,7 +170,7 @@ Message LargestCause(const MotionUncertainty& uncertainty, const Alignment& alig
   namespace words = say::comparison;
   const double off_m = std::sqrt(alignment.distortion.trace() / 3.0);
   const Message of_markers = words::CauseMarkers(off_m / kMillimetre);
-  const std::array<std::pair<const Matrix6d*, Message>, 10> causes = {{
+  const std::array<std::pair<const Matrix6d*, Message>, 12> causes = {{
       {&uncertainty.surface, words::CauseSurface()},
       {&uncertainty.markers, of_markers},
       {&uncertainty.distortion, of_markers},
@@ -166,6 +181,8 @@ Message LargestCause(const MotionUncertainty& uncertainty, const Alignment& alig
       {&uncertainty.room, words::CauseRoom()},
       {&uncertainty.skin, words::CauseSkin()},
       {&uncertainty.slices, words::CauseSlices()},
+      {&uncertainty.clothing, words::CauseClothing()},
+      {&uncertainty.ct_breathing, words::CauseCtBreathing()},
   }};
   const auto size = [&](const auto& cause) {
     return of_turns ? cause.first->template topLeftCorner<3, 3>().trace()

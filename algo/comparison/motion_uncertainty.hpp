@@ -2,6 +2,7 @@
 // Uncertainty of a body motion: one covariance for each cause, and their sum.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "algo/base/pose.hpp"
 #include "algo/comparison/scene_alignment.hpp"
 #include "algo/sensor_model/depth_sensor.hpp"
+#include "algo/types/planning_source.hpp"
 
 namespace plumb {
 
@@ -32,12 +34,14 @@ struct MotionUncertainty {
   /// The calibration of the room, for a planning CT and a reference of another room; for a planning
   /// CT also the threshold by which the skin was found and the spacing of the slices.
   Matrix6d room = Matrix6d::Zero(), skin = Matrix6d::Zero(), slices = Matrix6d::Zero();
+  /// What is stated of a planning CT: what is worn, and its breath against the treatment's.
+  Matrix6d clothing = Matrix6d::Zero(), ct_breathing = Matrix6d::Zero();
 
   [[nodiscard]] Matrix6d Total() const {
     return surface + markers + distortion + scale + frame + sensor + breathing + room + skin +
-           slices;
+           slices + clothing + ct_breathing;
   }
-  /// The causes with their names, in a fixed order; the last three only where they take part.
+  /// The causes with their names, in a fixed order; the last five only where they take part.
   [[nodiscard]] std::vector<std::pair<const char*, const Matrix6d*>> Parts() const;
 };
 
@@ -49,14 +53,23 @@ struct PlaceUncertainty {
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();  ///< That marker in the reference frame.
 };
 
+/// The motions that a surface that lies elsewhere by up to 1 m would feign: each a rotation vector
+/// and a translation about the moved centroid, of a pattern by itself.
+struct FeignedMotions {
+  Vector6d skin = Vector6d::Zero();  ///< Farther out everywhere.
+  /// Farther out everywhere; tilted as by that over one half of it, along and across the couch.
+  std::array<Vector6d, 3> clothing = {Vector6d::Zero(), Vector6d::Zero(), Vector6d::Zero()};
+  /// Higher everywhere; tilted as by that over one half of it, along the couch.
+  std::array<Vector6d, 2> breathing = {Vector6d::Zero(), Vector6d::Zero()};
+};
+
 /// What is added where scans are joined by calibrations of rooms.
 struct PlannedUncertainty {
   std::vector<PlaceUncertainty> scans;  ///< One for a planning CT, two for two rooms.
   Eigen::Vector3d isocentre_m = Eigen::Vector3d::Zero();  ///< Of the rooms, reference frame.
-  /// The motion that a skin farther out by 1 m would feign: (rotation vector, translation) about
-  /// the moved centroid.
-  Vector6d per_skin = Vector6d::Zero();
+  FeignedMotions feigned = {};
   double skin_u95_m = 0.0, slice_spacing_m = 0.0;
+  StatedSurface surface = {};
 };
 
 /// Input of Uncertainty(). Borrowed for the call.

@@ -5,9 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-
 #include "algo/base/units.hpp"
+#include "algo/motion/surface_patterns.hpp"
 #include "words/comparison.hpp"
 
 namespace plumb {
@@ -116,24 +115,12 @@ Alignment AlignAcrossRooms(const Alignment& reference, const Alignment& current)
   return across;
 }
 
-Vector6d MotionPerSkin(const PointCloud& cloud,
-                       const std::function<bool(const Eigen::Vector3d&)>& in_region,
-                       const Pose& T_motion, const Eigen::Vector3d& moved_m) {
-  constexpr std::size_t kStride = 7;
-  Matrix6d information = Matrix6d::Zero();
-  Vector6d right = Vector6d::Zero();
-  for (std::size_t i = 0; i < cloud.size(); i += kStride) {
-    const Eigen::Vector3d p = cloud.points[i].cast<double>();
-    if (!in_region(p)) continue;
-    const Eigen::Vector3d normal = T_motion.linear() * cloud.normals[i].cast<double>();
-    Vector6d gradient;
-    gradient << (T_motion * p - moved_m).cross(normal), normal;
-    information += gradient * gradient.transpose();
-    right += gradient;
-  }
-  // Directions that the surface does not determine stay where they are.
-  information += 1e-6 * (1.0 + information.trace()) * Matrix6d::Identity();
-  return information.ldlt().solve(right);
+FeignedMotions FeignedBy(const PointCloud& cloud,
+                         const std::function<bool(const Eigen::Vector3d&)>& in_region,
+                         const Pose& T_motion, const Eigen::Vector3d& moved_m) {
+  const auto [out, out_along, out_across, up, up_along] =
+      MotionsOfPatterns(cloud, in_region, T_motion, moved_m);
+  return {.skin = out, .clothing = {out, out_along, out_across}, .breathing = {up, up_along}};
 }
 
 }  // namespace plumb

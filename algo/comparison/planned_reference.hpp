@@ -40,11 +40,11 @@ struct PlacedScan {
 /// @param reference, current  Both with an alignment.
 [[nodiscard]] Alignment AlignAcrossRooms(const Alignment& reference, const Alignment& current);
 
-/// PlannedUncertainty::per_skin of a surface.
-/// @param cloud  With normals, in the reference frame.
+/// What a surface that lies elsewhere than the skin of a planning CT would feign.
+/// @param cloud  With normals, in IEC axes.
 /// @param T_motion  p_current = T_motion * p_reference; `moved_m` is the moved centroid.
-[[nodiscard]] Vector6d MotionPerSkin(const PointCloud& cloud,
-                                     const std::function<bool(const Eigen::Vector3d&)>& in_region,
-                                     const Pose& T_motion, const Eigen::Vector3d& moved_m);
+[[nodiscard]] FeignedMotions FeignedBy(const PointCloud& cloud,
+                                       const std::function<bool(const Eigen::Vector3d&)>& in_region,
+                                       const Pose& T_motion, const Eigen::Vector3d& moved_m);
 
 }  // namespace plumb

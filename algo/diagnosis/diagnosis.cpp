@@ -48,22 +48,22 @@ constexpr double kChi2ToReport = 2.0, kChi2ToRefuse = 4.0;
 constexpr double kChi2OfAssumedToRefuse = 5.5;
 // A result that rests on an assumed camera is refused if its lengths are off by more than this.
 constexpr double kAssumedScale = 0.03;
-// Units of depth for a metre that recordings have, beside the usual 1000: 5000 (TUM), 10000 and
-// 4000 (RealSense), 256 (KITTI), 100.
-constexpr std::array kDepthUnits = {5000.0, 10000.0, 4000.0, 256.0, 100.0};
+// Units of depth for a metre that recordings have: the usual 1000, 5000 (TUM), 10000 and 4000
+// (RealSense), 256 (KITTI), 100.
+constexpr std::array kDepthUnits = {1000.0, 5000.0, 10000.0, 4000.0, 256.0, 100.0};
 
 // Whether the factor is one between millimetres and another unit of depth.
 bool IsFactorOfUnits(double ratio) {
   return std::ranges::any_of(kDepthUnits, [&](double unit) {
     const double factor = unit / 1000;
-    return std::abs(ratio / factor - 1) < 0.5 * kSameSize ||
-           std::abs(ratio * factor - 1) < 0.5 * kSameSize;
+    return unit != 1000 && (std::abs(ratio / factor - 1) < 0.5 * kSameSize ||
+                            std::abs(ratio * factor - 1) < 0.5 * kSameSize);
   });
 }
 
 // The unit in use that is nearest to a measured one, where one is near; that itself otherwise.
 double NearestUnits(double units_per_metre) {
-  for (const double unit : {1000.0, 5000.0, 10000.0, 4000.0, 256.0, 100.0})
+  for (const double unit : kDepthUnits)
     if (std::abs(units_per_metre / unit - 1) < 0.5 * kSameSize) return unit;
   return units_per_metre;
 }

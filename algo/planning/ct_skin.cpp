@@ -222,6 +222,7 @@ void CtSkin::Add(const CtImage& image, const std::string& name) {
   if (!places_.insert(std::llround(kPlacesPerMillimetre * image.origin_mm.z())).second)
     throw DataError(say::planning::ImageTwice(name, image.origin_mm.z()));
   series_uid_ = image.series_uid;
+  instance_uids_.insert(image.file.instance_uid);
   position_ = image.position;
   file_ = image.file;
   roi_.frame_of_reference_uid = image.file.frame_of_reference_uid;
@@ -256,6 +257,16 @@ void CtSkin::RequireWhole() const {
   throw DataError(say::planning::ImagesMissing(
       static_cast<double>(*std::next(places_.begin(), found)) / kPlacesPerMillimetre,
       steps[static_cast<std::size_t>(found)], usual));
+}
+
+bool CtSkin::RequireNamed(const StructureSet& structures) const {
+  const auto found = structures.image_uids.find(series_uid_);
+  if (found == structures.image_uids.end() || found->second.empty()) return false;
+  const std::set<std::string> named(found->second.begin(), found->second.end());
+  const auto missing = std::ranges::count_if(
+      named, [this](const std::string& uid) { return !instance_uids_.contains(uid); });
+  if (missing > 0) throw DataError(say::planning::ImagesNamedMissing(std::ssize(named), missing));
+  return true;
 }
 
 double CtSkin::Steepness() const {

@@ -35,6 +35,10 @@ class CtSkin {
   /// @throws DataError if one is missing between others: the series was not sent as a whole.
   void RequireWhole() const;
 
+  /// @throws DataError if one that the structure set names is missing, which may be at an end.
+  /// @return  Whether it names any of this series.
+  bool RequireNamed(const StructureSet& structures) const;
+
   [[nodiscard]] std::size_t num_images() const { return places_.size(); }
   [[nodiscard]] double threshold_hu() const { return threshold_hu_; }
   /// Its name states the threshold.
@@ -57,6 +61,7 @@ class CtSkin {
   std::vector<std::vector<Eigen::Vector3d>> cuts_mm_;
   PlanningFile file_;
   std::string series_uid_, position_;
+  std::set<std::string> instance_uids_;
   double pixel_mm_ = 0.0;
   std::size_t num_points_ = 0;
   std::set<std::int64_t> places_;  // along the body, in hundredths of a millimetre

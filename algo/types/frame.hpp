@@ -40,6 +40,7 @@ struct StreamInfo {
   UsableDepth usable_depth = {};    ///< Likewise.
   bool intrinsics_assumed = false;  ///< The recording has no calibration; nominal values are used.
   bool depth_unit_assumed = false;  ///< Nothing states the unit of the depth images.
+  bool depth_unit_open = false;     ///< Likewise, and another may be given to the reader.
   double depth_units_per_metre = 0.0;  ///< The unit that was taken; 0: the source has metres.
   /// Depth is not registered to colour, nothing says where its camera is, and the images do not
   /// show it: the frames have depth as if it were registered.

@@ -14,6 +14,18 @@
 
 namespace plumb {
 
+/// How far the surface that a camera sees may lie from the skin of the CT, as a person states it:
+/// half-widths of 95 % intervals. Zero: bare, and in the same breath.
+struct StatedSurface {
+  /// Along the skin's normal, by what is worn or lies there at the CT or at the treatment.
+  double clothing_u95_m = 0.0;
+  /// In height, by how full the lungs were at the CT and are at the treatment.
+  double ct_breathing_u95_m = 0.0;
+};
+
+/// The most that can be stated, of each.
+inline constexpr double kMostStated_m = 30 * kMillimetre;
+
 /// Of a scene in IEC axes. No name and no identifier of the patient.
 struct PlanningSource {
   std::string roi;  ///< Name of the contour that is the surface.
@@ -32,6 +44,7 @@ struct PlanningSource {
   double skin_u95_m = 1 * kMillimetre;
   /// Hounsfield units by which the skin was found in CT images; not set: a contour is the surface.
   std::optional<double> skin_threshold_hu = {};
+  StatedSurface surface = {};
 };
 
 }  // namespace plumb

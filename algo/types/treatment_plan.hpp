@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,8 @@ struct PlannedRoi {
 struct StructureSet {
   PlanningFile file;
   std::vector<PlannedRoi> rois;
+  /// The instances of the images on which it was drawn, by series, where it names them.
+  std::map<std::string, std::vector<std::string>> image_uids = {};
 };
 
 struct PlannedBeam {

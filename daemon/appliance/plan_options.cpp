@@ -8,7 +8,9 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
+#include "web/model/limits.hpp"
 #include "words/scan.hpp"
+#include "words/store.hpp"
 
 namespace plumb {
 namespace {
@@ -23,6 +25,13 @@ PatientPosture PostureOf(std::string_view name) {
 double CheckedTolerance(std::string_view field, double value) {
   if (!(std::isfinite(value) && value > 0)) Fail(say::scan::PlanTolerance(field, value));
   return value;
+}
+
+double CheckedStated_m(std::string_view field, double value_mm) {
+  const Range& range = kStatedSurface_mm.stored;
+  if (!range.Holds(value_mm))
+    Fail(say::store::ValueOutOfRange(field, value_mm, range.least, range.most));
+  return value_mm * kMillimetre;
 }
 
 template <std::size_t N>
@@ -57,6 +66,9 @@ CompareOptions CompareOptionsFor(const ReferencePlan& plan, const CompareOptions
   }
   options.marker_kind = plan.couch_markers ? MarkerKind::kCouch : MarkerKind::kRoom;
   options.posture = PostureOf(plan.posture);
+  options.surface = {
+      .clothing_u95_m = CheckedStated_m("clothing_mm", plan.clothing_mm),
+      .ct_breathing_u95_m = CheckedStated_m("ct_breathing_mm", plan.ct_breathing_mm)};
   options.limits.shift_tolerance_m =
       CheckedTolerance("shift_tolerance_mm", plan.tolerance.shift_mm) * kMillimetre;
   options.limits.rotation_tolerance_rad =

@@ -3,15 +3,18 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
@@ -76,11 +79,29 @@ std::unique_ptr<Database> OpenSource(const fs::path& state, bool is_backup) {
   return database;
 }
 
+/// The patient whose code it is but for hyphens and capitals; of several, which units before 0.3.0
+/// took, the one who has exactly this code.
+/// @throws DataError if there are several and none has exactly this code
 std::optional<std::int64_t> FindCode(Database& database, const std::string& code) {
-  return database.FirstInteger(
-      "SELECT id FROM patients WHERE replace(code, '-', '') = replace(?, '-', '') COLLATE NOCASE "
-      "AND id > 0",
+  struct Row {
+    std::int64_t id = 0;
+    std::string code;
+  };
+  const std::vector<Row> rows = database.All(
+      "SELECT id, code FROM patients WHERE replace(code, '-', '') = replace(?, '-', '') COLLATE "
+      "NOCASE AND id > 0 ORDER BY id",
+      [](const Statement& row) {
+        return Row{row.Integer(0), row.Text(1)};
+      },
       code);
+  const auto exact = std::ranges::find_if(
+      rows, [&](const Row& row) { return AsciiLower(row.code) == AsciiLower(code); });
+  if (exact != rows.end()) return exact->id;
+  if (rows.empty()) return std::nullopt;
+  if (rows.size() > 1)
+    throw DataError(
+        say::backup::ExportSeveralPatients(code.substr(0, kMaxName), rows[0].code, rows[1].code));
+  return rows.front().id;
 }
 
 /// The record of an earlier import; null if the patient was created here.

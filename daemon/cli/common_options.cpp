@@ -26,7 +26,7 @@ namespace {
 template <typename Source, typename Open>
 std::unique_ptr<FrameSource> WithDepthUnit(std::unique_ptr<Source> source,
                                            RecordingDefaults& defaults, const Open& open) {
-  if (!source->info().depth_unit_assumed) return source;
+  if (!source->info().depth_unit_open) return source;
   try {
     defaults.depth_scale = DepthUnitByMarkers(*source);
   } catch (const DataError&) {

@@ -18,6 +18,7 @@
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/planning/planning_import.hpp"
 #include "words/cli.hpp"
+#include "words/web.hpp"
 
 namespace plumb {
 namespace {
@@ -28,6 +29,7 @@ struct ImportDicomArguments {
   double threshold_hu = kSkinThreshold_hu;
   std::filesystem::path out;
   PlanningChoice choice;
+  double clothing_mm = 0.0, ct_breathing_mm = 0.0;
   bool json = false;
 };
 
@@ -60,6 +62,11 @@ std::string TextOf(const Scene& scene, const ImportDicomArguments& options,
   text += context.Said(
               say::cli::PlanBox(BoxOf(scene), cells, scene.height_map->grid.step / kMillimetre)) +
           "\n";
+  const auto& [clothing_u95_m, ct_breathing_u95_m] = planning.surface;
+  if (clothing_u95_m > 0 || ct_breathing_u95_m > 0)
+    text += context.Said(say::cli::SurfaceStated(clothing_u95_m / kMillimetre,
+                                                 ct_breathing_u95_m / kMillimetre)) +
+            "\n";
   for (const Message& warning : scene.warnings)
     text += fmt::format("  {} {}\n", LeftAligned(context.Said(say::cli::WarningLabel()), 10),
                         context.Said(warning));
@@ -79,13 +86,24 @@ Scene Read(const ImportDicomArguments& options, const std::stop_token& stop, Pro
   return ReadPlanningWithImages(files, images, options.choice).scene;
 }
 
+/// Also refuses what is not a number.
+double Stated_m(const char* option, double value_mm) {
+  constexpr double kMost_mm = kMostStated_m / kMillimetre;
+  if (value_mm >= 0 && value_mm <= kMost_mm) return value_mm * kMillimetre;
+  throw InvalidRequest(say::web::FieldRange(option, 0, kMost_mm, value_mm));
+}
+
 int Run(const ImportDicomArguments& options, const CommandContext& context) {
+  const StatedSurface stated{
+      .clothing_u95_m = Stated_m("--clothing-mm", options.clothing_mm),
+      .ct_breathing_u95_m = Stated_m("--ct-breathing-mm", options.ct_breathing_mm)};
   if (options.files.size() < 2 && options.images.empty())
     throw InvalidRequest(say::cli::StructuresOrImages());
   { const AtomicFolder check(options.out, SceneOutput()); }  // rejects a bad place before the work
   Progress progress(context.language);
   progress.Update(say::cli::ReadingDicom(), 0.1);
   Scene scene = Read(options, context.stop, progress);
+  scene.planning->surface = stated;
   CompareWithEarlierPlan(options.out, scene);
   progress.Update(say::cli::Writing(), 0.9);
   WriteScene(scene, options.out, context.stop);
@@ -124,6 +142,16 @@ Command AddImportDicom(CLI::App& app) {
   app.add_option("--isocentre-of", options->choice.beam,
                  "Name or number of the beam whose isocentre counts, where they differ")
       ->type_name("BEAM");
+  app.add_option("--clothing-mm", options->clothing_mm,
+                 "How far the surface that the camera sees may lie from the skin of the CT along "
+                 "its normal, by what is worn at either: half-width of the 95 % interval, 0 to 30")
+      ->capture_default_str()
+      ->type_name("MM");
+  app.add_option("--ct-breathing-mm", options->ct_breathing_mm,
+                 "How much higher or lower chest and belly may be than in the breath of the CT: "
+                 "half-width of the 95 % interval, 0 to 30")
+      ->capture_default_str()
+      ->type_name("MM");
   app.add_flag("--json", options->json, "Print scene.json on the standard output");
   return [options](const CommandContext& context) { return Run(*options, context); };
 }

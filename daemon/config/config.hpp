@@ -160,7 +160,6 @@ enum class ConfigUse { kCommandLine, kAppliance, kSimulatedAppliance };
 ///                    keep_recordings, code_check_character, warm_up_min, session_idle_min,
 ///                    room_max_age_days
 ///     [sensor]       driver, socket, library, exposure_us
-
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low
 ///     [monitor]      gate_chip, gate_line, gate_active_low

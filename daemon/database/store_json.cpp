@@ -127,6 +127,9 @@ std::string PlanJson(const ReferencePlan& plan) {
                      {"posture", plan.posture},
                      {"couch_markers", plan.couch_markers}};
   if (plan.isocentre_m) json["isocentre_m"] = *plan.isocentre_m;
+  // Only where they are stated: what was signed before keeps its digest.
+  if (plan.clothing_mm != 0.0) json["clothing_mm"] = plan.clothing_mm;
+  if (plan.ct_breathing_mm != 0.0) json["ct_breathing_mm"] = plan.ct_breathing_mm;
   return json.dump();
 }
 
@@ -144,6 +147,9 @@ ReferencePlan ParsePlan(const std::string& text) {
   plan.couch_markers = stored.Flag("couch_markers");
   if (const StoredJson* isocentre = stored.Find("isocentre_m"))
     plan.isocentre_m = stored.Point<3>("isocentre_m", *isocentre);
+  for (const auto& [key, value] :
+       {std::pair{"clothing_mm", &plan.clothing_mm}, {"ct_breathing_mm", &plan.ct_breathing_mm}})
+    if (stored.Find(key) != nullptr) *value = stored.Number(key, kStatedSurface_mm.stored);
   return plan;
 }
 

@@ -58,6 +58,8 @@ struct StoredFields<PlanningSource> {
     visit("support_m", self.support_m, Bounds{-10, 10});
     visit("skin_u95_m", self.skin_u95_m, Bounds{1e-6, 0.1});
     visit.IfSet("skin_threshold_hu", self.skin_threshold_hu, Bounds{-2000, 2000});
+    visit.OrAsIs("clothing_u95_m", self.surface.clothing_u95_m, Bounds{0, kMostStated_m});
+    visit.OrAsIs("ct_breathing_u95_m", self.surface.ct_breathing_u95_m, Bounds{0, kMostStated_m});
   }
 };
 

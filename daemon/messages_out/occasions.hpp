@@ -50,8 +50,8 @@ struct OccasionRules {
 
 /// Decides which messages are due: one when an event begins, and one a day for as long as it lasts.
 /// A new event of the same kind waits until an hour after the last message of that kind, so that a
-/// condition that comes and goes does not flood the mailbox. An event whose last message
-/// was given up by every way counts as new.
+/// condition that comes and goes does not flood the mailbox. An event whose last message was given
+/// up by every way counts as new.
 class OccasionMemory {
  public:
   using Time = std::chrono::steady_clock::time_point;

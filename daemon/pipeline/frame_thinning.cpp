@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "words/progress.hpp"
+#include "words/reconstruction.hpp"
 
 namespace plumb {
 
@@ -114,9 +115,12 @@ bool ThinnedFeed::Takes(double stamp_s, double arrived_s) {
 
 int ThinnedFeed::TakeDropped() { return feed_.TakeDropped() + std::exchange(num_unreported_, 0); }
 
-Message ThinnedFeed::Warning() const {
-  if (num_left_out_ == 0) return {};
-  return say::progress::FramesLeftOut(num_left_out_, num_left_out_ + num_taken_);
+void ThinnedFeed::WarnIn(Scene& scene) const {
+  if (num_left_out_ == 0) return;
+  if (scene.frames_dropped == num_left_out_)
+    std::erase_if(scene.warnings,
+                  [](const Message& said) { return said.Is(say::reconstruction::kFramesDropped); });
+  scene.warnings.push_back(say::progress::FramesLeftOut(num_left_out_, num_left_out_ + num_taken_));
 }
 
 }  // namespace plumb

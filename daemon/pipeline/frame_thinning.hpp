@@ -6,7 +6,7 @@
 #include <optional>
 #include <stop_token>
 
-#include "algo/base/message.hpp"
+#include "algo/types/scene.hpp"
 #include "daemon/pipeline/frame_feed.hpp"
 
 namespace plumb {
@@ -81,8 +81,9 @@ class ThinnedFeed : public FrameFeed {
   [[nodiscard]] std::optional<double> last_frame_s() const override { return feed_.last_frame_s(); }
 
   [[nodiscard]] int stride() const { return stride_; }
-  /// A sentence for the scene's warnings; empty if no frame was skipped.
-  [[nodiscard]] Message Warning() const;
+  /// Adds to the scene's warnings that frames were skipped; in place of that they were dropped, if
+  /// no others were.
+  void WarnIn(Scene& scene) const;
 
  private:
   [[nodiscard]] bool Takes(double stamp_s, double arrived_s);

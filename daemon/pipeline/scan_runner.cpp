@@ -165,8 +165,7 @@ Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::
   ThinnedFeed thinned(reader);
   Scene scene = RunScan(thinned, source.info(), options.reconstructor, stop, progress);
   RefuseUnfitCameras(scene);
-  if (const Message warning = thinned.Warning(); !warning.empty())
-    scene.warnings.push_back(warning);
+  thinned.WarnIn(scene);
   return scene;
 }
 

@@ -45,9 +45,12 @@ class Rows {
 };
 
 void AddComparisonTo(Rows& rows, const StoredResult& result) {
-  if (const auto& planned = result.compared_with)
+  if (const auto& planned = result.compared_with) {
     rows.Add(say::text_report::Reference(), ComparedWith(*planned),
              planned->skin_threshold_hu.has_value());
+    if (Message stated = SurfaceStated(*planned); !stated.empty())
+      rows.Add(say::text_report::Surface(), std::move(stated));
+  }
   if (const auto& alignment = result.alignment) {
     rows.Add(say::result::QualityMarkers(),
              say::result::QualityCount(static_cast<std::int64_t>(alignment->markers_used.size())));

@@ -122,8 +122,11 @@ void Report::Numbers(const std::vector<ShownRow>& rows, Verdict verdict) {
 
 void Report::Trust(const StoredResult& result) {
   Line("\n" + Said(say::text_report::Quality()) + "\n");
-  if (const auto& planned = result.compared_with)
+  if (const auto& planned = result.compared_with) {
     Row(say::text_report::Reference(), ComparedWith(*planned));
+    if (const Message stated = SurfaceStated(*planned); !stated.empty())
+      Row(say::text_report::Surface(), stated);
+  }
   if (const auto& alignment = result.alignment) {
     Row(say::text_report::Markers(), MarkersThatPlace(*alignment));
     for (const auto& [id, residual_m] : alignment->markers_rejected)
@@ -154,6 +157,11 @@ Message ComparedWith(const StoredReference& planned) {
                                         planned.posture);
   return say::text_report::PlanningCtImages(*planned.skin_threshold_hu, planned.skin_u95_mm,
                                             planned.plan_label, planned.plan_date, planned.posture);
+}
+
+Message SurfaceStated(const StoredReference& planned) {
+  if (planned.clothing_mm == 0 && planned.ct_breathing_mm == 0) return {};
+  return say::text_report::SurfaceStated(planned.clothing_mm, planned.ct_breathing_mm);
 }
 
 Message MarkersThatPlace(const StoredAlignment& alignment) {

@@ -20,6 +20,9 @@ namespace plumb {
 /// What the reference was: a contour of a planning CT, or the skin of its images.
 [[nodiscard]] Message ComparedWith(const StoredReference& planned);
 
+/// What a person has stated of its surface; empty: nothing.
+[[nodiscard]] Message SurfaceStated(const StoredReference& planned);
+
 /// Which markers place the scan, and how well they fit where they were fitted.
 [[nodiscard]] Message MarkersThatPlace(const StoredAlignment& alignment);
 

@@ -142,7 +142,9 @@ StoredReference Stored(const PlanningSource& planning) {
           .isocentre_lps_mm = planning.isocentre_mm,
           .skin_u95_mm = planning.skin_u95_m / kMillimetre,
           .slice_spacing_mm = planning.slice_spacing_m / kMillimetre,
-          .skin_threshold_hu = planning.skin_threshold_hu};
+          .skin_threshold_hu = planning.skin_threshold_hu,
+          .clothing_mm = planning.surface.clothing_u95_m / kMillimetre,
+          .ct_breathing_mm = planning.surface.ct_breathing_u95_m / kMillimetre};
 }
 
 void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {

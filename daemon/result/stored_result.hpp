@@ -217,6 +217,7 @@ struct StoredReference {
   double skin_u95_mm = 0.0, slice_spacing_mm = 0.0;
   /// Of CT images; not set: a contour was the surface.
   std::optional<double> skin_threshold_hu = {};
+  double clothing_mm = 0.0, ct_breathing_mm = 0.0;  ///< As stated: see StatedSurface.
 
   static void Fields(auto& self, const auto& visit) {
     visit("source", self.source);
@@ -231,6 +232,8 @@ struct StoredReference {
     visit("skin_u95_mm", self.skin_u95_mm);
     visit("slice_spacing_mm", self.slice_spacing_mm);
     visit.IfSet("skin_threshold_hu", self.skin_threshold_hu);
+    visit.OrAsIs("clothing_mm", self.clothing_mm);
+    visit.OrAsIs("ct_breathing_mm", self.ct_breathing_mm);
   }
 };
 
@@ -292,13 +295,13 @@ struct StoredResult {
 ///         a judgement contradicts the numbers.
 [[nodiscard]] StoredResult ParseResult(std::string_view text, const std::string& name);
 
-/// A correction alone, as the control socket sends it.
 /// Whether the correction is stated about the middle of the region, as where no isocentre is known.
 [[nodiscard]] inline bool IsAboutMiddle(const StoredResult& result) {
   return result.motion && result.correction &&
          result.correction->isocentre == result.motion->centroid_m;
 }
 
+/// A correction alone, as the control socket sends it.
 [[nodiscard]] nlohmann::ordered_json CorrectionJson(const StoredCorrection& correction);
 /// @throws DataError
 [[nodiscard]] StoredCorrection ParseCorrection(const nlohmann::ordered_json& json);

@@ -237,13 +237,7 @@ Scene ScanSession::Track(const std::stop_token& stop) {
     Scene scene = RunScan(feed, job_.info, job_.reconstructor, stop,
                           [this](const ScanProgress& progress) { OnProgress(progress); });
     if (recording) recording->Complete(stop);
-    if (const Message warning = thinned.Warning(); !warning.empty()) {
-      // It says of the same frames also how they were chosen, and what to do.
-      std::erase_if(scene.warnings, [](const Message& said) {
-        return said.Is(say::reconstruction::kFramesDropped);
-      });
-      scene.warnings.push_back(warning);
-    }
+    thinned.WarnIn(scene);
     return scene;
   } catch (...) {
     if (recording && !stop.stop_requested()) KeepFailed(*recording, stop);

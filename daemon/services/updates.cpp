@@ -83,6 +83,7 @@ void Updates::WatchChannel() {
                      .serial = options_.serial,
                      .version = VersionOfSystem(options_.release, std::string(Version())),
                      .max_bytes = static_cast<std::uint64_t>(config.max_bundle_mb) << 20,
+                     .every = options_.look_every,
                      .again_after = options_.look_again_after,
                      .first_after = options_.first_look_after,
                      .may_fetch = [this] { return updater_.is_free(); }},
@@ -105,7 +106,7 @@ UpdateStatus Updates::GetUpdate() {
   UpdateStatus status = updater_.status();
   status.channel_failure = look_.failure;
   const bool is_here = std::ranges::find(status.bundles, look_.name) != status.bundles.end();
-  // What was installed just now may be what is offered.
+  // The offered bundle may be the one that was just installed.
   if (is_here && !status.restart_needed)
     status.offered = say::channel::IsOffered(look_.version, look_.name);
   return status;
@@ -211,9 +212,8 @@ void Updates::OnCopied(const Actor& actor, const std::string& name,
   copying_ = false;
   const Done logged = Logged(actor, "update.install", name, done);
   if (copy.empty()) return logged(failure);
-  const auto drop = [copy, logged](const Change& why) {
-    std::error_code ignored;
-    std::filesystem::remove(copy, ignored);
+  const auto drop = [this, copy, logged](const Change& why) {
+    updater_.DropCopy(copy);
     logged(why);
   };
   // A scan may have started during the copying.

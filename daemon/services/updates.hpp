@@ -27,6 +27,7 @@ struct UpdatesOptions {
   std::filesystem::path sticks = "/run/plumb-stick";  ///< See UsbSticks.
   /// Looks at the channel: see ChannelOptions.
   std::chrono::milliseconds first_look_after = std::chrono::minutes(5);
+  std::chrono::milliseconds look_every = std::chrono::hours(24);
   std::chrono::milliseconds look_again_after = std::chrono::hours(1);
   std::string serial = {};  ///< Of this unit: its place in the fleet; empty: the host's name.
   std::filesystem::path release = "/etc/plumb-release";  ///< See VersionOfSystem().

@@ -155,7 +155,7 @@ class WebPatients final : public web::PatientService {
     if (session_.id() != session_id) return done(AnswerOf(say::scan::SessionClosed()));
     const std::optional<Patient> patient = FindPatient(session_.patient_id());
     if (!patient) return done(Refused(ChangeResult::kNotFound, say::store::NoPatient()));
-    if (PlainPatientCode(code) != PlainPatientCode(patient->code))
+    if (PlainCode(code) != PlainCode(patient->code))
       return done(AnswerOf(say::scan::OtherWristband(patient->code)));
     session_.ConfirmWristband(std::chrono::steady_clock::now());
     notices_.TellPage(web::EventKind::kStatus);

@@ -146,6 +146,8 @@ class WebReferences final : public web::ReferenceService {
       const bool is_same = plan.posture == Name(planning->posture) && !plan.couch_markers &&
                            plan.isocentre_m == std::array<double, 3>{0, 0, 0};
       if (!is_same) return done(Refused(ChangeResult::kInvalid, say::scan::PlanningIsFixed()));
+    } else if (plan.clothing_mm != 0 || plan.ct_breathing_mm != 0) {
+      return done(Refused(ChangeResult::kInvalid, say::scan::SurfaceOfPlanning()));
     }
     store_.Write(&Store::references, std::move(done), [=](ReferenceStore& references) {
       const std::string planned = references.Plan(actor, id, revision, plan);

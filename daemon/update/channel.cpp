@@ -95,11 +95,12 @@ std::size_t TakePart(char* from, std::size_t size, std::size_t count, void* into
 
 /// Parts of files that the index no longer names.
 void RemoveOtherParts(const fs::path& folder, const fs::path& kept) {
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with(".channel-") && name.ends_with(kPartEnd) && entry.path() != kept)
-      fs::remove(entry.path(), ignored);
+  std::error_code error, ignored;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with(".channel-") && name.ends_with(kPartEnd) && entry->path() != kept)
+      fs::remove(entry->path(), ignored);
   }
 }
 
@@ -140,7 +141,7 @@ void FetchRest(const ChannelOptions& options, const ChannelBundle& bundle, const
                                            static_cast<std::int64_t>(bundle.bytes)));
 }
 
-/// Why nothing is to be fetched; nothing: it is.
+/// A reason not to fetch a bundle.
 enum class Found { kHere, kRemovedByPerson };
 
 /// @throws DataError if another file has the name, IoError if it cannot be read

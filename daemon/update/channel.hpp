@@ -26,7 +26,7 @@ struct ChannelOptions {
   std::filesystem::path folder = {};   ///< Of the bundles.
   std::filesystem::path state = {};    ///< Of what is remembered: see ChannelMemory.
   std::string serial = {};             ///< Of this unit.
-  std::string version = {};            ///< That runs.
+  std::string version = {};            ///< The one that runs.
   std::uint64_t max_bytes = std::uint64_t{2} << 30;  ///< Limit for one bundle.
   std::chrono::milliseconds every = std::chrono::hours(24);
   std::chrono::milliseconds again_after = std::chrono::hours(1);  ///< After a failure.

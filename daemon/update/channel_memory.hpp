@@ -36,7 +36,7 @@ struct ChannelMemory {
   std::vector<FetchedBundle> fetched = {};
 };
 
-/// Of a channel whose index is signed by that key: another key, another order of numbers.
+/// The name under which a channel's numbers are kept: an index that another key signs counts anew.
 [[nodiscard]] std::string NameOfOrder(const std::string& channel, const std::string& key);
 
 /// Empty where there is no file yet.

@@ -216,7 +216,8 @@ struct Updater::Impl {
     return last && is_there ? WhyRolledBack(*last, slot, options.boot, options.version) : Message();
   }
 
-  /// Whether it is done or why not, on the loop once the work is done elsewhere.
+  /// Runs `work` in the background, and `then` with its result on the loop.
+  /// @return false if the background has too much to do
   template <typename Work, typename Then>
   [[nodiscard]] bool InBackground(const char* what, Work work, Then then) {
     return options.run_in_background(
@@ -557,5 +558,7 @@ void Updater::Install(const std::string& name, Done done) { impl_->Install(name,
 void Updater::InstallCopy(const std::filesystem::path& copy, const std::string& name, Done done) {
   impl_->InstallCopy(copy, name, std::move(done));
 }
+
+void Updater::DropCopy(const std::filesystem::path& copy) { impl_->RemoveCopy(copy); }
 
 }  // namespace plumb

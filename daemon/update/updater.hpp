@@ -77,6 +77,8 @@ class Updater {
   /// copied again, and copies that stay would fill the disk.
   /// @param name  Of the bundle, for people.
   void InstallCopy(const std::filesystem::path& copy, const std::string& name, Done done);
+  /// Removes such a copy without installing it.
+  void DropCopy(const std::filesystem::path& copy);
   /// The roll-back was acknowledged and is not reported any more.
   void ForgetRollBack();
 

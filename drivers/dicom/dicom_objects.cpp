@@ -194,6 +194,19 @@ PlannedContour ContourOf(const Item& item, std::size_t& num_points) {
   return contour;
 }
 
+/// The images that a frame of reference of a structure set names, whether contours lie in them or
+/// not.
+void AddImagesOf(const Item& frame, StructureSet& structures) {
+  frame.ForEach(DCM_RTReferencedStudySequence, [&](const Item& study) {
+    study.ForEach(DCM_RTReferencedSeriesSequence, [&](const Item& series) {
+      std::vector<std::string>& uids = structures.image_uids[series.Text(DCM_SeriesInstanceUID)];
+      series.ForEach(DCM_ContourImageSequence, [&](const Item& image) {
+        uids.push_back(image.Text(DCM_ReferencedSOPInstanceUID));
+      });
+    });
+  });
+}
+
 StructureSet StructuresOf(const Item& set) {
   StructureSet structures;
   structures.file = FileOf(set, DCM_StructureSetLabel, DCM_StructureSetDate, DCM_StructureSetTime);
@@ -201,6 +214,8 @@ StructureSet StructuresOf(const Item& set) {
     // That of the images; a frame of the file itself says nothing of the contours.
     structures.file.frame_of_reference_uid = frame.Text(DCM_FrameOfReferenceUID);
   });
+  set.ForEach(DCM_ReferencedFrameOfReferenceSequence,
+              [&](const Item& frame) { AddImagesOf(frame, structures); });
   const auto find = [&](std::int64_t number) -> PlannedRoi* {
     for (PlannedRoi& roi : structures.rois)
       if (roi.number == number) return &roi;

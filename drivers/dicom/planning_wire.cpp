@@ -171,7 +171,10 @@ CtImage ImageOf(const Json& json, std::span<const double> numbers) {
 
 std::string FactsOf(const PlanningContent& content) {
   Json json = {{"file", Written(content.file)}, {"modality", content.modality}};
-  if (content.structures) json["rois"] = Written(*content.structures);
+  if (content.structures) {
+    json["rois"] = Written(*content.structures);
+    json["image_uids"] = content.structures->image_uids;
+  }
   if (content.plan) json["plan"] = Written(*content.plan);
   if (content.image) json["image"] = Written(*content.image);
   if (!content.image_fault.empty())
@@ -203,6 +206,8 @@ PlanningContent ParsePlanning(std::string_view facts, std::span<const double> po
     if (json.contains("rois")) {
       content.structures = StructuresOf(json["rois"], points);
       content.structures->file = content.file;
+      content.structures->image_uids =
+          json.at("image_uids").get<decltype(StructureSet::image_uids)>();
     }
     if (json.contains("plan")) {
       content.plan = PlanOf(json["plan"]);

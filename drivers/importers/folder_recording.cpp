@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
 #include "drivers/importers/recorded_file.hpp"
@@ -45,10 +46,7 @@ class ListedFolder : public ImportedRecording {
 }  // namespace
 
 bool EndsLike(std::string_view name, std::string_view ending) {
-  if (name.size() < ending.size()) return false;
-  return std::ranges::equal(name.substr(name.size() - ending.size()), ending, [](char a, char b) {
-    return (a >= 'A' && a <= 'Z' ? static_cast<char>(a - 'A' + 'a') : a) == b;
-  });
+  return AsciiLower(name).ends_with(ending);
 }
 
 bool IsImageName(const std::string& name, std::string_view ending, bool is_depth) {

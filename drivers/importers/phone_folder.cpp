@@ -24,7 +24,7 @@ constexpr std::size_t kMaxMetadata = std::size_t{64} << 20;  // An hour at 60 Hz
 constexpr double kPhoneUnitsPerMetre = 1000.0;
 constexpr int kSureConfidence = 2;  // ARKit: 0 low, 1 medium, 2 high.
 constexpr std::size_t kSampledMaps = 24;
-// Of the focal length: less is neither seen in a sweep nor worth a word.
+// Of the focal length: a smaller one has no effect that a sweep shows.
 constexpr double kLeastFocalSpread = 0.001;
 
 struct FoundPhone {

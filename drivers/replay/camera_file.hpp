@@ -35,7 +35,7 @@ inline constexpr const char* kAssumedDepthCamera = "depth_registered";
 /// The validated contents of camera.yaml.
 struct CameraFile {
   Intrinsics color;
-  bool color_assumed = false;  ///< By who wrote the file, as the two below.
+  bool color_assumed = false;  ///< By the program that wrote the file; likewise the next two.
   bool depth_unit_assumed = false;
   bool depth_camera_estimated = false;      ///< Depth was registered with a camera from its images.
   std::optional<double> depth_scale;        ///< Units of a depth image per metre.

@@ -26,6 +26,8 @@ constexpr std::array kDevices = {
     NamedDevice{"iphone", DepthSensor::kLidar},
     NamedDevice{"ipad", DepthSensor::kLidar},
     NamedDevice{"realsensed4", DepthSensor::kActiveStereo},
+    NamedDevice{"realsensesr3", DepthSensor::kStructuredLight},
+    NamedDevice{"realsensef2", DepthSensor::kStructuredLight},
     NamedDevice{"gemini", DepthSensor::kActiveStereo},
     NamedDevice{"structuresensor", DepthSensor::kStructuredLight},
     NamedDevice{"kinectv1", DepthSensor::kStructuredLight},

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "algo/base/ascii_lower.hpp"
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/parse_number.hpp"
@@ -114,9 +115,8 @@ void TakeLens(const ordered_json& camera, const std::string& name, Stated& state
   for (const char* key : {"model", "distortion_model", "camera_model"})
     if (stated_model.empty()) stated_model = TextIn(camera, key);
   std::string model;
-  for (const char c : stated_model)
-    if (c != '_' && c != ' ' && c != '-')
-      model += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  for (const char c : AsciiLower(stated_model))
+    if (c != '_' && c != ' ' && c != '-') model += c;
   const auto is_one_of = [&](std::initializer_list<std::string_view> parts) {
     return std::ranges::any_of(
         parts, [&](std::string_view part) { return model.find(part) != std::string::npos; });
@@ -356,6 +356,7 @@ std::optional<ForeignCalibration> FindForeignCalibration(const fs::path& folder,
     if (depth != color) throw DataError(say::foreign::DepthCameraAlone(found->file));
     return found;
   }
+  if (found->camera.depth_camera) return found;  // stated in Plumb's own keys
   for (const std::string& name : names)
     if (IsOfDepth(name) && found->depth_file.empty())
       CompareDepthCamera(folder / name, depth, *found);

@@ -260,7 +260,7 @@ void TumRecording::SetCamera(CameraFile camera, const RecordingDefaults& default
 }
 
 void TumRecording::TakeDepthUnit(const RecordingDefaults& defaults) {
-  info_.depth_unit_assumed = true;
+  info_.depth_unit_assumed = info_.depth_unit_open = true;
   if (defaults.depth_scale) {
     camera_.depth_scale = defaults.depth_scale;
     info_.warnings.push_back(say::recording::DepthScaleByMarkers(*camera_.depth_scale));

@@ -21,6 +21,7 @@
 #include "tests/support/calibrate_room.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
+#include "web/model/reference.hpp"
 
 namespace plumb {
 namespace {
@@ -106,7 +107,9 @@ class DaemonPlanningTest : public ::testing::Test {
   }
   /// Plans the draft as it is, and has another person approve it.
   /// @param skin_of_images  It must be confirmed that this is the body's.
-  void Approve(const std::string& reference, bool skin_of_images = false) {
+  /// @param stated  Of its surface.
+  void Approve(const std::string& reference, bool skin_of_images = false,
+               const ReferencePlan& stated = {}) {
     const std::string path = "/api/v1/references/" + reference;
     const json draft = planner_->Get(path).json();
     json plan = {
@@ -118,6 +121,10 @@ class DaemonPlanningTest : public ::testing::Test {
     plan["isocentre_m"] = {0.001, 0, 0};
     EXPECT_EQ(planner_->Put(path + "/plan", plan).status, 400) << "the isocentre is the plan's";
     plan["isocentre_m"] = {0, 0, 0};
+    plan["clothing_mm"] = 30.1;
+    EXPECT_EQ(planner_->Put(path + "/plan", plan).status, 400) << "no clothing is so thick";
+    plan["clothing_mm"] = stated.clothing_mm;
+    plan["ct_breathing_mm"] = stated.ct_breathing_mm;
     ASSERT_EQ(planner_->Put(path + "/plan", plan).status, 200);
     const json planned = approver_->Get(path).json();
     EXPECT_EQ(planned["room"]["gantry_xy"], (json{0.0, 1.0})) << planned.dump();
@@ -157,6 +164,13 @@ class DaemonPlanningTest : public ::testing::Test {
     const json draft = planner_->Get(path).json();
     EXPECT_EQ(draft["source"], "sweep");
     EXPECT_EQ(draft["plan"]["tolerance"]["shift_mm"], 3.5) << "as in the plan of the CT";
+    EXPECT_EQ(draft["plan"]["clothing_mm"], 0) << "what the camera saw, not the CT";
+    json covered = {
+        {"region_m", json::array()},     {"isocentre_m", nullptr}, {"shift_tolerance_mm", 3},
+        {"rotation_tolerance_deg", 1},   {"posture", "HFS"},       {"couch_markers", false},
+        {"revision", draft["revision"]}, {"ct_breathing_mm", 1}};
+    EXPECT_EQ(planner_->Put(path + "/plan", covered).json()["error_message"]["id"],
+              "scan.surface_of_planning");
     EXPECT_EQ(planner_
                   ->Put(path + "/plan", {{"region_m", json::array()},
                                          {"isocentre_m", draft["room"]["lasers_m"]},
@@ -236,7 +250,7 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path()))
     EXPECT_NE(entry.path().extension(), ".dcm") << "the files name the patient";
   EXPECT_FALSE(scene["planning"].contains("skin_threshold_hu")) << "a contour has none";
-  Approve(reference);
+  Approve(reference, /*skin_of_images=*/false, {.clothing_mm = 1, .ct_breathing_mm = 1.5});
 
   // The board lies there and no body: whatever is seen, the room is not calibrated.
   const json without = ScanFraction();
@@ -250,6 +264,14 @@ TEST_F(DaemonPlanningTest, FromTheUploadToSixNumbersInACalibratedRoom) {
   ASSERT_TRUE(result["correction"].is_object()) << result["reasons"].dump();
   const Vector6d couch = TrueCouch();
   ExpectShifts(result["correction"], couch);
+  // What was stated and signed is in the intervals by its cause; without it 1.7 mm in height.
+  EXPECT_EQ(result["compared_with"]["clothing_mm"], 1);
+  EXPECT_EQ(result["compared_with"]["ct_breathing_mm"], 1.5);
+  const json& parts = result["motion"]["covariance_parts"];
+  EXPECT_NEAR(1960 * std::sqrt(parts["ct_breathing"][5][5].get<double>()), 1.5, 0.2)
+      << parts.dump();
+  EXPECT_GT(1960 * std::sqrt(parts["clothing"][5][5].get<double>()), 0.8);
+  EXPECT_GT(result["correction"]["uncertainty"]["vertical_mm"].get<double>(), 2.1);
 
   // That position is captured. Each session compares with what was chosen for it.
   const std::string captured = Capture(planner_->Get("/api/v1/status").json()["last_result"]["id"]);

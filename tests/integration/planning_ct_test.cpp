@@ -177,6 +177,61 @@ TEST_F(PlanningCtTest, FromTheFilesToSixNumbersInACalibratedRoom) {
   EXPECT_GE(total.at("intervals_95").at("all").at("inside").get<int>(), 23) << "of 24";
 }
 
+TEST_F(PlanningCtTest, WhatIsStatedOfTheSurfaceHasLimits) {
+  for (const char* option : {"--clothing-mm", "--ct-breathing-mm"}) {
+    for (const char* wrong : {"-0.1", "30.1", "nan", "inf", "thick"}) {
+      const RunResult refused = Import({}, {option, wrong});
+      EXPECT_EQ(refused.exit_code, 2) << option << wrong;
+      EXPECT_THAT(refused.err, HasSubstr(option));
+      EXPECT_FALSE(fs::exists(folder_ / "planned")) << option << wrong;
+    }
+    for (const char* right : {"0", "30"})
+      EXPECT_EQ(Import({}, {option, right}).exit_code, 0) << option << right;
+  }
+}
+
+// From the number that a person states to the interval that it widens, and nothing else.
+TEST_F(PlanningCtTest, ClothingAndTheBreathOfTheCtWidenTheIntervals) {
+  const fs::path suite = SmallCtSuite(), ct = suite / "recordings/ct_HFS";
+  ASSERT_EQ(Plumb({"reconstruct", suite / "recordings/placement_1", "--out", folder_ / "current"})
+                .exit_code,
+            0);
+  const auto result_of = [&](const std::vector<std::string>& stated) {
+    std::vector<std::string> arguments = {"import-dicom", ct / "structures.dcm", ct / "plan.dcm",
+                                          "--out", folder_ / "planned"};
+    arguments.insert(arguments.end(), stated.begin(), stated.end());
+    const RunResult imported = Plumb(arguments);
+    EXPECT_EQ(imported.exit_code, 0) << imported.err;
+    const RunResult compared =
+        Plumb({"compare", folder_ / "planned", folder_ / "current", "--config", suite / "room.toml",
+               "--out", folder_ / "result", "--json"});
+    EXPECT_THAT(compared.exit_code, testing::AnyOf(0, 4)) << compared.err;
+    return json::parse(compared.out);
+  };
+  const json bare = result_of({});
+  const json stated = result_of({"--clothing-mm", "5", "--ct-breathing-mm", "7.5"});
+  EXPECT_EQ(ReadScene(folder_ / "planned").planning->surface.ct_breathing_u95_m, 0.0075);
+  EXPECT_THAT(ReadText(folder_ / "result" / "result.json"), HasSubstr("clothing_mm"));
+  EXPECT_EQ(stated.at("compared_with").at("clothing_mm"), 5);
+  EXPECT_EQ(stated.at("compared_with").at("ct_breathing_mm"), 7.5);
+  EXPECT_FALSE(bare.at("motion").at("covariance_parts").contains("clothing"));
+  EXPECT_TRUE(stated.at("motion").at("covariance_parts").contains("ct_breathing"));
+  const auto half = [](const json& result, const char* number) {
+    return result.at("correction").at("uncertainty").at(number).get<double>();
+  };
+  EXPECT_LT(half(bare, "vertical_mm"), 4);
+  EXPECT_GT(half(stated, "vertical_mm"), 8.5);
+  EXPECT_GT(half(stated, "pitch_deg"), 2 * half(bare, "pitch_deg"));
+  EXPECT_NE(bare.at("verdict"), "no_answer");
+  EXPECT_EQ(stated.at("verdict"), "no_answer") << "more than the tolerance is stated";
+  EXPECT_THAT(stated.at("reasons").dump(), HasSubstr("the CT may be of another breath"));
+  EXPECT_EQ(stated.at("motion").at("T"), bare.at("motion").at("T"));
+  EXPECT_EQ(
+      result_of({"--clothing-mm", "0", "--ct-breathing-mm", "0"}).at("motion").at("covariance"),
+      bare.at("motion").at("covariance"))
+      << "bit for bit";
+}
+
 TEST_F(PlanningCtTest, WithoutACalibratedRoomThereIsNoAnswer) {
   ASSERT_EQ(Import({}).exit_code, 0);
   const RunResult result = Plumb({"compare", folder_ / "planned", SmallScene(SmallNames().back()),

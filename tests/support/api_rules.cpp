@@ -230,6 +230,8 @@ TEST_F(ApiRules, AReferenceIsApprovedByASecondPersonAsItWasPlanned) {
   EXPECT_EQ(plan["tolerance"]["rotation_deg"], 1.5);
   EXPECT_EQ(plan["posture"], "FFP");
   EXPECT_EQ(plan["couch_markers"], true);
+  EXPECT_EQ(plan["clothing_mm"], 0) << "not stated";
+  EXPECT_EQ(plan["ct_breathing_mm"], 0);
   EXPECT_EQ(technician.Get("/api/v1/patients/" + patient).json()["approved_reference_id"], id);
   EXPECT_EQ(Open(technician, patient, "fraction").status, 200);
 

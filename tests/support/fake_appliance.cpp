@@ -60,7 +60,7 @@ void FakeAppliance::ConfirmWristband(const Actor& actor, const std::string& sess
                                      const std::string& code, Done done) {
   if (!status.session || status.session->id != session_id)
     return Finish(done, Refused(ChangeResult::kConflict, say::scan::SessionClosed()));
-  if (PlainPatientCode(code) != PlainPatientCode(status.session->patient_code))
+  if (PlainCode(code) != PlainCode(status.session->patient_code))
     return Finish(done, Refused(ChangeResult::kConflict,
                                 say::scan::OtherWristband(status.session->patient_code)));
   wristband_of_ = session_id;

@@ -368,7 +368,9 @@ std::optional<Reference> FakeAppliance::FindReference(const std::string& id) {
   return FindById(references, id);
 }
 
-RoomOnMap FakeAppliance::RoomOfReference(const Reference&) {
+RoomOnMap FakeAppliance::RoomOfReference(const Reference& reference) {
+  if (reference.origin.source == ReferenceSource::kPlanningCt)  // in the axes of the room
+    return {.gantry_xy = {0, 1}, .right_xy = {1, 0}, .is_known = true};
   return room_of_references.value_or(status.room);
 }
 

@@ -26,6 +26,8 @@ const equal = (found, expected, what) => {
 
 const kPlan = JSON.stringify({ region_m: [[0, 0], [1, 0], [1, 1]], isocentre_m: null,
   shift_tolerance_mm: 2.5, rotation_tolerance_deg: 1, posture: 'HFS', couch_markers: false });
+const kCovered = JSON.stringify({ ...JSON.parse(kPlan), posture: 'HFP', clothing_mm: 4.5,
+  ct_breathing_mm: 6 });
 // Action, stored detail, English, Spanish.
 const kDetails = [
   ['check.done', 'passed', 'PASSED', 'SUPERADO'],
@@ -113,6 +115,12 @@ for (const language of ['en', 'es']) {
     `${language}: a person's reason`);
   if (detailWords({ action: 'reference.plan', user: 'anna', detail: kPlan }).includes('HFS')) {
     failures.push(`${language}: the plan's posture is raw`);
+  }
+  const decimal = language === 'en' ? '4.5' : '4,5';
+  for (const [plan, wanted] of [[kPlan, false], [kCovered, true]]) {
+    const told = detailWords({ action: 'reference.plan', user: 'anna', detail: plan });
+    equal(told.includes(`(mm): ±${decimal}`), wanted, `${language}: clothing where it is stated`);
+    equal(told.includes('(mm): ±6'), wanted, `${language}: the breath of the CT likewise`);
   }
 }
 for (const [language, retention, fraction, gone, button] of [

@@ -13,6 +13,7 @@ const kPatience_ms = 30000;
 /// Screenshots are only for people to look at; without them, WebScreens takes 360 instead of 479 s
 /// of processor time.
 export const keepsPictures = process.env.PLUMB_PICTURES === '1';
+const kDelay_ms = Number(process.env.PLUMB_ANSWER_DELAY_MS ?? 0);
 // Every size is in screens_test.mjs; painting a larger window would only take the others longer.
 const kSize = { width: 1280, height: 800 };
 
@@ -36,6 +37,17 @@ function switchOffAntialiasing() {
   prototype.getContext = function get(kind, attributes) {
     return getContext.call(this, kind,
       kind.startsWith('webgl') ? { ...attributes, antialias: false } : attributes);
+  };
+}
+
+/// Runs in the page: every answer comes that much later, as on a busy machine. What a test does not
+/// wait for, it then misses each time.
+function delayAnswers(delay_ms) {
+  const { fetch } = window;
+  window.fetch = async (...request) => {
+    const answer = await fetch(...request);
+    await new Promise((ready) => { setTimeout(ready, delay_ms); });
+    return answer;
   };
 }
 
@@ -157,6 +169,7 @@ export class Harness {
     await context.addInitScript(definePixelsOf);
     await context.addInitScript(switchOffAntialiasing);
     await context.addInitScript(countTicks);
+    if (kDelay_ms) await context.addInitScript(delayAnswers, kDelay_ms);
     const page = await context.newPage();
     page.setDefaultTimeout(kPatience_ms);
     page.on('pageerror', (error) => {

@@ -62,16 +62,127 @@ await h.step('structure set and plan become a draft whose isocentre is read-only
   await h.look(planner, 'planning-plan');
 });
 
+await h.step('the cuts move, and come back to the isocentre', async () => {
+  for (const [name, label, axis, off] of [
+    ['Axial cut, across the couch', 'Place of the axial cut along the couch (mm)', 'y', 60],
+    ['Sagittal cut, along the couch', 'Place of the sagittal cut across the couch (mm)', 'x', -40],
+  ]) {
+    const place = planner.getByLabel(label);
+    const figure = planner.locator('.side-view', { has: place });
+    const skin = () => figure.locator('.skin-line').getAttribute('d');
+    const cross = figure.locator('.isocentre-cross');
+    const through = `${axis} 0 mm, through the isocentre`;
+    await figure.getByText(`${name}: ${through}`).waitFor();
+    equal(await figure.getByRole('img').getAttribute('aria-label'), `${name}: ${through}`, 'drawn');
+    equal(await place.getAttribute('aria-valuetext'), through, 'what a screen reader says');
+    equal(await cross.count(), 1, 'it begins at the isocentre');
+    const first = await skin();
+    check(first.length > 200, 'there is skin');
+    await place.press('ArrowRight');
+    await figure.getByText(`${name}: ${axis} 1 mm`, { exact: true }).waitFor();
+    equal(await cross.count(), 0, 'no isocentre 1 mm beside it');
+    await place.fill(`${off}`);
+    const said = `${axis} ${off} mm`;
+    await figure.getByText(`${name}: ${said}`, { exact: true }).waitFor();
+    check(await skin() !== first, 'another cut shows other skin');
+    await h.look(planner, `planning-cut-${axis}`);
+    const back = figure.getByRole('button', { name: 'To the isocentre' });
+    for (const target of [place, back]) {
+      const { height } = await target.boundingBox();
+      check(height >= 60, `for a hand in a glove: ${height} px`);
+    }
+    await back.press('Enter');
+    await figure.getByText(`${name}: ${through}`).waitFor();
+    equal(await skin(), first, 'the same cut again');
+    // To both ends, where the map may be empty.
+    for (const key of ['Home', 'End']) {
+      await place.press(key);
+      equal(await cross.count(), 0, key);
+    }
+    await back.click();
+  }
+  check(await planner.getByText('There are unsaved changes').count() === 0,
+    'looking changes nothing');
+});
+
+await h.step('the surface of a planning CT is shown in three dimensions', async () => {
+  const loaded = () => planner.evaluate(() => performance.getEntriesByType('resource')
+    .filter(({ name }) => /\/assets\/mesh\./.test(name)).length);
+  equal(await loaded(), 0, 'nobody has asked for it');
+  await planner.getByRole('button', { name: 'Open the 3-D view' }).click();
+  const mesh = planner.locator('canvas.mesh[data-ready=yes]');
+  await mesh.waitFor({ timeout: 60000 });
+  equal(await loaded(), 1, 'loaded only now');
+  const drawn = () => mesh.evaluate(async (canvas) => {
+    const { data } = await window.pixelsOf(canvas);
+    let bright = 0;
+    for (let i = 0; i < data.length; i += 4) if (data[i] + data[i + 1] + data[i + 2] > 90) ++bright;
+    return { bytes: canvas.toDataURL('image/png'), share: bright / (data.length / 4) };
+  });
+  const { bytes, share } = await drawn();
+  check(share > 0.05, `a body is drawn: ${share}`);
+  await planner.locator('.mesh-place').getByRole('button', { name: 'Top', exact: true })
+    .press('Enter');
+  check((await drawn()).bytes !== bytes, 'from above it looks another way');
+  await mesh.scrollIntoViewIfNeeded();
+  await h.look(planner, 'planning-mesh', { fullPage: false });
+});
+
+await h.step('clothing and the breath of the CT are stated, and signed', async () => {
+  const clothing = planner.getByLabel('Clothing or covers (mm)');
+  const breath = planner.getByLabel('Breath of the CT (mm)');
+  equal(await clothing.inputValue(), '0', 'bare, unless somebody says otherwise');
+  equal(await breath.inputValue(), '0', 'in the same breath');
+  const save = planner.getByRole('button', { name: 'Save plan' });
+  const put = [];
+  planner.on('request', (request) => { if (request.method() === 'PUT') put.push(request.url()); });
+  for (const wrong of ['-0.1', '30.1', '']) {
+    await clothing.fill(wrong);
+    await save.click();
+    equal(await clothing.getAttribute('aria-invalid'), 'true', `"${wrong}" is refused`);
+  }
+  equal(put.length, 0, 'nothing was sent');
+  await clothing.fill('4.5');
+  await breath.fill('6');
+  await h.look(planner, 'planning-stated');
+  await save.click();
+  await planner.getByText('Plan saved.').first().waitFor();
+  equal(await clothing.inputValue(), '4.5', 'stored');
+  const { body } = await h.api(planner, `references/${plan.split('/').pop()}`);
+  equal([body.plan.clothing_mm, body.plan.ct_breathing_mm].join(), '4.5,6', 'as it was stated');
+});
+
 await h.step('another physicist signs it', async () => {
-  await planner.getByRole('button', { name: 'Save plan' }).click();
   await second.goto(plan);
   await second.locator('.planning-facts').waitFor();
   await second.getByRole('button', { name: 'Review and approve' }).click();
   await second.locator('.summary .planning-facts', { hasText: 'BODY' }).waitFor();
   equal(await second.getByText('below the couch').count(), 0, 'a CT shows no couch');
+  for (const stated of ['±4.5 mm', '±6 mm']) {
+    await second.locator('.summary dd', { hasText: stated }).first().waitFor();
+  }
+  equal(await second.locator('.summary input[type=range]').count(), 2, 'the cuts move here, too');
+  await second.getByRole('button', { name: 'Open the 3-D view' }).click();
+  await second.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
   await h.look(second, 'planning-summary-phone');
   await h.sign(second);
   await second.getByText('approved by second').first().waitFor();
+});
+
+await h.step('the review in German', async () => {
+  await second.evaluate(() => {
+    for (const who of ['login', 'second']) localStorage.setItem(`plumb-language-${who}`, 'de');
+  });
+  await second.reload();
+  await second.getByText('Axialer Schnitt, quer zum Tisch: y 0 mm, durch das Isozentrum')
+    .first().waitFor();
+  await second.getByText('Atem des CT (mm)').first().waitFor();
+  await h.look(second, 'planning-plan-german-phone');
+  await second.evaluate(() => {
+    for (const who of ['login', 'second']) localStorage.removeItem(`plumb-language-${who}`);
+  });
+  await second.reload();
+  await second.getByText('Axial cut, across the couch').first().waitFor();
 });
 
 /// Sweeps once in the session that is open, and returns the scan.

@@ -23,6 +23,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <string>
 
 #include "daemon/files/compact_map.hpp"
@@ -81,6 +82,7 @@ void WritePlanning(const fs::path& root) {
   const simulated::ScenePlan& scene = demo.scenes.front();
   Pose T_iec_body = scene.T_world_body;
   T_iec_body.pretranslate(Eigen::Vector3d(0, 0, -0.1));
+  T_iec_body.prerotate(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()));
   for (const auto& [name, quirks] :
        {std::pair{"", std::vector<simulated::CtQuirk>{}},
         {"several-", std::vector{simulated::CtQuirk::kSeveralExternal}}}) {

@@ -1338,6 +1338,7 @@ await h.step('a press of the button is use of a screen that shows the sweep, and
   for (const [screen, most] of [['status', 0], ['scan', 1]]) {
     await idle.goto(`${h.url}#/${screen}`);
     await idle.locator('.headline').waitFor();
+    await h.ticks(idle);  // what the screens before have asked for was asked
     uses = 0;
     h.tell('press');
     await idle.locator('.chip[data-state=scanning]').waitFor();

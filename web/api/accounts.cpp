@@ -18,6 +18,7 @@
 #include "web/http/connection_table.hpp"
 #include "web/model/account.hpp"
 #include "web/model/limits.hpp"
+#include "web/model/plain_code.hpp"
 #include "web/model/wall_clock.hpp"
 #include "web/security/certificate_care.hpp"
 #include "web/security/password_rules.hpp"
@@ -371,10 +372,7 @@ void Accounts::VerifyOwn(const Request& request, OwnProof proof, const Message& 
                        return respond(ErrorResponse(401, say::web::SessionEnded()));
                      then(user);
                    };
-                   RespondGuarded(
-                       "signature",
-                       [&] { PassSecondFactor(actor, user, second_factor, respond, signed_by); },
-                       respond);
+                   PassSecondFactor(actor, user, second_factor, respond, signed_by);
                  });
 }
 

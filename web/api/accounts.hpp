@@ -138,10 +138,10 @@ class Accounts : public SessionLookup {
   void AskDirectoryOf(const std::string& name, std::string password,
                       const std::vector<std::string>& counters, const Respond& respond,
                       std::function<void(const DirectoryAnswer&)> done);
-  /// Calls `done`, or answers that it cannot be told, which then is no guess.
+  /// Calls `done`; answers 503 if the password cannot be checked, which is not counted as a guess.
   void CheckPassword(std::string password, std::string hash, bool trusted, const Respond& respond,
                      std::function<void()> take_guess_back, std::function<void(bool matches)> done);
-  /// Of a logged-in user; calls `done`, or answers that it cannot be told.
+  /// Of a logged-in user; likewise.
   void VerifyPassword(const User& user, std::string password,
                       const std::vector<std::string>& counters, const Respond& respond,
                       std::function<void(bool matches)> done);
@@ -173,6 +173,9 @@ class Accounts : public SessionLookup {
   /// Replaces it by an uploaded one or a new self-signed one; requires the user's own password.
   void ReplaceCertificate(const Request& request, const Respond& respond);
   void MakeNewCertificate(const Request& request, const Respond& respond);
+  /// IPv4 addresses that this machine has had for an hour: its certificate must name them, if its
+  /// own authority has signed it.
+  [[nodiscard]] std::vector<std::string> SteadyAddresses(std::chrono::steady_clock::time_point now);
   /// Serves an identity from now on. @param replaced_by  Action in the log.
   void ServeCertificate(const Actor& actor, const TlsIdentity& identity, const char* replaced_by);
   /// A browser has come back with the certificate on trial: it is kept.
@@ -222,6 +225,8 @@ class Accounts : public SessionLookup {
   };
   std::optional<CertificateTrial> trial_;
   std::chrono::steady_clock::time_point next_certificate_care_{}, clock_steady_since_{};
+  std::vector<std::string> addresses_;  ///< Of this machine, at the last look.
+  std::chrono::steady_clock::time_point addresses_since_{};
   std::chrono::system_clock::duration clock_ahead_{};  ///< Of the steady clock, at the last look.
   Sessions sessions_;
   Displays displays_;

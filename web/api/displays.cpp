@@ -9,6 +9,7 @@
 #include "web/http/checks.hpp"
 #include "web/model/account.hpp"
 #include "web/model/limits.hpp"
+#include "web/model/plain_code.hpp"
 #include "web/model/wall_clock.hpp"
 #include "web/security/secrets.hpp"
 #include "words/web.hpp"

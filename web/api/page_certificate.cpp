@@ -19,7 +19,7 @@ constexpr std::size_t kMaxChainBytes = 32 << 10, kMaxKeyBytes = 16 << 10;
 /// A certificate that a person set is taken back unless a browser has connected with it by then.
 constexpr std::chrono::seconds kTrial{120};
 /// How often, and for how long the clock must have run without a step for its date to count.
-constexpr std::chrono::minutes kCareEvery{10}, kClockHeld{60};
+constexpr std::chrono::minutes kCareEvery{10}, kClockHeld{60}, kAddressHeld{60};
 constexpr std::chrono::minutes kClockStep{1};
 
 /// The appliance itself, as the store names it.
@@ -130,6 +130,19 @@ std::optional<std::chrono::seconds> Accounts::CertificateLeft() const {
                               std::chrono::system_clock::to_time_t(options_.wall_now()));
 }
 
+std::vector<std::string> Accounts::SteadyAddresses(std::chrono::steady_clock::time_point now) {
+  // A self-signed certificate would be asked about again on every screen.
+  if (!OwnAuthorityOf(certificate_->certificate_pem)) return {};
+  std::vector<std::string> found = options_.own_addresses();
+  // Those of IPv6 may change every day, for privacy; they are renewed with the others.
+  std::erase_if(found, [](const std::string& one) { return one.find(':') != std::string::npos; });
+  if (found != addresses_) {
+    addresses_ = std::move(found);
+    addresses_since_ = now;
+  }
+  return now - addresses_since_ >= kAddressHeld ? addresses_ : std::vector<std::string>();
+}
+
 void Accounts::CareForCertificate() {
   const auto now = options_.now();
   if (!serve_certificate_) return;
@@ -139,9 +152,10 @@ void Accounts::CareForCertificate() {
   if (trial_ && now - trial_->begun >= kTrial) EndTrial("certificate.revert");
   if (trial_ || now < next_certificate_care_) return;
   next_certificate_care_ = now + kCareEvery;
-  std::vector<std::string> names = OwnNames();
-  names.insert(names.end(), options_.host_names.begin(), options_.host_names.end());
   try {
+    std::vector<std::string> names = OwnNames();
+    for (const std::vector<std::string>& more : {options_.host_names, SteadyAddresses(now)})
+      names.insert(names.end(), more.begin(), more.end());
     // A clock that has just started or stepped may still be corrected.
     const bool is_trusted = now - clock_steady_since_ >= kClockHeld && options_.is_clock_trusted();
     const auto wall = options_.wall_now();

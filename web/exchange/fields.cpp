@@ -201,6 +201,9 @@ std::pair<ReferencePlan, int> ParsePlan(const std::string& body) {
   plan.tolerance = ToleranceIn(fields);
   plan.posture = PostureIn(fields);
   plan.couch_markers = fields.Flag("couch_markers");
+  for (const auto& [name, stated] :
+       {std::pair{"clothing_mm", &plan.clothing_mm}, {"ct_breathing_mm", &plan.ct_breathing_mm}})
+    if (fields.Has(name)) *stated = NumberIn(fields, name, kStatedSurface_mm);
   fields.Finish();
   return {plan, revision};
 }

@@ -401,7 +401,9 @@ Json PlanJson(const ReferencePlan& plan) {
           {"isocentre_m", plan.isocentre_m},
           {"tolerance", plan.tolerance},
           {"posture", plan.posture},
-          {"couch_markers", plan.couch_markers}};
+          {"couch_markers", plan.couch_markers},
+          {"clothing_mm", plan.clothing_mm},
+          {"ct_breathing_mm", plan.ct_breathing_mm}};
 }
 
 }  // namespace

@@ -29,6 +29,8 @@ struct HttpServerOptions {
   std::function<void(const TlsIdentity&)> keep_certificate;
   /// Makes one of the unit's own, such as by its authority; throws. Empty: a self-signed one.
   std::function<TlsIdentity(std::chrono::system_clock::time_point)> make_certificate;
+  /// For tests: this machine's addresses.
+  std::function<std::vector<std::string>()> own_addresses = OwnAddresses;
   /// Called with every identity that replaces another. May be empty.
   std::function<void(const TlsIdentity&)> on_certificate;
   /// Called when strangers begin to guess passwords faster than permitted, and again when none has

@@ -29,6 +29,8 @@ struct Limits {
 
 inline constexpr Limits kShiftTolerance_mm{.entered = {0.1, 50}, .stored = {0.001, 1000}};
 inline constexpr Limits kRotationTolerance_deg{.entered = {0.1, 20}, .stored = {0.001, 180}};
+/// Clothing and the breath of the CT, as a person states them of a planning CT.
+inline constexpr Limits kStatedSurface_mm{.entered = {0, 30}, .stored = {0, 100}};
 inline constexpr Limits kAutoStop_s{.entered = {1, 120}, .stored = {0.1, 3600}};
 inline constexpr Limits kScanLimit_s{.entered = {5, 600}, .stored = {0.1, 3600}};
 inline constexpr Limits kRetention_days{.entered = {0, 36500}, .stored = {0, 1'000'000}};

@@ -8,26 +8,19 @@
 #include <string>
 #include <string_view>
 
+#include "web/model/plain_code.hpp"
 #include "web/model/reference.hpp"
 #include "web/model/scan.hpp"
 #include "web/model/wall_clock.hpp"
 
 namespace plumb {
 
-/// Codes are the same without regard to case, spaces and hyphens, as scanners send them.
-[[nodiscard]] inline std::string PlainPatientCode(std::string_view code) {
-  std::string plain;
-  for (const char c : code)
-    if (c != '-' && c != ' ') plain += c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
-  return plain;
-}
-
 /// Whether the last letter or digit of a code is the check character of those before it, by ISO/IEC
 /// 7064, MOD 37,36: one wrong character is always found, and so are nearly all that changed places.
 [[nodiscard]] inline bool HasCheckCharacter(std::string_view code) {
   constexpr int kNone = -1, kLetters = 36;
   int sum = kLetters, last = kNone, count = 0;
-  for (const char c : PlainPatientCode(code)) {
+  for (const char c : PlainCode(code)) {
     const int value = c >= '0' && c <= '9' ? c - '0' : c >= 'A' && c <= 'Z' ? c - 'A' + 10 : kNone;
     if (value == kNone) continue;
     if (last != kNone) {

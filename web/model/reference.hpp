@@ -28,6 +28,8 @@ struct ReferencePlan {
   Tolerance tolerance;
   std::string posture = "HFS";  ///< One of kPostures.
   bool couch_markers = false;   ///< Markers are fixed to the couch: no shifts are calculated.
+  /// As StatedSurface has them; of a planning CT, and zero of any other reference.
+  double clothing_mm = 0.0, ct_breathing_mm = 0.0;
 };
 
 /// What a reference was made of.

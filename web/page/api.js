@@ -50,6 +50,7 @@ async function ask(method, path, body,
   if (method !== 'GET' && session) headers['X-CSRF-Token'] = session.csrf_token;
   if (body !== undefined) headers['Content-Type'] = 'application/json';
   if (background) headers['X-Plumb-Background'] = '1';
+  const asked = now();
   let response;
   try {
     response = await fetch(path, {
@@ -60,7 +61,7 @@ async function ask(method, path, body,
       signal: AbortSignal.timeout(timeout_ms),
     });
     if (response.ok) {
-      if (!background) noteUse();
+      if (!background) noteUse(asked);
       return await read(response);
     }
   } catch {
@@ -73,8 +74,9 @@ async function ask(method, path, body,
   throw problem;
 }
 
-function noteUse() {
-  touched = now();
+/// @param when  The request began, which is not later than it counted there.
+function noteUse(when) {
+  touched = when;
   channel?.postMessage({ kind: 'used' });
 }
 

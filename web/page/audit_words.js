@@ -18,7 +18,10 @@ function planWords(plan) {
     `${text.isocentre}: ${point ? `${point} m` : text.middle}`,
     `±${plain(plan.shift_tolerance_mm)} mm, ±${plain(plan.rotation_tolerance_deg)}°`,
     wordOf(text.postures, plan.posture),
-    plan.couch_markers ? text.couchMarkers : text.roomMarkers].join('; ');
+    plan.couch_markers ? text.couchMarkers : text.roomMarkers,
+    ...[['clothing', plan.clothing_mm], ['ctBreathing', plan.ct_breathing_mm]]
+      .filter(([, value]) => value)
+      .map(([name, value]) => `${text[name]}: ±${plain(value)}`)].join('; ');
 }
 
 /// The plan before and after, a line each; earlier versions wrote only the new one.

@@ -5,6 +5,8 @@
 export const kBounds = {
   shift_tolerance_mm: { min: 0.1, max: 50, step: 0.1 },
   rotation_tolerance_deg: { min: 0.1, max: 20, step: 0.1 },
+  clothing_mm: { min: 0, max: 30, step: 'any' },
+  ct_breathing_mm: { min: 0, max: 30, step: 'any' },
   auto_stop_s: { min: 1, max: 120, step: 1 },
   scan_limit_s: { min: 5, max: 600, step: 1 },
   retention_days: { min: 0, max: 36500, step: 1 },

@@ -12,7 +12,7 @@
 namespace plumb::web {
 
 std::string PatientHash(std::string_view code, std::string_view secret) {
-  const std::string plain = PlainPatientCode(code);
+  const std::string plain = PlainCode(code);
   std::array<unsigned char, crypto_auth_hmacsha256_BYTES> sum{};
   crypto_auth_hmacsha256_state state;
   crypto_auth_hmacsha256_init(&state, reinterpret_cast<const unsigned char*>(secret.data()),

@@ -7,7 +7,7 @@
 
 namespace plumb::web {
 
-/// HMAC-SHA256 of PlainPatientCode(), because codes that differ in nothing else are the same;
+/// HMAC-SHA256 of PlainCode(), because codes that differ in nothing else are the same;
 /// hexadecimal. Who knows the secret can try codes, so it is shared by units only.
 [[nodiscard]] std::string PatientHash(std::string_view code, std::string_view secret);
 

@@ -9,6 +9,7 @@
 #include <gnutls/gnutls.h>
 
 #include "algo/base/errors.hpp"
+#include "web/model/plain_code.hpp"
 #include "web/security/secrets.hpp"
 #include "words/web.hpp"
 

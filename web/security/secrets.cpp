@@ -28,15 +28,6 @@ std::string RandomCode(int letters) {
   return code;
 }
 
-std::string PlainCode(std::string_view typed) {
-  std::string code;
-  for (const char c : typed) {
-    if (c == ' ' || c == '-') continue;
-    code += c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
-  }
-  return code;
-}
-
 std::string RandomToken(std::size_t bytes) { return ToBase64Url(RandomBytes(bytes)); }
 
 std::string StoredHashOf(const std::string& token) {

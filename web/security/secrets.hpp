@@ -14,8 +14,6 @@ namespace plumb::web {
 /// A code that people type: that many letters and digits that are not easily confused, of 5 bits
 /// each, with a hyphen in the middle, as in "AB3D-7KQM".
 [[nodiscard]] std::string RandomCode(int letters);
-/// Such a code as a person typed it, in capitals and without spaces and hyphens: to be compared.
-[[nodiscard]] std::string PlainCode(std::string_view typed);
 
 /// The hash by which a display's token is stored, in hexadecimal digits.
 [[nodiscard]] std::string StoredHashOf(const std::string& token);

@@ -166,7 +166,8 @@ Certificate AuthorityIn(const std::string& authority) {
   return certificate;
 }
 
-/// This machine's addresses in its networks, as numbers.
+}  // namespace
+
 std::vector<std::string> OwnAddresses() {
   std::vector<std::string> addresses;
   ifaddrs* list = nullptr;
@@ -189,8 +190,6 @@ std::vector<std::string> OwnAddresses() {
   freeifaddrs(list);
   return addresses;
 }
-
-}  // namespace
 
 std::vector<std::string> OwnNames() {
   std::array<char, 65> host{};

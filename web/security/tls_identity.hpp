@@ -28,6 +28,9 @@ inline constexpr const char* kTlsPriorities =
 /// at each call, because a name can change while the service runs. Empty where it has none.
 [[nodiscard]] std::vector<std::string> OwnNames();
 
+/// This machine's addresses in its networks now, as numbers, without link-local ones.
+[[nodiscard]] std::vector<std::string> OwnAddresses();
+
 /// Subject of the certificates that this machine makes for itself.
 inline constexpr std::string_view kOwnSubject = "Plumb scan appliance";
 

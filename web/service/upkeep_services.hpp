@@ -62,7 +62,7 @@ class UpdateService {
   /// Names of bundles on plugged-in USB sticks, as the last look found them. Begins another look;
   /// EventKind::kUpdate if it finds others.
   [[nodiscard]] virtual std::vector<std::string> StickBundles() = 0;
-  /// Copies one of them, then continues as InstallUpdate(); the copy is none of the bundles.
+  /// Copies one of them, then continues as InstallUpdate(); the copy is not listed as a bundle.
   virtual void InstallFromStick(const Actor& actor, const std::string& bundle, Done done) = 0;
   virtual void RemoveBundle(const Actor& actor, const std::string& name, Done done) = 0;
   virtual void InstallUpdate(const Actor& actor, const std::string& bundle,

@@ -110,6 +110,21 @@ std::string ContourItem(const PlannedContour& contour) {
   return item + Value(0x30060050, "DS", data);
 }
 
+/// The series on which it was drawn; nothing where it names none.
+std::string ImagesOf(const StructureSet& structures) {
+  std::vector<std::string> all;
+  for (const auto& [uid, image_uids] : structures.image_uids) {
+    std::vector<std::string> images;
+    for (const std::string& image : image_uids)
+      images.push_back(Value(0x00081150, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+                       Value(0x00081155, "UI", image));
+    all.push_back(Value(0x0020000E, "UI", uid) + Sequence(0x30060016, images));
+  }
+  if (all.empty()) return {};
+  return Sequence(0x30060012, {Value(0x00081150, "UI", "1.2.840.10008.3.1.2.3.1") +
+                               Value(0x00081155, "UI", "2.25.1309") + Sequence(0x30060014, all)});
+}
+
 std::string BeamItem(const PlannedBeam& beam) {
   std::string point =
       Value(0x300A0112, "IS", "0") + Value(0x300A0122, "DS", fmt::format("{:.9g}", beam.couch_deg));
@@ -177,7 +192,8 @@ std::string DicomBytes(const StructureSet& structures) {
   std::string data = Head(file, "RTSTRUCT") + Value(0x30060002, "SH", file.label) +
                      Value(0x30060008, "DA", DateOf(file)) + Value(0x30060009, "TM", TimeOf(file));
   if (!file.frame_of_reference_uid.empty())
-    data += Sequence(0x30060010, {Value(0x00200052, "UI", file.frame_of_reference_uid)});
+    data += Sequence(0x30060010,
+                     {Value(0x00200052, "UI", file.frame_of_reference_uid) + ImagesOf(structures)});
   data += Sequence(0x30060020, rois) + Sequence(0x30060039, contours) +
           Sequence(0x30060080, observations);
   return WholeFile(file, data);

@@ -22,7 +22,9 @@ ReferencePlan UnlikeTheDefaults() {
           .isocentre_m = {{0.31, -0.22, 0.07}},
           .tolerance = {.shift_mm = 7.5, .rotation_deg = 2.25},
           .posture = "FFP",
-          .couch_markers = true};
+          .couch_markers = true,
+          .clothing_mm = 4.5,
+          .ct_breathing_mm = 6.25};
 }
 
 /// Unlike the defaults and unlike the plan in everything.
@@ -48,10 +50,11 @@ CompareOptions UnlikeThePlan() {
 TEST(PlanOptionsTest, EveryFieldOfThePlanReachesTheComparison) {
   ReferencePlan plan = UnlikeTheDefaults();
   // A field that is added to the plan does not compile here until it has a line below.
-  const auto& [region_m, isocentre_m, tolerance, posture, couch_markers] = plan;
+  const auto& [region_m, isocentre_m, tolerance, posture, couch_markers, clothing_mm,
+               ct_breathing_mm] = plan;
   const auto& [shift_mm, rotation_deg] = tolerance;
   (void)region_m, (void)isocentre_m, (void)posture, (void)couch_markers, (void)shift_mm,
-      (void)rotation_deg;
+      (void)rotation_deg, (void)clothing_mm, (void)ct_breathing_mm;
   const CompareOptions options = CompareOptionsFor(plan, UnlikeThePlan());
   ASSERT_EQ(options.region_polygon_m.size(), 4U);
   EXPECT_EQ(options.region_polygon_m[0], Eigen::Vector2d(0.11, 0.12));
@@ -63,6 +66,22 @@ TEST(PlanOptionsTest, EveryFieldOfThePlanReachesTheComparison) {
       << "2.25 degrees in radians";
   EXPECT_EQ(options.posture, PatientPosture::kFeetFirstProne);
   EXPECT_EQ(options.marker_kind, MarkerKind::kCouch);
+  ASSERT_TRUE(options.surface);
+  EXPECT_DOUBLE_EQ(options.surface->clothing_u95_m, 0.0045);
+  EXPECT_DOUBLE_EQ(options.surface->ct_breathing_u95_m, 0.00625);
+}
+
+TEST(PlanOptionsTest, WhatNobodyCanHaveStatedOfTheSurfaceIsRefused) {
+  for (const double wrong : {-0.1, 100.1, std::numeric_limits<double>::quiet_NaN()}) {
+    for (double ReferencePlan::*field :
+         {&ReferencePlan::clothing_mm, &ReferencePlan::ct_breathing_mm}) {
+      ReferencePlan plan;
+      plan.*field = wrong;
+      EXPECT_THROW((void)CompareOptionsFor(plan, {}), DataError) << wrong;
+      plan.*field = 100;
+      EXPECT_NO_THROW((void)CompareOptionsFor(plan, {}));
+    }
+  }
 }
 
 TEST(PlanOptionsTest, WhatIsTheRoomsStaysAsConfigured) {

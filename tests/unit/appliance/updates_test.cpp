@@ -45,6 +45,7 @@ class UpdatesTest : public testing::ApplianceTest {
                 .state = folder_ / "state",
                 .sticks = folder_ / "sticks",
                 .first_look_after = std::chrono::milliseconds(1),
+                .look_every = std::chrono::milliseconds(1),
                 .look_again_after = std::chrono::milliseconds(1),
                 .release = folder_ / "no-release",
                 .bus_address = message_bus_.address(),
@@ -111,6 +112,9 @@ TEST_F(UpdatesTest, WhatTheChannelGaveIsOfferedAndLoggedOnceUntilARestartIsNeede
     const Message offer = say::channel::IsOffered("99.0", "plumb-99.0.raucb");
     const auto offered = [&] { return updates_->GetUpdate().offered; };
     EXPECT_TRUE(Becomes([&] { return offered() == offer; }));
+    // One look follows the other.
+    const int looks = server.num_looks_;
+    EXPECT_TRUE(Becomes([&] { return server.num_looks_ > looks + 1; }));
     const auto answer = std::make_shared<std::promise<Change>>();
     On([&] {
       updates_->InstallUpdate(kTester, "plumb-99.0.raucb",

@@ -363,6 +363,21 @@ TEST_F(PatientTransferTest, PlansThatWereChangedInBothUnitsStayInBoth) {
   EXPECT_THAT(came.front(), HasSubstr("2.0"));
 }
 
+TEST_F(PatientTransferTest, OfTwoCodesThatDifferInHyphensTheExactOneIsTaken) {
+  {
+    // Units before 0.3.0 took both.
+    Database database(here() / "plumb.db", Database::Access::kReadWrite);
+    database.Run("INSERT INTO patients (code, site, created_at) VALUES ('P7', '', 1)");
+  }
+  const auto scans_of = [&](const char* code, const char* name) {
+    return ExportPatient(here(), code, folder_ / name).scans;
+  };
+  EXPECT_EQ(scans_of("p-7", "hyphen"), 3U);
+  EXPECT_EQ(scans_of("P7", "plain"), 0U);
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ExportPatient(here(), "P--7", folder_ / "x"); }),
+              AllOf(HasSubstr("P-7"), HasSubstr("P7"), HasSubstr("exactly")));
+}
+
 TEST_F(PatientTransferTest, ACodeWithOtherDataIsRefused) {
   (void)ExportPatient(here(), "P-7", out());
   {

@@ -5,7 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "algo/base/units.hpp"
@@ -223,6 +225,84 @@ TEST(PlannedReferenceTest, TheSkinCountsMostlyUpwards) {
   EXPECT_EQ(comparison.motion->uncertainty.Parts().size(), 10U);
 }
 
+// Half-widths of what is stated, in metres: once in the scene, once in the options.
+Comparison Stated(const StatedSurface& in_scene, const std::optional<StatedSurface>& in_options,
+                  const Scene& current) {
+  Scene planned = PlannedScene();
+  planned.planning->surface = in_scene;
+  CompareOptions options = InRoom();
+  options.surface = in_options;
+  return Compare(planned, current, options);
+}
+
+TEST(PlannedReferenceTest, WhatIsStatedOfTheSurfaceWidensTheIntervalsByCause) {
+  const Scene current = Current(SmallMotion());
+  const Comparison bare = Compare(PlannedScene(), current, InRoom());
+  const StatedSurface both{.clothing_u95_m = 0.005, .ct_breathing_u95_m = 0.008};
+  const Comparison stated = Stated(both, std::nullopt, current);
+  ASSERT_TRUE(bare.motion && stated.motion && bare.correction && stated.correction);
+  const MotionUncertainty& parts = stated.motion->uncertainty;
+  EXPECT_EQ(parts.Parts().size(), 12U);
+  // As the skin counts, which is everywhere farther out; one half alone comes on top.
+  const double skin_m = std::sqrt(parts.skin(5, 5)) * 1.96 / 0.001;
+  EXPECT_NEAR(std::sqrt(parts.clothing(5, 5)) * 1.96, 0.005 * skin_m, 0.0005);
+  EXPECT_NEAR(std::sqrt(parts.ct_breathing(5, 5)) * 1.96, 0.008, 0.0005) << "straight up";
+  // The tilt of one half, 0.2 to 0.4 m long, about the axis across the couch: y of the markers.
+  EXPECT_GT(std::sqrt(parts.clothing(1, 1)) * 1.96, 0.75 * 0.005 / 0.4);
+  EXPECT_LT(std::sqrt(parts.clothing(1, 1)) * 1.96, 0.75 * 0.005 / 0.1);
+  EXPECT_GT(std::sqrt(parts.ct_breathing(1, 1)) * 1.96, 0.75 * 0.008 / 0.4);
+  EXPECT_GT(parts.clothing(0, 0), 25 * parts.skin(0, 0)) << "a cover on one side rolls the body";
+  EXPECT_TRUE(stated.motion->covariance.isApprox(parts.Total()));
+  EXPECT_TRUE((parts.Total() - parts.clothing - parts.ct_breathing)
+                  .isApprox(bare.motion->uncertainty.Total(), 1e-12));
+  EXPECT_GT(*stated.correction->u95.vertical_mm, 8.0);
+  EXPECT_LT(*bare.correction->u95.vertical_mm, 3.0);
+  EXPECT_EQ(stated.motion->T.matrix(), bare.motion->T.matrix()) << "no number is changed";
+  EXPECT_EQ(stated.planning->surface.clothing_u95_m, 0.005);
+}
+
+TEST(PlannedReferenceTest, NothingStatedCountsForNothing) {
+  const Scene current = Current(SmallMotion());
+  const Comparison bare = Compare(PlannedScene(), current, InRoom());
+  const Comparison zero = Stated({}, StatedSurface{}, current);
+  ASSERT_TRUE(bare.motion && zero.motion);
+  EXPECT_EQ(zero.motion->covariance, bare.motion->covariance) << "bit for bit";
+  EXPECT_EQ(zero.motion->uncertainty.Parts().size(), 10U);
+  // A plan that states nothing counts, not what the scene of the files states.
+  const Comparison cleared = Stated({.clothing_u95_m = 0.01}, StatedSurface{}, current);
+  EXPECT_EQ(cleared.motion.value().covariance, bare.motion->covariance);
+  for (const double wrong : {-0.001, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THROW((void)Stated({}, StatedSurface{.clothing_u95_m = wrong}, current),
+                 std::invalid_argument);
+    EXPECT_THROW((void)Stated({}, StatedSurface{.ct_breathing_u95_m = wrong}, current),
+                 std::invalid_argument);
+  }
+}
+
+// How many of the six numbers of a body that lies where it was planned are outside their intervals,
+// where its surface is higher by up to 6 mm, from the feet to the head over `ramp_m`.
+int NumbersOutside(double ramp_m, const StatedSurface& stated) {
+  SyntheticOptions raised = PlacedBody();
+  raised.deform = [=](const Eigen::Vector3d& p) {
+    return Eigen::Vector3d(0, 0, 0.006 * std::clamp(0.5 + p.x() / ramp_m, 0.0, 1.0));
+  };
+  const Comparison comparison = Stated(stated, std::nullopt, Current(Pose::Identity(), raised));
+  const CouchNumbers &off = comparison.correction.value().value, &u95 = comparison.correction->u95;
+  return (std::abs(*off.vertical_mm) > *u95.vertical_mm) +
+         (std::abs(*off.longitudinal_mm) > *u95.longitudinal_mm) +
+         (std::abs(*off.lateral_mm) > *u95.lateral_mm) + (std::abs(off.pitch_deg) > u95.pitch_deg) +
+         (std::abs(off.roll_deg) > u95.roll_deg) + (std::abs(off.yaw_deg) > u95.yaw_deg);
+}
+
+TEST(PlannedReferenceTest, TheTruthLiesInTheIntervalsWhereItIsStated) {
+  // A cover over one half, 3.6 mm and 1.03 deg off; a chest that is fuller than at the CT.
+  constexpr double kCover_m = 0.1, kBreath_m = 0.5;
+  EXPECT_GE(NumbersOutside(kCover_m, {}), 2) << "height and pitch";
+  EXPECT_EQ(NumbersOutside(kCover_m, {.clothing_u95_m = 0.006}), 0);
+  EXPECT_GE(NumbersOutside(kBreath_m, {}), 2) << "height and pitch";
+  EXPECT_EQ(NumbersOutside(kBreath_m, {.ct_breathing_u95_m = 0.006}), 0);
+}
+
 TEST(PlannedReferenceTest, TaughtMarkersPlaceTheScanInsteadOfTheReferenceMarker) {
   // The scan's own frame is turned by 0.5 deg against the taught one: as if its reference marker
   // had been seen askew.
@@ -328,6 +408,21 @@ TEST(TwoRoomsTest, BothCalibrationsAreInTheIntervals) {
   // The translation at the isocentre by itself: (0.8² + 0.6²) mm² / 1.96², and more away from it.
   EXPECT_GE(both(3, 3), 1e-6 / (1.96 * 1.96) * 0.999);
   EXPECT_GT(room(without_first)(3, 3), 0.35e-6 / (1.96 * 1.96));
+}
+
+TEST(TwoRoomsTest, AMarkerThatMovedInTheReferencesRoomIsNotUsed) {
+  const Scene current = InOtherRoom(Pose::Identity());
+  CompareOptions options = InTwoRooms();
+  options.reference_room->markers = ReferenceScan().markers;
+  for (Eigen::Vector3d& corner : options.reference_room->markers.rbegin()->second.corners)
+    corner.x() += 0.05;
+  EXPECT_TRUE(Compare(ReferenceScan(), current, options).motion) << "it is left out";
+  // The method as published uses it.
+  options.preset = Preset::kPaper;
+  const Comparison published = Compare(ReferenceScan(), current, options);
+  EXPECT_EQ(published.verdict, Verdict::kNoAnswer);
+  EXPECT_FALSE(published.motion);
+  EXPECT_THAT(published.reasons.at(0).English(), testing::StartsWith("the reference scan"));
 }
 
 TEST(TwoRoomsTest, ARoomThatIsNotCalibratedIsNamed) {

@@ -48,11 +48,13 @@ class PlanningFilesTest : public ::testing::Test {
 TEST_F(PlanningFilesTest, AStructureSetIsReadAsItWasWritten) {
   auto [written, plan] = SmallCt({.quirks = {CtQuirk::kPoints, CtQuirk::kEmptyRoi}});
   written.rois[1].name = "K\u00f6rper";
+  written.image_uids = {{"2.25.2", {"2.25.481.2.1", "2.25.481.2.2"}}, {"2.25.3", {"2.25.481.2.3"}}};
   const StructureSet read = ReadStructureSet(Write("structures.dcm", DicomBytes(written)));
   EXPECT_EQ(read.file.instance_uid, written.file.instance_uid);
   EXPECT_EQ(read.file.patient_id, "SIM-1");
   EXPECT_EQ(read.file.date, "20260101 080000");
   EXPECT_EQ(read.file.frame_of_reference_uid, "2.25.52");
+  EXPECT_EQ(read.image_uids, written.image_uids);
   ASSERT_EQ(read.rois.size(), written.rois.size());
   for (std::size_t r = 0; r < read.rois.size(); ++r) {
     const PlannedRoi &a = read.rois[r], &b = written.rois[r];

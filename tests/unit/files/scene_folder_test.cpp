@@ -129,6 +129,20 @@ TEST_F(SceneFolderTest, GivesBackAPlanningCt) {
   scene.planning->skin_threshold_hu = -350;
   WriteScene(scene, scene_);
   EXPECT_EQ(ReadScene(scene_).planning->skin_threshold_hu, -350);
+  EXPECT_EQ(ReadScene(scene_).planning->surface.clothing_u95_m, 0) << "nothing is stated";
+  scene.planning->surface = {.clothing_u95_m = 0.03, .ct_breathing_u95_m = 0.004};
+  WriteScene(scene, scene_);
+  EXPECT_EQ(ReadScene(scene_).planning->surface.clothing_u95_m, 0.03);
+  EXPECT_EQ(ReadScene(scene_).planning->surface.ct_breathing_u95_m, 0.004);
+  for (const double wrong : {-0.001, 0.0301}) {
+    scene.planning->surface = {.ct_breathing_u95_m = wrong};
+    WriteScene(scene, scene_);
+    EXPECT_THAT(Refusal(), HasSubstr("ct_breathing_u95_m")) << wrong;
+    scene.planning->surface = {.clothing_u95_m = wrong};
+    WriteScene(scene, scene_);
+    EXPECT_THAT(Refusal(), HasSubstr("clothing_u95_m")) << wrong;
+  }
+  scene.planning->surface = {};
   scene.planning->skin_threshold_hu = -2001;
   WriteScene(scene, scene_);
   EXPECT_THAT(Refusal(), HasSubstr("skin_threshold_hu"));

@@ -97,6 +97,7 @@ TEST(ImageFolderTest, TheClassOfTheDeviceReachesTheFramesAndTheImportedFolder) {
   }
   EXPECT_EQ(ClassOfDevice("Kinect"), std::nullopt) << "three classes have had that name";
   EXPECT_EQ(ClassOfDevice(""), std::nullopt);
+  EXPECT_EQ(ClassOfDevice("Intel RealSense SR305"), DepthSensor::kStructuredLight);
 }
 
 TEST(ImageFolderTest, PartnersHaveTheSameNumberAndTheRateCanBeStated) {

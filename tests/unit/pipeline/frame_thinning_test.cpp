@@ -13,8 +13,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "words/reconstruction.hpp"
+
 namespace plumb {
 namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
 
 constexpr double kPeriod_s = 1.0 / 30;
 
@@ -100,7 +105,7 @@ struct Sweep {
   std::vector<std::int64_t> taken;
   std::vector<bool> with_fewer;  // Of each frame in `taken`.
   int lost = 0, dropped = 0;
-  std::string warning;
+  std::vector<std::string> warnings;  // Of a scene that said how many were dropped.
 };
 
 /// @param tracking_s  That a frame takes, by its index.
@@ -118,7 +123,12 @@ Sweep Track(int num_frames, const std::function<double(std::int64_t)>& tracking_
   }
   sweep.dropped += feed.TakeDropped();
   sweep.lost = sensor.lost_in_all;
-  sweep.warning = feed.Warning().English();
+  Scene scene;
+  scene.frames_dropped = sweep.dropped;
+  scene.frames_total = num_frames;
+  scene.warnings.push_back(say::reconstruction::FramesDropped(sweep.dropped, num_frames));
+  feed.WarnIn(scene);
+  sweep.warnings = EnglishTexts(scene.warnings);
   return sweep;
 }
 
@@ -127,7 +137,7 @@ TEST(ThinnedFeed, TakesEveryFrameOfASweepThatIsTrackedInTime) {
   const Sweep sweep = Track(300, [](std::int64_t i) { return i % 5 == 0 ? 0.06 : 0.02; });
   EXPECT_EQ(sweep.taken.size(), 300U);
   EXPECT_EQ(sweep.dropped, 0);
-  EXPECT_EQ(sweep.warning, "");
+  EXPECT_THAT(sweep.warnings, ElementsAre(HasSubstr("dropped")));
   EXPECT_EQ(std::count(sweep.with_fewer.begin(), sweep.with_fewer.end(), true), 0);
 }
 
@@ -136,7 +146,7 @@ TEST(ThinnedFeed, FewerKeypointsSaveFramesWhereTheyAreEnough) {
   const Sweep sweep = Track(
       300, [](std::int64_t) { return 0.035; }, 0.7);
   EXPECT_EQ(sweep.taken.size(), 300U);
-  EXPECT_EQ(sweep.warning, "");
+  EXPECT_THAT(sweep.warnings, ElementsAre(HasSubstr("dropped")));
   const auto fewer = std::count(sweep.with_fewer.begin(), sweep.with_fewer.end(), true);
   EXPECT_GT(fewer, 200);
   EXPECT_LT(fewer, 270) << "they are reduced once tracking is late, not before";
@@ -165,7 +175,8 @@ TEST(ThinnedFeed, LeavesOutEvenlyAndLosesNoneWhereTrackingTakesTooLong) {
   EXPECT_NEAR(static_cast<double>(sweep.taken.size()), 155, 15);
   for (std::size_t i = 61; i < sweep.taken.size(); ++i)
     EXPECT_EQ(sweep.taken[i] - sweep.taken[i - 1], 2) << "before " << sweep.taken[i];
-  EXPECT_THAT(sweep.warning, testing::HasSubstr("of 300 frames were left out evenly"));
+  EXPECT_THAT(sweep.warnings, ElementsAre(HasSubstr("of 300 frames were left out evenly")))
+      << "of the same frames it is not said that they were dropped";
 }
 
 TEST(ThinnedFeed, TakesAllAgainWhenTheLoadIsOver) {
@@ -178,6 +189,7 @@ TEST(ThinnedFeed, TakesAllAgainWhenTheLoadIsOver) {
 TEST(ThinnedFeed, BeyondWhatItMayLeaveOutTheQueueLosesFramesAndTheyAreCounted) {
   const Sweep sweep = Track(300, [](std::int64_t) { return 0.4; });
   EXPECT_GT(sweep.lost, 50);
+  EXPECT_THAT(sweep.warnings, ElementsAre(HasSubstr("dropped"), HasSubstr("left out evenly")));
   EXPECT_EQ(sweep.taken.size() + static_cast<std::size_t>(sweep.dropped), 300U);
 }
 

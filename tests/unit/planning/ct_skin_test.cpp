@@ -313,6 +313,26 @@ TEST(CtSkinTest, AMissingImageIsRefusedWithItsPlace) {
   EXPECT_TRUE(RefusalOf(moved).Is(say::planning::kImagesMissing));
 }
 
+TEST(CtSkinTest, AnImageThatIsMissingAtAnEndIsNoticedWhereTheStructureSetNamesIt) {
+  CtFiles files = FilesOf(Region());
+  files.structures =
+      simulated::MakePlanningCt(Torso().surface, PlaceOfTorso(), Region({CtQuirk::kNoExternal}))
+          .first;
+  files.images.pop_back();
+  EXPECT_TRUE(RefusalOf(files).empty()) << "nothing tells how far the images go";
+  files.structures->image_uids["2.25.3"] = {"2.25.404"};
+  EXPECT_TRUE(RefusalOf(files).empty()) << "another series says nothing of this one";
+  for (const CtImage& image : files.images)
+    files.structures->image_uids[image.series_uid].push_back(image.file.instance_uid);
+  EXPECT_TRUE(RefusalOf(files).empty()) << RefusalOf(files).English();
+  // The file may name one twice.
+  files.structures->image_uids[files.images.front().series_uid].push_back(
+      files.images.front().file.instance_uid);
+  const auto count = static_cast<std::int64_t>(files.images.size());
+  files.images.erase(files.images.begin(), files.images.begin() + 2);
+  EXPECT_EQ(RefusalOf(files), say::planning::ImagesNamedMissing(count, 2));
+}
+
 TEST(CtSkinTest, ASeriesOfTwoSpacingsIsWhole) {
   PlanningCtOptions options = Region();
   options.spacing_m = 0.0025;

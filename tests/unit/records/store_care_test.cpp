@@ -164,7 +164,9 @@ TEST_F(StoreCareTest, EveryFieldOfAPlanComesBackAsItWasStored) {
                                .isocentre_m = {{0.125, -0.25, 0.5}},
                                .tolerance = {.shift_mm = 7.5, .rotation_deg = 2.25},
                                .posture = posture,
-                               .couch_markers = couch_markers};
+                               .couch_markers = couch_markers,
+                               .clothing_mm = 4.5,
+                               .ct_breathing_mm = 6.25};
       const std::string id = store_->references.Add(kAnna, scan, "", plan);
       const ReferencePlan stored = store_->references.Find(id)->plan;
       EXPECT_EQ(stored.region_m, plan.region_m);
@@ -173,8 +175,13 @@ TEST_F(StoreCareTest, EveryFieldOfAPlanComesBackAsItWasStored) {
       EXPECT_EQ(stored.tolerance.rotation_deg, 2.25);
       EXPECT_EQ(stored.posture, posture);
       EXPECT_EQ(stored.couch_markers, couch_markers);
+      EXPECT_EQ(stored.clothing_mm, 4.5);
+      EXPECT_EQ(stored.ct_breathing_mm, 6.25);
     }
   }
+  // What was signed before these were known keeps its text, and its digest.
+  EXPECT_EQ(PlanJson({}).find("clothing"), std::string::npos);
+  EXPECT_EQ(PlanJson({}).find("breathing"), std::string::npos);
 }
 
 TEST_F(StoreCareTest, AStoredPlanThatCannotBeReadIsAnErrorAndNoDefault) {
@@ -194,7 +201,9 @@ TEST_F(StoreCareTest, AStoredPlanThatCannotBeReadIsAnErrorAndNoDefault) {
        R"({"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
        R"({"region_m":[[0,0],[1,1]],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
        R"({"region_m":[[0,0],[1,1],[1,null]],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
-       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"isocentre_m":[0,1]})"}) {
+       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"isocentre_m":[0,1]})",
+       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"clothing_mm":-1})",
+       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"ct_breathing_mm":101})"}) {
     Execute(fmt::format("UPDATE refs SET plan = '{}' WHERE id = {}", bad, id));
     EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->references.Find(id); }),
                 HasSubstr("version 1 of the reference"))

@@ -363,6 +363,14 @@ TEST_F(TumRecordingTest, UnregisteredDepthIsRegistered) {
   ASSERT_TRUE(frame);
   EXPECT_NEAR(frame->depth_m.at<float>(24, 32), 0.75F,
               1e-4);  // 0.5 m before a depth camera that stands 0.25 m in front
+
+  // Under another name, and beside a file of another depth camera, it is the stated one, too.
+  fs::rename(recording_ / "camera.yaml", recording_ / "camera.yml");
+  text.replace(text.find("52.5"), 4, "40.5");
+  WriteWholeFile(recording_ / "depth.yaml", std::string_view(text));
+  const auto renamed = OpenTumRecording(recording_);
+  EXPECT_FALSE(renamed->info().depth_camera_unknown);
+  EXPECT_NEAR(renamed->Next()->depth_m.at<float>(24, 32), 0.75F, 1e-4);
 }
 
 TEST_F(TumRecordingTest, SaturatedDepthIsNothing) {

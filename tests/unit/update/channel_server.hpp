@@ -70,7 +70,10 @@ class ChannelServer {
           fmt::format("HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n{}", body.size(), body));
     };
     if (is_away_) return;
-    if (head.starts_with("GET /plumb/index.json ")) return answer(index_);
+    if (head.starts_with("GET /plumb/index.json ")) {
+      ++num_looks_;
+      return answer(index_);
+    }
     if (head.starts_with("GET /plumb/index.sig ")) return answer(signature_);
     if (!head.starts_with(fmt::format("GET /plumb/{} ", name_))) return;
     if (serve_bundle_) return serve_bundle_(client);
@@ -93,6 +96,7 @@ class ChannelServer {
   std::size_t cut_after_ = std::string::npos;
   std::function<void(PeerConnection&)> serve_bundle_;
   std::atomic<std::size_t> last_from_ = 0;
+  std::atomic<int> num_looks_ = 0;
   std::atomic<bool> is_away_ = false;
   std::array<unsigned char, crypto_sign_PUBLICKEYBYTES> public_key_{};
   std::array<unsigned char, crypto_sign_SECRETKEYBYTES> secret_key_{};

@@ -324,6 +324,11 @@ TEST_F(ApiTest, PlansOutOfRangeAreRefusedWithTheField) {
   refused("region_m", {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}});
   refused("region_m", std::vector<std::array<double, 2>>(501, {0.0, 0.0}));
   refused("isocentre_m", {1, 2});
+  for (const char* stated : {"clothing_mm", "ct_breathing_mm"}) {
+    for (const nlohmann::json& wrong :
+         {nlohmann::json(-0.1), nlohmann::json(30.1), nlohmann::json("5"), nlohmann::json(nullptr)})
+      refused(stated, wrong);
+  }
   nlohmann::json crossing = Plan();
   crossing["region_m"] = {{0, 0}, {1, 1}, {1, 0}, {0, 1}};
   const HttpAnswer answer = physicist.Put("/api/v1/references/r1/plan", crossing);

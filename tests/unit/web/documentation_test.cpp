@@ -96,6 +96,8 @@ TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
   const std::string page = TextOf("/web/page/limits.js"), api = TextOf("/web/openapi.yaml");
   for (const auto& [name, limits] : {std::pair{"shift_tolerance_mm", kShiftTolerance_mm},
                                      {"rotation_tolerance_deg", kRotationTolerance_deg},
+                                     {"clothing_mm", kStatedSurface_mm},
+                                     {"ct_breathing_mm", kStatedSurface_mm},
                                      {"auto_stop_s", kAutoStop_s},
                                      {"scan_limit_s", kScanLimit_s},
                                      {"retention_days", kRetention_days},

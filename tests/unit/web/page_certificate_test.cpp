@@ -34,6 +34,9 @@ struct Certificate {
 
 class PageCertificateTest : public WebTest {
  protected:
+  explicit PageCertificateTest(web::TlsIdentity own = web::MakeTlsIdentity({}))
+      : own_(std::move(own)) {}
+  virtual void Set(web::HttpServerOptions& /*options*/) {}
   void SetUp() override {
     Start([this](web::HttpServerOptions& options) {
       options.tls = own_;
@@ -49,6 +52,7 @@ class PageCertificateTest : public WebTest {
                std::chrono::seconds(skipped_s_ + clock_off_s_.load());
       };
       options.is_clock_trusted = [this] { return is_clock_trusted_.load(); };
+      Set(options);
     });
     const json body = {{"code", setup_code_}, {"name", "engineer"}, {"password", kPassword}};
     const std::string answer = Ask("POST", "/api/v1/setup", body);
@@ -125,7 +129,7 @@ class PageCertificateTest : public WebTest {
   }
 
   plumb::testing::TempFolder folder_;
-  const web::TlsIdentity own_ = web::MakeTlsIdentity({});
+  const web::TlsIdentity own_;
   std::optional<web::TlsIdentity> kept_;
   bool is_full_ = false;
   std::string session_, token_;
@@ -205,6 +209,47 @@ TEST_F(PageCertificateTest, ItsOwnIsRenewedOnlyWhenTheClockHasHeldForAnHour) {
   EXPECT_NE(Shown(), own_.fingerprint);
   EXPECT_EQ(Shown(), kept_->fingerprint);
   EXPECT_GT(LeftInMetrics(), 800L * 24 * 3600);
+}
+
+/// Of the unit's own authority, which its browsers know.
+class IssuedCertificateTest : public PageCertificateTest {
+ protected:
+  IssuedCertificateTest()
+      : PageCertificateTest(
+            web::IssueTlsIdentity(Authority(), {}, std::chrono::system_clock::now())) {}
+  static const std::string& Authority() {
+    static const std::string authority = web::MakeAuthority({});
+    return authority;
+  }
+  void Set(web::HttpServerOptions& options) override {
+    options.own_addresses = [this]() -> std::vector<std::string> {
+      if (has_moved_) return {"2001:db8::1", "10.20.30.40"};
+      return {};
+    };
+    options.make_certificate = [](std::chrono::system_clock::time_point now) {
+      return web::IssueTlsIdentity(Authority(), {"10.20.30.40"}, now);
+    };
+  }
+  std::atomic<bool> has_moved_ = false;
+};
+
+TEST_F(IssuedCertificateTest, ItIsRenewedForAnAddressThatTheUnitHasHadForAnHour) {
+  LetItCare();
+  EXPECT_EQ(Shown(), own_.fingerprint);
+  has_moved_ = true;
+  skipped_s_ += 660;
+  LetItCare();
+  skipped_s_ += 3500;
+  LetItCare();
+  EXPECT_EQ(Shown(), own_.fingerprint) << "not an hour yet";
+  skipped_s_ += 660;
+  LetItCare();
+  ASSERT_NE(Shown(), own_.fingerprint);
+  const std::string renewed = Shown();
+  skipped_s_ += 2 * 3600;
+  LetItCare();
+  EXPECT_EQ(Shown(), renewed)
+      << "it names the address of IPv4, and that of IPv6 alone renews nothing";
 }
 
 TEST_F(PageCertificateTest, ANewConnectionIsShownTheNewOneAndTheLogHasBothFingerprints) {

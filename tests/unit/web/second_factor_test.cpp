@@ -2,6 +2,7 @@
 // Codes of an authenticator against the table of RFC 6238, and a log-in, a signature and the list
 // of sessions with them.
 #include "web/security/second_factor.hpp"
+#include "web/model/plain_code.hpp"
 #include "web/security/secrets.hpp"
 
 #include <gmock/gmock.h>
@@ -72,7 +73,7 @@ TEST(SecondFactorTest, ARecoveryCodeCountsOnceHoweverItIsTyped) {
   EXPECT_EQ(left->recovery_hashes.size(), 9U);
   EXPECT_FALSE(web::UsedSecondFactor(*left, codes[3], At(0)));
   EXPECT_TRUE(web::UsedSecondFactor(*left, codes[4], At(0)));
-  EXPECT_TRUE(web::UsedSecondFactor(*left, web::PlainCode(codes[5]), At(0))) << "no hyphen";
+  EXPECT_TRUE(web::UsedSecondFactor(*left, PlainCode(codes[5]), At(0))) << "no hyphen";
   for (const std::string& hash : factor.recovery_hashes)
     EXPECT_FALSE(web::UsedSecondFactor(factor, hash, At(0))) << "what is stored is no code";
 }

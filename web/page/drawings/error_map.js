@@ -150,10 +150,10 @@ function holeOf({ result, details }) {
 
 /// In the axes of the map; nothing where the plan has none and the numbers are about the middle of
 /// the region. The map of a planning CT has its origin at the isocentre.
-function isocentreOnMap({ correction, motion, compared_with: planned }) {
-  if (planned) return [0, 0];
-  const point = correction?.isocentre;
-  return point?.every((value, i) => value === motion?.centroid_m[i]) ? null : point;
+function isocentreOnMap({ result, details }) {
+  if (details?.compared_with) return [0, 0];
+  const isAboutMiddle = result?.about_message?.id === 'result.about_middle';
+  return isAboutMiddle ? null : details?.correction?.isocentre;
 }
 
 /// Figure with map, reading and profile for a scan with a result; falls back to the picture.
@@ -175,7 +175,7 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
   const view = viewOf(grid, region);
   const compass = compassOf(live.status?.room, sidesOf(scan, scan.details),
     reference.plan.posture);
-  const isocentre = isocentreOnMap(scan.details ?? {});
+  const isocentre = isocentreOnMap(scan);
 
   const canvas = h('canvas', {
     class: 'map', tabindex: '0', role: 'application', 'aria-label': text.mapLabel,

@@ -151,6 +151,7 @@ export async function showPatients(place) {
   };
   const today = todaysList((id) => patients.find((one) => one.id === id && !one.archived),
     may('patients') && toForm);
+  await load();  // before somebody looks for a code or adds one that looks like another
   clear(place, h('h1', {}, text.title), today.element,
     h('section', { class: 'card' }, field(text.search, search), missed, list,
       h('label', { class: 'check below' }, archived, ' ', text.showArchived),
@@ -175,7 +176,6 @@ export async function showPatients(place) {
       h('button', { class: 'primary' }, text.add))));
   // Not where a keyboard on the screen would cover the list.
   if (!matchMedia('(pointer: coarse)').matches) search.focus({ preventScroll: true });
-  await load();
   today.load();
   return live.listen((kind) => {
     if (kind === 'data') load().catch(() => {});

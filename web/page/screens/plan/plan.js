@@ -10,13 +10,14 @@ import { guardLeaving } from '../../leave.js';
 import { kBounds, kReason } from '../../limits.js';
 import { compassOfPlan, marksNote } from '../../drawings/map_frame.js';
 import { loadMap } from '../../drawings/maps.js';
-import { doubtsOf, sideViews } from '../../drawings/side_view.js';
+import { doubtsOf, movableCuts, sideViews } from '../../drawings/side_view.js';
 import { kAxes } from '../../numbers.js';
 import { drafts } from '../../plan_drafts.js';
 import { signedForm } from '../../signed_form.js';
 import { S, said } from '../../words.js';
 import { capturedAgainst, capturedCard } from '../captured.js';
 import { blockNote, flagList, qualityOf } from '../common.js';
+import { meshView } from '../mesh_view.js';
 import { planningFacts, skinThreshold } from '../planning.js';
 import { editor, inMillimetres, measure } from './plan_editor.js';
 import { templateOf } from './plan_template.js';
@@ -46,6 +47,19 @@ function markerChoice(scene, take) {
     action(text.takeMarker, async () => take(middleOf(scene.markers[marker.value])), {}));
 }
 
+/// The body from the side; of a planning CT wherever one cuts it.
+const sidesOf = (heights, point) =>
+  (heights?.scene.planning ? movableCuts : sideViews)(heights, point);
+
+/// What is stated of a planning CT's surface; nothing for other references.
+function statedFields({ stated }) {
+  const text = S.plan;
+  return stated.clothing_mm && h('fieldset', {}, h('legend', {}, text.surface),
+    hint(text.surfaceHint),
+    field(text.clothing, stated.clothing_mm, text.clothingHint),
+    field(text.ctBreathing, stated.ct_breathing_mm, text.ctBreathingHint));
+}
+
 function isInside(region, [x, y]) {
   let inside = false;
   region.forEach(([ax, ay], i) => {
@@ -70,6 +84,10 @@ function controls(reference, model, plan, editable) {
   const rotation = number(plan.rotation_tolerance_deg, kBounds.rotation_tolerance_deg);
   const posture = select(text.postures, plan.posture, { disabled: !editable });
   const couch = checkbox(text.couch, plan.couch_markers, { disabled: !editable });
+  // What is stated of the surface of a planning CT; otherwise they are not shown, and not sent.
+  const stated = reference.source !== 'planning_ct' ? {}
+    : Object.fromEntries(['clothing_mm', 'ct_breathing_mm'].map((name) =>
+      [name, number(plan[name] ?? 0, { required: true, ...kBounds[name] })]));
   /// The field that makes the isocentre neither three numbers nor none.
   const wrongAxis = () => axes.find((axis) => axis.validity.badInput)
     ?? (axes.some((axis) => axis.value !== '') ? axes.find((axis) => axis.value === '')
@@ -80,7 +98,7 @@ function controls(reference, model, plan, editable) {
     bad.textContent = wrong ? text.isocentreBad : '';
     for (const axis of axes) axis.setAttribute('aria-invalid', String(axis === wrong));
     wrong?.focus();
-    return !wrong;
+    return !wrong && Object.values(stated).every((input) => input.reportValidity());
   };
   const isocentre = () => (wrongAxis() || axes[0].value === '' ? null
     : axes.map((axis) => Number(axis.value) / 1000));
@@ -88,12 +106,16 @@ function controls(reference, model, plan, editable) {
     region_m: model.region, isocentre_m: isocentre(), revision: reference.revision,
     shift_tolerance_mm: Number(shift.value), rotation_tolerance_deg: Number(rotation.value),
     posture: posture.value, couch_markers: couch.box.checked,
+    ...Object.fromEntries(Object.entries(stated).map(([name, input]) =>
+      [name, Number(input.value)])),
   });
   /// Everything that a person can change, to find out whether they did.
   const typed = (axis) => [axis.value, axis.validity.badInput];
-  const written = () => JSON.stringify([body(), axes.map(typed)]);
-  const all = [...axes, shift, rotation, posture, couch.box];
-  return { axes, bad, shift, rotation, posture, couch, judge, isocentre, body, written, all };
+  const written = () =>
+    JSON.stringify([body(), [...axes, ...Object.values(stated)].map(typed)]);
+  const all = [...axes, shift, rotation, posture, couch.box, ...Object.values(stated)];
+  return { axes, bad, shift, rotation, posture, couch, stated, judge, isocentre, body, written,
+    all };
 }
 
 const storedPlan = (reference) => ({
@@ -101,6 +123,7 @@ const storedPlan = (reference) => ({
   shift_tolerance_mm: reference.plan.tolerance.shift_mm,
   rotation_tolerance_deg: reference.plan.tolerance.rotation_deg,
   posture: reference.plan.posture, couch_markers: reference.plan.couch_markers,
+  clothing_mm: reference.plan.clothing_mm, ct_breathing_mm: reference.plan.ct_breathing_mm,
 });
 
 /// Why the person who is logged in does not approve this draft; nothing where they may, or where it
@@ -155,10 +178,12 @@ function summary(reference, patient, { scan, quality, picture, heights, captured
           : `±${number(plan.tolerance.rotation_deg)}°`)),
       row(text.posture, text.postures[plan.posture]),
       row(text.markerKind, plan.couch_markers ? text.couchMarkers : text.roomMarkers),
+      planning && [row(text.clothing, `±${number(plan.clothing_mm)} mm`),
+        row(text.ctBreathing, `±${number(plan.ct_breathing_mm)} mm`)],
       quality && row(text.scanQuality, quality.rows.map((one) =>
         `${said(one, 'name')}: ${said(one, 'value')}`).join('; ')),
       row(text.signature, h('code', {}, reference.digest)))),
-    planning, capturedCard(captured), sideViews(heights, plan.isocentre_m),
+    planning, capturedCard(captured), sidesOf(heights, plan.isocentre_m),
     doubts.map((words) => h('p', { class: 'caution' }, words)),
     flags, hint(text.approveHint), signature);
 }
@@ -196,7 +221,7 @@ async function draft(place, reference, store, reload) {
     drawnPoint = shown;
     meant.box.checked = false;
     doubts = point && loaded && !planning ? doubtsOf(loaded, point) : { refused: false, words: [] };
-    clear(sidePlace, sideViews(loaded, point),
+    clear(sidePlace, sidesOf(loaded, point),
       doubts.words.map((words) => h('p', { class: 'caution isocentre-doubt' }, words)),
       doubts.words.length > 0 && !doubts.refused && editable && meant.element);
   };
@@ -204,6 +229,7 @@ async function draft(place, reference, store, reload) {
   const signPlace = h('div', {});
   const templatePlace = h('div', {});
   let stored;  // as written when nothing is edited
+  let mesh = null;
   let drawing = null;
   let hadIsocentre = Boolean(model.isocentre);
   let loaded = null;
@@ -255,6 +281,8 @@ async function draft(place, reference, store, reload) {
       }
     }
     const compass = compassFor(plan.posture);
+    // No other screen shows this surface before it is signed.
+    if (planning && scan) mesh = meshView({ scan }, { compass }, 0);
     const marksPlace = h('div', {}, marksNote(compass));
     drawing = editor({ ...loaded, compass }, model, editable, changed, Boolean(planning));
     inputs.posture.addEventListener('change', () => {
@@ -349,11 +377,12 @@ async function draft(place, reference, store, reload) {
           })),
         h('fieldset', {}, h('legend', {}, text.tolerance), field(text.shift, inputs.shift),
           field(text.rotation, inputs.rotation)),
+        statedFields(inputs),
         templatePlace, field(text.posture, inputs.posture), inputs.couch.element,
         editable && hint(reference.approved_by ? text.approvedHint : text.approveHint),
         refusal && h('p', { class: 'caution refusal' }, refusal),
         unsaved, !planning && block, h('div', { class: 'row' }, editable && save, sign))),
-    signPlace));
+    mesh && card(S.result.mesh, mesh.element), signPlace));
   if (editable && drawing) {
     templateOf(patient, loaded.grid, model, inputs, drawing, changed)
       .then((element) => clear(templatePlace, element), (error) => warn(error.message));
@@ -368,7 +397,7 @@ async function draft(place, reference, store, reload) {
   changed();
   stored ??= inputs.written();
   note();
-  return { isEdited };
+  return { isEdited, stop: () => mesh?.stop() };
 }
 
 export async function showPlan(place, id) {
@@ -378,6 +407,7 @@ export async function showPlan(place, id) {
   let busy = false;  // with our own change, of which the stream notifies us too
   const load = async () => {
     reference = await get(`references/${id}`);
+    shown?.stop();
     shown = await draft(place, reference, store, load);
   };
   const differs = async () => {
@@ -420,6 +450,7 @@ export async function showPlan(place, id) {
   const stop = live.listen((kind) => { if (kind === 'data') follow().catch(() => {}); });
   return () => {
     guardLeaving(null);
+    shown.stop();
     stop();
   };
 }
