@@ -362,13 +362,13 @@ def fail_once(machine, people, bundle, unit, before):
     machine.wait_console("release 0.2.0 .* is marked good", 600)
 
 
-def read_old_backup(machine, files):
-    """By this version, from the disk on which 0.2.0 has left it."""
-    backup = machine.ask_sh("ls -d /var/lib/plumb-backup/plumb*")
+def read_old_backup(machine, name, files):
+    """By this version, from the disk on which 0.2.0 has left it under this name."""
+    backup = f"/var/lib/plumb-backup/{name}"
     out, wrong = "/tmp/restored", "/tmp/wrong"
-    code = machine.sh(f"echo wrong >{wrong}; plumb restore {backup} --key-file {wrong} "
-                      f"--state {out}", 120)[1]
-    expect("with another key the backup of 0.2.0 is refused", "^[1-9]", code)
+    machine.ask_sh(f"umask 077; echo a key that nobody has used >{wrong}")
+    said, code = machine.sh(f"plumb restore {backup} --key-file {wrong} --state {out}", 120)
+    expect("with another key the backup of 0.2.0 is refused", "^3 .*another key than", f"{code} {said}")
     machine.ask_sh(f"plumb restore {backup} --key-file /etc/plumb/backup.key --state {out}", 300)
     restored = set(machine.ask_sh(
         f"cd {out} && find {KEPT} -type f -exec sha256sum {{}} +", 120).splitlines())
@@ -436,7 +436,7 @@ def update_from(old, folder, work):
         is_unit_of(machine, people, r"0\.3\.", "B")
         people.log_in_all()
         expect_accounted(machine, people, before, made, "after the second update")
-        read_old_backup(machine, before[1])
+        read_old_backup(machine, os.listdir(unit.backup)[0], before[1])
         machine.wait_console(r"release 0\.3\.1 .* is marked good", 900)
         say("ok      the gate with its self test finds this version fit")
         check_gate(machine)
