@@ -61,7 +61,7 @@ struct LiveFigures {
   std::size_t false_moved = 0;  ///< Frames `moved_sensor` while it has not moved.
   /// Times `in` was left while the truth was within 60 % of every tolerance.
   std::size_t needless_holds = 0;
-  std::size_t blind_holds = 0;  ///< Those of them at which the body was not seen.
+  std::size_t blind_holds = 0;       ///< Those of them at which the body was not seen.
   std::vector<double> hold_after_s;  ///< From the truth's going out to hold.
   /// From a step until hold, by its size, where the advice was `in` before; and how many led to
   /// none.
