@@ -110,10 +110,12 @@ function buttons() {
   const text = S.scan;
   let request = '';
   let tapped = null;
+  let isAnswered = true;  // the button has changed since that tap
   const press = action('', async () => {
-    // The second of two taps was meant for what the button said before.
+    // The second of two taps was meant for what the button said before, however late it changed.
     if (tapped && since_s(tapped) < kSecondTap_s) return;
     tapped = now();
+    isAnswered = false;
     await post(request);
   }, { class: 'primary giant' });
   const discard = action(text.discard, async () => {
@@ -123,7 +125,11 @@ function buttons() {
   const draw = (status) => {
     const next = offer(status);
     request = next.request;
-    if (press.textContent !== next.label) press.textContent = next.label;
+    if (press.textContent !== next.label) {
+      press.textContent = next.label;
+      if (!isAnswered) tapped = now();
+      isAnswered = true;
+    }
     press.classList.toggle('stop', status.state === 'scanning');
     const isHeld = request === 'scan/start' && status.wants_wristband;
     enable(press, Boolean(request) && live.connected && isAcknowledged() && !isHeld);
