@@ -444,7 +444,8 @@ export async function showPatient(place, id) {
       clear(correction, may('accept') && correctFraction(history.scans, load));
     }
   };
-  const patient = await get(`patients/${id}`);
+  // Nothing moves under the finger of who is quick.
+  const [patient] = await Promise.all([get(`patients/${id}`), load()]);
   const session = h('div', {});
   const file = (name, label) => h('a', {
     class: 'button', href: `/api/v1/patients/${id}/${name}`, download: '',
@@ -470,7 +471,6 @@ export async function showPatient(place, id) {
     weigh();
   };
   drawSession();
-  await load();
   guardLeaving(isDrawing);
   const stop = live.listen((kind) => {
     if (kind === 'status') drawSession();
