@@ -179,6 +179,7 @@ TEST_F(PlanningCtTest, FromTheFilesToSixNumbersInACalibratedRoom) {
 
 TEST_F(PlanningCtTest, WhatIsStatedOfTheSurfaceHasLimits) {
   for (const char* option : {"--clothing-mm", "--ct-breathing-mm"}) {
+    fs::remove_all(folder_ / "planned");
     for (const char* wrong : {"-0.1", "30.1", "nan", "inf", "thick"}) {
       const RunResult refused = Import({}, {option, wrong});
       EXPECT_EQ(refused.exit_code, 2) << option << wrong;
