@@ -318,6 +318,14 @@ await h.step('another patient’s files are refused until a person has looked', 
   await planner.waitForURL(/#\/plan\//);
 });
 
+/// By another screen, so that nothing of the one before is taken for this one.
+const openImport = async () => {
+  await planner.goto(`${h.url}#/patients`);
+  await planner.getByRole('heading', { name: 'Patients', exact: true }).waitFor();
+  await planner.goto(`${h.url}#/patient/${patient}`);
+  await planner.getByText('Reference from the planning CT').click();
+};
+
 await h.step('an import that ends when another screen is shown leaves that screen', async () => {
   h.tell('received');
   const sent = /patients\/.*\/planning\/received/;
@@ -336,9 +344,7 @@ await h.step('an import that ends when another screen is shown leaves that scree
     });
     // Also where a question for the list has no answer.
     await planner.route('**/api/v1/planning/received', (route) => route.abort(), { times: 1 });
-    await planner.goto(`${h.url}#/patients`);
-    await planner.goto(`${h.url}#/patient/${patient}`);
-    await planner.getByText('Reference from the planning CT').click();
+    await openImport();
     await planner.getByRole('row', { name: 'Plan THORAX' }).getByRole('button', { name: 'Import' })
       .click();
     await asked;
@@ -352,9 +358,7 @@ await h.step('an import that ends when another screen is shown leaves that scree
 
 await h.step('what the planning system sent is listed and imported from there', async () => {
   h.tell('received');
-  await planner.goto(`${h.url}#/patients`);
-  await planner.goto(`${h.url}#/patient/${patient}`);
-  await planner.getByText('Reference from the planning CT').click();
+  await openImport();
   const received = planner.getByRole('table', { name: 'From the planning system' });
   await received.getByText('Plan THORAX').waitFor();
   const rowOf = (text) => received.locator('tbody tr', { hasText: text });
@@ -375,15 +379,12 @@ await h.step('what the planning system sent is listed and imported from there', 
   await planner.getByLabel('The files are of this patient').check();
   await rowOf('Plan THORAX').getByRole('button', { name: 'Import' }).click();
   await planner.waitForURL(/#\/plan\//);
-  await planner.goto(`${h.url}#/patient/${patient}`);
-  await planner.getByText('Reference from the planning CT').click();
+  await openImport();
   await rowOf('Plan THORAX').getByRole('link', { name: 'a reference' }).waitFor();
 });
 
 await h.step('received images are offered where a plan has no contour', async () => {
-  await planner.goto(`${h.url}#/patients`);
-  await planner.goto(`${h.url}#/patient/${patient}`);
-  await planner.getByText('Reference from the planning CT').click();
+  await openImport();
   const received = planner.getByRole('table', { name: 'From the planning system' });
   const breast = received.locator('tbody tr', { hasText: 'BREAST' });
   await breast.getByText('its CT images are here').waitFor();
