@@ -12,8 +12,8 @@
 namespace plumb {
 namespace {
 
-// What is out by 1 over one half of a length tilts it as what is out by this at one end and in at
-// the other.
+// The least-squares line through a step of height 1 in the middle of [-1, 1] rises by this from the
+// middle to the end: (1/2) / (2/3).
 constexpr double kTiltOfHalf = 0.75;
 constexpr int kNumPatterns = 5;
 using Patterns = Eigen::Matrix<double, 1, kNumPatterns>;

@@ -12,8 +12,8 @@
 namespace plumb {
 
 /// Motions (rotation vector, translation about the moved centroid) per metre of each pattern: a
-/// surface that is farther out along its normals, or higher, everywhere, or as that over one half
-/// of the region would tilt it, along its y axis or across it.
+/// surface that is farther out along its normals, or higher, everywhere; or tilted like the plane
+/// that fits such a step over one half of the region best, along the y axis or across it.
 struct PatternMotions {
   Vector6d out, out_along, out_across, up, up_along;
 };

@@ -259,14 +259,18 @@ void CtSkin::RequireWhole() const {
       steps[static_cast<std::size_t>(found)], usual));
 }
 
-bool CtSkin::RequireNamed(const StructureSet& structures) const {
+bool CtSkin::IsNamedBy(const StructureSet& structures) const {
   const auto found = structures.image_uids.find(series_uid_);
-  if (found == structures.image_uids.end() || found->second.empty()) return false;
+  return found != structures.image_uids.end() && !found->second.empty();
+}
+
+void CtSkin::RequireNamed(const StructureSet& structures) const {
+  const auto found = structures.image_uids.find(series_uid_);
+  if (found == structures.image_uids.end()) return;
   const std::set<std::string> named(found->second.begin(), found->second.end());
   const auto missing = std::ranges::count_if(
       named, [this](const std::string& uid) { return !instance_uids_.contains(uid); });
   if (missing > 0) throw DataError(say::planning::ImagesNamedMissing(std::ssize(named), missing));
-  return true;
 }
 
 double CtSkin::Steepness() const {

@@ -35,9 +35,10 @@ class CtSkin {
   /// @throws DataError if one is missing between others: the series was not sent as a whole.
   void RequireWhole() const;
 
-  /// @throws DataError if one that the structure set names is missing, which may be at an end.
-  /// @return  Whether it names any of this series.
-  bool RequireNamed(const StructureSet& structures) const;
+  /// Whether the structure set names images of this series.
+  [[nodiscard]] bool IsNamedBy(const StructureSet& structures) const;
+  /// @throws DataError if one that it names is missing, which may be at an end.
+  void RequireNamed(const StructureSet& structures) const;
 
   [[nodiscard]] std::size_t num_images() const { return places_.size(); }
   [[nodiscard]] double threshold_hu() const { return threshold_hu_; }

@@ -238,7 +238,7 @@ Scene MakePlannedScene(const std::optional<StructureSet>& structures, const Trea
   RequireImagesOfPlan(images, plan, place.posture);
   RequireOneFrame(structures.value_or(StructureSet()), images.roi(), plan);
   images.RequireWhole();
-  if (structures) (void)images.RequireNamed(*structures);
+  if (structures) images.RequireNamed(*structures);
 
   PlanningSource& source = scene.planning.emplace();
   const ContourSurface surface = SurfaceOfImages(images, structures, place, scene);

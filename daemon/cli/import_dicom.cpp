@@ -18,6 +18,7 @@
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/planning/planning_import.hpp"
 #include "words/cli.hpp"
+#include "words/text_report.hpp"
 #include "words/web.hpp"
 
 namespace plumb {
@@ -64,8 +65,8 @@ std::string TextOf(const Scene& scene, const ImportDicomArguments& options,
           "\n";
   const auto& [clothing_u95_m, ct_breathing_u95_m] = planning.surface;
   if (clothing_u95_m > 0 || ct_breathing_u95_m > 0)
-    text += context.Said(say::cli::SurfaceStated(clothing_u95_m / kMillimetre,
-                                                 ct_breathing_u95_m / kMillimetre)) +
+    text += context.Said(say::text_report::SurfaceStated(clothing_u95_m / kMillimetre,
+                                                         ct_breathing_u95_m / kMillimetre)) +
             "\n";
   for (const Message& warning : scene.warnings)
     text += fmt::format("  {} {}\n", LeftAligned(context.Said(say::cli::WarningLabel()), 10),

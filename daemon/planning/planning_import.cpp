@@ -108,7 +108,7 @@ ReadPlan ReadPlanningWithImages(const PlanningFiles& files, const PlanningImages
   ReadPlan read{.scene = MakePlannedScene(drawn, plan, skin, choice),
                 .patient_id = plan.file.patient_id};
   if (read.scene.planning->skin_threshold_hu) {  // otherwise a contour counts
-    const bool are_named = drawn && skin.RequireNamed(*drawn);
+    const bool are_named = drawn && skin.IsNamedBy(*drawn);
     const auto ends = are_named ? say::planning::ImagesAllNamed : say::planning::ImagesEnds;
     read.scene.warnings.push_back(
         ends(static_cast<std::int64_t>(skin.num_images()), first_mm, last_mm));

@@ -36,7 +36,8 @@ struct ChannelMemory {
   std::vector<FetchedBundle> fetched = {};
 };
 
-/// The name under which a channel's numbers are kept: an index that another key signs counts anew.
+/// The name under which the number of a channel's newest index is kept. It contains the key,
+/// because the numbers start again when another key signs the index.
 [[nodiscard]] std::string NameOfOrder(const std::string& channel, const std::string& key);
 
 /// Empty where there is no file yet.

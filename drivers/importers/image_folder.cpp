@@ -34,10 +34,10 @@ struct Layout {
   std::string_view color_ending, depth_ending;  ///< Empty: any image.
 };
 
-/// The time that a name states: seconds with decimals, or a whole number of milli-, micro- or
-/// nanoseconds since 1970; its number of digits tells which. Other text may precede it
-/// ("rgb_12.345"), a short number with decimals only with a separator between them: the 1.0002 of
-/// "cam1.0002" is not a time.
+/// The time that a name states: seconds with decimals, or a whole number of milliseconds,
+/// microseconds or nanoseconds since 1970, recognised by its number of digits. Other text may
+/// precede it ("rgb_12.345"); a short number with decimals then needs a separator before it,
+/// because the 1.0002 of "cam1.0002" is not a time.
 std::optional<double> StampOf(std::string_view stem) {
   constexpr std::size_t kDigitsSince1970 = 9;
   if (const std::size_t before = stem.find_last_not_of("0123456789."); before != stem.npos) {

@@ -67,4 +67,6 @@ class CommandLineTest : public testing::Test {
 /// data.
 #define PLUMB_SHARED_DATA(folder, name)                           \
   const std::filesystem::path folder = ::plumb::SharedData(name); \
-  if (folder.empty()) GTEST_SKIP() << "no test data \"" << (name) << "\": set PLUMB_TEST_DATA"
+  if (folder.empty())                                             \
+  GTEST_SKIP() << "the test data in \"" << (name)                 \
+               << "\" are missing; PLUMB_TEST_DATA names their folder"

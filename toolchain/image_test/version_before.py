@@ -356,7 +356,7 @@ def fail_once(machine, people, bundle, unit, before):
     codes = [one["code"] for one in people.ask("planner", "GET", "/patients")["patients"]]
     if "LOST" in codes:
         fail(f"0.2.0 has the rows of the version on trial: {codes}")
-    expect("what was stored on trial lies aside", "plumb.db",
+    expect("the database of the version on trial was set aside", "plumb.db",
            machine.ask_sh("ls /var/lib/plumb/before-restore-1"))
     expect("the page of 0.2.0 says what has happened", ".",
            people.ask("planner", "GET", "/status")["rolled_back"])
@@ -371,7 +371,7 @@ def read_old_backup(machine, name, files):
     """By this version, from the disk on which 0.2.0 has left it under this name."""
     backup = f"/var/lib/plumb-backup/{name}"
     out, wrong = "/tmp/restored", "/tmp/wrong"
-    machine.ask_sh(f"umask 077; echo a key that nobody has used >{wrong}")
+    machine.ask_sh(f"umask 077; echo the wrong key >{wrong}")
     said, code = machine.sh(f"plumb restore {backup} --key-file {wrong} --state {out}", 120)
     expect("with another key the backup of 0.2.0 is refused", "^3 .*another key than",
            f"{code} {said}")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Codes as they are compared, whoever typed or scanned them.
+// The form in which codes are compared, whether they were typed or scanned.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// Without spaces and hyphens and in capitals: codes that differ in nothing else are the same.
+/// The code in capitals, without spaces and hyphens. Codes with the same plain form are the same.
 [[nodiscard]] inline std::string PlainCode(std::string_view code) {
   std::string plain;
   for (const char c : code)

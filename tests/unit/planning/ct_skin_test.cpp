@@ -319,7 +319,7 @@ TEST(CtSkinTest, AnImageThatIsMissingAtAnEndIsNoticedWhereTheStructureSetNamesIt
       simulated::MakePlanningCt(Torso().surface, PlaceOfTorso(), Region({CtQuirk::kNoExternal}))
           .first;
   files.images.pop_back();
-  EXPECT_TRUE(RefusalOf(files).empty()) << "nothing tells how far the images go";
+  EXPECT_TRUE(RefusalOf(files).empty()) << "nothing states how many images there were";
   files.structures->image_uids["2.25.3"] = {"2.25.404"};
   EXPECT_TRUE(RefusalOf(files).empty()) << "another series says nothing of this one";
   for (const CtImage& image : files.images)

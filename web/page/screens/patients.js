@@ -151,7 +151,8 @@ export async function showPatients(place) {
   };
   const today = todaysList((id) => patients.find((one) => one.id === id && !one.archived),
     may('patients') && toForm);
-  await load();  // before somebody looks for a code or adds one that looks like another
+  // Before anything is drawn: codes that are typed are compared with the list.
+  await load();
   clear(place, h('h1', {}, text.title), today.element,
     h('section', { class: 'card' }, field(text.search, search), missed, list,
       h('label', { class: 'check below' }, archived, ' ', text.showArchived),
@@ -404,8 +405,8 @@ export async function showPatient(place, id) {
   /// The button that begins a session is the primary one only where this patient's is not open.
   const weigh = () => opening.querySelector('.start-session')
     ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
-  const load = async () => {
-    const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
+  const load = async (inBackground = true) => {
+    const [patient, found, history] = await Promise.all([get(`patients/${id}`, inBackground),
       get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
     const onSheet = JSON.stringify([patient.alert, patient.immobilisation,
       patient.sheet_revision]);
@@ -443,9 +444,10 @@ export async function showPatient(place, id) {
       numbered = sessions;
       clear(correction, may('accept') && correctFraction(history.scans, load));
     }
+    return patient;
   };
-  // Nothing moves under the finger of who is quick.
-  const [patient] = await Promise.all([get(`patients/${id}`), load()]);
+  // Before anything is drawn: lists that came later would move what a person is about to tap.
+  const patient = await load(false);
   const session = h('div', {});
   const file = (name, label) => h('a', {
     class: 'button', href: `/api/v1/patients/${id}/${name}`, download: '',
