@@ -907,7 +907,12 @@ await h.step('eight tabs of one browser and three browsers: every one live, one 
 });
 
 await h.step('disconnected: states and buttons are off, and say how old they are', async () => {
+  // Lists that never come hold up neither the state nor its age.
+  const lists = /\/api\/v1\/(patients|scans)/;
+  await bob.route(lists, () => {});
   await bob.goto(`${h.url}#/status`);
+  await bob.locator('.hero .headline', { hasText: 'Ready' }).waitFor();
+  await anna.getByRole('button', { name: 'Start sweep' }).waitFor();
   await clara.goto(`${h.url}#/patient/${patient}`);
   const open = clara.getByRole('button', { name: /^Start (treatment session|a new fraction)$/ });
   await open.waitFor();
@@ -936,6 +941,7 @@ await h.step('disconnected: states and buttons are off, and say how old they are
     await h.look(anna, 'scan-disconnected', { axe: false });
   } finally {
     h.server.kill('SIGCONT');
+    await bob.unroute(lists);
   }
   for (const page of [anna, bob, clara]) {
     await page.locator('.disconnected').waitFor({ state: 'detached', ...kSlow });

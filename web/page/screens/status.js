@@ -79,7 +79,6 @@ export async function showStatus(place) {
     login.textContent = lastLoginWords(answer);
     login.classList.toggle('caution', answer.failed > 0);
   });
-  let codes = await patientCodes();
   clear(place,
     h('h1', { class: 'visually-hidden' }, text.title),
     h('section', { class: 'card hero' }, h('div', {}, known.element, headline, advice),
@@ -101,8 +100,7 @@ export async function showStatus(place) {
     redraw(grid, tiles(status));
   };
   const load = async () => {
-    codes = await patientCodes();
-    const { scans } = await get('scans?limit=8', true);
+    const [codes, { scans }] = await Promise.all([patientCodes(), get('scans?limit=8', true)]);
     const rows = scans.map((scan) => row(
       h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at)),
       codes.get(scan.patient_id) ?? S.none, S.purposes[scan.purpose], outcomeBadge(scan)));
@@ -111,11 +109,17 @@ export async function showStatus(place) {
       : hint(text.noScans));
     draw();
   };
-  draw();  // what is known already; the list may take a moment
-  await load();
-  return follow((kind) => {
+  draw();  // what is known already; the list may take a moment, or never come
+  const stop = follow((kind) => {
     if (kind === 'status' || kind === 'connection') draw();
     if (kind === 'data') live.refresh();  // a plan or an approval changes what waits
     if (kind === 'data' || kind === 'result') load().catch(() => {});
   }, known.draw);
+  try {
+    await load();
+  } catch (error) {
+    stop();
+    throw error;
+  }
+  return stop;
 }
