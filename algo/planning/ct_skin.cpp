@@ -264,6 +264,10 @@ bool CtSkin::IsNamedBy(const StructureSet& structures) const {
   return found != structures.image_uids.end() && !found->second.empty();
 }
 
+bool CtSkin::IsOfAnotherSeries(const StructureSet& structures) const {
+  return !structures.image_uids.empty() && !structures.image_uids.contains(series_uid_);
+}
+
 void CtSkin::RequireNamed(const StructureSet& structures) const {
   const auto found = structures.image_uids.find(series_uid_);
   if (found == structures.image_uids.end()) return;

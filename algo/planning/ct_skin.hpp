@@ -37,6 +37,8 @@ class CtSkin {
 
   /// Whether the structure set names images of this series.
   [[nodiscard]] bool IsNamedBy(const StructureSet& structures) const;
+  /// Whether it names images, and none of this series.
+  [[nodiscard]] bool IsOfAnotherSeries(const StructureSet& structures) const;
   /// @throws DataError if one that it names is missing, which may be at an end.
   void RequireNamed(const StructureSet& structures) const;
 

@@ -79,29 +79,24 @@ std::unique_ptr<Database> OpenSource(const fs::path& state, bool is_backup) {
   return database;
 }
 
+struct PatientCode {
+  std::int64_t id = 0;
+  std::string code;
+};
+
 /// The patient whose code it is but for hyphens and capitals; of several, which units before 0.3.0
-/// took, the one who has exactly this code.
-/// @throws DataError if there are several and none has exactly this code
-std::optional<std::int64_t> FindCode(Database& database, const std::string& code) {
-  struct Row {
-    std::int64_t id = 0;
-    std::string code;
-  };
-  const std::vector<Row> rows = database.All(
+/// took, the one who has exactly this code, or all of them if none has.
+std::vector<PatientCode> PatientsOf(Database& database, const std::string& code) {
+  std::vector<PatientCode> rows = database.All(
       "SELECT id, code FROM patients WHERE replace(code, '-', '') = replace(?, '-', '') COLLATE "
       "NOCASE AND id > 0 ORDER BY id",
       [](const Statement& row) {
-        return Row{row.Integer(0), row.Text(1)};
+        return PatientCode{row.Integer(0), row.Text(1)};
       },
       code);
   const auto exact = std::ranges::find_if(
-      rows, [&](const Row& row) { return AsciiLower(row.code) == AsciiLower(code); });
-  if (exact != rows.end()) return exact->id;
-  if (rows.empty()) return std::nullopt;
-  if (rows.size() > 1)
-    throw DataError(
-        say::backup::ExportSeveralPatients(code.substr(0, kMaxName), rows[0].code, rows[1].code));
-  return rows.front().id;
+      rows, [&](const PatientCode& row) { return AsciiLower(row.code) == AsciiLower(code); });
+  return exact == rows.end() ? rows : std::vector{*exact};
 }
 
 /// The record of an earlier import; null if the patient was created here.
@@ -135,14 +130,18 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
   std::error_code ignored;
   const bool is_backup = fs::exists(state / "backup.json", ignored);
   const std::unique_ptr<Database> database = OpenSource(state, is_backup);
-  const std::optional<std::int64_t> patient = FindCode(*database, code);
-  if (!patient)
+  const std::vector<PatientCode> owners = PatientsOf(*database, code);
+  if (owners.empty())
     throw DataError(say::backup::ExportNoPatient(code.substr(0, kMaxName), state.string()));
-  const Json rows = PatientRows(*database, *patient);
+  if (owners.size() > 1)
+    throw DataError(say::backup::ExportSeveralPatients(code.substr(0, kMaxName), owners[0].code,
+                                                       owners[1].code));
+  const std::int64_t patient = owners.front().id;
+  const Json rows = PatientRows(*database, patient);
   const TemporaryFolder own(fs::temp_directory_path(), "plumb-");
-  const Json earlier = EarlierEvidence(state, *patient);
+  const Json earlier = EarlierEvidence(state, patient);
   WriteWholeFile(own.path() / kRecord, Json{{"rows", rows},
-                                            {"evidence", PatientEvidence(*database, *patient)},
+                                            {"evidence", PatientEvidence(*database, patient)},
                                             {"rooms", RoomsOf(*database, rows, earlier)},
                                             {"earlier", earlier}}
                                            .dump(1, ' ', false, Json::error_handler_t::replace));
@@ -180,7 +179,7 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
                                                static_cast<std::int64_t>(report.problems.size()));
   if (!recipients.empty()) described = say::backup::LogEncrypted(std::move(described));
   Transaction transaction(*database);
-  AppendAuditEntry(*database, kCommand, "patient.export", std::to_string(*patient), described);
+  AppendAuditEntry(*database, kCommand, "patient.export", std::to_string(patient), described);
   transaction.Commit();
   return report;
 }
@@ -246,11 +245,14 @@ class PatientImport {
 
   /// @throws InvalidRequest if another patient has the code, or this patient has other data.
   bool IsThere() {
-    const std::optional<std::int64_t> patient = FindCode(*database_, report_.code);
-    if (!patient) return false;
-    if (PatientRows(*database_, *patient) == rows()) return true;  // the store of the export
-    const Json earlier = EarlierEvidence(store_.folders.state(), *patient);
-    if (earlier.is_object() && earlier.value("rows", Json()) == rows()) return true;
+    const std::vector<PatientCode> found = PatientsOf(*database_, report_.code);
+    if (found.empty()) return false;
+    if (found.size() == 1) {
+      const std::int64_t patient = found.front().id;
+      if (PatientRows(*database_, patient) == rows()) return true;  // the store of the export
+      const Json earlier = EarlierEvidence(store_.folders.state(), patient);
+      if (earlier.is_object() && earlier.value("rows", Json()) == rows()) return true;
+    }
     throw InvalidRequest(say::backup::ImportOtherPatient(report_.code));
   }
 

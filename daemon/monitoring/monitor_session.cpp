@@ -199,7 +199,7 @@ void MonitorSession::Follow(Monitor& monitor, const MonitorOptions& options,
     if (sensor >= clocks.size()) continue;  // it came too late to be zeroed with the other one
     if (job_.second) {  // each has a clock of its own, and another one after it was unplugged
       const double stamp_s = frame->depth_time_s;
-      newest_s = std::max(newest_s, clocks[sensor].SteadyStamp(stamp_s, feed_->taken_arrived_s()));
+      newest_s = std::max(newest_s, clocks[sensor].SteadyStamp(stamp_s, *feed_->taken_arrived_s()));
       frame->depth_time_s = newest_s;
       frame->color_time_s += newest_s - stamp_s;
     }
@@ -224,7 +224,7 @@ void MonitorSession::Follow(Monitor& monitor, const MonitorOptions& options,
     if (told_s && !changed && now_s - *told_s < kTellEvery_s) continue;
     told_s = now_s;
     next.line = line;
-    next.arrived_s = feed_->taken_arrived_s();
+    next.arrived_s = *feed_->taken_arrived_s();
     next.done_s = now_s;
     for (std::size_t i = 0; i < clocks.size(); ++i)
       next.has_breathing |= monitor.takes_part(i) && monitor.sensor(i).breathing().has_value();

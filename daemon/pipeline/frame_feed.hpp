@@ -23,6 +23,8 @@ class FrameFeed {
   virtual void Finish() = 0;
   /// Steady time at which the last frame arrived; not set where time has no meaning.
   [[nodiscard]] virtual std::optional<double> last_frame_s() const = 0;
+  /// Likewise, of the frame that Next() returned last: others may have arrived since.
+  [[nodiscard]] virtual std::optional<double> taken_arrived_s() const { return std::nullopt; }
 };
 
 /// Steady clock in seconds.

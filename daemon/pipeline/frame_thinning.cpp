@@ -64,10 +64,10 @@ std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
   }
   handed_out_s_.reset();
   while (std::optional<Frame> frame = feed_.Next(stop)) {
-    const double arrived_s = now_s_();
-    if (Takes(frame->depth_time_s, arrived_s)) {
+    const double now_s = now_s_();
+    if (Takes(frame->depth_time_s, feed_.taken_arrived_s().value_or(now_s), now_s)) {
       ++num_taken_;
-      handed_out_s_ = arrived_s;
+      handed_out_s_ = now_s;
       frame->fewer_keypoints = fewer_keypoints_;
       return frame;
     }
@@ -77,32 +77,34 @@ std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
   return std::nullopt;
 }
 
-bool ThinnedFeed::Takes(double stamp_s, double arrived_s) {
-  if (!last_stamp_s_) changed_s_ = stamp_s;
+bool ThinnedFeed::Takes(double stamp_s, double arrived_s, double now_s) {
+  if (!last_stamp_s_) {
+    first_stamp_s_ = stamp_s;
+    first_arrived_s_ = changed_s_ = arrived_s;
+  }
   // A gap in the frames does not mean a slower sensor.
   if (const double elapsed_s = stamp_s - last_stamp_s_.value_or(stamp_s);
       elapsed_s > 0 && (frame_period_s_ == 0 || elapsed_s < 3 * frame_period_s_))
     frame_period_s_ = Smoothed(frame_period_s_, elapsed_s, kPeriodWeight);
   last_stamp_s_ = stamp_s;
-  // The stamps' clock has another zero: the smallest observed lag is that of a frame that did not
-  // wait.
-  const double lag_s = arrived_s - stamp_s;
-  least_lag_s_ = std::min(lag_s, least_lag_s_.value_or(lag_s));
-  TrackingLoad load{.frame_period_s = frame_period_s_,
+  // Stamps are even where arrivals come in bursts, but their clock may have another rate.
+  const double rate =
+      stamp_s > first_stamp_s_ ? (arrived_s - first_arrived_s_) / (stamp_s - first_stamp_s_) : 1.0;
+  TrackingLoad load{.frame_period_s = rate * frame_period_s_,
                     .tracking_s = num_taken_ < kFewFrames ? 0.0 : tracking_s_,
-                    .late_s = lag_s - *least_lag_s_,
-                    .since_change_s = stamp_s - changed_s_};
+                    .late_s = now_s - arrived_s,
+                    .since_change_s = arrived_s - changed_s_};
   const bool fewer = NextFewerKeypoints(fewer_keypoints_, stride_, load, keypoint_options_);
   if (fewer != fewer_keypoints_) {
     fewer_keypoints_ = fewer;
     // This alone may clear the queue, so frames are not skipped yet.
-    changed_s_ = stamp_s;
+    changed_s_ = arrived_s;
     load.since_change_s = 0.0;
   }
   const int next = NextStride(stride_, load, options_);
   if (next != stride_) {
     stride_ = next;
-    changed_s_ = stamp_s;
+    changed_s_ = arrived_s;
     left_to_skip_ = std::min(left_to_skip_, stride_ - 1);
   }
   if (left_to_skip_ > 0) {
@@ -117,10 +119,15 @@ int ThinnedFeed::TakeDropped() { return feed_.TakeDropped() + std::exchange(num_
 
 void ThinnedFeed::WarnIn(Scene& scene) const {
   if (num_left_out_ == 0) return;
-  if (scene.frames_dropped == num_left_out_)
-    std::erase_if(scene.warnings,
-                  [](const Message& said) { return said.Is(say::reconstruction::kFramesDropped); });
-  scene.warnings.push_back(say::progress::FramesLeftOut(num_left_out_, num_left_out_ + num_taken_));
+  const std::int64_t lost = scene.frames_dropped - num_left_out_;
+  const auto told = std::ranges::find_if(scene.warnings, [](const Message& said) {
+    return said.Is(say::reconstruction::kFramesDropped);
+  });
+  if (told != scene.warnings.end() && lost > 0)
+    *told = say::reconstruction::FramesDropped(lost, scene.frames_total);
+  else if (told != scene.warnings.end())
+    scene.warnings.erase(told);
+  scene.warnings.push_back(say::progress::FramesLeftOut(num_left_out_, scene.frames_total));
 }
 
 }  // namespace plumb

@@ -69,7 +69,8 @@ struct ThinningOptions {
 class ThinnedFeed : public FrameFeed {
  public:
   /// @param feed   Borrowed.
-  /// @param now_s  A clock with the rate of the frames' stamps.
+  /// @param now_s  The clock of FrameFeed::taken_arrived_s(). The rate of the frames' stamps does
+  /// not matter: a program that sends a recording at half its speed leaves twice the time.
   explicit ThinnedFeed(FrameFeed& feed, std::function<double()> now_s = SteadySeconds,
                        const ThinningOptions& options = {},
                        const KeypointBudgetOptions& keypoints = {});
@@ -79,14 +80,17 @@ class ThinnedFeed : public FrameFeed {
   int TakeDropped() override;
   void Finish() override { feed_.Finish(); }
   [[nodiscard]] std::optional<double> last_frame_s() const override { return feed_.last_frame_s(); }
+  [[nodiscard]] std::optional<double> taken_arrived_s() const override {
+    return feed_.taken_arrived_s();
+  }
 
   [[nodiscard]] int stride() const { return stride_; }
-  /// Adds to the scene's warnings that frames were skipped; in place of that they were dropped, if
-  /// no others were.
+  /// Adds to the scene's warnings that frames were skipped, and takes them out of the number that
+  /// were dropped.
   void WarnIn(Scene& scene) const;
 
  private:
-  [[nodiscard]] bool Takes(double stamp_s, double arrived_s);
+  [[nodiscard]] bool Takes(double stamp_s, double arrived_s, double now_s);
 
   FrameFeed& feed_;
   const std::function<double()> now_s_;
@@ -95,8 +99,8 @@ class ThinnedFeed : public FrameFeed {
   bool fewer_keypoints_ = false;
   int stride_ = 1, left_to_skip_ = 0;
   int num_taken_ = 0, num_left_out_ = 0, num_unreported_ = 0;
-  std::optional<double> last_stamp_s_, handed_out_s_, least_lag_s_;
-  double changed_s_ = 0.0;
+  std::optional<double> last_stamp_s_, handed_out_s_;
+  double first_stamp_s_ = 0.0, first_arrived_s_ = 0.0, changed_s_ = 0.0;
   double frame_period_s_ = 0.0, tracking_s_ = 0.0;
 };
 

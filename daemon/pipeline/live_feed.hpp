@@ -49,8 +49,6 @@ class LiveFeed : public FrameFeed {
   }
 
   [[nodiscard]] std::int64_t num_pushed() const { return num_pushed_; }
-  /// Steady time at which the frame that Next() returned last arrived.
-  [[nodiscard]] double taken_arrived_s() const { return taken_arrived_s_; }
   /// Which sensor it is of; only for who calls Next().
   [[nodiscard]] std::size_t taken_sensor() const { return taken_sensor_; }
 
@@ -68,6 +66,7 @@ class LiveFeed : public FrameFeed {
   int TakeDropped() override { return dropped_.exchange(0); }
   void Finish() override {}
   [[nodiscard]] std::optional<double> last_frame_s() const override { return last_frame_s_; }
+  [[nodiscard]] std::optional<double> taken_arrived_s() const override { return taken_arrived_s_; }
 
  private:
   void ThrowFailure() {

@@ -30,7 +30,12 @@ class FrameReader : public FrameFeed {
         queue_(capacity),
         thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
-  std::optional<Frame> Next(const std::stop_token& stop) override { return queue_.Pop(stop); }
+  std::optional<Frame> Next(const std::stop_token& stop) override {
+    std::optional<Arrived> arrived = queue_.Pop(stop);
+    if (!arrived) return std::nullopt;
+    taken_arrived_s_ = arrived->time_s;
+    return std::move(arrived->frame);
+  }
   int TakeDropped() override { return dropped_.exchange(0); }
 
   /// Ends the thread.
@@ -44,8 +49,16 @@ class FrameReader : public FrameFeed {
   [[nodiscard]] std::optional<double> last_frame_s() const override {
     return realtime_ ? std::optional<double>(last_frame_s_) : std::nullopt;
   }
+  [[nodiscard]] std::optional<double> taken_arrived_s() const override {
+    return realtime_ ? std::optional<double>(taken_arrived_s_) : std::nullopt;
+  }
 
  private:
+  struct Arrived {
+    Frame frame;
+    double time_s = 0.0;
+  };
+
   void Run(const std::stop_token& stop) {
     try {
       while (!stop.stop_requested()) {
@@ -54,8 +67,8 @@ class FrameReader : public FrameFeed {
         if (realtime_ && !WaitForItsTime(frame->depth_time_s, stop)) break;
         last_frame_s_ = SteadySeconds();
         if (realtime_) {
-          dropped_ += queue_.PushDroppingOldest(std::move(*frame));
-        } else if (!queue_.Push(std::move(*frame), stop)) {
+          dropped_ += queue_.PushDroppingOldest({std::move(*frame), last_frame_s_});
+        } else if (!queue_.Push({std::move(*frame), last_frame_s_}, stop)) {
           break;
         }
       }
@@ -84,9 +97,10 @@ class FrameReader : public FrameFeed {
 
   FrameSource& source_;
   const bool realtime_;
-  BoundedQueue<Frame> queue_;
+  BoundedQueue<Arrived> queue_;
   std::atomic<int> dropped_ = 0;
   std::atomic<double> last_frame_s_ = 0.0;
+  double taken_arrived_s_ = 0.0;  ///< Only for who calls Next().
   std::optional<double> last_stamp_s_;
   double first_stamp_s_ = 0.0;  ///< Of the frame that came, or would have come, at start_.
   std::chrono::steady_clock::time_point start_;

@@ -112,6 +112,8 @@ ReadPlan ReadPlanningWithImages(const PlanningFiles& files, const PlanningImages
     const auto ends = are_named ? say::planning::ImagesAllNamed : say::planning::ImagesEnds;
     read.scene.warnings.push_back(
         ends(static_cast<std::int64_t>(skin.num_images()), first_mm, last_mm));
+    if (drawn && skin.IsOfAnotherSeries(*drawn))
+      read.scene.warnings.push_back(say::planning::ImagesOtherSeries());
   }
   return read;
 }

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/plain_text.hpp"
@@ -199,9 +200,12 @@ PlannedContour ContourOf(const Item& item, std::size_t& num_points) {
 void AddImagesOf(const Item& frame, StructureSet& structures) {
   frame.ForEach(DCM_RTReferencedStudySequence, [&](const Item& study) {
     study.ForEach(DCM_RTReferencedSeriesSequence, [&](const Item& series) {
-      std::vector<std::string>& uids = structures.image_uids[series.Text(DCM_SeriesInstanceUID)];
+      const std::string series_uid = series.Text(DCM_SeriesInstanceUID);
+      if (series_uid.empty()) return;  // such items name nothing
+      std::vector<std::string>& uids = structures.image_uids[series_uid];
       series.ForEach(DCM_ContourImageSequence, [&](const Item& image) {
-        uids.push_back(image.Text(DCM_ReferencedSOPInstanceUID));
+        if (std::string uid = image.Text(DCM_ReferencedSOPInstanceUID); !uid.empty())
+          uids.push_back(std::move(uid));
       });
     });
   });

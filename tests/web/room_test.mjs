@@ -946,6 +946,12 @@ await h.step('disconnected: states and buttons are off, and say how old they are
   for (const page of [anna, bob, clara]) {
     await page.locator('.disconnected').waitFor({ state: 'detached', ...kSlow });
   }
+  // Nor do lists that fail.
+  await bob.route(lists, (route) => route.abort());
+  await bob.reload();
+  await bob.locator('main').getByText('The appliance is not responding.').waitFor();
+  await bob.locator('.hero .headline', { hasText: 'Ready' }).waitFor();
+  await bob.unroute(lists);
   equal(await open.getAttribute('aria-disabled'), null, 'a session can be opened again');
 });
 

@@ -2,7 +2,9 @@
 // Set-up, login and accounts: everything that handles passwords.
 #pragma once
 
+#include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -225,8 +227,8 @@ class Accounts : public SessionLookup {
   };
   std::optional<CertificateTrial> trial_;
   std::chrono::steady_clock::time_point next_certificate_care_{}, clock_steady_since_{};
-  std::vector<std::string> addresses_;  ///< Of this machine, at the last look.
-  std::chrono::steady_clock::time_point addresses_since_{};
+  /// Addresses of this machine at the last look, and since when it has had each.
+  std::map<std::string, std::chrono::steady_clock::time_point> addresses_since_;
   std::chrono::system_clock::duration clock_ahead_{};  ///< Of the steady clock, at the last look.
   Sessions sessions_;
   Displays displays_;

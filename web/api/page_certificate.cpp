@@ -136,11 +136,15 @@ std::vector<std::string> Accounts::SteadyAddresses(std::chrono::steady_clock::ti
   std::vector<std::string> found = options_.own_addresses();
   // Those of IPv6 may change every day, for privacy; they are renewed with the others.
   std::erase_if(found, [](const std::string& one) { return one.find(':') != std::string::npos; });
-  if (found != addresses_) {
-    addresses_ = std::move(found);
-    addresses_since_ = now;
+  std::map<std::string, std::chrono::steady_clock::time_point> since;
+  for (const std::string& one : found) {
+    const auto before = addresses_since_.find(one);
+    since[one] = before == addresses_since_.end() ? now : before->second;
   }
-  return now - addresses_since_ >= kAddressHeld ? addresses_ : std::vector<std::string>();
+  addresses_since_ = std::move(since);
+  std::erase_if(
+      found, [&](const std::string& one) { return now - addresses_since_.at(one) < kAddressHeld; });
+  return found;
 }
 
 void Accounts::CareForCertificate() {

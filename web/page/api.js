@@ -19,6 +19,7 @@ const kSilent_s = 6;  // the appliance sends a beat every 2 s
 
 /// A moment, for since_s().
 export const now = () => ({ wall: Date.now(), steady: performance.now() });
+const ago = (s) => ({ wall: Date.now() - 1000 * s, steady: performance.now() - 1000 * s });
 /// Seconds since that moment: never negative, and neither too few because the machine slept (the
 /// steady clock may have stood still) nor because its clock was set back.
 export const since_s = (moment) =>
@@ -74,10 +75,17 @@ async function ask(method, path, body,
   throw problem;
 }
 
+/// Answers may come in another order than their requests: the latest use counts.
 /// @param when  The request began, which is not later than it counted there.
 function noteUse(when) {
-  touched = when;
-  channel?.postMessage({ kind: 'used' });
+  if (!takeUse(when)) return;
+  // Each tab has a steady clock of its own.
+  channel?.postMessage({ kind: 'used', age_s: since_s(when) });
+}
+function takeUse(when) {
+  const isLater = since_s(when) < since_s(touched);
+  if (isLater) touched = when;
+  return isLater;
 }
 
 /// The bytes of an answer, with its progress: `onPart(received, total)`, total 0 where not known.
@@ -346,7 +354,7 @@ export const live = {
   /// Takes a message of another tab.
   hear(message) {
     if (message.kind === 'used') {
-      touched = now();
+      takeUse(ago(message.age_s));
       return;
     }
     if (!this.wanted) return;

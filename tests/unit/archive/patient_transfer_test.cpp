@@ -388,6 +388,14 @@ TEST_F(PatientTransferTest, ACodeWithOtherDataIsRefused) {
       MessageOf<std::invalid_argument>([&] { (void)ImportPatient(out(), there()); }),
       AllOf(HasSubstr("P-7"), HasSubstr("not with the same data"), HasSubstr("nothing was")));
   {
+    Database database(there() / "plumb.db", Database::Access::kReadWrite);
+    database.Run("UPDATE patients SET code = 'P7' WHERE code = 'p-7'");
+    database.Run("INSERT INTO patients (code, site, created_at) VALUES ('P--7', '', 1)");
+  }
+  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { (void)ImportPatient(out(), there()); }),
+              HasSubstr("not with the same data"))
+      << "two have the code but for hyphens, neither exactly";
+  {
     Store store(here());
     (void)StoreScan(store, patient_);
   }

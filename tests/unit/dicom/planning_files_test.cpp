@@ -55,6 +55,12 @@ TEST_F(PlanningFilesTest, AStructureSetIsReadAsItWasWritten) {
   EXPECT_EQ(read.file.date, "20260101 080000");
   EXPECT_EQ(read.file.frame_of_reference_uid, "2.25.52");
   EXPECT_EQ(read.image_uids, written.image_uids);
+  StructureSet unnamed = written;
+  unnamed.image_uids["2.25.3"].push_back("");
+  unnamed.image_uids[""] = {"2.25.481.2.4"};
+  EXPECT_EQ(ReadStructureSet(Write("unnamed.dcm", DicomBytes(unnamed))).image_uids,
+            written.image_uids)
+      << "items without an identifier name nothing";
   ASSERT_EQ(read.rois.size(), written.rois.size());
   for (std::size_t r = 0; r < read.rois.size(); ++r) {
     const PlannedRoi &a = read.rois[r], &b = written.rois[r];

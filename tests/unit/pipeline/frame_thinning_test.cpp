@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -73,7 +74,9 @@ TEST(NextStride, StaysWhileNothingIsKnown) {
 /// frames may wait; the oldest are lost then.
 class Sensor : public FrameFeed {
  public:
-  explicit Sensor(int num_frames) : num_frames_(num_frames) {}
+  /// @param stamps_per_s  How fast its clock goes.
+  Sensor(int num_frames, double stamps_per_s)
+      : num_frames_(num_frames), stamps_per_s_(stamps_per_s) {}
   double now_s = 0.0;
 
   std::optional<Frame> Next(const std::stop_token&) override {
@@ -86,19 +89,23 @@ class Sensor : public FrameFeed {
     }
     Frame frame;
     frame.index = next_++;
-    frame.depth_time_s = 77.0 + static_cast<double>(frame.index) * kPeriod_s;
+    frame.depth_time_s = 77.0 + static_cast<double>(frame.index) * kPeriod_s * stamps_per_s_;
+    taken_arrived_s_ = ArrivalOf(static_cast<int>(frame.index));
     return frame;
   }
   int TakeDropped() override { return std::exchange(lost_, 0); }
   void Finish() override {}
   std::optional<double> last_frame_s() const override { return std::nullopt; }
+  std::optional<double> taken_arrived_s() const override { return taken_arrived_s_; }
 
   int lost_in_all = 0;
 
  private:
   static double ArrivalOf(int frame) { return frame * kPeriod_s + 0.01; }
   const int num_frames_;
+  const double stamps_per_s_;
   int next_ = 0, lost_ = 0;
+  double taken_arrived_s_ = 0.0;
 };
 
 struct Sweep {
@@ -111,8 +118,8 @@ struct Sweep {
 /// @param tracking_s  That a frame takes, by its index.
 /// @param share_of_fewer  By how much of that with fewer keypoints.
 Sweep Track(int num_frames, const std::function<double(std::int64_t)>& tracking_s,
-            double share_of_fewer = 1.0) {
-  Sensor sensor(num_frames);
+            double share_of_fewer = 1.0, double stamps_per_s = 1.0) {
+  Sensor sensor(num_frames, stamps_per_s);
   ThinnedFeed feed(sensor, [&] { return sensor.now_s; });
   Sweep sweep;
   while (const std::optional<Frame> frame = feed.Next({})) {
@@ -179,6 +186,17 @@ TEST(ThinnedFeed, LeavesOutEvenlyAndLosesNoneWhereTrackingTakesTooLong) {
       << "of the same frames it is not said that they were dropped";
 }
 
+TEST(ThinnedFeed, TheRateOfTheStampsClockDoesNotMatter) {
+  for (const double stamps_per_s : {0.25, 4.0}) {
+    const auto track = [&](double tracking_s, double rate) {
+      return Track(
+          300, [&](std::int64_t) { return tracking_s; }, 1.0, rate);
+    };
+    EXPECT_EQ(track(0.025, stamps_per_s).taken.size(), 300U) << stamps_per_s;
+    EXPECT_EQ(track(0.05, stamps_per_s).taken, track(0.05, 1.0).taken) << stamps_per_s;
+  }
+}
+
 TEST(ThinnedFeed, TakesAllAgainWhenTheLoadIsOver) {
   const Sweep sweep = Track(600, [](std::int64_t i) { return i < 150 ? 0.05 : 0.01; });
   EXPECT_EQ(sweep.lost, 0);
@@ -189,7 +207,10 @@ TEST(ThinnedFeed, TakesAllAgainWhenTheLoadIsOver) {
 TEST(ThinnedFeed, BeyondWhatItMayLeaveOutTheQueueLosesFramesAndTheyAreCounted) {
   const Sweep sweep = Track(300, [](std::int64_t) { return 0.4; });
   EXPECT_GT(sweep.lost, 50);
-  EXPECT_THAT(sweep.warnings, ElementsAre(HasSubstr("dropped"), HasSubstr("left out evenly")));
+  EXPECT_THAT(sweep.warnings,
+              ElementsAre(HasSubstr(fmt::format("{} of 300 frames were dropped", sweep.lost)),
+                          HasSubstr(fmt::format("{} of 300 frames were left out evenly",
+                                                sweep.dropped - sweep.lost))));
   EXPECT_EQ(sweep.taken.size() + static_cast<std::size_t>(sweep.dropped), 300U);
 }
 

@@ -322,9 +322,14 @@ TEST(CtSkinTest, AnImageThatIsMissingAtAnEndIsNoticedWhereTheStructureSetNamesIt
   EXPECT_TRUE(RefusalOf(files).empty()) << "nothing states how many images there were";
   files.structures->image_uids["2.25.3"] = {"2.25.404"};
   EXPECT_TRUE(RefusalOf(files).empty()) << "another series says nothing of this one";
+  CtSkin skin(kSkinThreshold_hu);
+  for (const CtImage& image : files.images) skin.Add(image, "image");
+  EXPECT_TRUE(skin.IsOfAnotherSeries(*files.structures));
+  EXPECT_FALSE(skin.IsOfAnotherSeries({})) << "one that names none says nothing";
   for (const CtImage& image : files.images)
     files.structures->image_uids[image.series_uid].push_back(image.file.instance_uid);
   EXPECT_TRUE(RefusalOf(files).empty()) << RefusalOf(files).English();
+  EXPECT_FALSE(skin.IsOfAnotherSeries(*files.structures)) << "it is one of two";
   // The file may name one twice.
   files.structures->image_uids[files.images.front().series_uid].push_back(
       files.images.front().file.instance_uid);

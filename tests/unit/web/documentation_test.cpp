@@ -8,6 +8,7 @@
 #include <set>
 
 #include "algo/planning/ct_skin.hpp"
+#include "algo/types/planning_source.hpp"
 #include "algo/verdict/default_tolerance.hpp"
 #include "tests/unit/web/web_fixture.hpp"
 #include "web/model/limits.hpp"
@@ -93,6 +94,7 @@ std::set<double> Stated(const std::string& text, const std::string& name, const 
 }
 
 TEST(LimitsTest, ThePageAndTheDescriptionStateTheLimitsOfTheServer) {
+  EXPECT_EQ(kStatedSurface_mm.entered.most, kMostStated_m * 1e3) << "that of the command line";
   const std::string page = TextOf("/web/page/limits.js"), api = TextOf("/web/openapi.yaml");
   for (const auto& [name, limits] : {std::pair{"shift_tolerance_mm", kShiftTolerance_mm},
                                      {"rotation_tolerance_deg", kRotationTolerance_deg},

@@ -223,14 +223,18 @@ class IssuedCertificateTest : public PageCertificateTest {
   }
   void Set(web::HttpServerOptions& options) override {
     options.own_addresses = [this]() -> std::vector<std::string> {
-      if (has_moved_) return {"2001:db8::1", "10.20.30.40"};
-      return {};
+      if (!has_moved_) return {};
+      // The one of another interface comes and goes, at times before the one that stays.
+      const std::string other = "10.9.0." + std::to_string(++num_looks_ % 200);
+      if (num_looks_ % 2 == 0) return {other, "10.20.30.40"};
+      return {"2001:db8::1", "10.20.30.40", other};
     };
     options.make_certificate = [](std::chrono::system_clock::time_point now) {
       return web::IssueTlsIdentity(Authority(), {"10.20.30.40"}, now);
     };
   }
   std::atomic<bool> has_moved_ = false;
+  std::atomic<int> num_looks_ = 0;
 };
 
 TEST_F(IssuedCertificateTest, ItIsRenewedForAnAddressThatTheUnitHasHadForAnHour) {

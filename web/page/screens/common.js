@@ -126,6 +126,16 @@ export function lastKnownNote(look, role = 'status', before = () => '') {
   return { element, draw };
 }
 
+/// As `ask`, but nothing where a later call has begun meanwhile: its answer is newer.
+export function newestOf(ask) {
+  let turn = 0;
+  return async (...rest) => {
+    const mine = ++turn;
+    const answer = await ask(...rest);
+    return mine === turn ? answer : null;
+  };
+}
+
 /// As live.listen(); calls `tick` regularly besides. Returns what ends both.
 export function follow(listener, tick, every_ms = 1000) {
   const stop = live.listen(listener);

@@ -18,7 +18,7 @@ import { setUpCard, setUpNote } from './patient/set_up_sheet.js';
 import { courseStatistics } from './patient/statistics.js';
 import { planningUpload } from './planning.js';
 import {
-  acceptanceMark, ageText, blockNote, isAdvice, outcomeBadge, sentence, whenSettled,
+  acceptanceMark, ageText, blockNote, isAdvice, newestOf, outcomeBadge, sentence, whenSettled,
 } from './common.js';
 
 const waitsFor = ({ planned_by: planner }) =>
@@ -120,9 +120,12 @@ export async function showPatients(place) {
       ? table([text.code, text.site, text.scans, text.reference, text.added], rows, text.title)
       : hint(wanted() ? text.noMatch(search.value.trim()) : text.empty));
   };
+  // The state says which drafts wait for what.
+  const ask = newestOf(() => Promise.all([get('patients', true), live.refreshed()]));
   const load = async () => {
-    // The state says which drafts wait for what.
-    [{ patients }] = await Promise.all([get('patients', true), live.refreshed()]);
+    const answers = await ask();
+    if (!answers) return;
+    [{ patients }] = answers;
     draw();
     today.draw();
   };
@@ -406,9 +409,12 @@ export async function showPatient(place, id) {
   /// The button that begins a session is the primary one only where this patient's is not open.
   const weigh = () => opening.querySelector('.start-session')
     ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
+  const ask = newestOf((inBackground) => Promise.all([get(`patients/${id}`, inBackground),
+    get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]));
   const load = async (inBackground = true) => {
-    const [patient, found, history] = await Promise.all([get(`patients/${id}`, inBackground),
-      get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
+    const answers = await ask(inBackground);
+    if (!answers) return null;
+    const [patient, found, history] = answers;
     const onSheet = JSON.stringify([patient.alert, patient.immobilisation,
       patient.sheet_revision]);
     // A reason that was typed stays as long as nothing else is offered.

@@ -116,7 +116,12 @@ function buttons() {
     if (tapped && since_s(tapped) < kSecondTap_s) return;
     tapped = now();
     isAnswered = false;
-    await post(request);
+    try {
+      await post(request);
+    } catch (error) {
+      isAnswered = true;  // refused: what the button says next is no answer to this tap
+      throw error;
+    }
   }, { class: 'primary giant' });
   const discard = action(text.discard, async () => {
     await post('cancel');

@@ -6,8 +6,8 @@ import { lastLogin, lastLoginWords } from '../last_login.js';
 import { sessionName } from '../treatment.js';
 import { S, said, saidEach } from '../words.js';
 import {
-  cautionsOf, faultWords, follow, isCold, lastKnownNote, minutesOf, outcomeBadge, patientCodes,
-  stateHere, stateHint,
+  cautionsOf, faultWords, follow, isCold, lastKnownNote, minutesOf, newestOf, outcomeBadge,
+  patientCodes, stateHere, stateHint,
 } from './common.js';
 
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
@@ -99,8 +99,11 @@ export async function showStatus(place) {
     advice.textContent = live.connected ? faultWords(status) ?? stateHint(status) : '';
     redraw(grid, tiles(status));
   };
+  const ask = newestOf(() => Promise.all([patientCodes(), get('scans?limit=8', true)]));
   const load = async () => {
-    const [codes, { scans }] = await Promise.all([patientCodes(), get('scans?limit=8', true)]);
+    const answers = await ask();
+    if (!answers) return;
+    const [codes, { scans }] = answers;
     const rows = scans.map((scan) => row(
       h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at)),
       codes.get(scan.patient_id) ?? S.none, S.purposes[scan.purpose], outcomeBadge(scan)));
@@ -115,11 +118,6 @@ export async function showStatus(place) {
     if (kind === 'data') live.refresh();  // a plan or an approval changes what waits
     if (kind === 'data' || kind === 'result') load().catch(() => {});
   }, known.draw);
-  try {
-    await load();
-  } catch (error) {
-    stop();
-    throw error;
-  }
+  await load().catch((error) => redraw(list, hint(error.message)));
   return stop;
 }

@@ -407,8 +407,9 @@ export async function showPlan(place, id) {
   let busy = false;  // with our own change, of which the stream notifies us too
   const load = async () => {
     reference = await get(`references/${id}`);
-    shown?.stop();
+    const before = shown;
     shown = await draft(place, reference, store, load);
+    before?.stop();
   };
   const differs = async () => {
     const stored = await get(`references/${id}`, true);
