@@ -30,8 +30,8 @@ void RequestFactoryReset(const std::filesystem::path& state, FactoryReset kind, 
 
 /// Carries out a request; an interrupted one starts again. Keeping the records removes accounts,
 /// paired displays, settings, bundles, what is remembered of channels of updates, and the keys of
-/// page and browsers; wiping removes everything in the folder, and counts as done once nothing is left
-/// in or outside it. The (new) audit log records who requested it.
+/// page and browsers; wiping removes everything in the folder, and counts as done once nothing is
+/// left in or outside it. The (new) audit log records who requested it.
 /// @returns what was done, as a sentence; nothing without a request.
 /// @throws DataError for a request that cannot be read, which changes nothing; IoError and its
 ///         kinds, after which the next start continues.
