@@ -29,11 +29,13 @@ const std::string kPatientColumns =
     "r.approved_by <> '') ORDER BY version DESC LIMIT 1), note, archived, immobilisation, alert, "
     "has_photo, drawing <> '', sheet_revision FROM patients ";
 
-/// The newest session for fractions of patient ?1, if it can be resumed: closed since ?2.
+/// The newest session for fractions of patient ?1 in which a sweep was begun, be it that the power
+/// ended it, if it can be resumed: closed since ?2.
 constexpr const char* kResumable =
     "SELECT id, fraction, (SELECT count(*) FROM scans WHERE session_id = sessions.id AND outcome = "
-    "'done') AS num_scans, closed_at FROM sessions WHERE id = (SELECT max(id) FROM sessions WHERE "
-    "patient_id = ?1 AND purpose = 'fraction') AND closed_at >= ?2 AND num_scans > 0";
+    "'done'), closed_at FROM sessions WHERE id = (SELECT max(begun.id) FROM sessions AS begun WHERE "
+    "begun.patient_id = ?1 AND begun.purpose = 'fraction' AND EXISTS (SELECT 1 FROM scans WHERE "
+    "session_id = begun.id)) AND closed_at >= ?2";
 
 std::int64_t ResumableSince() {
   return StoredNow() - std::int64_t{kResumable_h} * 3600 * 1'000'000;

@@ -454,7 +454,11 @@ await h.step('the room’s display, and the scan from the start to the result an
   await openPatient(first.id, 'fraction');
   await sweep('moved z 8 HFS');
   await look({ ...inRoom('move', '.verdict.move'), state: false });
+  // The page of the sweep goes to the result by itself; only then is it asked for another screen.
+  await anna.evaluate(() => { location.hash = '/scan'; });
+  await anna.locator('.scan-grid .headline').waitFor();
   await sweep('hole');
+  await anna.waitForURL(/#\/result$/);
   await lookAll(inRoom('no-answer', '.verdict.no_answer'),
     atScan('again', '.headline[data-state=result]'));
   h.tell('slow');

@@ -60,7 +60,7 @@ struct Patient {
   bool has_drawing = false;         ///< PatientService::Drawing() has one.
   int sheet_revision = 0;           ///< Grows with every photo and every drawing.
   bool archived = false;            ///< Not in the list and not to be opened; nothing is deleted.
-  /// The newest session for fractions, if scans were completed in it and it was closed in the last
+  /// The newest session for fractions in which a sweep was begun, if it was closed in the last
   /// kResumable_h hours. Not set in lists.
   std::optional<EndedSession> last_session = {};
 };

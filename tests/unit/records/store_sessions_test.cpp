@@ -226,6 +226,27 @@ TEST_F(StoreSessionsTest, AClosedSessionGoesOnWithItsFractionOnTheSameDay) {
   EXPECT_EQ(store.scans.Find(scan)->fraction, 1);
 }
 
+TEST_F(StoreSessionsTest, ASessionWhoseOnlySweepWasCutOffGoesOnAndAnEmptyOneHidesNone) {
+  Store store(folder_ / "state");
+  const std::string patient = store.patients.Add(kAnna, "P-1", "");
+  const std::string session = store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);
+  (void)store.scans.Begin({.patient_id = patient,
+                           .reference_id = {},
+                           .purpose = ScanPurpose::kFraction,
+                           .sensor_serial = "S1",
+                           .session_id = session,
+                           .sensor_on_s = 90.0,
+                           .daily_check = DailyCheck::kPassed});
+  store.treatments.CloseAll(kSelf);
+  (void)store.treatments.Open(kAnna, patient, ScanPurpose::kFraction);  // by mistake
+  store.treatments.CloseAll(kAnna);
+  const auto last = store.patients.Find(patient)->last_session;
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->id, session);
+  EXPECT_EQ(last->num_scans, 0) << "none was completed";
+  EXPECT_EQ(RefusalOf([&] { store.treatments.Resume(kBert, session); }), ChangeResult::kDone);
+}
+
 TEST_F(StoreSessionsTest, AFractionNumberIsCorrectedForAReasonAndTheNextFollowsIt) {
   Store store(folder_ / "state");
   const std::string patient = store.patients.Add(kAnna, "P-1", "");

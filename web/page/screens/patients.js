@@ -380,9 +380,10 @@ function wipe(patient) {
 function openNow(patient) {
   const session = live.status?.session;
   if (session?.patient_id !== patient.id) return null;
-  return h('p', { class: 'lead' }, h('strong', {}, S.patients.isOpen), ' ',
-    session.fraction ? S.session.fraction(session.fraction) : S.purposes.reference, ' ',
-    h('a', { class: 'button primary', href: '#/scan' }, S.status.goScan), ' ',
+  const what = session.fraction ? S.session.fraction(session.fraction) : S.purposes.reference;
+  return h('div', { class: 'row' },
+    h('span', { class: 'lead' }, h('strong', {}, S.patients.isOpen), ` ${what}`),
+    h('a', { class: 'button primary', href: '#/scan' }, S.status.goScan),
     may('scan') && action(S.session.close, () => closeSession(session), {}));
 }
 
@@ -391,7 +392,7 @@ export async function showPatient(place, id) {
   const references = h('div', {});
   const scans = h('div', {});
   const spread = h('div', {});
-  const opening = h('div', {});
+  const opening = h('div', { class: 'below' });
   const about = h('div', {});
   const setUp = h('div', {});
   const heading = h('h1', {});
