@@ -191,14 +191,20 @@ TEST_F(DaemonDamageTest, StartsFromEveryDamagedStateSaysWhatIsWrongAndDeletesNot
 /// alone.
 fs::path MakeKilledState(const fs::path& folder) {
   fs::create_directories(folder);
+  {  // Whoever ends in order empties the log of writes; one that runs does so once a minute.
+    Plumbd plumbd(folder);
+    EXPECT_TRUE(plumbd.WaitUntilUp()) << plumbd.log();
+    HttpClient engineer = plumbd.MakeFirstAccount();
+    EXPECT_EQ(engineer.LogIn("engineer", kPassword), 200);
+    EXPECT_TRUE(test::AddAccount(plumbd.port(), engineer, "tom", "technician"));
+    EXPECT_EQ(plumbd.Stop(), 0) << plumbd.log();
+    const fs::path log = plumbd.state() / "plumb.db-wal";
+    EXPECT_TRUE(!fs::exists(log) || fs::file_size(log) == 0);
+  }
   Plumbd plumbd(folder);
   EXPECT_TRUE(plumbd.WaitUntilUp()) << plumbd.log();
-  HttpClient engineer = plumbd.MakeFirstAccount(), tom(plumbd.port());
-  EXPECT_EQ(engineer.LogIn("engineer", kPassword), 200);
-  EXPECT_TRUE(test::AddAccount(plumbd.port(), engineer, "tom", "technician"));
+  HttpClient tom(plumbd.port());
   EXPECT_EQ(tom.LogIn("tom", kPassword), 200);
-  plumbd.WaitFor("the log of writes to be emptied",
-                 [&](const json&) { return fs::file_size(plumbd.state() / "plumb.db-wal") == 0; });
   for (int i = 0; i < 5; ++i)
     EXPECT_EQ(tom.Post("/api/v1/patients", {{"code", fmt::format("K{}", i)}, {"site", ""}}).status,
               201);

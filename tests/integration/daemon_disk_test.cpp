@@ -347,7 +347,7 @@ TEST_F(DaemonDiskTest, ACopyOfTheDiskAtAnyMomentStartsWithEveryScanThatWasAnnoun
   MountImage();
   if (IsSkipped() || HasFatalFailure()) return;
   const char* wanted = std::getenv("PLUMB_CRASH_IMAGES");
-  const int num_images = wanted != nullptr ? std::atoi(wanted) : 8;
+  const int num_images = wanted != nullptr ? std::atoi(wanted) : 4;
   std::mt19937 random(11);
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());

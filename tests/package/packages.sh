@@ -49,14 +49,17 @@ cat check.log
 
 every_library_is_depended_upon() {
   local package file library owner bad=0
+  local -A owners=() # asking dpkg takes long, and the programs share most libraries
   for package in plumb plumbd plumb-dicom plumb-virtual-sensor; do
     depends=" $(dpkg-deb -f "$once/${package}"_*.deb Depends) "
     while IFS= read -r file; do
       case "$file" in *libOpenNI2.so* | *libOniFile.so*) continue ;; esac
       for library in $(readelf -dW "$file" 2>/dev/null | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'); do
-        owner=$(for path in "$sysroot"{,/usr}/lib/"$multiarch/$library"; do
-          dpkg-query ${sysroot:+--admindir="$sysroot/var/lib/dpkg"} -S "$path" 2>/dev/null || true
-        done | sed 's/:.*//' | sort -u | head -1)
+        [ -n "${owners[$library]+known}" ] || owners[$library]=$(
+          for path in "$sysroot"{,/usr}/lib/"$multiarch/$library"; do
+            dpkg-query ${sysroot:+--admindir="$sysroot/var/lib/dpkg"} -S "$path" 2>/dev/null || true
+          done | sed 's/:.*//' | sort -u | head -1)
+        owner=${owners[$library]}
         [[ $depends =~ [\ ,]"$owner"[\ ,\(] ]] ||
           { echo "$package: $library of '$owner' is not in Depends:$depends"; bad=1; }
       done

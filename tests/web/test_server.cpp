@@ -24,7 +24,9 @@
 #include <filesystem>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "daemon/files/compact_map.hpp"
 #include "daemon/files/scene_folder.hpp"
@@ -143,6 +145,20 @@ void ServePlanning(FakeAppliance& service, const fs::path& root) {
   };
 }
 
+/// The surface so far, in a hundred steps of the sweep: making it takes longer than serving it.
+/// @param shown  What is shown of it now.
+void ShowSurface(FakeAppliance& service, Recorder& recorder,
+                 std::optional<std::pair<int, bool>>& shown) {
+  if (service.status.state != ApplianceState::kScanning) return;
+  constexpr int kSteps = 100;
+  const std::pair now(static_cast<int>(std::min(1.0, service.swept) * kSteps),
+                      service.status.scan->purpose == ScanPurpose::kFraction);
+  if (shown == now) return;
+  shown = now;
+  service.surface = std::make_shared<const std::string>(
+      SurfaceAt(recorder.reference(), static_cast<double>(now.first) / kSteps, now.second));
+}
+
 int Serve(const fs::path& root, bool tls) {
   FakeAppliance service;
   Recorder recorder(root);
@@ -190,6 +206,7 @@ int Serve(const fs::path& root, bool tls) {
              server.setup_code().value_or(""));
   std::fflush(stdout);
   std::string rest;
+  std::optional<std::pair<int, bool>> shown;
   while (true) {
     std::array<pollfd, 2> waiting = {pollfd{server.fd(), POLLIN, 0},
                                      pollfd{STDIN_FILENO, POLLIN, 0}};
@@ -203,10 +220,7 @@ int Serve(const fs::path& root, bool tls) {
       }
     }
     service.Tick(std::chrono::steady_clock::now());
-    if (service.status.state == ApplianceState::kScanning)
-      service.surface = std::make_shared<const std::string>(
-          SurfaceAt(recorder.reference(), std::min(1.0, service.swept),
-                    service.status.scan->purpose == ScanPurpose::kFraction));
+    ShowSurface(service, recorder, shown);
     server.Run();
   }
 }

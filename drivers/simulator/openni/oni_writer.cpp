@@ -14,6 +14,7 @@
 #include "drivers/files/file_io.hpp"
 #include "drivers/openni/oni_recorder.hpp"
 #include "drivers/openni/openni_provider.hpp"
+#include "drivers/replay/tum_writer.hpp"
 #include "drivers/simulator/openni/virtual_session.hpp"
 #include "drivers/simulator/player/raw_frame.hpp"
 #include "words/simulator.hpp"
@@ -100,7 +101,7 @@ void WriteOni(const fs::path& file, FrameSource& source, const std::stop_token& 
   VirtualSession::Contents contents;
   contents.serial = "SIMULATED";
   contents.scenes = {spool.path};
-  contents.camera = source.info();
+  contents.camera_file = CameraFileText(source.info(), 1000.0);
   const VirtualSession session(contents);
   OpenNiOptions options;
   options.library = FindVirtualSensorRuntime();

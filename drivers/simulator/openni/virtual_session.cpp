@@ -21,7 +21,6 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/program_folders.hpp"
-#include "drivers/replay/tum_writer.hpp"
 #include "drivers/simulator/player/virtual_scenes.hpp"
 #include "words/simulator.hpp"
 
@@ -86,8 +85,7 @@ void VirtualSession::Write(const Contents& contents) const {
   for (const fs::path& scene : contents.scenes)
     text += fmt::format("scene {}\n", fs::absolute(scene).string());
   WriteWholeFile(folder_.path() / "session", text);
-  WriteWholeFile(calibration_folder_ / (contents.serial + ".yaml"),
-                 CameraFileText(contents.camera, 1000.0));
+  WriteWholeFile(calibration_folder_ / (contents.serial + ".yaml"), contents.camera_file);
 }
 
 std::string VirtualSession::Command(std::string_view command) const {

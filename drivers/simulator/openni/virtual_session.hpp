@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "algo/types/frame.hpp"
 #include "drivers/files/temporary.hpp"
 
 namespace plumb {
@@ -27,7 +26,7 @@ class VirtualSession {
     std::string serial = "VIRTUAL-0001";  ///< 1 to 64 letters, digits, - and _.
     bool plugged = true;
     std::vector<std::filesystem::path> scenes;  ///< Files as frame_cache.hpp describes them.
-    StreamInfo camera;                          ///< Written to the calibration file of the unit.
+    std::string camera_file;                    ///< The calibration file of the unit.
   };
   /// @throws IoError; std::invalid_argument for a bad serial.
   explicit VirtualSession(const Contents& contents);

@@ -8,8 +8,12 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace plumb::simulated {
+
+/// Before the number of the process, at the end of the name of a file that is not complete yet.
+inline constexpr std::string_view kPartialMark = ".partial-";
 
 /// Stamps of one pair, microseconds from the sweep's start.
 struct CachedStamps {

@@ -10,7 +10,6 @@
 #include "algo/base/errors.hpp"
 #include "drivers/live/boxed_sensor.hpp"
 #include "drivers/live/sensor_calibration.hpp"
-#include "drivers/replay/tum_writer.hpp"
 #include "drivers/simulator/player/sweep_player.hpp"
 #include "drivers/simulator/player/virtual_scenes.hpp"
 #include "words/sensor.hpp"
@@ -90,10 +89,10 @@ class VirtualSetup : public SensorSetup {
     const std::string& second = options.second_serial;
     units_ = {.bus = std::make_shared<VirtualBus>(stage, options.serial, second),
               .settings = std::move(settings),
-              .calibrations = {{options.serial, CameraFileText(scenes.camera, 1000.0)}}};
+              .calibrations = {{options.serial, scenes.camera_file}}};
     if (options.plugged) (void)Command("plug");
     if (scenes.second_at_rest.empty()) return;
-    units_.calibrations[second] = CameraFileText(scenes.second_camera, 1000.0);
+    units_.calibrations[second] = scenes.second_camera_file;
     (void)Command("plug " + second);
   }
 

@@ -15,7 +15,9 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/replay/tum_writer.hpp"
 #include "drivers/simulator/player/frame_cache.hpp"
+#include "drivers/simulator/player/kept_scenes.hpp"
 #include "drivers/simulator/player/raw_frame.hpp"
 #include "drivers/simulator/suites/board_scenes.hpp"
 #include "drivers/simulator/suites/live_scenes.hpp"
@@ -50,7 +52,7 @@ bool IsCurrent(const fs::path& file, const FrameCacheShape& shape, const RawFram
 
 /// Removes incomplete files of killed processes, which may be half a gigabyte each.
 void RemoveStale(const fs::path& folder) {
-  constexpr std::string_view kMark = ".partial-";
+  constexpr std::string_view kMark = simulated::kPartialMark;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
@@ -61,10 +63,21 @@ void RemoveStale(const fs::path& folder) {
   }
 }
 
+/// The cache's folder, made if it is not there.
+fs::path PrepareFolder(const VirtualSensorOptions& options) {
+  const fs::path folder =
+      options.cache_folder.empty() ? DefaultVirtualSensorCache() : options.cache_folder;
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw IoError(DescribeWriteError(folder, error.value()));
+  RemoveStale(folder);
+  return folder;
+}
+
 /// Renders the missing scenes into the cache.
 class Renderer {
  public:
-  Renderer(const VirtualSensorOptions& options, const SimulateOptions& simulate)
+  Renderer(const VirtualSensorOptions& options, const SimulateOptions& simulate, fs::path folder)
       : options_(options),
         plan_(simulated::PlanSuite(simulate)),
         shape_{static_cast<std::uint32_t>(options.width),
@@ -72,23 +85,22 @@ class Renderer {
                static_cast<std::uint32_t>(options.frames),
                static_cast<std::uint32_t>(std::lround(1e6 / options.rate_hz)),
                PLUMB_SIMULATOR_VERSION},
-        folder_(options.cache_folder.empty() ? DefaultVirtualSensorCache() : options.cache_folder) {
+        folder_(std::move(folder)) {
     if (!options_.board_centres_m.empty())
       simulated::AddBoardScenes(plan_, options_.board_centres_m, kBoardScenes);
     num_sweeps_ = plan_.scenes.size();
     if (options_.max_scenes > 0) num_sweeps_ = std::min(num_sweeps_, options_.max_scenes);
+    num_swept_ = plan_.scenes.size();
     if (options_.at_rest)
       simulated::AddRestLoops(
           plan_, simulate, num_sweeps_ - 1,
           {.with_second = !options_.second_serial.empty(), .with_steps = options_.rest_steps});
-    std::error_code error;
-    fs::create_directories(folder_, error);
-    if (error) throw IoError(DescribeWriteError(folder_, error.value()));
-    RemoveStale(folder_);
   }
 
   [[nodiscard]] const simulated::SuitePlan& plan() const { return plan_; }
   [[nodiscard]] std::size_t num_sweeps() const { return num_sweeps_; }
+  /// Those after it are loops of a sensor at rest.
+  [[nodiscard]] std::size_t num_swept() const { return num_swept_; }
 
   fs::path Prepare(std::size_t scene, const std::stop_token& stop,
                    const std::function<void(double)>& progress) const {
@@ -99,13 +111,13 @@ class Renderer {
                               static_cast<int>(options_.noise), options_.seed,
                               options_.room ? fmt::format("-room{}", *options_.room) : "",
                               options_.width, options_.height, options_.frames, options_.rate_hz,
-                              plan_.scenes[scene].name);
+                              NameInCache(scene));
     const RawFrame first = MakeRaw(source->Next().value(), start_s);
     FrameCacheShape shape = shape_;
     shape.num_frames = static_cast<std::uint32_t>(source->info().num_frames.value());
     if (IsCurrent(file, shape, first)) return file;
     fs::path beside = file;
-    beside += fmt::format(".partial-{}", ::getpid());
+    beside += fmt::format("{}{}", simulated::kPartialMark, ::getpid());
     FileWriter writer(beside);
     writer.Write(simulated::FrameCacheHeader(shape));
     WriteRaw(writer, first);
@@ -123,9 +135,18 @@ class Renderer {
   }
 
  private:
+  /// A loop shows the body of the last sweep, or on its way to that of the first: another one of
+  /// the same name where other sweeps are shown.
+  [[nodiscard]] std::string NameInCache(std::size_t scene) const {
+    const std::string& name = plan_.scenes[scene].name;
+    if (scene < num_swept_) return name;
+    return fmt::format("{}-of-{}-{}", name, plan_.scenes.front().name,
+                       plan_.scenes[num_sweeps_ - 1].name);
+  }
+
   const VirtualSensorOptions& options_;
   simulated::SuitePlan plan_;
-  std::size_t num_sweeps_ = 0;
+  std::size_t num_sweeps_ = 0, num_swept_ = 0;
   FrameCacheShape shape_;
   fs::path folder_;
 };
@@ -160,17 +181,21 @@ fs::path DefaultVirtualSensorCache() {
 
 RenderedScenes RenderScenes(const VirtualSensorOptions& options, const std::stop_token& stop,
                             const SetUpProgress& progress) {
-  const Renderer renderer(options, ScenesOf(options));
+  const SimulateOptions simulate = ScenesOf(options);
+  const fs::path folder = PrepareFolder(options);
+  if (std::optional<RenderedScenes> kept = simulated::ReadKeptScenes(folder, options))
+    return *std::move(kept);
+  const Renderer renderer(options, simulate, folder);
+  const auto& planned = renderer.plan().scenes;
   std::vector<std::size_t> wanted;
   for (std::size_t i = 0; i < renderer.num_sweeps(); ++i) wanted.push_back(i);
-  const auto& planned = renderer.plan().scenes;
-  const auto is_rest = [](const auto& scene) { return scene.name.starts_with("rest"); };
-  const auto first_rest = std::find_if(planned.begin(), planned.end(), is_rest);
-  for (auto i = first_rest; i != planned.end(); ++i)
-    wanted.push_back(static_cast<std::size_t>(i - planned.begin()));
+  for (std::size_t i = renderer.num_swept(); i < planned.size(); ++i) wanted.push_back(i);
+  const auto camera_file = [&](std::size_t scene) {
+    return CameraFileText(simulated::MakeSource(renderer.plan(), scene)->info(), 1000.0);
+  };
   RenderedScenes scenes;
   for (std::size_t k = 0; k < wanted.size(); ++k) {
-    const std::string& name = renderer.plan().scenes[wanted[k]].name;
+    const std::string& name = planned[wanted[k]].name;
     fs::path cache = renderer.Prepare(wanted[k], stop, [&](double fraction) {
       if (progress)
         progress((static_cast<double>(k) + fraction) / static_cast<double>(wanted.size()), name);
@@ -178,14 +203,14 @@ RenderedScenes RenderScenes(const VirtualSensorOptions& options, const std::stop
     if (k >= renderer.num_sweeps()) {
       const bool is_second = name.starts_with("rest_second");
       (is_second ? scenes.second_at_rest : scenes.at_rest).push_back(std::move(cache));
-      if (is_second)
-        scenes.second_camera = simulated::MakeSource(renderer.plan(), wanted[k])->info();
+      if (is_second) scenes.second_camera_file = camera_file(wanted[k]);
       continue;
     }
     scenes.names.push_back(name);
     scenes.caches.push_back(std::move(cache));
   }
-  scenes.camera = simulated::MakeSource(renderer.plan(), 0)->info();
+  scenes.camera_file = camera_file(0);
+  simulated::KeepScenes(folder, options, scenes);
   return scenes;
 }
 

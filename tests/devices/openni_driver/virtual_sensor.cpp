@@ -9,8 +9,8 @@ VirtualSensor::VirtualSensor(const VirtualSensorOptions& options, const std::sto
                              const SetUpProgress& progress)
     : runtime_library_(options.runtime.empty() ? FindVirtualSensorRuntime() : options.runtime) {
   const RenderedScenes rendered = RenderScenes(options, stop, progress);
-  session_ = std::make_unique<VirtualSession>(
-      VirtualSession::Contents{options.serial, options.plugged, rendered.caches, rendered.camera});
+  session_ = std::make_unique<VirtualSession>(VirtualSession::Contents{
+      options.serial, options.plugged, rendered.caches, rendered.camera_file});
 }
 
 VirtualSensor::~VirtualSensor() = default;

@@ -13,12 +13,13 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
-#include "drivers/replay/tum_writer.hpp"
+#include "drivers/files/file_io.hpp"
 #include "drivers/simulator/player/raw_frame.hpp"
 #include "drivers/simulator/player/sweep_player.hpp"
 #include "drivers/simulator/player/virtual_scenes.hpp"
 #include "drivers/simulator/suites/suite_plan.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace plumb {
 namespace {
@@ -26,6 +27,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::MessageOf;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 /// Two scenes of 20 frames at 320 x 240, as the tests of OpenNI2 have them.
@@ -44,7 +46,7 @@ class VirtualProviderTest : public ::testing::Test {
     const RenderedScenes scenes = RenderScenes(Small());
     std::vector<std::string> caches;
     for (const auto& cache : scenes.caches) caches.push_back(cache.string());
-    camera_ = scenes.camera;
+    camera_file_ = scenes.camera_file;
     bus_ = std::make_shared<simulated::VirtualBus>(std::make_shared<simulated::Stage>(caches),
                                                    "VIRTUAL-0001");
     bus_->Obey("plug");
@@ -53,11 +55,11 @@ class VirtualProviderTest : public ::testing::Test {
   [[nodiscard]] VirtualProvider Provider(std::chrono::milliseconds stall_time) const {
     return VirtualProvider({.bus = bus_,
                             .settings = {.calibration_folder = {}, .markers_are_the_rooms = false},
-                            .calibrations = {{"VIRTUAL-0001", CameraFileText(camera_, 1000.0)}},
+                            .calibrations = {{"VIRTUAL-0001", camera_file_}},
                             .stall_time = stall_time});
   }
 
-  StreamInfo camera_;
+  std::string camera_file_;
   std::shared_ptr<simulated::VirtualBus> bus_;
 };
 
@@ -65,9 +67,9 @@ TEST_F(VirtualProviderTest, EveryFrameOfASweepComesAsTheSimulatorMadeIt) {
   VirtualProvider provider = Provider(std::chrono::seconds(20));
   const auto sensor = provider.Open("");
   EXPECT_EQ(sensor->info().intrinsics.width, 320);
-  EXPECT_NEAR(sensor->info().intrinsics.fx, camera_.intrinsics.fx, 1e-6);
-  EXPECT_EQ(sensor->info().room_markers.reference, camera_.room_markers.reference);
   const auto truth = simulated::MakeSource(simulated::PlanSuite(ScenesOf(Small())), 0);
+  EXPECT_NEAR(sensor->info().intrinsics.fx, truth->info().intrinsics.fx, 1e-6);
+  EXPECT_EQ(sensor->info().room_markers.reference, truth->info().room_markers.reference);
   std::vector<simulated::RawFrame> expected;  // rendered first: the sensor does not wait
   while (const std::optional<Frame> frame = truth->Next())
     expected.push_back(simulated::MakeRaw(*frame, truth->sweep().start_time_s));
@@ -208,6 +210,92 @@ TEST(VirtualDriverTest, TheRegistrySetsItUpAndAScanBeginsWithTheSweep) {
   const std::optional<Frame> first = sensor->Next();
   ASSERT_TRUE(first.has_value());
   EXPECT_EQ(first->index, 0);
+}
+
+class RenderedScenesTest : public ::testing::Test {
+ protected:
+  RenderedScenesTest() {
+    options_.frames = 3;
+    options_.max_scenes = 1;
+    options_.cache_folder = folder_.path();
+  }
+  RenderedScenes Render() {
+    num_rendered_ = 0;
+    return RenderScenes(options_, {}, [&](double, std::string_view) { ++num_rendered_; });
+  }
+  /// The one file of that kind.
+  [[nodiscard]] std::filesystem::path File(const std::string& extension) const {
+    std::filesystem::path found;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) {
+      if (entry.path().extension() != extension) continue;
+      EXPECT_EQ(found, "") << "another one beside it: " << entry.path();
+      found = entry.path();
+    }
+    return found;
+  }
+  /// Replaces a part of what was kept.
+  void Tamper(const std::string& before, const std::string& after) const {
+    std::string text = ReadTextFile(File(".scenes"), 1 << 20);
+    const std::size_t at = text.find(before);
+    ASSERT_NE(at, std::string::npos) << text;
+    WriteWholeFile(File(".scenes"), text.replace(at, before.size(), after));
+  }
+
+  testing::TempFolder folder_;
+  VirtualSensorOptions options_ = Small();
+  int num_rendered_ = 0;
+};
+
+TEST_F(RenderedScenesTest, WhatTheSameProgramFoundOutIsTakenAsItIs) {
+  const RenderedScenes first = Render();
+  EXPECT_GT(num_rendered_, 0);
+  const RenderedScenes again = Render();
+  EXPECT_EQ(num_rendered_, 0);
+  EXPECT_EQ(again.names, first.names);
+  EXPECT_EQ(again.caches, first.caches);
+  EXPECT_EQ(again.camera_file, first.camera_file);
+  // That it is taken and not found out once more shows in what nobody else has written.
+  Tamper("image_width", "IMAGE_WIDTH");
+  EXPECT_THAT(Render().camera_file, HasSubstr("IMAGE_WIDTH"));
+  // Nothing is taken from another build of the program, for other options, or of a damaged file.
+  Tamper("\"program_stamp\":\"", "\"program_stamp\":\"9");
+  EXPECT_EQ(Render().camera_file, first.camera_file);
+  EXPECT_EQ(num_rendered_, 0) << "the frames were the same";
+  Tamper("image_width", "IMAGE_WIDTH");
+  Tamper("{", "[");
+  EXPECT_EQ(Render().camera_file, first.camera_file);
+  Tamper("image_width", "IMAGE_WIDTH");
+  options_.seed = 2;
+  EXPECT_THAT(Render().camera_file, Not(HasSubstr("IMAGE_WIDTH")));
+}
+
+TEST_F(RenderedScenesTest, FramesThatWereReplacedAreLookedAtAndRenderedAgain) {
+  (void)Render();
+  const std::filesystem::path file = File(".frames");
+  std::vector<std::uint8_t> bytes = ReadWholeFile(file, 1 << 21);
+  const std::vector<std::uint8_t> before = bytes;
+  bytes[1000] ^= 0xFF;  // in the first frame
+  WriteWholeFile(file, bytes);
+  (void)Render();
+  EXPECT_GT(num_rendered_, 0);
+  EXPECT_EQ(ReadWholeFile(file, 1 << 21), before);
+  std::filesystem::remove(file);
+  (void)Render();
+  EXPECT_GT(num_rendered_, 0);
+}
+
+TEST_F(RenderedScenesTest, LoopsOfAnotherBodyAreOtherFiles) {
+  options_.at_rest = true;
+  options_.rate_hz = 1;  // 4 frames of a loop
+  const auto of_first = Render().at_rest;
+  options_.max_scenes = 2;
+  const auto of_second = Render().at_rest;
+  ASSERT_THAT(of_first, SizeIs(2));
+  ASSERT_THAT(of_second, SizeIs(2));
+  for (std::size_t i = 0; i < of_first.size(); ++i) EXPECT_NE(of_first[i], of_second[i]);
+  options_.max_scenes = 1;
+  EXPECT_EQ(Render().at_rest, of_first);
+  EXPECT_EQ(num_rendered_, 0);
 }
 
 }  // namespace

@@ -317,7 +317,7 @@ TEST(VirtualSensorTest, RendersAgainWhatTheCacheHoldsNoMore) {
   prepare();
   EXPECT_EQ(rendered, 0);
   EXPECT_FALSE(std::filesystem::exists(stale));
-  const auto file = std::filesystem::directory_iterator(folder.path())->path();
+  const std::filesystem::path file = RenderScenes(options).caches.front();
   std::filesystem::resize_file(file, std::filesystem::file_size(file) - 1);
   prepare();
   EXPECT_GT(rendered, 0);
