@@ -6,6 +6,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <exception>
+#include <sstream>
 #include <system_error>
 #include <vector>
 
@@ -73,28 +75,50 @@ std::vector<fs::path> EntriesOf(const fs::path& folder) {
 }
 
 /// The files of scans are removed before the database, so that an interrupted wipe never looks like
-/// a lost database.
+/// a lost database. What cannot be removed does not keep the rest.
+/// @throws DiskRefused at the end, for the first that could not
 void Wipe(const fs::path& state) {
   FolderLock lock;
   lock.Take(state);
+  std::exception_ptr first;
+  const auto remove = [&first](const fs::path& path) {
+    try {
+      Remove(path);
+    } catch (const DiskRefused&) {
+      if (!first) first = std::current_exception();
+    }
+  };
   const fs::path scans = state / kScansFolder;
   if (fs::is_directory(scans)) {  // or a link to one, on another disk
     for (const fs::path& entry : EntriesOf(scans)) {
-      if (entry.filename() != kOfFileSystem) Remove(entry);
+      if (entry.filename() != kOfFileSystem) remove(entry);
     }
     std::error_code kept;  // it stays where it is the root of a disk
     fs::remove(scans, kept);
   } else if (fs::is_symlink(scans)) {
     throw DiskRefused(say::backup::ResetNoDisk(scans.string()));
   } else {
-    Remove(scans);
+    remove(scans);
   }
   for (const fs::path& entry : EntriesOf(state)) {
     if (entry != scans && entry.filename() != kFactoryResetFile &&
-        entry.filename() != kOfFileSystem)
-      Remove(entry);
+        entry.filename() != kFactoryResetLeft && entry.filename() != kOfFileSystem)
+      remove(entry);
   }
   SyncToDisk(state);
+  if (first) std::rethrow_exception(first);
+}
+
+/// Of what plumbd may not remove itself. @throws DiskRefused
+void RequireNothingLeftOutside(const fs::path& state) {
+  const fs::path note = state / kFactoryResetLeft;
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(note, error))) return;
+  std::istringstream lines(ReadTextFile(note, kMaxRequestBytes));
+  std::string what, why;
+  std::getline(lines, what);
+  std::getline(lines, why);
+  throw DiskRefused(say::backup::ResetNotRemoved(what, why));
 }
 
 /// With its entry in the log; a store that cannot be opened is not changed.
@@ -157,6 +181,7 @@ std::optional<Message> CarryOutFactoryReset(const fs::path& state) {
   Message done = say::backup::ResetWiped();
   if (request.kind == FactoryReset::kWipe) {
     Wipe(state);
+    RequireNothingLeftOutside(state);
     Store(state).audit.Log(request.actor, "system.factory_reset", "", done);
   } else {
     done = KeepRecords(state, request.actor);

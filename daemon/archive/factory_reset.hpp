@@ -15,6 +15,8 @@ namespace plumb {
 
 /// In the state folder; systemd/factory-reset reads its kind too.
 inline constexpr const char* kFactoryResetFile = "factory-reset.json";
+/// By systemd/factory-reset: what it could not remove of a wipe, and why, a line each.
+inline constexpr const char* kFactoryResetLeft = "factory-reset-left";
 
 /// Records the request and who made it, durably. The file gets the folder's owner.
 /// @throws IoError; what was written by then is withdrawn, or the message says that it may count.
@@ -28,8 +30,8 @@ void RequestFactoryReset(const std::filesystem::path& state, FactoryReset kind, 
 
 /// Carries out a request; an interrupted one starts again. Keeping the records removes accounts,
 /// paired displays, settings, bundles, what is remembered of channels of updates, and the keys of
-/// page and browsers; wiping removes everything in the folder. The (new) audit log records who
-/// requested it.
+/// page and browsers; wiping removes everything in the folder, and counts as done once nothing is
+/// left in or outside it. The (new) audit log records who requested it.
 /// @returns what was done, as a sentence; nothing without a request.
 /// @throws DataError for a request that cannot be read, which changes nothing; IoError and its
 ///         kinds, after which the next start continues.

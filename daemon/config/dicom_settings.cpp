@@ -6,6 +6,7 @@
 
 #include <array>
 #include <optional>
+#include <sstream>
 
 #include "algo/base/parse_number.hpp"
 #include "drivers/files/file_io.hpp"
@@ -143,6 +144,23 @@ DicomSettings ReadDicomSettingsFile(const std::filesystem::path& file) {
   const std::string name = file.string();
   const toml::table root = ParseToml(ReadTextFile(file, kMostConfigBytes), name);
   return ReadDicomSettings(Section(root, "dicom", name));
+}
+
+std::filesystem::path SpoolNamedIn(const std::filesystem::path& file) {
+  std::filesystem::path spool = DicomSettings{}.spool;
+  std::istringstream lines(ReadTextFile(file, kMostConfigBytes));
+  try {
+    return ReadDicomSettingsFile(file).spool;
+  } catch (const DataError&) {  // it may not be valid TOML
+    for (std::string line; std::getline(lines, line);) {
+      const std::size_t key = line.find("spool"), begin = line.find_first_of("\"'", key);
+      if (key > line.find('#') || begin == std::string::npos) continue;
+      const std::size_t end = line.find(line[begin], begin + 1);
+      const std::string text = line.substr(begin + 1, end - begin - 1);
+      if (text.starts_with('/') && end != std::string::npos) spool = text;
+    }
+  }
+  return spool;
 }
 
 }  // namespace plumb

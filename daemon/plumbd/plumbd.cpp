@@ -28,6 +28,7 @@
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/archive/factory_reset.hpp"
+#include "daemon/config/dicom_settings.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/control/control_server.hpp"
@@ -356,6 +357,15 @@ int ShowStopped(const PlumbdOptions& options, const SensorRegistry& registry) {
   return loop.Run();
 }
 
+/// For systemd/factory-reset.
+int ShowFolders(const PlumbdOptions& options, const SensorRegistry& registry) {
+  const std::optional<fs::path> file = ConfigFile(options);
+  fmt::print("state {}\nspool {}\n",
+             ReadOrExplain(options, registry).config.appliance.state.string(),
+             (file ? SpoolNamedIn(*file) : DicomSettings{}.spool).string());
+  return 0;
+}
+
 /// Called before anything opens the state folder. @returns why that could not be done: nothing
 /// stored may be opened then, because the next start continues it.
 Message ResetIfAsked(const fs::path& state) {
@@ -401,6 +411,7 @@ int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
     fmt::print("the configuration is good\n");
     return 0;
   }
+  if (options.show_folders) return ShowFolders(options, registry);
   if (options.provision && options.recover) throw InvalidRequest(say::control::TwoTasks());
   if (options.provision) {
     const Config config = ReadConfiguration(options, registry);

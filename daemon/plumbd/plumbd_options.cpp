@@ -116,6 +116,9 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
       ->type_name("FILE");
   app.add_flag("--check-config", options.check_config,
                "Check the configuration, report errors, and exit");
+  app.add_flag("--show-folders", options.show_folders,
+               "Print the state folder and that of received files, also of a configuration that "
+               "cannot be used, and exit");
   app.add_flag("--show-stopped", options.show_stopped,
                "Only drive the light, with the pattern for a service that is not running, until "
                "SIGTERM");

@@ -20,7 +20,7 @@ namespace plumb {
 struct PlumbdOptions {
   std::optional<std::filesystem::path> config_file;
   bool use_default_config = true;  ///< If it exists and no file is named.
-  bool check_config = false, show_stopped = false;
+  bool check_config = false, show_folders = false, show_stopped = false;
   std::string simulated;  ///< Name of the suite; empty: real sensors.
   std::optional<std::filesystem::path> state, control, provision, recover;
   std::filesystem::path unit = "/data/unit";  ///< Where an image stores its provisioning data.

@@ -46,6 +46,12 @@ received=$(cat out/normal/var-lib-plumb*dicom.mount)
 check "what is received lies on the data partition" \
   'What=/data/dicom.*Where=/var/lib/plumb-dicom' "$(tr '\n' ' ' <<<"$received")"
 check "and is mounted once its folder is made" 'After=systemd-tmpfiles-setup.service' "$received"
+mount=$(systemd-escape -p --suffix=mount /var/lib/plumb-dicom)
+for order in Wants After; do
+  check "plumbd, and a wipe before it, wait for that folder: $order" "^there$" \
+    "$(sed '/^.Service/,$d' root/etc/systemd/system/plumbd.service.d/appliance.conf |
+      grep -qxF "$order=$mount" && echo there)"
+done
 backup=$(cat out/normal/var-lib-plumb*backup.mount)
 check "a disk for backups is found by its label" \
   'What=/dev/disk/by-label/plumb-backup.*Where=/var/lib/plumb-backup' "$(tr '\n' ' ' <<<"$backup")"

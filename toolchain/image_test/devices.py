@@ -6,6 +6,8 @@ import struct
 import threading
 import time
 
+from image_test.sockets import receive
+
 
 class UsbUnit:
     """A USB device with the identifiers of an Xtion Pro Live, connected to QEMU's usb-redir device.
@@ -23,6 +25,7 @@ class UsbUnit:
 
     def __init__(self, path):
         self.socket = socket.socket(socket.AF_UNIX)
+        self.socket.settimeout(30)  # until QEMU has answered
         self.socket.connect(path)
         self.asked = []  # control requests from the guest: (type, request, value)
         self.configuration = 0
@@ -34,6 +37,7 @@ class UsbUnit:
         self._receive(length)
         if kind != self.HELLO:
             raise RuntimeError(f"QEMU's USB redirection begins with {kind}, expected hello")
+        self.socket.settimeout(None)
         threading.Thread(target=self._serve, daemon=True).start()
 
     def plug(self):
@@ -124,8 +128,8 @@ class GpioLines:
             raise RuntimeError(f"expected one pl061 in the machine, found {found}")
         self.device = "/machine/unattached/" + found[0]
         self.socket = socket.socket(socket.AF_UNIX)
-        self.socket.connect(path)
         self.socket.settimeout(30)
+        self.socket.connect(path)
 
     def set(self, line, level):
         self._ask(f"set_irq_in {self.device} unnamed-gpio-in {line} {level}")
@@ -142,10 +146,11 @@ class GpioLines:
         return (data >> line) & 1 if (direction >> line) & 1 else None
 
     def _ask(self, command):
+        until = time.monotonic() + 30
         self.socket.sendall(command.encode() + b"\n")
         answer = b""
         while not answer.endswith(b"\n"):
-            answer += self.socket.recv(4096)
+            answer += receive(self.socket, until)
         answer = answer.decode().strip().splitlines()[-1]
         if not answer.startswith("OK"):
             raise RuntimeError(f"QEMU's test interface, asked '{command}', answers '{answer}'")

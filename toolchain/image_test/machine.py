@@ -16,6 +16,8 @@ import time
 import urllib.error
 import urllib.request
 
+from image_test.sockets import receive
+
 PASSWORD = "correct horse battery 7"
 BEGIN = time.monotonic()
 LARGER_MB = 600  # by which the disk is larger than the image
@@ -158,6 +160,7 @@ class Machine:
     def monitor(self, command):
         """What QEMU's monitor answers."""
         with socket.socket(socket.AF_UNIX) as monitor:
+            until = time.monotonic() + 30 * Run.patience
             monitor.settimeout(30 * Run.patience)
             monitor.connect(f"{self.folder}/monitor")
             answer = b""
@@ -165,7 +168,7 @@ class Machine:
                 monitor.sendall(ask)
                 answer = b""
                 while not answer.endswith(b"(qemu) "):
-                    answer += monitor.recv(65536)
+                    answer += receive(monitor, until)
             return answer.decode(errors="replace")
 
     def connect_shell(self):
@@ -181,15 +184,18 @@ class Machine:
         """What a command prints that root runs in the guest, by the shell that
         toolchain/test-image-make adds to the image, and its exit code."""
         end = f"end-{time.monotonic_ns()}"
+        until = time.monotonic() + seconds * Run.patience
         self.shell.settimeout(seconds * Run.patience)
-        answer = ""
+        answer = b""
         try:
             self.shell.sendall(f"{{ {command}\n}} 2>&1 </dev/null; code=$?; echo; "
                                f"echo {end} $code\n".encode())
-            while not (found := re.search(rf"(?s)(.*)\n{end} (\d+)\n", answer)):
-                answer += self.shell.recv(65536).decode(errors="replace")
-        except (TimeoutError, OSError) as error:
-            fail(f"the guest's shell does not answer '{command}': {error}: {answer}")
+            while not (found := re.search(rf"(?s)(.*)\n{end} (\d+)\n",
+                                          answer.decode(errors="replace"))):
+                answer += receive(self.shell, until)
+        except OSError as error:
+            fail(f"the guest's shell does not answer '{command}': {error}: "
+                 f"{answer.decode(errors='replace')}")
         return found[1].rstrip("\n"), int(found[2])
 
     def ask_sh(self, command, seconds=60):
@@ -305,6 +311,8 @@ class Page:
                 return update["message"]
             if stop(update, time.monotonic() - begin):
                 return None
+            if time.monotonic() - begin > 3600 * Run.patience:
+                fail(f"the installation does not end: {update}")
             if int(10 * update["fraction"]) != shown:
                 shown = int(10 * update["fraction"])
                 say(f"        {100 * update['fraction']:.0f} % {update['message']}")

@@ -119,6 +119,7 @@ class Unit:
     """plumbd of a version with its virtual sensor, out of its packages, on this machine."""
 
     def __init__(self, packages, work):
+        self.process = None
         self.tree, self.folder = os.path.join(work, "programs"), os.path.join(work, "unit")
         for folder in (self.tree, self.folder):
             shutil.rmtree(folder, ignore_errors=True)
@@ -161,6 +162,10 @@ class Unit:
         self.process.terminate()
         if self.process.wait(60 * Run.patience) != 0:
             fail(f"plumbd ended with {self.process.returncode}")
+
+    def kill(self):
+        if self.process is not None and self.process.poll() is None:
+            self.process.kill()
 
 
 class People:
@@ -421,7 +426,7 @@ def update_from(old, folder, work):
     try:
         made = use_old_unit(unit)
     finally:
-        unit.process.kill()
+        unit.kill()
     broken = make_release(folder, work, "0.3.0", old, broken=True)
     good = make_release(folder, work, "0.3.1", old, broken=False)
     say(f"ok      two bundles of this version, signed with the keys in {old}")

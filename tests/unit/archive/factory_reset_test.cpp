@@ -116,6 +116,30 @@ TEST_F(FactoryResetTest, AWipeFollowsTheLinkToTheDiskOfTheScans) {
   EXPECT_THAT(Open()->patients.List(), SizeIs(0));
 }
 
+/// systemd/factory-reset, as root, could not empty a folder.
+TEST_F(FactoryResetTest, AWipeIsNotDoneWhileSomethingIsLeftOutside) {
+  (void)Use();
+  RequestFactoryReset(state(), FactoryReset::kWipe, kAnna);
+  WriteWholeFile(state() / kFactoryResetLeft, std::string_view("/data/dicom\nwrite-protected\n"));
+  for (int start = 0; start < 2; ++start) {
+    const std::string why = MessageOf<DiskRefused>([&] { (void)CarryOutFactoryReset(state()); });
+    EXPECT_THAT(why, HasSubstr("cannot remove /data/dicom: write-protected"));
+    EXPECT_FALSE(fs::exists(database())) << "what names patients is gone at once";
+    EXPECT_FALSE(IsThere("scans"));
+    EXPECT_TRUE(IsThere(kFactoryResetFile)) << "the next start goes on";
+  }
+  fs::remove(state() / kFactoryResetLeft);
+  ASSERT_TRUE(CarryOutFactoryReset(state()));
+  EXPECT_THAT(Open()->audit.Find({0, 100, ""}), SizeIs(1));
+}
+
+TEST_F(FactoryResetTest, WhatIsLeftOutsideConcernsAWipeOnly) {
+  (void)Use();
+  RequestFactoryReset(state(), FactoryReset::kKeepRecords, kAnna);
+  WriteWholeFile(state() / kFactoryResetLeft, std::string_view("/data/dicom\n\n"));
+  EXPECT_TRUE(CarryOutFactoryReset(state()));
+}
+
 /// Power is lost at any point of it: the request is still there, and the folder half empty.
 TEST_F(FactoryResetTest, AnInterruptedWipeGoesOn) {
   (void)Use();
