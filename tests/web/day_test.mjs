@@ -29,8 +29,8 @@ async function scene(number) {
     await run(plumb, ['--control', socket, 'sim', 'next-scene']);
   }
 }
-/// At a quarter of the speed: what is tested is not how many images a loaded machine loses.
-const slowDown = () => run(plumb, ['--control', socket, 'sim', 'speed', '0.25']);
+/// At half the speed: what is tested is not how many images a loaded machine loses.
+const slowDown = () => run(plumb, ['--control', socket, 'sim', 'speed', '0.5']);
 const button = () => run(plumb, ['--control', socket, 'press']);
 
 const engineer = await h.person('engineer');
@@ -350,10 +350,16 @@ await h.step('the network is lost for 7 s: nothing can be accepted until what is
 await h.step('a tablet without network accepts neither a result that has been replaced nor the new',
   async () => {
   const { last_result: before } = await state();
-  await anna.context().setOffline(true);
   const offer = anna.getByRole('button', { name: 'Accept', exact: true });
+  // It goes as the finger comes down, and then for longer.
+  const request = /\/accept$/;
+  await anna.route(request, (route) => route.abort());
   await offer.click();
   await anna.getByRole('alert').getByText('The appliance is not responding').waitFor(kSlow);
+  await anna.unroute(request);
+  await anna.context().setOffline(true);
+  await anna.locator('.old-note', { hasText: 'NO CONNECTION' }).waitFor(kSlow);
+  equal(await offer.count(), 0, 'nothing to accept');
   await scanByButton();
   const { last_result: newest } = await state();
   check(newest.id !== before.id, 'another result');
