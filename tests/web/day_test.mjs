@@ -259,7 +259,10 @@ await h.step('fraction 2: a power cut in the middle of a sweep leaves nothing to
   const { scan: cut } = await state();
   await h.cutPower();
   // Whoever stands there sees that nothing is known; no number of before comes in its place.
-  for (const page of [anna, room]) await page.getByText(/no connection/i).first().waitFor(kSlow);
+  for (const page of [anna, room]) {
+    await page.getByText(/no connection/i).first().waitFor(kSlow);
+    await page.getByText(/last known: scanning/i).first().waitFor();
+  }
   equal(await anna.getByRole('button', { name: /^Accept/ }).count(), 0, 'nothing to accept');
   equal(await anna.locator('.number .arrow').count(), 0, 'no arrow to follow');
   await h.powerOn();

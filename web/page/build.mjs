@@ -24,7 +24,7 @@ function keep(name, end, data) {
 
 // A language's words are a file of their own, which the page loads when the language is chosen.
 // What only commands print is left out.
-const kPrinted = ['cli', 'doctor', 'evaluation'];
+const kPrinted = ['cli', 'doctor', 'evaluation', 'foreign'];
 const languages = {};
 const texts = {};
 for (const code of readFileSync(join(words, 'stamp'), 'utf8').trim().split('\n')) {

@@ -86,8 +86,11 @@ export function say(text, seen = false) {
 /// Says that what a person just did has worked.
 export const done = (text) => say(text, true);
 
-export function warn(text) {
+export function warn(what) {
   const place = document.getElementById('alert');
+  // A request that was under way when the connection ended does not hide that it has ended.
+  const isLost = what === S.noAnswer && document.body.classList.contains('disconnected');
+  const text = isLost ? S.offline : what;
   if (text) say('');  // what worked before is not shown beside what did not
   const close = () => h('button', {
     class: 'quiet', onclick: () => warn(''), 'aria-label': S.close,
