@@ -326,7 +326,7 @@ void TrendOf(Pages& pages, const std::vector<CourseRow>& rows, std::size_t numbe
 
 constexpr double kTrendHeight = 62, kTrendRow = kTrendHeight + 30;
 
-/// The six, three in a row.
+/// The six in one row, so that the map fits on the same page.
 void Trends(Pages& pages, const std::vector<CourseRow>& rows, const std::array<double, 2>& limits,
             const Catalogue& language) {
   if (rows.size() < 2) return;
@@ -334,10 +334,10 @@ void Trends(Pages& pages, const std::vector<CourseRow>& rows, const std::array<d
   constexpr std::array kNames = {say::result::kShortVertical, say::result::kShortLongitudinal,
                                  say::result::kShortLateral,  say::result::kShortPitch,
                                  say::result::kShortRoll,     say::result::kShortYaw};
-  const double gap = 16, width = (pages.inner() - 2 * gap) / 3, top = pages.y;
+  constexpr double kGap = 9, kMany = kNames.size();
+  const double width = (pages.inner() - (kMany - 1) * kGap) / kMany, row = pages.y;
   for (std::size_t i = 0; i < kNames.size(); ++i) {
-    const double x = kMargin + static_cast<double>(i % 3) * (width + gap);
-    const double row = top + (i < 3 ? 0.0 : kTrendRow);
+    const double x = kMargin + static_cast<double>(i) * (width + kGap);
     const double limit = limits.at(i / 3);
     std::string name = Word(kNames.at(i), language);
     if (limit > 0) name += fmt::format("  \u00b1{}", PlainNumber(limit, language.decimal));
@@ -348,7 +348,7 @@ void Trends(Pages& pages, const std::vector<CourseRow>& rows, const std::array<d
     const std::string& last = rows.back().fraction;
     pages.Text(x + width - pages.Width(last, 7), below, last, 7, kGrey);
   }
-  pages.y = top + 2 * kTrendRow;
+  pages.y = row + kTrendRow;
 }
 
 /// At the foot of the page, to be filled in by hand.
@@ -476,7 +476,7 @@ void Draw(Pages& pages, const ScanReport& report) {
   std::array<double, 2> limits{};
   for (const CouchRow& number : report.numbers)
     limits.at(IsShift(number.judged.number) ? 0 : 1) = number.judged.tolerance;
-  const double trends = report.trend.size() < 2 ? 0.0 : 2 * kTrendRow + kSignature;
+  const double trends = report.trend.size() < 2 ? 0.0 : kTrendRow + kSignature;
   const bool fits = pages.y + trends + kSignature < pages.bottom();
   if (fits) Trends(pages, report.trend, limits, *report.language);
   if (report.pictures.empty() && (fits || trends == 0.0)) return;
@@ -524,7 +524,7 @@ void Draw(Pages& pages, const CourseReport& report) {
     pages.y += 8;
     pages.Paragraph(kMargin, pages.inner(), report.note, kSmall, kGrey);
   }
-  if (pages.y + 2 * kTrendRow + 2 * kSignature > pages.bottom()) pages.Next();
+  if (pages.y + kTrendRow + 2 * kSignature > pages.bottom()) pages.Next();
   Trends(pages, report.rows, report.tolerance, *report.language);
   SignatureLine(pages, *report.language);
 }

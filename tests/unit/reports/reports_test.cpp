@@ -167,6 +167,22 @@ TEST_F(ReportsTest, NamesOfEachScriptAreWholeAndStayOnThePage) {
   }
 }
 
+TEST_F(ReportsTest, AReportWithTrendAndMapHasOnePageUnlessTheMapWouldBeTooSmall) {
+  const std::string id = AddScan(Approved(), kMove);
+  ScanReport report = DescribeScan(sources_, *store_.scans.Find(id), EnglishCatalogue());
+  const CourseReport course =
+      DescribeCourse(sources_, *store_.patients.Find(patient_), EnglishCatalogue());
+  report.trend = {course.rows.back(), course.rows.back()};
+  report.pictures.assign(2, cv::Mat(1000, 1400, CV_8UC3, cv::Scalar::all(200)));
+  const auto pages = [&] {
+    const std::string told = ToldOf(PdfOf(report), {"/usr/bin/pdfinfo"});
+    return std::stoi(told.substr(told.find("Pages:") + 6));
+  };
+  EXPECT_EQ(pages(), 1);
+  report.cautions.insert(report.cautions.end(), 8, "of what there is to say a line");
+  EXPECT_EQ(pages(), 2);
+}
+
 TEST_F(ReportsTest, ReportsAreMadeForThePaperOfTheUnit) {
   const std::string id = AddScan(Approved(), kMove);
   const auto size_of = [&](const std::string& pdf) {
