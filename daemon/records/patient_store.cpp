@@ -33,7 +33,8 @@ const std::string kPatientColumns =
 /// ended it, if it can be resumed: closed since ?2.
 constexpr const char* kResumable =
     "SELECT id, fraction, (SELECT count(*) FROM scans WHERE session_id = sessions.id AND outcome = "
-    "'done'), closed_at FROM sessions WHERE id = (SELECT max(begun.id) FROM sessions AS begun WHERE "
+    "'done'), closed_at FROM sessions WHERE id = (SELECT max(begun.id) FROM sessions AS begun "
+    "WHERE "
     "begun.patient_id = ?1 AND begun.purpose = 'fraction' AND EXISTS (SELECT 1 FROM scans WHERE "
     "session_id = begun.id)) AND closed_at >= ?2";
 
