@@ -122,7 +122,7 @@ check "wiped: nothing is received any more while it is removed" \
   '^stop plumb-dicomd.service: study$' "$(head -1 systemctl.calls)"
 check "wiped: the receiver starts afterwards" '^--no-block start plumb-dicomd.service: $' \
   "$(tail -1 systemctl.calls)"
-check "wiped: other folders of received files, but nobody else's files" \
+check "wiped: received files in other folders, and no other files there" \
   '^before/else.dcm data/dicom/else.dcm spool two/else.dcm $' \
   "$(find before data/dicom "spool two" -type f | sort | tr '\n' ' ')"
 check "wiped: the journal of an earlier machine ID" '^this$' "$(ls data/journal)"

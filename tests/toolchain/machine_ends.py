@@ -31,7 +31,7 @@ def qemu(path, says, stays=False):
                 if says:
                     connection.sendall(says)
                 connection.recv(65536)
-                with contextlib.suppress(OSError):  # nobody listens any more
+                with contextlib.suppress(OSError):  # the other end has closed it
                     while stays and not over.wait(0.05):
                         connection.sendall(b".")
 

@@ -360,8 +360,8 @@ def fail_once(machine, people, bundle, unit, before):
     expect_accounted(machine, people, before, unit, "0.2.0 after the return")
     codes = [one["code"] for one in people.ask("planner", "GET", "/patients")["patients"]]
     if "LOST" in codes:
-        fail(f"0.2.0 has the rows of the version on trial: {codes}")
-    expect("the database of the version on trial was set aside", "plumb.db",
+        fail(f"0.2.0 has rows of the newer version: {codes}")
+    expect("the database that the newer version had converted was set aside", "plumb.db",
            machine.ask_sh("ls /var/lib/plumb/before-restore-1"))
     expect("the page of 0.2.0 says what has happened", ".",
            people.ask("planner", "GET", "/status")["rolled_back"])

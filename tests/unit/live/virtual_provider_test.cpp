@@ -254,7 +254,7 @@ TEST_F(RenderedScenesTest, WhatTheSameProgramFoundOutIsTakenAsItIs) {
   EXPECT_EQ(again.names, first.names);
   EXPECT_EQ(again.caches, first.caches);
   EXPECT_EQ(again.camera_file, first.camera_file);
-  // That it is taken and not found out once more shows in what nobody else has written.
+  // A changed text in the kept file comes back, so the file was read and nothing was rendered.
   Tamper("image_width", "IMAGE_WIDTH");
   EXPECT_THAT(Render().camera_file, HasSubstr("IMAGE_WIDTH"));
   // Nothing is taken from another build of the program, for other options, or of a damaged file.

@@ -27,13 +27,7 @@ class FilesTest : public WebTest {
     std::ofstream(folder_ / "secret") << "secret";
     std::filesystem::create_symlink(folder_ / "secret", folder_ / "scan/result/overlay.png");
     std::filesystem::create_directories(folder_ / "scan/result/error_map.png");
-    loop_->Do([&] {
-      Scan scan;
-      scan.id = "s1";
-      scan.outcome = ScanOutcome::kDone;
-      scan.folder = folder_ / "scan";
-      service_.scans.push_back(scan);
-    });
+    AddScanIn(folder_ / "scan");
   }
   plumb::testing::TempFolder folder_;
 };
@@ -121,10 +115,11 @@ class UploadTest : public WebTest {
     return count;
   }
 
-  /// A file goes when its request is over, which is after its answer.
-  [[nodiscard]] bool BecomesEmpty() const {
-    for (int i = 0; i < 10000 && FilesLeft() > 0; ++i) ::usleep(1000);
-    return FilesLeft() == 0;
+  /// Waits until the folder has that many files; false if it has not within ten seconds. A file
+  /// goes when its request is over, which is after its answer.
+  [[nodiscard]] bool ComesToHold(std::size_t files) const {
+    for (int ms = 0; ms < 10000 && FilesLeft() != files; ++ms) ::usleep(1000);
+    return FilesLeft() == files;
   }
 
   testing::TempFolder folder_;
@@ -138,7 +133,7 @@ TEST_F(UploadTest, ABundleGoesToTheDiskAndNothingIsLeftOfIt) {
     EXPECT_EQ(service_.uploaded_bytes, bundle.size());
     EXPECT_THAT(service_.update.bundles, ::testing::Contains("plumb-2.raucb"));
   });
-  EXPECT_TRUE(BecomesEmpty()) << "the fake keeps none";
+  EXPECT_TRUE(ComesToHold(0)) << "the fake keeps none";
   HttpClient again = LoggedIn("engineer");
   EXPECT_EQ(again.Ask("DELETE", "/api/v1/update/bundles/plumb-2.raucb", "").status, 200);
   EXPECT_EQ(again.Ask("DELETE", "/api/v1/update/bundles/plumb-2.raucb", "").status, 404);
@@ -162,7 +157,7 @@ TEST_F(UploadTest, APlanningCtReachesTheServiceWithItsChoicesAndNothingIsLeftOfI
     EXPECT_EQ(service_.sent_planning.beam, "AP");
     EXPECT_EQ(service_.references.back().id, answer.json()["id"]);
   });
-  EXPECT_TRUE(BecomesEmpty()) << "it names the patient";
+  EXPECT_TRUE(ComesToHold(0)) << "it names the patient";
   physicist.extra_headers["X-Plumb-Planning"] =
       "structures_bytes=0&plan_bytes=4&threshold_hu=-300.5";
   EXPECT_EQ(physicist.Ask("POST", path, "planimages").status, 201);
@@ -193,7 +188,7 @@ TEST_F(UploadTest, WhatIsNoBundleOrTooLargeIsRefused) {
   HttpConnection large(port_);
   large.Send(Head(engineer, "large.raucb", std::size_t{2} << 20));
   EXPECT_EQ(large.Read().status, 413);
-  EXPECT_TRUE(BecomesEmpty());
+  EXPECT_TRUE(ComesToHold(0));
 }
 
 TEST_F(UploadTest, ABrokenUploadLeavesNothing) {
@@ -202,13 +197,11 @@ TEST_F(UploadTest, ABrokenUploadLeavesNothing) {
     HttpConnection broken(port_);
     broken.Send(Head(engineer, "broken.raucb", 500000));
     broken.Send("hsqs" + std::string(100000, 'x'));
-    bool begun = false;
-    for (int i = 0; i < 2000 && !begun; ++i) begun = FilesLeft() == 1, ::usleep(1000);
-    EXPECT_TRUE(begun);
+    EXPECT_TRUE(ComesToHold(1)) << "the upload has begun";
     EXPECT_EQ(Send(engineer, "second.raucb", "hsqs" + std::string(5000, 'x')).status, 409)
         << "one at a time";
   }
-  EXPECT_TRUE(BecomesEmpty());
+  EXPECT_TRUE(ComesToHold(0));
   EXPECT_EQ(Send(engineer, "third.raucb", "hsqs" + std::string(5000, 'x')).status, 200);
 }
 
@@ -217,7 +210,7 @@ TEST_F(UploadTest, OnlyAnEngineerSendsBundles) {
     EXPECT_EQ(Send(LoggedIn(name), "a.raucb", "hsqs" + std::string(5000, 'x')).status, 403);
   HttpClient logged_out(port_);
   EXPECT_EQ(Send(logged_out, "a.raucb", "hsqs" + std::string(5000, 'x')).status, 401);
-  EXPECT_TRUE(BecomesEmpty());
+  EXPECT_TRUE(ComesToHold(0));
 }
 
 TEST_F(FilesTest, WithoutAFolderNoFilesAreTaken) {

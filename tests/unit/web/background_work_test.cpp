@@ -84,13 +84,7 @@ class AsideTest : public WebTest {
   std::string MakeFile(std::size_t bytes) {
     std::filesystem::create_directories(folder_ / "scan/scene");
     std::ofstream(folder_ / "scan/scene/mesh.ply") << std::string(bytes, 'm');
-    loop_->Do([&] {
-      Scan scan;
-      scan.id = "s1";
-      scan.outcome = ScanOutcome::kDone;
-      scan.folder = folder_ / "scan";
-      service_.scans.push_back(scan);
-    });
+    AddScanIn(folder_ / "scan");
     in_memory = InMemory::kNothing;
     return "/api/v1/scans/s1/files/mesh.ply";
   }

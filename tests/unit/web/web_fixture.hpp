@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -50,6 +51,17 @@ class WebTest : public ::testing::Test {
                                      {"second", "physicist"}}) {
       ASSERT_TRUE(AddAccount(port_, engineer, name, role)) << name;
     }
+  }
+
+  /// A scan "s1" whose files are in that folder.
+  void AddScanIn(const std::filesystem::path& folder) {
+    loop_->Do([&] {
+      Scan scan;
+      scan.id = "s1";
+      scan.outcome = ScanOutcome::kDone;
+      scan.folder = folder;
+      service_.scans.push_back(scan);
+    });
   }
 
   [[nodiscard]] HttpClient LoggedIn(const std::string& name) {
