@@ -8,6 +8,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "algo/base/statistics.hpp"
+#include "algo/geometry/working_image.hpp"
 
 namespace plumb {
 namespace {
@@ -55,12 +56,14 @@ std::optional<double> RatioOnFace(const MarkerObservation& marker, const cv::Mat
       const cv::Vec3d p = rotation * cv::Vec3d(at(i), at(j), 0) + place;
       if (!(p[2] > 0)) return std::nullopt;
       const Eigen::Vector2d pixel = Project(intrinsics, {p[0], p[1], p[2]});
-      const auto column = static_cast<int>(std::lround(pixel.x()));
-      const auto row = static_cast<int>(std::lround(pixel.y()));
+      const Eigen::Vector2d in_depth = InDepthImage(pixel, intrinsics, depth_m);
+      const auto column = static_cast<int>(std::lround(in_depth.x()));
+      const auto row = static_cast<int>(std::lround(in_depth.y()));
       if (column < 0 || row < 0 || column >= depth_m.cols || row >= depth_m.rows) continue;
       if (const float z = DepthAt(depth_m, row, column, layout); z > 0)
         ratios.push_back(
-            known.CorrectedDepth(z, CentredCoordinates(column, row, depth_m.cols, depth_m.rows)) /
+            known.CorrectedDepth(
+                z, CentredCoordinates(pixel.x(), pixel.y(), intrinsics.width, intrinsics.height)) /
             p[2]);
     }
   }

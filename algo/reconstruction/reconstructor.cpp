@@ -10,7 +10,6 @@
 #include "algo/diagnosis/sweep_watch.hpp"
 #include "algo/reconstruction/scene_assembly.hpp"
 #include "algo/reconstruction/scene_solver.hpp"
-#include "algo/surface/view_surface.hpp"
 #include "algo/tracking/map_budget.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "words/reconstruction.hpp"
@@ -22,14 +21,12 @@ namespace {
 // and the memory that it takes from a long sweep.
 constexpr std::size_t kMostUpToNow = 48;
 
-TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOptions& options) {
+TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   TrackerOptions tracking;
   tracking.use_markers = options.use_markers;
   tracking.use_keypoints = options.use_keypoints;
   tracking.keep_color = options.keep_color;
-  // Surfaces take their colours at working resolution only.
-  if (options.preset == Preset::kBest)
-    tracking.color_block = info.intrinsics.width / WorkingIntrinsics(info.intrinsics).width;
+  tracking.keep_working_images = options.preset == Preset::kBest;
   tracking.keyframe_distance *= options.keyframe_spacing;
   tracking.keyframe_angle_rad *= options.keyframe_spacing;
   tracking.max_images = options.max_images;
@@ -53,7 +50,7 @@ struct Reconstructor::Impl {
   Impl(const StreamInfo& stream, const ReconstructorOptions& reconstructor_options)
       : info(stream),
         options(reconstructor_options),
-        tracker(stream, TrackingOptions(stream, reconstructor_options)),
+        tracker(stream, TrackingOptions(reconstructor_options)),
         watch(stream.usable_depth) {}
 
   [[nodiscard]] double Now() const { return options.now_s ? options.now_s() : 0.0; }

@@ -11,19 +11,16 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/units.hpp"
+#include "algo/geometry/working_image.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr int kWorkingWidth = 320;  // number of columns from which the block size is chosen
 constexpr int kNormalRadius =
     3;  // working pixels; half a window of about 25 mm at 1 m, longer than the noise's correlation
 constexpr int kRimRadius = 2;  // working pixels excluded around depth edges and holes
 constexpr int kMinRimCount =
     20;  // of the 25 pixels of a rim window; single drop-outs do not reject a window
-constexpr float kEdgeSlope =
-    6.0F;  // tan of 80 deg; steeper steps between neighbours are edges, not surfaces
-constexpr float kEdgeSigmas = 4.0F;  // additional margin for noise
 
 /// Sums over any rectangle of the image by four look-ups.
 class BoxSums {
@@ -72,39 +69,16 @@ class BoxSums {
   std::vector<double> sum_;
 };
 
-/// Step in depth between neighbouring working pixels that is too large for any plausible surface.
-float EdgeStep(const DepthNoise& noise, float depth_m, float pixel_angle) {
-  return kEdgeSlope * depth_m * pixel_angle + kEdgeSigmas * noise.SigmaFacing_m(depth_m);
-}
-
-/// Computes the inverse depth of the working image.
-void Bin(const DepthView& view, const ViewSurfaceOptions& options, ViewSurface& surface) {
-  const int block = surface.block;
-  const int min_count = (3 * block * block + 3) / 4;
-  const float pixel_angle = static_cast<float>(1.0 / surface.intrinsics.fx);
-  for (int row = 0; row < surface.height(); ++row) {
-    for (int column = 0; column < surface.width(); ++column) {
-      const std::size_t i =
-          static_cast<std::size_t>(row) * static_cast<std::size_t>(surface.width()) +
-          static_cast<std::size_t>(column);
-      float sum = 0.0F;
-      float nearest = options.max_depth_m;
-      float farthest = 0.0F;
-      int count = 0;
-      for (int dy = 0; dy < block; ++dy) {
-        const float* z = view.depth_m.ptr<float>(row * block + dy) + column * block;
-        for (int dx = 0; dx < block; ++dx) {
-          if (!(z[dx] >= options.min_depth_m && z[dx] <= options.max_depth_m)) continue;
-          sum += 1.0F / z[dx];
-          nearest = std::min(nearest, z[dx]);
-          farthest = std::max(farthest, z[dx]);
-          ++count;
-        }
-      }
-      const bool usable = count >= min_count &&
-                          farthest - nearest <= EdgeStep(surface.depth_noise, nearest, pixel_angle);
-      surface.pixels[i].inverse_depth = usable ? sum / static_cast<float>(count) : 0.0F;
-    }
+/// Inverse depth of the working image, within the usable range.
+void Invert(const cv::Mat& working_depth_m, const ViewSurfaceOptions& options,
+            ViewSurface& surface) {
+  std::size_t i = 0;
+  for (int row = 0; row < working_depth_m.rows; ++row) {
+    const float* z = working_depth_m.ptr<float>(row);
+    for (int column = 0; column < working_depth_m.cols; ++column, ++i)
+      surface.pixels[i].inverse_depth =
+          z[column] >= options.min_depth_m && z[column] <= options.max_depth_m ? 1.0F / z[column]
+                                                                               : 0.0F;
   }
 }
 
@@ -137,7 +111,7 @@ std::vector<std::uint8_t> WithoutEdges(const ViewSurface& surface, int widened) 
     const float nearer = 1.0F / std::max(inverse(a), inverse(b));
     // |1/a - 1/b| as a step in depth at the nearer of the two
     if (std::abs(inverse(a) - inverse(b)) * nearer * nearer >
-        EdgeStep(surface.depth_noise, nearer, pixel_angle))
+        EdgeStep_m(surface.depth_noise, nearer, pixel_angle))
       good[a] = good[b] = 0;
   };
   for (std::size_t row = 0; row < static_cast<std::size_t>(surface.height()); ++row) {
@@ -220,27 +194,10 @@ float AxialSigma(const DepthNoise& noise, float depth_m, float cos_incidence) {
 
 Color ViewSurface::ColorAt(std::size_t i) const {
   if (color_rgb.empty()) return {0, 0, 0};
-  const int color_block = color_rgb.cols == width() ? 1 : block;
-  const int row =
-      static_cast<int>(i / static_cast<std::size_t>(width())) * color_block + color_block / 2;
-  const int column =
-      static_cast<int>(i % static_cast<std::size_t>(width())) * color_block + color_block / 2;
-  const cv::Vec3b& rgb = color_rgb.at<cv::Vec3b>(row, column);
+  const auto columns = static_cast<std::size_t>(width());
+  const cv::Vec3b& rgb =
+      color_rgb.at<cv::Vec3b>(static_cast<int>(i / columns), static_cast<int>(i % columns));
   return {rgb[0], rgb[1], rgb[2]};
-}
-
-Intrinsics WorkingIntrinsics(const Intrinsics& image) {
-  const int block = std::max(1, (image.width + kWorkingWidth / 2) / kWorkingWidth);
-  const int width = image.width / block;
-  const int height = image.height / block;
-  if (width < 1 || height < 1)
-    throw std::invalid_argument(
-        fmt::format("view surface: image size {}x{}", image.width, image.height));
-  // Resized() is exact for the part of the image that whole blocks cover.
-  Intrinsics covered = image;
-  covered.width = width * block;
-  covered.height = height * block;
-  return Resized(covered, width, height);
 }
 
 ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTable>& working_rays,
@@ -268,17 +225,15 @@ ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTa
   surface.rays = working_rays;
   surface.intrinsics = working_rays->intrinsics();
   surface.depth_noise = options.depth_noise;
-  surface.block = depth.cols / surface.intrinsics.width;
-  surface.color_rgb = view.color_rgb;
+  if (!view.color_rgb.empty()) surface.color_rgb = WorkingColor(view.color_rgb, view.intrinsics);
   surface.T_world_camera = view.T_world_camera;
   const int width = surface.width();
   const int height = surface.height();
   const std::size_t size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   surface.pixels.resize(size);
   surface.normals.assign(size, Eigen::Vector3f::Zero());
-  Bin(view, options, surface);
-  const std::vector<std::uint8_t> good =
-      WithoutEdges(surface, options.edge_px * depth.cols / 640 / surface.block);
+  Invert(WorkingDepth(depth, view.intrinsics, options.depth_noise), options, surface);
+  const std::vector<std::uint8_t> good = WithoutEdges(surface, options.edge_px * width / 640);
   BoxSums sums(width, height);
   for (int row = 0; row < height; ++row) {
     const std::size_t start = static_cast<std::size_t>(row) * static_cast<std::size_t>(width);

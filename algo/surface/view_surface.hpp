@@ -13,6 +13,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/geometry/back_projection.hpp"
+#include "algo/geometry/working_image.hpp"
 #include "algo/sensor_model/depth_noise.hpp"
 #include "algo/types/keyframe.hpp"
 #include "algo/types/point_cloud.hpp"
@@ -35,10 +36,8 @@ struct ViewSurfaceOptions {
   std::stop_token stop = {};  ///< Polled by PrepareViews(); see CheckStop().
 };
 
-/// A depth image at working resolution (about 320 columns for any sensor). Each working pixel is
-/// the mean INVERSE depth of a block of image pixels: planes are linear in inverse depth, so the
-/// mean is exact on them, and the quantisation of structured light is uniform in it. All vectors
-/// have width * height values, row by row.
+/// A depth image at working resolution, see WorkingDepth(). All vectors have width * height values,
+/// row by row.
 struct ViewSurface {
   /// Inverse depth and weight are stored together because searches need both.
   struct Pixel {
@@ -50,8 +49,7 @@ struct ViewSurface {
 
   Intrinsics intrinsics;   ///< Camera of the working image.
   DepthNoise depth_noise;  ///< Of the depth image's pixels, not of their means.
-  int block = 1;           ///< Image pixels per working pixel in each direction.
-  cv::Mat color_rgb;       ///< As in the view: at image or working resolution, or empty.
+  cv::Mat color_rgb;       ///< CV_8UC3, or empty.
   double time_s = 0.0;     ///< When the depth image was taken.
   Pose T_world_camera = Pose::Identity();
   std::shared_ptr<const RayTable>
@@ -73,10 +71,8 @@ struct ViewSurface {
   [[nodiscard]] Color ColorAt(std::size_t i) const;
 };
 
-/// The camera of the working images for images of this camera.
-[[nodiscard]] Intrinsics WorkingIntrinsics(const Intrinsics& image);
-
-/// Prepares one view. Its colour image may also be at working resolution.
+/// Prepares one view. Its images may also be at working resolution: depth with the camera of that
+/// resolution, colour with either.
 /// @param working_rays  RayTable of WorkingIntrinsics(view.intrinsics).
 /// @throws std::invalid_argument if images, intrinsics, rays or options do not fit together.
 [[nodiscard]] ViewSurface PrepareView(const DepthView& view,

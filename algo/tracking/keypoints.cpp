@@ -12,6 +12,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "algo/base/statistics.hpp"
+#include "algo/geometry/working_image.hpp"
 
 namespace plumb {
 namespace {
@@ -254,7 +255,7 @@ DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m,
   DescribedFeatures features;
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     const Eigen::Vector2d pixel(keypoints[i].pt.x, keypoints[i].pt.y);
-    const double z = DepthAt(depth_m, pixel);
+    const double z = DepthAt(depth_m, InDepthImage(pixel, intrinsics, depth_m));
     if (z <= 0) continue;
     const Eigen::Vector2d ideal = Undistort(intrinsics, pixel);
     features.pixels.emplace_back(pixel.cast<float>());

@@ -75,7 +75,7 @@ struct SurfaceDepth {
 /// neither side. The slope is that of the plane through all 13x13 pixels, which must agree with it.
 [[nodiscard]] SurfaceDepth SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
 
-/// ORB features with depth, for relocalisation.
+/// ORB features with depth, for relocalisation. The depth image may be at working resolution.
 struct DescribedFeatures {
   std::vector<Eigen::Vector2f> pixels;
   std::vector<Eigen::Vector3f> in_camera;  ///< Metres.

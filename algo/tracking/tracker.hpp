@@ -34,8 +34,8 @@ struct TrackerOptions {
   /// Fraction of the keyframe's keypoints below which a new keyframe is created.
   double min_tracked_fraction = 0.6;
   int local_keyframes = 6;  ///< Keyframes that local bundle adjustment moves.
-  /// Of each block of so many pixels each way, keyframes keep the colour of the middle one.
-  int color_block = 1;
+  /// Keyframes keep colour, and depth once they are not the newest, at working resolution.
+  bool keep_working_images = false;
   bool keep_color = true;  ///< Keyframes keep their colour images.
   /// Largest number of keyframes that keep images, see BoundImages().
   std::size_t max_images = 96;

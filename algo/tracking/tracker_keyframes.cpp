@@ -6,6 +6,7 @@
 
 #include "algo/base/statistics.hpp"
 #include "algo/bundle/bundle_adjustment.hpp"
+#include "algo/geometry/working_image.hpp"
 #include "algo/tracking/loop_closer.hpp"
 #include "algo/tracking/map_budget.hpp"
 #include "algo/tracking/surface_agreement.hpp"
@@ -38,17 +39,6 @@ double MedianDepth(const DenseView& view) {
   for (const float value : view.z_m)
     if (value > 0) z.push_back(value);
   return z.empty() ? 1.0 : TakeMedian(z);
-}
-
-cv::Mat MiddlesOfBlocks(const cv::Mat& rgb, int block) {
-  if (block == 1) return rgb;
-  cv::Mat middles(rgb.rows / block, rgb.cols / block, CV_8UC3);
-  for (int r = 0; r < middles.rows; ++r) {
-    const auto* from = rgb.ptr<cv::Vec3b>(r * block + block / 2) + block / 2;
-    auto* to = middles.ptr<cv::Vec3b>(r);
-    for (int c = 0; c < middles.cols; ++c) to[c] = from[c * block];
-  }
-  return middles;
 }
 
 }  // namespace
@@ -88,6 +78,10 @@ std::vector<std::size_t> Tracker::KeyframesNear(const Pose& T_world_color,
 void Tracker::MakeKeyframe(const Frame& frame, FrameData& prepared, const Pose& T_world_color,
                            TrackedFrame& result) {
   FindAllMarkers(prepared);
+  if (options_.keep_working_images && !map_.keyframes.empty()) {
+    DepthView& before = map_.keyframes.back().data.view;  // Only the newest is tracked against it.
+    before.depth_m = WorkingDepth(before.depth_m, info_.intrinsics, info_.depth_noise);
+  }
   MapKeyframe keyframe;
   keyframe.data.frame_index = frame.index;
   keyframe.data.color_time_s = frame.color_time_s;
@@ -95,7 +89,9 @@ void Tracker::MakeKeyframe(const Frame& frame, FrameData& prepared, const Pose& 
   keyframe.data.view.intrinsics = info_.intrinsics;
   keyframe.data.view.depth_m = frame.depth_m;
   if (options_.keep_color)
-    keyframe.data.view.color_rgb = MiddlesOfBlocks(frame.color_rgb, options_.color_block);
+    keyframe.data.view.color_rgb = options_.keep_working_images
+                                       ? WorkingColor(frame.color_rgb, info_.intrinsics)
+                                       : frame.color_rgb;
   keyframe.data.markers = prepared.markers;
   keyframe.T_world_color = T_world_color;
   keyframe.velocity_per_s = velocity_;

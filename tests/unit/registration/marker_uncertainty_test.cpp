@@ -125,7 +125,7 @@ TEST(MarkerUncertaintyTest, AMarkerThatNothingDeterminesHasNone) {
   EXPECT_FALSE(without.contains(5));
   for (const auto& [id, sigma] : without)
     EXPECT_NEAR(sigma / kErrorByPosterior, 0.0003, 3e-5) << id;
-  EXPECT_THAT(MarkerSigmas({}, map, kLength_m), testing::IsEmpty());
+  EXPECT_THAT(MarkerSigmas({}, map, kLength_m), ::testing::IsEmpty());
 }
 
 // The covariance itself: how far markers lie from the truth in repeated sweeps, whose observations
