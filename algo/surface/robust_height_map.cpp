@@ -203,7 +203,7 @@ TopPlane FindTop(std::span<TopSample> samples, std::span<const ViewSurface> view
       ++top.count;
       const Eigen::Matrix3f R = RotationOf(view);
       top.point += weight * (R * view.PointInCamera(i) + TranslationOf(view));
-      normal += weight * (R * view.normals[i]);
+      normal += weight * (R * view.normals[i].Unit());
       weight_sum += weight;
     }
     // The top is seen only at rims or is too steep: no height, and nothing below it either.

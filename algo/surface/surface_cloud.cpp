@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <tbb/parallel_for.h>
@@ -62,56 +63,54 @@ Key Mix(Key key) {
 }
 std::size_t ShardOf(Key key) { return (Mix(BlockOf(key)) >> 20) % kNumShards; }
 
-/// Open-addressing map from a voxel to its entry's index, in order of first insertion.
-class VoxelIndex {
+/// Entries by voxel, in order of first insertion. Open addressing with the entries apart, so that
+/// the free slots are small.
+/// @tparam Entry  Has a `key`.
+template <typename Entry>
+class VoxelTable {
  public:
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
 
-  /// How often the key has been asked for by FindOrAdd().
-  [[nodiscard]] std::uint32_t Count(Key key) const {
-    if (slots_.empty()) return 0;
-    std::size_t at = Start(key);
-    while (slots_[at].index != kNone && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
-    return slots_[at].count;
+  [[nodiscard]] const Entry* Find(Key key) const {
+    if (slots_.empty()) return nullptr;
+    const std::uint32_t index = slots_[SlotOf(key)];
+    return index == kNone ? nullptr : &entries_[index];
   }
 
-  /// Index of the key's entry; the caller appends an entry when it equals size() before the call.
-  std::uint32_t FindOrAdd(Key key) {
-    if (2 * (size_ + 1) > slots_.size()) Grow();
-    std::size_t at = Start(key);
-    while (slots_[at].index != kNone && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
-    if (slots_[at].index == kNone) slots_[at] = {key, static_cast<std::uint32_t>(size_++), 0};
-    ++slots_[at].count;
-    return slots_[at].index;
+  /// The entry of this one's voxel, which becomes this one if there is none, and whether it did.
+  std::pair<Entry&, bool> FindOrAdd(const Entry& entry) {
+    if (2 * (entries_.size() + 1) > slots_.size()) Grow();
+    std::uint32_t& index = slots_[SlotOf(entry.key)];
+    const bool is_new = index == kNone;
+    if (is_new) {
+      index = static_cast<std::uint32_t>(entries_.size());
+      entries_.push_back(entry);
+    }
+    return {entries_[index], is_new};
   }
 
  private:
-  struct Slot {
-    Key key = 0;
-    std::uint32_t index = kNone;
-    std::uint32_t count = 0;
-  };
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-  /// Voxels of a block lie close together, five slots apart, so that filled planes do not form long
-  /// runs.
-  [[nodiscard]] std::size_t Start(Key key) const {
+  /// The slot of a voxel's entry, or where it belongs.
+  [[nodiscard]] std::size_t SlotOf(Key key) const {
+    // Voxels of a block lie close together, five slots apart, so that filled planes do not form
+    // long runs.
     constexpr Key kWithin = (Key{1} << (3 * kBlockBits)) - 1;
-    return (Mix(BlockOf(key)) + 5 * (key & kWithin)) & (slots_.size() - 1);
+    std::size_t at = (Mix(BlockOf(key)) + 5 * (key & kWithin)) & (slots_.size() - 1);
+    while (slots_[at] != kNone && entries_[slots_[at]].key != key)
+      at = (at + 1) & (slots_.size() - 1);
+    return at;
   }
 
   void Grow() {
-    std::vector<Slot> old(std::max<std::size_t>(1024, 2 * slots_.size()));
-    old.swap(slots_);
-    for (const Slot& slot : old) {
-      if (slot.index == kNone) continue;
-      std::size_t at = Start(slot.key);
-      while (slots_[at].index != kNone) at = (at + 1) & (slots_.size() - 1);
-      slots_[at] = slot;
-    }
+    slots_.assign(std::max<std::size_t>(1024, 2 * slots_.size()), kNone);
+    for (std::size_t i = 0; i < entries_.size(); ++i)
+      slots_[SlotOf(entries_[i].key)] = static_cast<std::uint32_t>(i);
   }
 
-  std::vector<Slot> slots_;
-  std::size_t size_ = 0;
+  std::vector<std::uint32_t> slots_;
+  std::vector<Entry> entries_;
 };
 
 /// A measured working pixel to be entered into a voxel.
@@ -158,20 +157,24 @@ void SortIntoShards(const ViewSurface& view, float inverse_size, Shards<VoxelSam
   }
 }
 
-using VoxelShards = std::array<VoxelIndex, kNumShards>;
+using SeedTables = std::array<VoxelTable<Seed>, kNumShards>;
 
 /// The seeds whose voxel holds at least as many measurements as its two neighbours along the
 /// surface's normal. Noise spreads a surface over several layers of voxels, whose seeds would all
 /// move to the same place.
-std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const std::vector<Seed>& seeds,
-                                const VoxelShards& voxels) {
+std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const SeedTables& tables,
+                                std::size_t shard) {
+  const auto count_at = [&](Key key) {
+    const Seed* const seed = tables[ShardOf(key)].Find(key);
+    return seed == nullptr ? 0 : seed->count;
+  };
   std::vector<Seed> kept;
-  for (const Seed& seed : seeds) {
+  for (const Seed& seed : tables[shard].entries()) {
     const ViewSurface& view = views[seed.view];
-    const Eigen::Vector3f n = view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel];
+    const Eigen::Vector3f n =
+        view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel].Unit();
     int axis = 0;
     n.cwiseAbs().maxCoeff(&axis);
-    const auto count_at = [&](Key key) { return voxels[ShardOf(key)].Count(key); };
     // Of two equally filled layers the lower one is kept.
     if (seed.count >= count_at(Beside(seed.key, axis, 1)) &&
         seed.count > count_at(Beside(seed.key, axis, -1)))
@@ -184,8 +187,7 @@ std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const std::v
 /// One seed per touched voxel, thinned to one layer, by shard, in block order within each.
 Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size,
                        const std::stop_token& stop) {
-  Shards<Seed> seeds;
-  VoxelShards voxels;
+  SeedTables tables;
   std::vector<Shards<VoxelSample>> samples(std::min(kViewsAtOnce, views.size()));
   for (std::size_t first = 0; first < views.size(); first += kViewsAtOnce) {
     CheckStop(stop);
@@ -196,19 +198,15 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size,
     });
     tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
       for (std::size_t i = 0; i < count; ++i) {
+        const auto number = static_cast<std::uint32_t>(first + i);
         for (const VoxelSample& sample : samples[i][s]) {
-          const std::uint32_t index = voxels[s].FindOrAdd(sample.key);
-          if (index == seeds[s].size()) {
-            seeds[s].push_back({sample.key, sample.weight, sample.pixel,
-                                static_cast<std::uint32_t>(first + i), 1});
-            continue;
-          }
-          Seed& seed = seeds[s][index];
+          const auto [seed, is_new] =
+              tables[s].FindOrAdd({sample.key, sample.weight, sample.pixel, number, 0});
           ++seed.count;
-          if (sample.weight <= seed.weight) continue;
+          if (is_new || sample.weight <= seed.weight) continue;
           seed.weight = sample.weight;
           seed.pixel = sample.pixel;
-          seed.view = static_cast<std::uint32_t>(first + i);
+          seed.view = number;
         }
       }
     });
@@ -216,7 +214,7 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size,
   Shards<Seed> layer;
   tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
     CheckStop(stop);
-    layer[s] = FullestLayers(views, seeds[s], voxels);
+    layer[s] = FullestLayers(views, tables, s);
   });
   return layer;
 }
@@ -234,7 +232,8 @@ Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& f
     const Seed& seed = seeds[k];
     const ViewSurface& view = views[seed.view];
     const Eigen::Vector3f p = PointInWorld(view, seed.pixel);
-    const Eigen::Vector3f n = view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel];
+    const Eigen::Vector3f n =
+        view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel].Unit();
     if (k == 0 || BlockOf(seed.key) != block) {
       CheckStop(options.stop);
       block = BlockOf(seed.key);
@@ -256,33 +255,30 @@ Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& f
 
 /// Weighted mean of the moved seeds of each voxel.
 PointCloud MergeVoxels(const std::array<Shards<Merged>, kNumShards>& moved, bool with_colors) {
-  Shards<Merged> voxels;
+  std::array<VoxelTable<Merged>, kNumShards> voxels;
   tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
-    VoxelIndex index_of;
-    std::vector<Merged>& merged = voxels[s];
     for (const Shards<Merged>& source : moved) {
       for (const Merged& point : source[s]) {
-        const std::uint32_t index = index_of.FindOrAdd(point.key);
-        if (index == merged.size()) {
-          merged.push_back(point);
-          merged.back().point *= point.weight;
-          merged.back().normal *= point.weight;
-        } else {
-          merged[index].point += point.weight * point.point;
-          merged[index].normal += point.weight * point.normal;
-          merged[index].weight += point.weight;
+        auto [sum, is_new] = voxels[s].FindOrAdd(point);
+        if (is_new) {
+          sum.point *= point.weight;
+          sum.normal *= point.weight;
+          continue;
         }
+        sum.point += point.weight * point.point;
+        sum.normal += point.weight * point.normal;
+        sum.weight += point.weight;
       }
     }
   });
   PointCloud cloud;
   std::size_t size = 0;
-  for (const auto& shard : voxels) size += shard.size();
+  for (const auto& shard : voxels) size += shard.entries().size();
   cloud.points.reserve(size);
   cloud.normals.reserve(size);
   if (with_colors) cloud.colors.reserve(size);
   for (const auto& shard : voxels) {
-    for (const Merged& voxel : shard) {
+    for (const Merged& voxel : shard.entries()) {
       const float length = voxel.normal.norm();
       if (!(length > 0.0F)) continue;  // views from opposite sides do not form a surface
       cloud.points.push_back(voxel.point / voxel.weight);

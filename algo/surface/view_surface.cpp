@@ -177,7 +177,7 @@ void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, 
       const float cos_incidence = inverse / (length * std::sqrt(ray.squaredNorm() + 1.0F));
       if (!(cos_incidence >= min_cos)) continue;
       const float sigma = AxialSigma(surface.depth_noise, 1.0F / inverse, cos_incidence);
-      surface.normals[i] = plane * (-1.0F / length);
+      surface.normals[i] = PackedNormal(plane * (-1.0F / length));
       surface.pixels[i].weight = cos_incidence / (sigma * sigma);
     }
   }
@@ -231,7 +231,7 @@ ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTa
   const int height = surface.height();
   const std::size_t size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   surface.pixels.resize(size);
-  surface.normals.assign(size, Eigen::Vector3f::Zero());
+  surface.normals.resize(size);
   Invert(WorkingDepth(depth, view.intrinsics, options.depth_noise), options, surface);
   const std::vector<std::uint8_t> good = WithoutEdges(surface, options.edge_px * width / 640);
   BoxSums sums(width, height);

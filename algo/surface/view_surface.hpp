@@ -13,6 +13,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "algo/geometry/back_projection.hpp"
+#include "algo/geometry/packed_normal.hpp"
 #include "algo/geometry/working_image.hpp"
 #include "algo/sensor_model/depth_noise.hpp"
 #include "algo/types/keyframe.hpp"
@@ -55,8 +56,9 @@ struct ViewSurface {
   std::shared_ptr<const RayTable>
       rays;  ///< Of the working pixels; shared by the views of one camera.
   std::vector<Pixel> pixels;
-  std::vector<Eigen::Vector3f>
-      normals;  ///< Camera frame, unit length, towards the camera; valid where weight > 0.
+  /// Camera frame, towards the camera; valid where weight > 0. Packed, because the views of a sweep
+  /// are most of what its solution keeps in memory.
+  std::vector<PackedNormal> normals;
 
   [[nodiscard]] int width() const { return intrinsics.width; }
   [[nodiscard]] int height() const { return intrinsics.height; }
