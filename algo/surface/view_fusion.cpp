@@ -218,9 +218,8 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
       const float w = view.pixels[nearest].weight;
       samples[num_samples++] = {distance, w};
       widest_band = std::max(widest_band, band);
-      if (options_.with_normals)
-        fused.normal +=
-            w * (cameras_[index].R_camera_world.transpose() * view.normals[nearest].Unit());
+      const Eigen::Matrix3f& R = cameras_[index].R_camera_world;
+      if (options_.with_normals) fused.normal += w * (R.transpose() * view.normals[nearest].Unit());
       if (w > best_weight) {
         best_weight = w;
         fused.best_view = index;
