@@ -117,8 +117,8 @@ TEST_F(PlanningCtTest, FromImagesToSixNumbersInACalibratedRoom) {
   for (const char* part : {"room", "room.toml"}) fs::create_symlink(suite / part, folder_ / part);
   WriteText(folder_ / "suite.json", plan.dump());
   const json total = Evaluated();
-  // Measured: 0.15 deg, all inside. It is one short sweep: of the 40 pairs of a whole suite (unit 51)
-  // the worst has 1.4 mm and 0.05 deg.
+  // Measured: 0.15 deg, all inside. It is one short sweep: of the 40 pairs of a whole suite (unit
+  // 51) the worst has 1.4 mm and 0.05 deg.
   EXPECT_LT(total.at("translation_mm").at("max").get<double>(), 1.6);
   EXPECT_LT(total.at("rotation_deg").at("max").get<double>(), 0.2);
   EXPECT_GE(total.at("intervals_95").at("all").at("inside").get<int>(), 11) << "of 12";
