@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include <tbb/parallel_for.h>
 
@@ -42,13 +41,19 @@ std::vector<const MarkerSighting*> Chosen(const std::vector<MarkerSighting>& sig
 }
 
 using Losses = std::array<double, kNumGammas>;
+using Tables = std::array<ToneTable, kNumGammas>;
+
+// Curves to try: the first of them, the end, and the distance between two.
+struct Curves {
+  std::size_t first = 0, end = kNumGammas, step = 1;
+};
 
 // Logarithm of the residual for each curve, so that a sighting counts by how much a curve improves
 // it, not by how badly it fits. Nothing if one of the fits fails.
-std::optional<Losses> LossesOf(const MarkerSighting& sighting,
-                               const std::array<ToneTable, kNumGammas>& tables) {
+std::optional<Losses> LossesOf(const MarkerSighting& sighting, const Tables& tables,
+                               const Curves& curves) {
   Losses losses{};
-  for (std::size_t g = 0; g < kNumGammas; ++g) {
+  for (std::size_t g = curves.first; g < curves.end; g += curves.step) {
     CornerRefinementOptions options;
     options.tone = &tables[g];
     const auto fit = RefineCorners(sighting.gray, sighting.corners, sighting.pattern, options);
@@ -58,15 +63,53 @@ std::optional<Losses> LossesOf(const MarkerSighting& sighting,
   return losses;
 }
 
-// Position of the smallest mean, by a parabola through it and its neighbours.
-double BestGamma(const std::vector<Losses>& losses, std::size_t first, std::size_t stride) {
+// Of every `stride`-th sighting.
+std::vector<Losses> LossesOfAll(const std::vector<const MarkerSighting*>& sightings,
+                                std::size_t stride, const Tables& tables, const Curves& curves,
+                                const std::stop_token& stop) {
+  std::vector<std::optional<Losses>> all((sightings.size() + stride - 1) / stride);
+  tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+    CheckStop(stop);
+    all[i] = LossesOf(*sightings[i * stride], tables, curves);
+  });
+  std::vector<Losses> losses;
+  for (const auto& one : all)
+    if (one) losses.push_back(*one);
+  return losses;
+}
+
+// Sum over every `stride`-th sighting.
+Losses Sum(const std::vector<Losses>& losses, std::size_t first, std::size_t stride) {
   Losses sum{};
   for (std::size_t i = first; i < losses.size(); i += stride)
     for (std::size_t g = 0; g < kNumGammas; ++g) sum[g] += losses[i][g];
-  const auto best =
-      static_cast<std::size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
+  return sum;
+}
+
+std::size_t Smallest(const Losses& sum, const Curves& curves) {
+  std::size_t best = curves.first;
+  for (std::size_t g = curves.first; g < curves.end; g += curves.step)
+    if (sum[g] < sum[best]) best = g;
+  return best;
+}
+
+// The curves about the best of every second one. It is found by a few sightings, because each
+// curve costs as much time as the fit of all corners.
+Curves Nearest(const std::vector<const MarkerSighting*>& sightings, const Tables& tables,
+               const std::stop_token& stop) {
+  constexpr std::size_t kOneIn = 4;
+  constexpr std::size_t kReach = 2;
+  const Curves every_second{.step = 2};
+  const std::size_t best =
+      Smallest(Sum(LossesOfAll(sightings, kOneIn, tables, every_second, stop), 0, 1), every_second);
+  return {.first = best - std::min(best, kReach), .end = std::min(kNumGammas, best + kReach + 1)};
+}
+
+// Position of the smallest sum, by a parabola through it and its neighbours.
+double BestGamma(const Losses& sum, const Curves& curves) {
+  const std::size_t best = Smallest(sum, curves);
   double place = static_cast<double>(best);
-  if (best > 0 && best + 1 < kNumGammas) {
+  if (best > curves.first && best + 1 < curves.end) {
     const double bend = sum[best - 1] - 2 * sum[best] + sum[best + 1];
     if (bend > 0) place += 0.5 * (sum[best - 1] - sum[best + 1]) / bend;
   }
@@ -101,23 +144,18 @@ void FindEdgeShift(const std::vector<const MarkerSighting*>& sightings, SweepTon
 std::optional<SweepTone> EstimateTone(const std::vector<MarkerSighting>& sightings,
                                       const std::stop_token& stop) {
   const std::vector<const MarkerSighting*> chosen = Chosen(sightings);
-  std::array<ToneTable, kNumGammas> tables;
+  if (chosen.size() < kMinSightings) return std::nullopt;
+  Tables tables;
   for (std::size_t g = 0; g < kNumGammas; ++g)
     tables[g] = PowerTone(kFirstGamma + kGammaStep * static_cast<double>(g));
-  std::vector<std::optional<Losses>> all(chosen.size());
-  tbb::parallel_for(std::size_t{0}, chosen.size(), [&](std::size_t i) {
-    CheckStop(stop);
-    all[i] = LossesOf(*chosen[i], tables);
-  });
-  std::vector<Losses> losses;
-  for (const auto& one : all)
-    if (one) losses.push_back(*one);
+  const Curves curves = Nearest(chosen, tables, stop);
+  const std::vector<Losses> losses = LossesOfAll(chosen, 1, tables, curves, stop);
   if (losses.size() < kMinSightings) return std::nullopt;
   SweepTone tone;
-  tone.gamma = BestGamma(losses, 0, 1);
+  tone.gamma = BestGamma(Sum(losses, 0, 1), curves);
   double square = 0;
   for (std::size_t group = 0; group < kNumGroups; ++group)
-    square += std::pow(BestGamma(losses, group, kNumGroups) - tone.gamma, 2);
+    square += std::pow(BestGamma(Sum(losses, group, kNumGroups), curves) - tone.gamma, 2);
   tone.sigma_gamma = std::sqrt(square / (kNumGroups * (kNumGroups - 1)));
   tone.table = PowerTone(tone.gamma);
   FindEdgeShift(chosen, tone);

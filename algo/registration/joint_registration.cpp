@@ -79,7 +79,6 @@ class JointRegistration {
                     TrackingMap& map, const std::stop_token& stop)
       : stated_(stated), options_(options), map_(map), stop_(stop) {
     if (options.calibrate) MoveCalibration(options.prior.mean, result_.calibration);
-    AddTrackedLinks(map, links_);
   }
 
   JointRegistrationResult Run() {
@@ -91,7 +90,7 @@ class JointRegistration {
         return std::move(result_);
       }
     }
-    FindInformation(SparseBundle(), links_, false);
+    FindInformation(SparseBundle(), TrackedLinks(), false);
     return std::move(result_);
   }
 
@@ -126,7 +125,16 @@ class JointRegistration {
     return bundle;
   }
 
-  void SolveSparse() { BundleAdjust(stated_, SparseBundle(), links_, map_, result_.calibration); }
+  // At the present state of the map.
+  [[nodiscard]] std::vector<QuadraticTerm> TrackedLinks() const {
+    std::vector<QuadraticTerm> links;
+    AddTrackedLinks(map_, links);
+    return links;
+  }
+
+  void SolveSparse() {
+    BundleAdjust(stated_, SparseBundle(), TrackedLinks(), map_, result_.calibration);
+  }
 
   // The lens is estimated here, so the velocities must already be correct.
   void SolveWithNewVelocities() {
@@ -135,7 +143,7 @@ class JointRegistration {
     bundle.initial_damping = kDampingNearSolution;
     for (int round = 0; round < options_.num_velocity_rounds; ++round) {
       RefreshVelocities();
-      BundleAdjust(stated_, bundle, links_, map_, result_.calibration);
+      BundleAdjust(stated_, bundle, TrackedLinks(), map_, result_.calibration);
     }
   }
 
@@ -261,7 +269,6 @@ class JointRegistration {
   const std::stop_token& stop_;
   // Of the landmarks that tracking left, for all phases.
   double keypoint_sigma_px_ = options_.keypoint_sigma_px * KeypointSigmaFactor(map_);
-  std::vector<QuadraticTerm> links_;
   dense::Cells cells_;
   std::vector<dense::KeyframePair> pairs_;
   std::vector<QuadraticTerm> dense_terms_;
