@@ -1,24 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plan of a reference: region, isocentre, tolerances; and its approval, which signs exactly
-// what is stored.
-import { currentSession, get, live, may, post, put } from '../../api.js';
+// The plan of a reference: region, isocentre, tolerances, posture.
+import { get, live, may, put } from '../../api.js';
 import {
   action, card, checkbox, clear, done, enable, field, fixed, h, hint, keepFocus, localTime, say,
   select, signedTime, warn,
 } from '../../dom.js';
 import { guardLeaving } from '../../leave.js';
-import { kBounds, kReason, kStated } from '../../limits.js';
+import { kBounds, kStated } from '../../limits.js';
 import { compassOfPlan, marksNote } from '../../drawings/map_frame.js';
 import { loadMap } from '../../drawings/maps.js';
-import { doubtsOf, movableCuts, sideViews } from '../../drawings/side_view.js';
-import { kAxes } from '../../numbers.js';
+import { doubtsOf } from '../../drawings/side_view.js';
 import { drafts } from '../../plan_drafts.js';
-import { signedForm } from '../../signed_form.js';
-import { S, said } from '../../words.js';
+import { S } from '../../words.js';
 import { capturedAgainst, capturedCard } from '../captured.js';
-import { blockNote, flagList, qualityOf } from '../common.js';
+import { blockNote, qualityOf } from '../common.js';
 import { meshView } from '../mesh_view.js';
-import { planningFacts, skinThreshold } from '../planning.js';
+import { planningFacts } from '../planning.js';
+import { showSummary, sidesOf, whyNotApprove } from './plan_approval.js';
 import { editor, inMillimetres, measure } from './plan_editor.js';
 import { templateOf } from './plan_template.js';
 
@@ -46,10 +44,6 @@ function markerChoice(scene, take) {
   return h('div', { class: 'row' }, field(text.markerAtLasers, marker),
     action(text.takeMarker, async () => take(middleOf(scene.markers[marker.value])), {}));
 }
-
-/// The body from the side; of a planning CT wherever one cuts it.
-const sidesOf = (heights, point) =>
-  (heights?.scene.planning ? movableCuts : sideViews)(heights, point);
 
 /// What is stated of a planning CT's surface; nothing for other references.
 function statedFields({ stated }) {
@@ -126,119 +120,129 @@ const storedPlan = (reference) => ({
   clothing_mm: reference.plan.clothing_mm, ct_breathing_mm: reference.plan.ct_breathing_mm,
 });
 
-/// Why the person who is logged in does not approve this draft; nothing where they may, or where it
-/// is approved already.
-function whyNotApprove(reference) {
-  if (reference.approved_by) return null;
-  if (!reference.planned_by) return S.plan.unplanned;
-  const isOwn = [reference.created_by, reference.planned_by].includes(currentSession()?.user);
-  return isOwn && may('approve') ? S.plan.secondPerson : null;
+/// All that the screen shows of a reference; without `heights` where its map cannot be read, and
+/// then `noMap` says why.
+async function readAll(reference) {
+  const patient = await get(`patients/${reference.patient_id}`);
+  const scan = await get(`scans/${reference.scan_id}`).catch(() => null);
+  const quality = scan && await qualityOf(scan);
+  const captured = await capturedAgainst(reference);
+  const known = { reference, patient, scan, quality, captured, heights: null };
+  try {
+    known.heights = await loadHeights(reference);
+  } catch (error) {
+    known.noMap = error.message;
+  }
+  return known;
 }
 
-/// Shows what an approval signs, read-only and complete, with the checksum that goes into the log.
-function summary(reference, patient, { scan, quality, picture, heights, captured }, approve) {
-  const text = S.plan;
-  const { plan } = reference;
-  const row = (name, value) => [h('dt', {}, name), h('dd', {}, value)];
-  const placed = (point) => point.map((v, i) => `${'xyz'[i]} ${fixed(1000 * v, 1)}`).join('; ');
-  const number = (value) => `${value}`.replace('.', S.decimal);
-  const size = measure(plan.region_m);
-  const flags = scan && flagList(scan, quality);
-  const planning = planningFacts(heights?.scene);
-  // The map of a planning CT shows no couch to judge the isocentre by.
-  const doubts = heights && plan.isocentre_m && !planning
-    ? doubtsOf(heights, plan.isocentre_m).words : [];
-  const reason = flags && h('input', { required: true, autocomplete: 'off', ...kReason });
-  const posture = reference.room?.contradicts_posture
-    && checkbox(text.postureConfirm, false, { required: true });
-  const hu = skinThreshold(heights?.scene);
-  const skin = hu !== null && checkbox(text.imagesConfirm, false, { required: true });
-  const signature = signedForm({ class: 'form inline below' },
-    (sign) => approve({ ...sign(), ...(reason && { reason: reason.value.trim() }),
-      ...(posture && { posture_confirmed: posture.box.checked }),
-      ...(skin && { images_confirmed: skin.box.checked }) }),
-    h('button', { class: 'primary' }, text.summarySubmit),
-    reason ? field(text.flagsReason, reason) : [],
-    posture ? h('div', {}, h('p', { class: 'caution' }, text.postureContradicted),
-      posture.element) : [],
-    skin ? h('div', {}, h('p', { class: 'caution' }, text.imagesUsed(hu)), skin.element) : []);
-  return h('section', { class: 'card summary', 'aria-label': text.summary },
-    h('h2', {}, text.summary), h('div', { class: 'summary-grid' },
-      picture, h('dl', { class: 'facts' },
-      row(S.patients.code, patient.code), row(S.patients.version, `${reference.version}`),
-      row(S.patients.made, `${signedTime(reference.created_at)}, ${reference.created_by}`),
-      row(text.planned, reference.planned_by),
-      row(S.patients.reasonShort, reference.reason || S.none),
-      row(text.region, plan.region_m.length
-        ? `${text.corners(plan.region_m.length)}, ${text.area(size.cm2, size.mm)}`
-        : text.wholeBody),
-      row(text.isocentre, plan.isocentre_m ? `${placed(plan.isocentre_m)} mm` : text.middle),
-      kAxes.map((axis) => row(text.toleranceSigned(S.result.axes[axis.name].toLowerCase()),
-        axis.shift ? `±${number(plan.tolerance.shift_mm)} mm`
-          : `±${number(plan.tolerance.rotation_deg)}°`)),
-      row(text.posture, text.postures[plan.posture]),
-      row(text.markerKind, plan.couch_markers ? text.couchMarkers : text.roomMarkers),
-      planning && [row(text.clothing, `±${number(plan.clothing_mm)} mm`),
-        row(text.ctBreathing, `±${number(plan.ct_breathing_mm)} mm`)],
-      quality && row(text.scanQuality, quality.rows.map((one) =>
-        `${said(one, 'name')}: ${said(one, 'value')}`).join('; ')),
-      row(text.signature, h('code', {}, reference.digest)))),
-    planning, capturedCard(captured), sidesOf(heights, plan.isocentre_m),
-    doubts.map((words) => h('p', { class: 'caution' }, words)),
-    flags, hint(text.approveHint), signature);
+/// What the fields begin with: what was typed before, or what is stored. Nobody has planned it yet:
+/// what the calibration has measured of the lasers, unless somebody says otherwise.
+function beginning(reference, editable) {
+  const kept = editable ? drafts.read(reference) : null;
+  const plan = kept ?? storedPlan(reference);
+  const lasers = reference.room?.lasers_m?.map((value) => Number(value.toFixed(4))) ?? null;
+  const byLasers = Boolean(lasers && editable && !kept && !reference.planned_by
+    && !plan.isocentre_m);
+  const model = { region: plan.region_m.map((point) => [...point]),
+    isocentre: byLasers ? lasers : plan.isocentre_m };
+  return { kept, plan, lasers, byLasers, model };
 }
+
+/// The isocentre from the side, and what is implausible about it.
+function isocentreSide(heights, planning, editable) {
+  const place = h('div', {});
+  const meant = checkbox(S.plan.isocentreMeant, false, { disabled: !editable });
+  let doubts = { refused: false, words: [] };
+  let drawn = '';
+  const draw = (point) => {
+    const shown = JSON.stringify(point);
+    if (shown === drawn) return;
+    drawn = shown;
+    meant.box.checked = false;
+    doubts = point && heights && !planning ? doubtsOf(heights, point)
+      : { refused: false, words: [] };
+    clear(place, sidesOf(heights, point),
+      doubts.words.map((words) => h('p', { class: 'caution isocentre-doubt' }, words)),
+      doubts.words.length > 0 && !doubts.refused && editable && meant.element);
+  };
+  /// Throws what keeps the drawn point from being stored.
+  const check = (isStored) => {
+    if (doubts.refused) throw new Error(doubts.words[0]);
+    if (!doubts.words.length || isStored || meant.box.checked) return;
+    meant.box.focus();
+    throw new Error(S.plan.isocentreConfirm);
+  };
+  return { place, draw, check };
+}
+
+/// The map on which the region is drawn. Nothing has been compared: whoever plans and approves sees
+/// by its marks whether the posture is right.
+function regionMap({ reference, heights, noMap }, planning, model, posture, editable, changed) {
+  if (!heights) return { element: hint(noMap), drawing: null };
+  const compassFor = (wanted) => compassOfPlan(reference.room, wanted);
+  const compass = compassFor(posture.value);
+  const marks = h('div', {}, marksNote(compass));
+  const drawing = editor({ ...heights, compass }, model, editable, changed, Boolean(planning));
+  posture.addEventListener('change', () => {
+    const wanted = compassFor(posture.value);
+    drawing.mark(wanted);
+    clear(marks, marksNote(wanted));
+  });
+  return { element: [drawing.element, marks], drawing, compass };
+}
+
+/// The fields of the isocentre with what sets them.
+function isocentreFields({ heights }, { lasers, byLasers }, planning, inputs, drawing, editable,
+  notes) {
+  const text = S.plan;
+  const movable = editable && !planning;
+  const set = (point) => {
+    inputs.bad.textContent = '';
+    drawing.setIsocentre(point);
+  };
+  return h('fieldset', {}, h('legend', {}, text.isocentre),
+    !planning && hint(text.isocentreHint),
+    movable && hint(text.pickHint),
+    h('div', { class: 'triple' }, inputs.axes.map((input, i) =>
+      field(`${'xyz'[i]} (mm)`, input))), inputs.bad, notes,
+    byLasers && hint(text.lasersTaken),
+    movable && drawing && [lasers && action(text.lasers, async () => set([...lasers]), {}),
+      action(text.pick, async () => drawing.pick(), {}),
+      markerChoice(heights.scene, set)]);
+}
+
+/// What was stored, as controls() would write it.
+const writtenOf = (reference, editable) => controls(reference,
+  { region: reference.plan.region_m, isocentre: reference.plan.isocentre_m },
+  storedPlan(reference), editable).written();
 
 /// One stored plan and what is edited of it. `store(request)` sends a change, `reload` shows what
 /// is stored.
 async function draft(place, reference, store, reload) {
   const text = S.plan;
-  const patient = await get(`patients/${reference.patient_id}`);
-  const scan = await get(`scans/${reference.scan_id}`).catch(() => null);
-  const quality = scan && await qualityOf(scan);
-  const captured = await capturedAgainst(reference);
+  const known = await readAll(reference);
+  const { patient, scan, heights } = known;
   const editable = may('plan');
-  let planning = null;
-  const kept = editable ? drafts.read(reference) : null;
-  const plan = kept ?? storedPlan(reference);
-  const lasers = reference.room?.lasers_m?.map((value) => Number(value.toFixed(4))) ?? null;
-  // Nobody has planned it yet: what the calibration has measured, unless somebody says otherwise.
-  const byLasers = Boolean(lasers && editable && !kept && !reference.planned_by
-    && !plan.isocentre_m);
-  const model = { region: plan.region_m.map((point) => [...point]),
-    isocentre: byLasers ? lasers : plan.isocentre_m };
+  const planning = planningFacts(heights?.scene);
+  const begun = beginning(reference, editable);
+  const { kept, plan, model } = begun;
   const inputs = controls(reference, model, plan, editable);
+  if (planning) {  // The file states them.
+    for (const input of [...inputs.axes, inputs.posture, inputs.couch.box]) input.disabled = true;
+  }
+  const side = isocentreSide(heights, planning, editable);
   const corners = hint();
   const outside = h('p', { class: 'caution' });
-  const sidePlace = h('div', {});
-  const meant = checkbox(text.isocentreMeant, false, { disabled: !editable });
-  let doubts = { refused: false, words: [] };
-  let drawnPoint = '';
-  /// The isocentre from the side, and what is implausible about it.
-  const drawSide = () => {
-    const point = model.isocentre;
-    const shown = JSON.stringify([point, Boolean(loaded)]);
-    if (shown === drawnPoint) return;
-    drawnPoint = shown;
-    meant.box.checked = false;
-    doubts = point && loaded && !planning ? doubtsOf(loaded, point) : { refused: false, words: [] };
-    clear(sidePlace, sidesOf(loaded, point),
-      doubts.words.map((words) => h('p', { class: 'caution isocentre-doubt' }, words)),
-      doubts.words.length > 0 && !doubts.refused && editable && meant.element);
-  };
-  const mapPlace = h('div', {});
+  const unsaved = h('p', { class: 'caution', role: 'status' });
   const signPlace = h('div', {});
   const templatePlace = h('div', {});
   let stored;  // as written when nothing is edited
-  let mesh = null;
-  let drawing = null;
   let hadIsocentre = Boolean(model.isocentre);
-  let loaded = null;
-  // Nothing has been compared: whoever plans and approves sees here whether the posture is right.
-  const compassFor = (posture) => compassOfPlan(reference.room, posture);
   const isEdited = () => stored !== undefined && inputs.written() !== stored;
   const refusal = whyNotApprove(reference);
   const sign = may('approve') && !reference.approved_by && !refusal
-    && action(text.summaryReview, async () => showSummary(), {});
+    && action(text.summaryReview, async () => showSummary(signPlace, known, store), {});
   let blocked = null;
   const block = sign && blockNote((why) => {
     blocked = why;
@@ -248,7 +252,7 @@ async function draft(place, reference, store, reload) {
     const point = model.isocentre;
     outside.textContent = point && model.region.length > 2 && !isInside(model.region, point)
       ? text.isocentreOutside : '';
-    drawSide();
+    side.draw(point);
     const size = measure(model.region);
     corners.textContent = model.region.length > 2
       ? `${text.corners(model.region.length)}, ${text.area(size.cm2, size.mm)}`
@@ -270,48 +274,10 @@ async function draft(place, reference, store, reload) {
     hadIsocentre = Boolean(model.isocentre);
     note();
   };
-  const unsaved = h('p', { class: 'caution', role: 'status' });
-  try {
-    loaded = await loadHeights(reference);
-    planning = planningFacts(loaded.scene);
-    // The file states them.
-    if (planning) {
-      for (const input of [...inputs.axes, inputs.posture, inputs.couch.box]) {
-        input.disabled = true;
-      }
-    }
-    const compass = compassFor(plan.posture);
-    // No other screen shows this surface before it is signed.
-    if (planning && scan) mesh = meshView({ scan }, { compass }, 0);
-    const marksPlace = h('div', {}, marksNote(compass));
-    drawing = editor({ ...loaded, compass }, model, editable, changed, Boolean(planning));
-    inputs.posture.addEventListener('change', () => {
-      const wanted = compassFor(inputs.posture.value);
-      drawing.mark(wanted);
-      clear(marksPlace, marksNote(wanted));
-    });
-    clear(mapPlace, drawing.element, marksPlace);
-  } catch (error) {
-    clear(mapPlace, hint(error.message));
-  }
-  const picture = () => {
-    if (!loaded) return null;
-    const shown = { region: reference.plan.region_m, isocentre: reference.plan.isocentre_m };
-    const compass = compassFor(reference.plan.posture);
-    return h('div', {}, editor({ ...loaded, compass }, shown, false, () => {}).element,
-      marksNote(compass));
-  };
-  const showSummary = () => {
-    const approve = (signature) => store(() => post(`references/${reference.id}/approve`, {
-      revision: reference.revision, digest: reference.digest, ...signature,
-    }), text.approved);
-    const element = summary(reference, patient, {
-      scan, quality, picture: picture(), heights: loaded, captured,
-    }, approve);
-    clear(signPlace, element);
-    element.scrollIntoView({ block: 'nearest' });
-    element.querySelector('form input').focus();
-  };
+  const { element: map, drawing, compass } = regionMap(known, planning, model, inputs.posture,
+    editable, changed);
+  // No other screen shows this surface before it is signed.
+  const mesh = planning && scan ? meshView({ scan }, { compass }, 0) : null;
   inputs.axes.forEach((input) => input.addEventListener('input', () => {
     model.isocentre = inputs.isocentre();
     inputs.bad.textContent = '';
@@ -323,12 +289,7 @@ async function draft(place, reference, store, reload) {
   }
   const save = action(text.save, async () => {
     if (!inputs.judge()) return;
-    if (doubts.refused) throw new Error(doubts.words[0]);
-    const isStored = JSON.stringify(reference.plan.isocentre_m) === JSON.stringify(model.isocentre);
-    if (doubts.words.length && !isStored && !meant.box.checked) {
-      meant.box.focus();
-      throw new Error(text.isocentreConfirm);
-    }
+    side.check(JSON.stringify(reference.plan.isocentre_m) === JSON.stringify(model.isocentre));
     const body = inputs.body();
     await store(() => put(`references/${reference.id}/plan`, body), text.saved,
       () => drafts.remove(reference));
@@ -339,7 +300,6 @@ async function draft(place, reference, store, reload) {
       ` ${localTime(reference.created_at)}, ${reference.created_by}`];
   const deleteCorner = editable && drawing
     && action(text.deleteCorner, async () => drawing.deleteCorner(), {});
-  const movable = editable && !planning;
   const tools = deleteCorner && h('div', { class: 'row' },
     action(text.undo, async () => drawing.undo(), {}), deleteCorner,
     action(text.clear, async () => drawing.clear(), {}));
@@ -357,24 +317,10 @@ async function draft(place, reference, store, reload) {
     kept && h('p', { class: 'old-note row' }, h('span', {}, text.draftKept), discard),
     h('div', { class: 'plan-grid' },
       card(text.region,
-        editable && hint(text.regionHint), mapPlace, corners, tools),
+        editable && hint(text.regionHint), h('div', {}, map), corners, tools),
       h('section', { class: 'card form' },
-        planning, capturedCard(captured),
-        h('fieldset', {}, h('legend', {}, text.isocentre),
-          !planning && hint(text.isocentreHint),
-          movable && hint(text.pickHint),
-          h('div', { class: 'triple' }, inputs.axes.map((input, i) =>
-            field(`${'xyz'[i]} (mm)`, input))), inputs.bad, outside, sidePlace,
-          byLasers && hint(text.lasersTaken),
-          movable && drawing && lasers && action(text.lasers, async () => {
-            inputs.bad.textContent = '';
-            drawing.setIsocentre([...lasers]);
-          }, {}),
-          movable && drawing && action(text.pick, async () => drawing.pick(), {}),
-          movable && drawing && markerChoice(loaded.scene, (point) => {
-            inputs.bad.textContent = '';
-            drawing.setIsocentre(point);
-          })),
+        planning, capturedCard(known.captured),
+        isocentreFields(known, begun, planning, inputs, drawing, editable, [outside, side.place]),
         h('fieldset', {}, h('legend', {}, text.tolerance), field(text.shift, inputs.shift),
           field(text.rotation, inputs.rotation)),
         statedFields(inputs),
@@ -384,16 +330,11 @@ async function draft(place, reference, store, reload) {
         unsaved, !planning && block, h('div', { class: 'row' }, editable && save, sign))),
     mesh && card(S.result.mesh, mesh.element), signPlace));
   if (editable && drawing) {
-    templateOf(patient, loaded.grid, model, inputs, drawing, changed)
+    templateOf(patient, heights.grid, model, inputs, drawing, changed)
       .then((element) => clear(templatePlace, element), (error) => warn(error.message));
   }
-  if (kept) {
-    // An edit is compared with what was stored, not with what was kept.
-    const blank = controls(reference,
-      { region: reference.plan.region_m, isocentre: reference.plan.isocentre_m },
-      storedPlan(reference), editable);
-    stored = blank.written();
-  }
+  // An edit is compared with what was stored, not with what was kept.
+  if (kept) stored = writtenOf(reference, editable);
   changed();
   stored ??= inputs.written();
   note();
