@@ -212,7 +212,13 @@ const asked = [];  // the session at the start, beside the words
 async function begin(message) {
   const found = await ask(() => asked.pop() ?? loadSession());
   if (!found) return;
-  const { session, setupRequired, fault, certificate } = found;
+  // Screens need the words and the settings. Who goes to another one meanwhile gets that, once.
+  ++opening;
+  const isIn = await enter(found, message).finally(() => { --opening; });
+  if (isIn) await showFocused();
+}
+/// Whether there is a screen to show; otherwise it shows what has to be done before.
+async function enter({ session, setupRequired, fault, certificate }, message) {
   if (session) adoptPreferences(session);
   if (session?.has_pin) rememberQuickPeople();
   await speak(session?.user ?? kNobody);
@@ -227,7 +233,7 @@ async function begin(message) {
         faulty = false;
         return begin();
       });
-      return;
+      return false;
     }
     showLogin(main, setupRequired, certificate, async () => {
       await begin();
@@ -236,17 +242,15 @@ async function begin(message) {
       else if (answer) say(lastLoginWords(answer), true);
     });
     if (message) warn(message());
-    return;
+    return false;
   }
   if (session.password_change_required) {
     document.title = `${S.login.firstTitle} · ${S.product}`;
     showFirstPassword(main, session.user, () => begin());
-    return;
+    return false;
   }
-  // Screens use its settings. Who goes to another one meanwhile gets that, once.
-  ++opening;
-  await live.open().finally(() => { --opening; });
-  await showFocused();
+  await live.open();
+  return true;
 }
 
 /// A result that arrives while the sweep is shown is opened at once. A failed scan is announced,
