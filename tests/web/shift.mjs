@@ -50,6 +50,7 @@ export async function beginShift(h) {
     await anna.goto(`${h.url}#/patients`);
     await anna.getByRole('link', { name: 'PX-0001' }).click();
     await anna.getByRole('button', { name: 'Start treatment session' }).click();
+    await anna.locator('.who-line', { hasText: /PX-0001\s*Fraction/ }).waitFor();
   });
   return { engineer, anna, bob, clara, addPatient, scan };
 }
