@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <tbb/parallel_for.h>
 #include <Eigen/Cholesky>
@@ -22,7 +21,7 @@ using CalibrationPoint = Eigen::Matrix<double, kCalibrationSize, 3>;
 constexpr Eigen::Index kLargestDenseSystem = 1200;
 // With this damping steps are so short that, if they do not reduce the cost, the minimum is
 // reached.
-constexpr double kLargestDamping = 1e8;
+constexpr double kLargestDamping = 1e3;
 
 // A landmark's own 3x3 system, inverted, and its coupling to the free keyframes and the
 // calibration.
@@ -48,6 +47,9 @@ class Solver {
   void MakePoint(std::size_t s, double damping);
   // One damped Gauss-Newton step; false if the system cannot be solved.
   bool Step(const State& state, double damping, State& next);
+  // Takes the longest step that reduces the cost, from the present equations; false if there is
+  // none. A step that is too long is no iteration: the rounds of the joint solve have few.
+  bool Improve(State& state, double& cost, double& damping);
   // Information about the calibration once everything else has been eliminated, and the posterior.
   void FindInformation(const State& state, BundleSummary& summary);
   [[nodiscard]] BundlePosterior Posterior(Eigen::MatrixXd S) const;
@@ -108,30 +110,33 @@ BundleSummary Solver::Run() {
   summary.initial_cost = summary.final_cost = cost;
   if (!std::isfinite(cost) || problem_.size == 0) return summary;
   double damping = options_.initial_damping;
-  bool linearised = false;
-  while (summary.num_iterations < options_.max_iterations && damping < kLargestDamping) {
+  while (summary.num_iterations < options_.max_iterations) {
     CheckStop(options_.stop);
     ++summary.num_iterations;
-    if (!linearised) equations_.Linearise(state);
-    linearised = true;
-    State next;
-    const double next_cost =
-        Step(state, damping, next) ? problem_.Cost(next) : std::numeric_limits<double>::infinity();
-    if (!(next_cost < cost)) {
-      damping *= 10.0;
-      continue;
-    }
-    const bool settled = cost - next_cost < options_.function_tolerance * std::abs(cost);
-    state = std::move(next);
-    cost = next_cost;
+    equations_.Linearise(state);
+    const double before = cost;
+    if (!Improve(state, cost, damping)) break;
     damping = std::max(1e-9, 0.2 * damping);
-    linearised = false;
-    if (settled) break;
+    if (before - cost < options_.function_tolerance * std::abs(before)) break;
   }
   summary.final_cost = cost;
   if (options_.find_information) FindInformation(state, summary);
   problem_.Write(state);
   return summary;
+}
+
+bool Solver::Improve(State& state, double& cost, double& damping) {
+  for (; damping < kLargestDamping; damping *= 10.0) {
+    CheckStop(options_.stop);
+    State next;
+    if (!Step(state, damping, next)) continue;
+    const double next_cost = problem_.Cost(next);
+    if (!(next_cost < cost)) continue;
+    state = std::move(next);
+    cost = next_cost;
+    return true;
+  }
+  return false;
 }
 
 void Solver::MakePoint(std::size_t s, double damping) {

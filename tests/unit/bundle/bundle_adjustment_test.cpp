@@ -268,6 +268,26 @@ TEST(BundleAdjust, WrongObservationsWeighLittle) {
   EXPECT_LT(error.translation_m, 1e-3);
 }
 
+// The rounds of the joint solve have two or three iterations, begin with hardly any damping, and
+// take a map that did not move for settled.
+TEST(BundleAdjust, ATooLongStepIsShortenedWithinTheSameIteration) {
+  const auto truth = MakeTrueMap({});
+  for (const double off : {0.003, 0.5, 0.7, 1.0}) {
+    TrackingMap map = truth.map;
+    Disturb(map, off, off);
+    BundleOptions options = FreeAllButTheFirst(map);
+    options.max_iterations = 1;
+    options.initial_damping = 1e-7;
+    options.calibrate = true;
+    CalibrationModel calibration;
+    const BundleSummary summary = BundleAdjust(truth.stated, options, {}, map, calibration);
+    EXPECT_EQ(summary.num_iterations, 1);
+    EXPECT_LT(summary.final_cost, summary.initial_cost) << off;
+    fmt::print("off by {} m and rad: cost {:.3e} -> {:.3e}\n", off, summary.initial_cost,
+               summary.final_cost);
+  }
+}
+
 TEST(BundleAdjust, LeavesAMapThatShowsNothingAsItIs) {
   TrackingMap map;
   map.keyframes.resize(2);
