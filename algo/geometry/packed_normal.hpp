@@ -9,8 +9,8 @@
 
 namespace plumb {
 
-/// A unit vector, projected onto an octahedron whose lower half is folded outwards, so that it is a
-/// place in a square. Within 0.004 deg.
+/// A finite unit vector, projected onto an octahedron whose lower half is folded outwards into a
+/// square, whose coordinates are kept. Accurate to 0.004 deg.
 class PackedNormal {
  public:
   PackedNormal() = default;  ///< The z axis.

@@ -24,7 +24,8 @@ namespace plumb {
 
 /// Working image of depth: of each block the inverse of the mean INVERSE depth, because planes are
 /// linear in it (so that the mean is exact on them), and so is the quantisation of structured
-/// light. 0 where a quarter of a block was not measured, or a block reaches across a depth edge.
+/// light. 0 where more than a quarter of a block was not measured, or a block reaches across a
+/// depth edge.
 /// @param depth_m  CV_32FC1, metres, 0 where nothing was measured, of the image's size; a working
 ///        image is returned as it is.
 [[nodiscard]] cv::Mat WorkingDepth(const cv::Mat& depth_m, const Intrinsics& image,

@@ -93,15 +93,16 @@ std::size_t Smallest(const Losses& sum, const Curves& curves) {
   return best;
 }
 
-// The curves about the best of every second one. It is found by a few sightings, because each
-// curve costs as much time as the fit of all corners.
+// The curves about the best of every second one, which is found from a few sightings, because each
+// curve costs as much time as a fit of all corners does.
 Curves Nearest(const std::vector<const MarkerSighting*>& sightings, const Tables& tables,
                const std::stop_token& stop) {
   constexpr std::size_t kOneIn = 4;
   constexpr std::size_t kReach = 2;
   const Curves every_second{.step = 2};
-  const std::size_t best =
-      Smallest(Sum(LossesOfAll(sightings, kOneIn, tables, every_second, stop), 0, 1), every_second);
+  const std::vector<Losses> losses = LossesOfAll(sightings, kOneIn, tables, every_second, stop);
+  if (losses.empty()) return {};
+  const std::size_t best = Smallest(Sum(losses, 0, 1), every_second);
   return {.first = best - std::min(best, kReach), .end = std::min(kNumGammas, best + kReach + 1)};
 }
 
@@ -148,8 +149,14 @@ std::optional<SweepTone> EstimateTone(const std::vector<MarkerSighting>& sightin
   Tables tables;
   for (std::size_t g = 0; g < kNumGammas; ++g)
     tables[g] = PowerTone(kFirstGamma + kGammaStep * static_cast<double>(g));
-  const Curves curves = Nearest(chosen, tables, stop);
-  const std::vector<Losses> losses = LossesOfAll(chosen, 1, tables, curves, stop);
+  Curves curves = Nearest(chosen, tables, stop);
+  std::vector<Losses> losses = LossesOfAll(chosen, 1, tables, curves, stop);
+  const std::size_t best = Smallest(Sum(losses, 0, 1), curves);
+  if ((best == curves.first && best > 0) || (best + 1 == curves.end && best + 1 < kNumGammas)) {
+    // The few sightings have misled: the best curve may be any.
+    curves = {};
+    losses = LossesOfAll(chosen, 1, tables, curves, stop);
+  }
   if (losses.size() < kMinSightings) return std::nullopt;
   SweepTone tone;
   tone.gamma = BestGamma(Sum(losses, 0, 1), curves);

@@ -21,7 +21,6 @@ constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
 constexpr double kBreathingToReport_m = 2 * kMillimetre;
 constexpr double kGapToReport_s = 0.5;  // The comparison gives no answer above 1 s.
-constexpr double kDroppedToReport = 0.05;
 // For a marker without a variance, because the solve's equations do not determine it: as the preset
 // `paper` has it for a marker of one view. An alignment gives it less than a thousandth of a
 // usual marker's weight.

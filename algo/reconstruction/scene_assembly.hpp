@@ -15,6 +15,9 @@
 
 namespace plumb {
 
+/// Part of a sweep's frames above which a scene warns that they were dropped.
+inline constexpr double kDroppedToReport = 0.05;
+
 /// Whether the reference marker was seen often enough to base the scene's frame on it.
 [[nodiscard]] bool HasReferenceMarker(const StreamInfo& info, const TrackingMap& map);
 /// The reference marker's frame if it was seen often enough, otherwise the first keyframe's.

@@ -79,7 +79,8 @@ void Tracker::MakeKeyframe(const Frame& frame, FrameData& prepared, const Pose& 
                            TrackedFrame& result) {
   FindAllMarkers(prepared);
   if (options_.keep_working_images && !map_.keyframes.empty()) {
-    DepthView& before = map_.keyframes.back().data.view;  // Only the newest is tracked against it.
+    // Keypoints are observed in the newest keyframe only.
+    DepthView& before = map_.keyframes.back().data.view;
     before.depth_m = WorkingDepth(before.depth_m, info_.intrinsics, info_.depth_noise);
   }
   MapKeyframe keyframe;

@@ -75,8 +75,9 @@ std::vector<fs::path> EntriesOf(const fs::path& folder) {
 }
 
 /// The files of scans are removed before the database, so that an interrupted wipe never looks like
-/// a lost database. What cannot be removed does not keep the rest.
-/// @throws DiskRefused at the end, for the first that could not
+/// a lost database. What cannot be removed does not keep the rest from
+/// being removed.
+/// @throws DiskRefused at the end, for the first that could not be removed
 void Wipe(const fs::path& state) {
   FolderLock lock;
   lock.Take(state);

@@ -38,8 +38,8 @@ struct DicomSettings {
 /// [dicom] of a file; the other tables are not looked at. @throws DataError
 [[nodiscard]] DicomSettings ReadDicomSettingsFile(const std::filesystem::path& file);
 
-/// Where received files are as a file says, even one that cannot be used; by default the usual
-/// folder. @throws IoError
+/// Where received files are as a file states, even if it cannot be used otherwise: the last line
+/// that names a spool counts. By default the usual folder. @throws IoError
 [[nodiscard]] std::filesystem::path SpoolNamedIn(const std::filesystem::path& file);
 
 /// Of a computer itself or of a network that no router of the internet forwards.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "algo/reconstruction/scene_assembly.hpp"
 #include "words/progress.hpp"
 #include "words/reconstruction.hpp"
 
@@ -123,7 +124,8 @@ void ThinnedFeed::WarnIn(Scene& scene) const {
   const auto told = std::ranges::find_if(scene.warnings, [](const Message& said) {
     return said.Is(say::reconstruction::kFramesDropped);
   });
-  if (told != scene.warnings.end() && lost > 0)
+  if (told != scene.warnings.end() &&
+      static_cast<double>(lost) > kDroppedToReport * static_cast<double>(scene.frames_total))
     *told = say::reconstruction::FramesDropped(lost, scene.frames_total);
   else if (told != scene.warnings.end())
     scene.warnings.erase(told);

@@ -85,8 +85,8 @@ class ThinnedFeed : public FrameFeed {
   }
 
   [[nodiscard]] int stride() const { return stride_; }
-  /// Adds to the scene's warnings that frames were skipped, and takes them out of the number that
-  /// were dropped.
+  /// Adds to the scene's warnings that frames were left out, and takes them out of the number of
+  /// the warning of dropped ones, which goes if the rest is below its limit.
   void WarnIn(Scene& scene) const;
 
  private:

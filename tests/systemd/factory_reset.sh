@@ -39,9 +39,10 @@ export PATH=$work/bin:$PATH PLUMB_DATA=$work/data PLUMB_PLUMBD=$plumbd \
 export PLUMB_STATE=$work/state PLUMB_ETC=$work/etc PLUMB_DELIVERED=$source/toolchain/plumb.toml \
   PLUMB_GROUP PLUMB_RECEIVED=$work/received
 reset() { "$source/systemd/factory-reset" >reset.log 2>&1; }
-start() {
+start() { # how plumbd finds its state folder
+  [ $# -gt 0 ] || set -- --state state
   reset
-  "$plumbd" --state state --control control --listen 127.0.0.1:0 >log 2>&1 &
+  "$plumbd" "$@" --control control --listen 127.0.0.1:0 >log 2>&1 &
   pid=$!
   for _ in $(seq 300); do
     "$plumb" --control control status >/dev/null 2>&1 && return
@@ -205,13 +206,26 @@ end
 
 check "the receiver starts after plumbd, which a wipe is part of" '^After=plumbd.service$' \
   "$(grep -x 'After=plumbd.service' "$source/systemd/plumb-dicomd.service.in")"
-configure
-mkdir elsewhere
-printf '[appliance]\nstate = "%s"\n' "$work/elsewhere" >etc/plumb.toml
-"$plumb" factory-reset --wipe --yes --state elsewhere >out
-(unset PLUMB_STATE; reset)
-check "the state folder may be another" '^same$' \
-  "$(cmp etc/plumb.toml "$PLUMB_DELIVERED" && echo same)"
+# A state folder of its own, which only the configuration names.
+unset PLUMB_STATE
+own="$work/el\"se where"
+for kind in keep-records wipe; do
+  configure
+  mkdir -p "$own/calibration"
+  echo data >"$own/calibration/S1.yaml"
+  printf '[appliance]\nstate = %s\n' "'$own'" >etc/plumb.toml
+  "$plumb" factory-reset --$kind --yes --state "$own" >out
+  start --config etc/plumb.toml
+  check "$kind where the state folder is another: the configuration is delivered, but for that" \
+    '^1 1$' "$(diff etc/plumb.toml "$PLUMB_DELIVERED" | grep -c '^[<>]' || true) $(
+      diff etc/plumb.toml "$PLUMB_DELIVERED" | grep -c '^< state = ' || true)"
+  check "$kind: the request there is done" '^missing$' \
+    "$([ -e "$own/factory-reset.json" ] || echo missing)"
+  check "$kind: it is logged" 'factory reset: ' "$(cat log)"
+  end
+done
+check "and all that lay there is gone" '^missing$' "$([ -e "$own/calibration" ] || echo missing)"
+export PLUMB_STATE=$work/state
 
 configure
 echo '{"kind":"half"}' >state/factory-reset.json

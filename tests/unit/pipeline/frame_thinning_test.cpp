@@ -139,6 +139,29 @@ Sweep Track(int num_frames, const std::function<double(std::int64_t)>& tracking_
   return sweep;
 }
 
+// Of 300 frames: 5 % are 15.
+TEST(ThinnedFeed, OfFramesLeftOutOnlySoManyLostOnesAreTold) {
+  Sensor sensor(300, 1.0);
+  ThinnedFeed feed(sensor, [&] { return sensor.now_s; });
+  int left_out = 0;
+  while (feed.Next({})) {
+    sensor.now_s += 0.08;
+    left_out += feed.TakeDropped();
+  }
+  left_out += feed.TakeDropped() - sensor.lost_in_all;
+  ASSERT_GT(left_out, 0);
+  const auto told = [&](int lost) {
+    Scene scene;
+    scene.frames_total = 300;
+    scene.frames_dropped = left_out + lost;
+    scene.warnings = {say::reconstruction::FramesDropped(scene.frames_dropped, 300)};
+    feed.WarnIn(scene);
+    return EnglishTexts(scene.warnings);
+  };
+  EXPECT_THAT(told(15), ElementsAre(HasSubstr(fmt::format("{} of 300", left_out))));
+  EXPECT_THAT(told(16), ElementsAre(HasSubstr("16 of 300"), HasSubstr("of 300")));
+}
+
 TEST(ThinnedFeed, TakesEveryFrameOfASweepThatIsTrackedInTime) {
   // Every fifth is a keyframe and late by itself.
   const Sweep sweep = Track(300, [](std::int64_t i) { return i % 5 == 0 ? 0.06 : 0.02; });

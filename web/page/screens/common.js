@@ -126,13 +126,22 @@ export function lastKnownNote(look, role = 'status', before = () => '') {
   return { element, draw };
 }
 
-/// As `ask`, but nothing where a later call has begun meanwhile: its answer is newer.
+/// As `ask`, but nothing where the answer of a later call came before, which is newer, and where
+/// this one fails while a later one goes on.
 export function newestOf(ask) {
-  let turn = 0;
+  let asked = 0;
+  let answered = 0;
   return async (...rest) => {
-    const mine = ++turn;
-    const answer = await ask(...rest);
-    return mine === turn ? answer : null;
+    const mine = ++asked;
+    try {
+      const answer = await ask(...rest);
+      if (mine < answered) return null;
+      answered = mine;
+      return answer;
+    } catch (error) {
+      if (mine < asked) return null;
+      throw error;
+    }
   };
 }
 
