@@ -15,13 +15,10 @@
 namespace plumb {
 namespace {
 
-// Four neighbours whose depths differ by less than this part of the nearest lie on one surface:
-// over one working pixel, that of a surface at 85 deg differs by so much.
-constexpr float kOneSurface = 0.05F;
-
-// Depth between the pixels of an image: of the four around the place where they lie on one surface,
-// otherwise of the nearest; 0 where nothing was measured, and outside.
-float DepthBetween(const cv::Mat& depth_m, float x, float y) {
+// Depth between the pixels of a working image: of the four around the place where no edge separates
+// them, otherwise of the nearest; 0 where nothing was measured, and outside.
+float DepthBetween(const cv::Mat& depth_m, float x, float y, const DepthNoise& noise,
+                   float pixel_rad) {
   const auto last_x = static_cast<float>(depth_m.cols - 1);
   const auto last_y = static_cast<float>(depth_m.rows - 1);
   if (!(x >= -0.5F && y >= -0.5F && x <= last_x + 0.5F && y <= last_y + 0.5F)) return 0.0F;
@@ -36,7 +33,7 @@ float DepthBetween(const cv::Mat& depth_m, float x, float y) {
   const int next = depth_m.cols > 1 ? 1 : 0;
   const float nearest = std::min(std::min(top[0], top[next]), std::min(bottom[0], bottom[next]));
   const float farthest = std::max(std::max(top[0], top[next]), std::max(bottom[0], bottom[next]));
-  if (!(nearest > 0.0F && farthest - nearest < kOneSurface * nearest))
+  if (!(nearest > 0.0F && farthest - nearest <= EdgeStep_m(noise, nearest, pixel_rad)))
     return (down < 0.5F ? top : bottom)[right < 0.5F ? 0 : next];
   const float above = top[0] + right * (top[next] - top[0]);
   const float below = bottom[0] + right * (bottom[next] - bottom[0]);
@@ -46,9 +43,10 @@ float DepthBetween(const cv::Mat& depth_m, float x, float y) {
 // The working images of one sweep, as they are converted.
 class Converter {
  public:
-  Converter(const Intrinsics& stated, const JointRegistrationResult& joint)
+  Converter(const Intrinsics& stated, const JointRegistrationResult& joint, const DepthNoise& noise)
       : stated_(stated),
         joint_(joint),
+        noise_(noise),
         working_(WorkingIntrinsics(dense::MakeSensor(stated, joint.calibration).depth)),
         rays_(std::make_shared<const RayTable>(working_)),
         correction_(joint.calibration, stated.width, stated.height, WorkingBlock(stated)) {}
@@ -80,7 +78,7 @@ class Converter {
         // Where this line saw the point that the instantaneous camera sees in this pixel.
         const float x = static_cast<float>(c) - fx * (moved.x() - ray[c].x() * moved.z()) / here[c];
         const float y = static_cast<float>(r) - fy * (moved.y() - ray[c].y() * moved.z()) / here[c];
-        const float z = DepthBetween(depth_m, x, y);
+        const float z = DepthBetween(depth_m, x, y, noise_, 1.0F / fx);
         if (z > 0) out[c] = std::max(0.0F, Corrected(depth_m, x, y, z, image) + moved.z());
       }
     }
@@ -109,6 +107,7 @@ class Converter {
 
   const Intrinsics& stated_;
   const JointRegistrationResult& joint_;
+  const DepthNoise& noise_;
   Intrinsics working_;
   std::shared_ptr<const RayTable> rays_;
   DepthCorrection correction_;
@@ -120,7 +119,7 @@ std::vector<ViewSurface> PrepareCorrectedViews(TrackingMap& map, const Intrinsic
                                                const JointRegistrationResult& joint,
                                                const Pose& T_scene_world,
                                                const ViewSurfaceOptions& options) {
-  const Converter converter(stated, joint);
+  const Converter converter(stated, joint, options.depth_noise);
   std::vector<std::size_t> with_images;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
     MapKeyframe& keyframe = map.keyframes[k];

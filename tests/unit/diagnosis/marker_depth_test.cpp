@@ -4,9 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
+#include "algo/geometry/working_image.hpp"
 #include "tests/unit/markers/marker_scene.hpp"
 
 namespace plumb {
@@ -59,6 +61,34 @@ TEST(MarkerDepthTest, WhatIsKnownOfTheSensorIsTakenOut) {
   EXPECT_NEAR(measured[0].ratio, 1.0, 1e-3);
 }
 
+// The depth of a map's keyframes may be at working resolution, of which 848 columns are no
+// multiple. It grows by 0.2 % with each column; means over places between two columns.
+TEST(MarkerDepthTest, DepthAtWorkingResolutionIsReadInItsPlace) {
+  for (const int width : {640, 848}) {
+    const Intrinsics camera{width, 480, 527.0, 526.0, 0.5 * width, 244.1, {}};
+    cv::Mat depth_m(camera.height, camera.width, CV_32FC1);
+    for (int column = 0; column < width; ++column)
+      depth_m.col(column).setTo(0.8 * (1 + 0.002 * (column - 0.5 * width)));
+    const cv::Mat working_m = WorkingDepth(depth_m, camera, {});
+    ASSERT_LT(working_m.cols, width);
+    constexpr int kPlaces = 30;
+    double off = 0;
+    for (int i = 0; i < kPlaces; ++i) {
+      testing::PlacedMarker placed{4};
+      placed.T_camera_marker.linear() = RotationFromVector(Eigen::Vector3d(M_PI, 0, 0));
+      placed.T_camera_marker.translation() = Eigen::Vector3d(0.0007 * (i - kPlaces / 2), 0.05, 0.8);
+      const MarkerObservation marker{.id = 4,
+                                     .corners = testing::TrueCorners(placed, kLength_m, camera)};
+      const auto full = DepthRatioOnFace(marker, depth_m, camera, kLength_m);
+      const auto reduced = DepthRatioOnFace(marker, working_m, camera, kLength_m);
+      ASSERT_TRUE(full && reduced);
+      off += (*reduced - *full) / 0.002 / kPlaces;
+    }
+    fmt::print("{} columns: {:.3f} columns off\n", width, off);
+    EXPECT_LT(std::abs(off), 0.2) << width;
+  }
+}
+
 // Six views of two markers at 0.8 and 1 m, in opposite quarters of the image; the other quarters
 // have depths of their own.
 TrackingMap MapOfQuarters(const Intrinsics& camera) {
@@ -98,6 +128,9 @@ TEST(MarkerDepthTest, AMirroredOrTurnedDepthImageIsRecognised) {
       cv::Mat& depth_m = keyframe.data.view.depth_m;
       cv::flip(depth_m.clone(), depth_m, flip);
     }
+    EXPECT_EQ(FindDepthLayout(map, camera, {}, kLength_m), layout);
+    for (MapKeyframe& keyframe : map.keyframes)
+      keyframe.data.view.depth_m = WorkingDepth(keyframe.data.view.depth_m, camera, {});
     EXPECT_EQ(FindDepthLayout(map, camera, {}, kLength_m), layout);
     map.keyframes.resize(5);  // Ten views are too few to say it.
     EXPECT_EQ(FindDepthLayout(map, camera, {}, kLength_m), DepthLayout::kAsStated);

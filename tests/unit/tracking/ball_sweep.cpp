@@ -5,7 +5,7 @@
 
 namespace plumb {
 
-BallSweep MakeBallSweep(int num_frames) {
+BallSweep MakeBallSweep(int num_frames, int width) {
   using namespace simulated;
   BallSweep sweep;
   Room room;
@@ -39,7 +39,7 @@ BallSweep MakeBallSweep(int num_frames) {
   motion.rate_hz = 15.0;
   motion.reference_marker = kReferenceBoard;
   SimulatedSource source(std::make_shared<const World>(room, ball, T_world_ball),
-                         MakeSensorUnit(NoiseLevel::kIdeal, 1, 320, 240), motion);
+                         MakeSensorUnit(NoiseLevel::kIdeal, 1, width, width * 3 / 4), motion);
   sweep.info = source.info();
   while (const auto frame = source.Next()) {
     sweep.frames.push_back(*frame);

@@ -21,8 +21,8 @@ struct BallSweep {
   Eigen::Vector3d ball_centre = Eigen::Vector3d::Zero();  ///< World.
 };
 
-/// Ideal sensor, 320x240, 15 frames a second.
-[[nodiscard]] BallSweep MakeBallSweep(int num_frames);
+/// Ideal sensor, 15 frames a second, images of 4:3.
+[[nodiscard]] BallSweep MakeBallSweep(int num_frames, int width = 320);
 
 /// A frame in which nothing is to be seen, at the stamps of another.
 [[nodiscard]] Frame Blank(const Frame& frame);

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "algo/geometry/working_image.hpp"
 #include "tests/unit/tracking/synthetic_map.hpp"
 
 namespace plumb {
@@ -190,6 +191,27 @@ TEST(RelocalizeByFeatures, FindsTheKeyframeAndThePose) {
                    map, k, DescribeFeatures(cv::Mat::zeros(480, 640, CV_8UC1), depth, k), all)
                    .has_value())
       << "black";
+}
+
+TEST(RelocalizeByFeatures, ReadsDepthAtWorkingResolutionInItsPlace) {
+  const Intrinsics k;
+  cv::Mat depth_m(k.height, k.width, CV_32FC1);
+  for (int column = 0; column < k.width; ++column) depth_m.col(column).setTo(0.8 + 0.001 * column);
+  const cv::Mat photo = Photo(Texture(1), k, Pose::Identity());
+  const DescribedFeatures full = DescribeFeatures(photo, depth_m, k);
+  const DescribedFeatures working = DescribeFeatures(photo, WorkingDepth(depth_m, k, {}), k);
+  ASSERT_GT(full.pixels.size(), 200U);
+  ASSERT_EQ(working.pixels.size(), full.pixels.size());
+  double full_m = 0, working_m = 0;  // Mean errors: 0.5 mm would be half a column.
+  for (std::size_t i = 0; i < full.pixels.size(); ++i) {
+    const double true_m = 0.8 + 0.001 * full.pixels[i].x();
+    full_m += (full.in_camera[i].z() - true_m) / static_cast<double>(full.pixels.size());
+    working_m += (working.in_camera[i].z() - true_m) / static_cast<double>(full.pixels.size());
+  }
+  fmt::print("features: {:.3f} mm, at working resolution {:.3f} mm\n", 1e3 * full_m,
+             1e3 * working_m);
+  EXPECT_LT(std::abs(full_m), 1e-4);
+  EXPECT_LT(std::abs(working_m), 1e-4);
 }
 
 TEST(NearestKeyframe, WeighsDistanceAndAngle) {

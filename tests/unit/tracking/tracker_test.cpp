@@ -8,6 +8,7 @@
 #include <tbb/global_control.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/geometry/working_image.hpp"
 #include "tests/unit/tracking/ball_sweep.hpp"
 
 namespace plumb {
@@ -70,6 +71,32 @@ TEST_F(TrackerTest, FollowsASweepWithAnyOfItsMeans) {
     EXPECT_GE(tracker.map().keyframes.size(), 3U) << c.name;
     EXPECT_EQ(tracker.map().markers.empty(), !c.options.use_markers) << c.name;
     EXPECT_EQ(tracker.map().landmarks.empty(), !c.options.use_keypoints) << c.name;
+  }
+}
+
+// Keypoints are observed in the newest keyframe only, so that the others need no more than the
+// surface does.
+TEST_F(TrackerTest, KeepsAllButTheNewestKeyframeAtWorkingResolution) {
+  const BallSweep large = MakeBallSweep(12, 640);
+  Tracker whole(large.info, {}), working(large.info, {.keep_working_images = true});
+  for (const Frame& frame : large.frames) {
+    const TrackedFrame a = whole.Track(frame), b = working.Track(frame);
+    EXPECT_TRUE(b.tracked);
+    EXPECT_TRUE(whole.T_world_color(a).isApprox(working.T_world_color(b), 0.0));
+  }
+  const auto& keyframes = working.map().keyframes;
+  ASSERT_EQ(keyframes.size(), whole.map().keyframes.size());
+  ASSERT_GE(keyframes.size(), 3U);
+  for (std::size_t k = 0; k < keyframes.size(); ++k) {
+    const cv::Mat& depth_m = whole.map().keyframes[k].data.view.depth_m;
+    EXPECT_EQ(depth_m.size(), cv::Size(640, 480));
+    const cv::Mat kept = k + 1 < keyframes.size()
+                             ? WorkingDepth(depth_m, large.info.intrinsics, large.info.depth_noise)
+                             : depth_m;
+    const DepthView& view = keyframes[k].data.view;
+    ASSERT_EQ(view.depth_m.size(), kept.size()) << k;
+    EXPECT_EQ(cv::norm(view.depth_m, kept, cv::NORM_INF), 0) << k;
+    EXPECT_EQ(view.color_rgb.size(), cv::Size(320, 240)) << k;
   }
 }
 
