@@ -49,7 +49,7 @@ class Solver {
   bool Step(const State& state, double damping, State& next);
   // Takes the longest step that reduces the cost, from the present equations; false if there is
   // none. A step that is too long is no iteration: the rounds of the joint solve have few.
-  bool Improve(State& state, double& cost, double& damping);
+  bool Improve(State& state, double& cost, double& damping, int& num_shortened);
   // Information about the calibration once everything else has been eliminated, and the posterior.
   void FindInformation(const State& state, BundleSummary& summary);
   [[nodiscard]] BundlePosterior Posterior(Eigen::MatrixXd S) const;
@@ -115,7 +115,7 @@ BundleSummary Solver::Run() {
     ++summary.num_iterations;
     equations_.Linearise(state);
     const double before = cost;
-    if (!Improve(state, cost, damping)) break;
+    if (!Improve(state, cost, damping, summary.num_shortened)) break;
     damping = std::max(1e-9, 0.2 * damping);
     if (before - cost < options_.function_tolerance * std::abs(before)) break;
   }
@@ -125,8 +125,8 @@ BundleSummary Solver::Run() {
   return summary;
 }
 
-bool Solver::Improve(State& state, double& cost, double& damping) {
-  for (; damping < kLargestDamping; damping *= 10.0) {
+bool Solver::Improve(State& state, double& cost, double& damping, int& num_shortened) {
+  for (; damping < kLargestDamping; damping *= 10.0, ++num_shortened) {
     CheckStop(options_.stop);
     State next;
     if (!Step(state, damping, next)) continue;

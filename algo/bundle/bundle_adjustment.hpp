@@ -44,6 +44,7 @@ struct BundlePosterior {
 
 struct BundleSummary {
   int num_iterations = 0;
+  int num_shortened = 0;  ///< Steps that would not have reduced the cost, or could not be found.
   double initial_cost = 0;
   double final_cost = 0;
   /// Information of the residuals alone about the calibration, with all other unknowns free and

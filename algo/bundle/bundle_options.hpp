@@ -22,7 +22,7 @@ struct BundleOptions {
   /// Fill BundleSummary::information and posterior. Markers that only fixed keyframes see are then
   /// free too.
   bool find_information = false;
-  int max_iterations = 8;
+  int max_iterations = 8;  ///< Steps taken; one that is too long is shortened up to 12 times.
   double function_tolerance = 1e-5;  ///< Iteration ends when the relative decrease is smaller.
   /// Damping of the first step, relative to the diagonal. Along some directions poses and
   /// calibration change together, and the residuals determine these a million times more weakly

@@ -22,6 +22,7 @@ struct MarkerDepth {
 
 /// Measured depth over the distance at which a square of the stated side appears as large, median
 /// over the face; nothing without a pose of the marker or enough depth.
+/// @param depth_m  Of the size that `intrinsics` state, or at working resolution.
 [[nodiscard]] std::optional<double> DepthRatioOnFace(const MarkerObservation& marker,
                                                      const cv::Mat& depth_m,
                                                      const Intrinsics& intrinsics, double length_m);

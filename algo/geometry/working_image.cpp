@@ -37,6 +37,18 @@ float DepthOfBlock(const cv::Mat& depth_m, int first_row, int first_column, int 
   return static_cast<float>(count) / sum;
 }
 
+// Whether it is a working image already.
+bool IsWorking(const cv::Mat& pixels, int type, const Intrinsics& image,
+               const Intrinsics& working) {
+  const bool is_working = pixels.cols == working.width && pixels.rows == working.height;
+  if (pixels.type() != type ||
+      (!is_working && (pixels.cols != image.width || pixels.rows != image.height)))
+    throw std::invalid_argument(
+        fmt::format("working image: {}x{} (type {}) does not fit a camera of {}x{} (type {})",
+                    pixels.cols, pixels.rows, pixels.type(), image.width, image.height, type));
+  return is_working;
+}
+
 }  // namespace
 
 int WorkingBlock(const Intrinsics& image) {
@@ -62,7 +74,7 @@ float EdgeStep_m(const DepthNoise& noise, float depth_m, float pixel_rad) {
 
 cv::Mat WorkingDepth(const cv::Mat& depth_m, const Intrinsics& image, const DepthNoise& noise) {
   const Intrinsics working = WorkingIntrinsics(image);
-  if (depth_m.cols == working.width && depth_m.rows == working.height) return depth_m;
+  if (IsWorking(depth_m, CV_32FC1, image, working)) return depth_m;
   const int block = WorkingBlock(image);
   const auto pixel_rad = static_cast<float>(1.0 / working.fx);
   cv::Mat means(working.height, working.width, CV_32FC1);
@@ -82,7 +94,7 @@ Eigen::Vector2d InDepthImage(const Eigen::Vector2d& pixel, const Intrinsics& ima
 
 cv::Mat WorkingColor(const cv::Mat& rgb, const Intrinsics& image) {
   const Intrinsics working = WorkingIntrinsics(image);
-  if (rgb.cols == working.width && rgb.rows == working.height) return rgb;
+  if (IsWorking(rgb, CV_8UC3, image, working)) return rgb;
   const int block = WorkingBlock(image);
   cv::Mat middles(working.height, working.width, CV_8UC3);
   for (int r = 0; r < middles.rows; ++r) {

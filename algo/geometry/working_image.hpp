@@ -18,7 +18,9 @@ namespace plumb {
 /// @throws std::invalid_argument as WorkingBlock().
 [[nodiscard]] Intrinsics WorkingIntrinsics(const Intrinsics& image);
 
-/// Step in depth between neighbouring working pixels that is too large for any plausible surface.
+/// Step along the optical axis, in metres, between neighbouring working pixels that is too large
+/// for any plausible surface.
+/// @param depth_m    The nearer depth.
 /// @param pixel_rad  Angle between two working pixels.
 [[nodiscard]] float EdgeStep_m(const DepthNoise& noise, float depth_m, float pixel_rad);
 
@@ -27,16 +29,20 @@ namespace plumb {
 /// light. 0 where more than a quarter of a block was not measured, or a block reaches across a
 /// depth edge.
 /// @param depth_m  CV_32FC1, metres, 0 where nothing was measured, of the image's size; a working
-///        image is returned as it is.
+///        image is returned as it is, with the same pixels.
+/// @throws std::invalid_argument if it has another size or type, and as WorkingBlock().
 [[nodiscard]] cv::Mat WorkingDepth(const cv::Mat& depth_m, const Intrinsics& image,
                                    const DepthNoise& noise);
 
-/// Where a pixel of the image is in its depth image, which may be at working resolution.
+/// Where a pixel of the image is in its depth image, which is of the image's size or at working
+/// resolution.
 [[nodiscard]] Eigen::Vector2d InDepthImage(const Eigen::Vector2d& pixel, const Intrinsics& image,
                                            const cv::Mat& depth_m);
 
 /// Working image of colour: of each block the pixel in its middle.
-/// @param rgb  CV_8UC3 of the image's size; a working image is returned as it is.
+/// @param rgb  CV_8UC3 of the image's size; a working image is returned as it is, with the same
+///        pixels.
+/// @throws std::invalid_argument as WorkingDepth().
 [[nodiscard]] cv::Mat WorkingColor(const cv::Mat& rgb, const Intrinsics& image);
 
 }  // namespace plumb

@@ -49,7 +49,7 @@ class Converter {
         noise_(noise),
         working_(WorkingIntrinsics(dense::MakeSensor(stated, joint.calibration).depth)),
         rays_(std::make_shared<const RayTable>(working_)),
-        correction_(joint.calibration, stated.width, stated.height, WorkingBlock(stated)) {}
+        correction_(joint.calibration, stated.width, stated.height, block_) {}
 
   [[nodiscard]] const Intrinsics& working() const { return working_; }
   [[nodiscard]] const std::shared_ptr<const RayTable>& rays() const { return rays_; }
@@ -69,10 +69,10 @@ class Converter {
       const float* here = depth_m.ptr<float>(r);
       auto* const out = converted.ptr<float>(r);
       const Eigen::Vector2f* ray = rays_->row(r);
-      float late_s = Late_s(r, depth_m.rows);
+      float late_s = Late_s(r, stated_.height);
       for (int c = 0; c < depth_m.cols; ++c) {
         if (here[c] <= 0) continue;
-        if (by_columns) late_s = Late_s(c, depth_m.cols);
+        if (by_columns) late_s = Late_s(c, stated_.width);
         const Eigen::Vector3f p(ray[c].x() * here[c], ray[c].y() * here[c], here[c]);
         const Eigen::Vector3f moved = late_s * (w.cross(p) + v);
         // Where this line saw the point that the instantaneous camera sees in this pixel.
@@ -86,10 +86,11 @@ class Converter {
   }
 
  private:
-  // Of a line of pixels, after the image's stamp.
+  // Of a line of working pixels, after the image's stamp.
+  // @param num_lines  Of the stated image; whole blocks need not cover it.
   [[nodiscard]] float Late_s(int line, int num_lines) const {
     return static_cast<float>(joint_.calibration.depth[kDepthReadout] *
-                              ((line + 0.5) / num_lines - 0.5));
+                              ((line + 0.5) * block_ / num_lines - 0.5));
   }
 
   // A depth that was measured at a place of the working image. Its correction changes slowly over
@@ -101,13 +102,17 @@ class Converter {
     double metric_m = correction_.Correct(static_cast<std::size_t>(row * depth_m.cols + column), z);
     if (!joint_.depth_errors.images.empty())
       metric_m += joint_.depth_errors.Correction(
-          image, z, CentredCoordinates(column, row, depth_m.cols, depth_m.rows).cast<float>());
+          image, z,
+          CentredCoordinates((column + 0.5) * block_ - 0.5, (row + 0.5) * block_ - 0.5,
+                             stated_.width, stated_.height)
+              .cast<float>());
     return static_cast<float>(metric_m);
   }
 
   const Intrinsics& stated_;
   const JointRegistrationResult& joint_;
   const DepthNoise& noise_;
+  int block_ = WorkingBlock(stated_);
   Intrinsics working_;
   std::shared_ptr<const RayTable> rays_;
   DepthCorrection correction_;

@@ -14,7 +14,6 @@
 
 #include "algo/geometry/back_projection.hpp"
 #include "algo/geometry/packed_normal.hpp"
-#include "algo/geometry/working_image.hpp"
 #include "algo/sensor_model/depth_noise.hpp"
 #include "algo/types/keyframe.hpp"
 #include "algo/types/point_cloud.hpp"

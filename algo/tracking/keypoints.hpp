@@ -75,12 +75,15 @@ struct SurfaceDepth {
 /// neither side. The slope is that of the plane through all 13x13 pixels, which must agree with it.
 [[nodiscard]] SurfaceDepth SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
 
-/// ORB features with depth, for relocalisation. The depth image may be at working resolution.
+/// ORB features with depth, for relocalisation.
 struct DescribedFeatures {
   std::vector<Eigen::Vector2f> pixels;
   std::vector<Eigen::Vector3f> in_camera;  ///< Metres.
   cv::Mat descriptors;                     ///< CV_8UC1, 32 columns, one row per feature.
 };
+/// @param gray        CV_8UC1, of the size that `intrinsics` state.
+/// @param depth_m     CV_32FC1, metres, of that size or at working resolution.
+/// @return What has depth, in the camera's frame.
 [[nodiscard]] DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m,
                                                  const Intrinsics& intrinsics);
 

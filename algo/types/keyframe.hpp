@@ -13,7 +13,8 @@
 
 namespace plumb {
 
-/// A depth image with its pose, the input of surfaces. The images are shared by reference count.
+/// A depth image with its pose, the input of surfaces. The images are shared by reference count. In
+/// a tracker's map they may be at working resolution, see TrackerOptions::keep_working_images.
 struct DepthView {
   Intrinsics intrinsics;  ///< Of the depth image (colour camera's grid when registered).
   cv::Mat depth_m;        ///< CV_32FC1, metres, 0 where nothing was measured.

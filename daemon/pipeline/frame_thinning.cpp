@@ -79,18 +79,18 @@ std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
 }
 
 bool ThinnedFeed::Takes(double stamp_s, double arrived_s, double now_s) {
-  if (!last_stamp_s_) {
-    first_stamp_s_ = stamp_s;
-    first_arrived_s_ = changed_s_ = arrived_s;
-  }
-  // A gap in the frames does not mean a slower sensor.
+  if (!last_stamp_s_) changed_s_ = arrived_s;
+  // Neither a gap in the frames nor a clock that is set means a slower sensor.
   if (const double elapsed_s = stamp_s - last_stamp_s_.value_or(stamp_s);
-      elapsed_s > 0 && (frame_period_s_ == 0 || elapsed_s < 3 * frame_period_s_))
+      elapsed_s > 0 && (frame_period_s_ == 0 || elapsed_s < 3 * frame_period_s_)) {
     frame_period_s_ = Smoothed(frame_period_s_, elapsed_s, kPeriodWeight);
+    by_stamps_s_ += elapsed_s;
+    by_arrivals_s_ += arrived_s - last_arrived_s_;
+  }
   last_stamp_s_ = stamp_s;
+  last_arrived_s_ = arrived_s;
   // Stamps are even where arrivals come in bursts, but their clock may have another rate.
-  const double rate =
-      stamp_s > first_stamp_s_ ? (arrived_s - first_arrived_s_) / (stamp_s - first_stamp_s_) : 1.0;
+  const double rate = by_stamps_s_ > 0 ? by_arrivals_s_ / by_stamps_s_ : 1.0;
   TrackingLoad load{.frame_period_s = rate * frame_period_s_,
                     .tracking_s = num_taken_ < kFewFrames ? 0.0 : tracking_s_,
                     .late_s = now_s - arrived_s,

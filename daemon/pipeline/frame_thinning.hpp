@@ -100,7 +100,8 @@ class ThinnedFeed : public FrameFeed {
   int stride_ = 1, left_to_skip_ = 0;
   int num_taken_ = 0, num_left_out_ = 0, num_unreported_ = 0;
   std::optional<double> last_stamp_s_, handed_out_s_;
-  double first_stamp_s_ = 0.0, first_arrived_s_ = 0.0, changed_s_ = 0.0;
+  double last_arrived_s_ = 0.0, changed_s_ = 0.0;
+  double by_stamps_s_ = 0.0, by_arrivals_s_ = 0.0;  // The same intervals, by either clock.
   double frame_period_s_ = 0.0, tracking_s_ = 0.0;
 };
 

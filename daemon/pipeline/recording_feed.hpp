@@ -34,6 +34,9 @@ class RecordingFeed : public FrameFeed {
   /// @throws IoError if the recording could not be written.
   void Complete(const std::stop_token& stop);
   [[nodiscard]] std::optional<double> last_frame_s() const override { return feed_.last_frame_s(); }
+  [[nodiscard]] std::optional<double> taken_arrived_s() const override {
+    return feed_.taken_arrived_s();
+  }
 
  private:
   void Write(const std::stop_token& stop);

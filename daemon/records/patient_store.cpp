@@ -34,9 +34,8 @@ const std::string kPatientColumns =
 constexpr const char* kResumable =
     "SELECT id, fraction, (SELECT count(*) FROM scans WHERE session_id = sessions.id AND outcome = "
     "'done'), closed_at FROM sessions WHERE id = (SELECT max(begun.id) FROM sessions AS begun "
-    "WHERE "
-    "begun.patient_id = ?1 AND begun.purpose = 'fraction' AND EXISTS (SELECT 1 FROM scans WHERE "
-    "session_id = begun.id)) AND closed_at >= ?2";
+    "WHERE begun.patient_id = ?1 AND begun.purpose = 'fraction' AND EXISTS "
+    "(SELECT 1 FROM scans WHERE session_id = begun.id)) AND closed_at >= ?2";
 
 std::int64_t ResumableSince() {
   return StoredNow() - std::int64_t{kResumable_h} * 3600 * 1'000'000;

@@ -66,12 +66,32 @@ TEST(WorkingImageTest, ABlockNeedsThreeQuartersOfItsPixelsOnOneSurface) {
 }
 
 TEST(WorkingImageTest, ColourIsThatOfTheMiddle) {
-  const Intrinsics image = OfWidth(960);
-  cv::Mat rgb(image.height, image.width, CV_8UC3, cv::Scalar(0, 0, 0));
-  rgb.at<cv::Vec3b>(31, 61) = {1, 2, 3};
-  const cv::Mat middles = WorkingColor(rgb, image);
-  EXPECT_EQ(middles.cols, 320);
-  EXPECT_EQ(middles.at<cv::Vec3b>(10, 20), cv::Vec3b(1, 2, 3));
+  // Of four, the lower right; the last two columns of 848 belong to no block.
+  for (const int width : {960, 640, 848}) {
+    const Intrinsics image = OfWidth(width);
+    const int block = WorkingBlock(image);
+    cv::Mat rgb(image.height, image.width, CV_8UC3, cv::Scalar(0, 0, 0));
+    rgb.at<cv::Vec3b>(10 * block + block / 2, 20 * block + block / 2) = {1, 2, 3};
+    const cv::Mat middles = WorkingColor(rgb, image);
+    EXPECT_EQ(middles.cols, width / block);
+    EXPECT_EQ(middles.at<cv::Vec3b>(10, 20), cv::Vec3b(1, 2, 3)) << width;
+  }
+}
+
+TEST(WorkingImageTest, AnImageOfAnotherSizeOrTypeIsRefused) {
+  const Intrinsics image = OfWidth(640);
+  const auto depth = [&](int width, int height, int type) {
+    return WorkingDepth(cv::Mat(height, width, type, cv::Scalar::all(1)), image, {});
+  };
+  EXPECT_EQ(depth(640, image.height, CV_32FC1).cols, 320);
+  EXPECT_THROW((void)depth(640, image.height - 1, CV_32FC1), std::invalid_argument);
+  EXPECT_THROW((void)depth(639, image.height, CV_32FC1), std::invalid_argument);
+  EXPECT_THROW((void)depth(640, image.height, CV_16UC1), std::invalid_argument);
+  EXPECT_THROW((void)WorkingDepth({}, image, {}), std::invalid_argument);
+  EXPECT_THROW((void)WorkingColor(cv::Mat(image.height, 640, CV_8UC1), image),
+               std::invalid_argument);
+  EXPECT_THROW((void)WorkingColor(cv::Mat(image.height / 2, 640, CV_8UC3), image),
+               std::invalid_argument);
 }
 
 }  // namespace

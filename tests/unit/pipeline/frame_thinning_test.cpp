@@ -78,6 +78,7 @@ class Sensor : public FrameFeed {
   Sensor(int num_frames, double stamps_per_s)
       : num_frames_(num_frames), stamps_per_s_(stamps_per_s) {}
   double now_s = 0.0;
+  double set_by_s = 0.0;  ///< By how much its clock is set at the hundredth frame.
 
   std::optional<Frame> Next(const std::stop_token&) override {
     if (next_ == num_frames_) return std::nullopt;
@@ -90,6 +91,7 @@ class Sensor : public FrameFeed {
     Frame frame;
     frame.index = next_++;
     frame.depth_time_s = 77.0 + static_cast<double>(frame.index) * kPeriod_s * stamps_per_s_;
+    if (frame.index >= 100) frame.depth_time_s += set_by_s;
     taken_arrived_s_ = ArrivalOf(static_cast<int>(frame.index));
     return frame;
   }
@@ -217,6 +219,19 @@ TEST(ThinnedFeed, TheRateOfTheStampsClockDoesNotMatter) {
     };
     EXPECT_EQ(track(0.025, stamps_per_s).taken.size(), 300U) << stamps_per_s;
     EXPECT_EQ(track(0.05, stamps_per_s).taken, track(0.05, 1.0).taken) << stamps_per_s;
+  }
+}
+
+TEST(ThinnedFeed, AClockThatIsSetDoesNotMatter) {
+  for (const double set_by_s : {0.0, 3600.0, -3600.0}) {
+    Sensor sensor(300, 1.0);
+    sensor.set_by_s = set_by_s;
+    ThinnedFeed feed(sensor, [&] { return sensor.now_s; });
+    int taken = 0;
+    // One frame makes tracking late, which it can make up for.
+    for (; const std::optional<Frame> frame = feed.Next({}); ++taken)
+      sensor.now_s += frame->index == 200 ? 0.25 : 0.012;
+    EXPECT_EQ(taken, 300) << set_by_s;
   }
 }
 

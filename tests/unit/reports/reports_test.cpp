@@ -176,7 +176,8 @@ TEST_F(ReportsTest, AReportWithTrendAndMapHasOnePageUnlessTheMapWouldBeTooSmall)
   report.pictures.assign(2, cv::Mat(1000, 1400, CV_8UC3, cv::Scalar::all(200)));
   const auto pages = [&] {
     const std::string told = ToldOf(PdfOf(report), {"/usr/bin/pdfinfo"});
-    return std::stoi(told.substr(told.find("Pages:") + 6));
+    const std::size_t at = told.find("Pages:");
+    return at == std::string::npos ? 0 : std::stoi(told.substr(at + 6));
   };
   EXPECT_EQ(pages(), 1);
   report.cautions.insert(report.cautions.end(), 8, "of what there is to say a line");

@@ -348,9 +348,9 @@ export async function showPlan(place, id) {
   let busy = false;  // with our own change, of which the stream notifies us too
   const load = async () => {
     reference = await get(`references/${id}`);
-    const before = shown;
-    shown = await draft(place, reference, store, load);
-    before?.stop();
+    const drawn = await draft(place, reference, store, load);
+    shown?.stop();  // another load may have drawn meanwhile
+    shown = drawn;
   };
   const differs = async () => {
     const stored = await get(`references/${id}`, true);
